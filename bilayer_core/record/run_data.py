@@ -1,0 +1,55 @@
+"""A whole run as arrays over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bilayer_core.integrate.frame import Description
+
+
+@dataclass(frozen=True)
+class RunData:
+    """A run as arrays; the first axis of every array is time.
+
+    Attributes
+    ----------
+    description : Description
+    times : ndarray
+        Of scalars and bodies [s], shape (frames,).
+    stimulus : ndarray
+        Shape (frames, channels).
+    energy : dict
+        Term -> [J], shape (frames,).
+    com : ndarray
+        [m], shape (frames, 3).
+    body_positions, body_quaternions, body_wrenches : ndarray
+        [m], x y z w, [N, N m], shapes (frames, bodies, 3 | 4 | 6).
+    solver : dict
+        Name -> shape (frames,): iterations, residual [m/s], substeps, min_gap [m], cpu_time [s].
+    shape_times : ndarray
+        Of the arrays below [s], shape (shapes,).
+    positions, contact_forces : ndarray
+        Of every node [m, N], shape (shapes, node_count, 3), float32.
+    material_frames : ndarray
+        Unit quaternions x y z w of the axes m1 m2 m3 at the nodes of strands, shape (shapes, strand nodes, 4), float32.
+    strain, curvature : ndarray
+        Of every node [1, 1/m], shape (shapes, node_count), float32.
+    """
+
+    description: Description
+    times: np.ndarray
+    stimulus: np.ndarray
+    energy: dict[str, np.ndarray]
+    com: np.ndarray
+    body_positions: np.ndarray
+    body_quaternions: np.ndarray
+    body_wrenches: np.ndarray
+    solver: dict[str, np.ndarray]
+    shape_times: np.ndarray
+    positions: np.ndarray
+    contact_forces: np.ndarray
+    material_frames: np.ndarray
+    strain: np.ndarray
+    curvature: np.ndarray

@@ -1,0 +1,97 @@
+"""The topics of a run: one table that the log and the ROS node share.
+
+Names are relative to the node's private namespace (``/bilayer_sim`` in a log) unless they begin with a slash.
+Stamps are simulation time, the frame is ``world`` with z up, units are SI.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from bilayer_core.integrate.frame import Description
+
+LOG_NAMESPACE = "/bilayer_sim"
+FRAME_ID = "world"
+
+
+class Rate(Enum):
+    """How often a topic is sent."""
+
+    OUTPUT = "output"
+    """Every frame: small messages, and the state."""
+    DISPLAY = "display"
+    """At the rate of markers: large messages, made to be looked at."""
+    EVENT = "event"
+    """Whenever its value changes from outside: inputs."""
+
+
+@dataclass(frozen=True)
+class TopicSpec:
+    """One topic.
+
+    Attributes
+    ----------
+    name : str
+        Relative to the node's namespace, or absolute with a leading slash.
+    type : str
+        ROS type, for example ``"geometry_msgs/msg/PoseArray"``.
+    rate : Rate
+        How often it is sent.
+    depth : int
+        History depth of its quality of service; all topics are reliable and volatile.
+    """
+
+    name: str
+    type: str
+    rate: Rate
+    depth: int = 10
+
+    def full_name(self, namespace: str = LOG_NAMESPACE) -> str:
+        """Absolute name under `namespace`."""
+        return self.name if self.name.startswith("/") else f"{namespace}/{self.name}"
+
+
+MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+
+
+def output_topics(description: Description) -> tuple[TopicSpec, ...]:
+    """All topics that a run of this model sends.
+
+    ================================ ==================================================================================
+    ``/clock``                       simulation time
+    ``stimulus_applied``             value of each channel; every layout label is a channel
+    ``com``                          mass centre of the robot [m]
+    ``energy``                       energy of each term [J]; every label is a term
+    ``solver``                       labels iterations, residual [m/s], substeps, min_gap [m], cpu_time [s]: see `Frame`
+    ``body_pose/<body>``             mass centre and orientation
+    ``contact_wrench/<body>``        contact force [N] and moment about the mass centre [N m], world frame
+    ``state``                        all that a restart needs; every label is ``name:shape``, its size that of the part
+    ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
+                                     frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
+    ``points``                       x y z strain curvature fx fy fz of the same nodes, then of contact points of bodies
+    ``markers``                      strands coloured by strain, bodies, obstacles, contact forces
+    ================================ ==================================================================================
+    """
+    output, display = Rate.OUTPUT, Rate.DISPLAY
+    return (
+        TopicSpec("/clock", "rosgraph_msgs/msg/Clock", output, depth=1),
+        TopicSpec("stimulus_applied", MULTI_ARRAY, output),
+        TopicSpec("com", "geometry_msgs/msg/PointStamped", output),
+        TopicSpec("energy", MULTI_ARRAY, output),
+        TopicSpec("solver", MULTI_ARRAY, output),
+        *(TopicSpec(f"body_pose/{body.name}", "geometry_msgs/msg/PoseStamped", output) for body in description.bodies),
+        *(
+            TopicSpec(f"contact_wrench/{body.name}", "geometry_msgs/msg/WrenchStamped", output)
+            for body in description.bodies
+        ),
+        TopicSpec("state", MULTI_ARRAY, output),
+        TopicSpec("nodes", "geometry_msgs/msg/PoseArray", display),
+        TopicSpec("points", "sensor_msgs/msg/PointCloud2", display),
+        TopicSpec("markers", "visualization_msgs/msg/MarkerArray", display),
+    )
+
+
+def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
+    """The topics on which single channels are set; a log holds each value at the time from which it acted."""
+    return tuple(TopicSpec(f"stimulus/{name}", "std_msgs/msg/Float64", Rate.EVENT) for name in description.channels)
