@@ -1,0 +1,63 @@
+"""Pure functions between the simulator's quantities and those ROS messages that are not made from frames."""
+
+from __future__ import annotations
+
+import math
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
+
+from bilayer_sim_ros.worker import Status
+
+NANOSECONDS = 1_000_000_000
+# A run that reaches less than this part of the requested real-time factor is reported as late.
+ON_TIME = 0.95
+
+
+def to_time(seconds: float) -> Time:
+    """Simulated time [s] as a message, to the nearest nanosecond."""
+    whole, part = divmod(round(seconds * NANOSECONDS), NANOSECONDS)
+    return Time(sec=whole, nanosec=part)
+
+
+def to_seconds(stamp: Time) -> float:
+    """Time of a message [s]."""
+    return stamp.sec + stamp.nanosec / NANOSECONDS
+
+
+def to_diagnostics(status: Status, name: str, real_time_factor: float) -> DiagnosticArray:
+    """How the run is doing.
+
+    Parameters
+    ----------
+    status : Status
+    name : str
+        Full name of the node.
+    real_time_factor : float
+        The factor asked for; 0 for as fast as possible.
+    """
+    late = not status.paused and status.real_time_factor < ON_TIME * real_time_factor
+    if status.paused:
+        message = "paused"
+    elif late:
+        message = f"slower than asked for: {status.real_time_factor:.3g} instead of {real_time_factor:g}"
+    else:
+        message = "running"
+    per_step = status.iterations / status.steps if status.steps else math.nan
+    values = {
+        "simulated time [s]": f"{status.time:.6g}",
+        "real-time factor": f"{status.real_time_factor:.4g}",
+        "steps": str(status.steps),
+        "steps taken": str(status.substeps),
+        "Newton iterations per step": f"{per_step:.3g}",
+        "largest residual [m/s]": f"{status.residual:.3g}",
+    }
+    report = DiagnosticStatus(
+        level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
+        name=f"{name}: simulation",
+        message=message,
+        hardware_id=name,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+    return DiagnosticArray(header=Header(stamp=to_time(status.time)), status=[report])

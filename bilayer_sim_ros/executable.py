@@ -1,0 +1,118 @@
+"""What all executables of the package share: command line, parameters, signals, exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+from collections.abc import Callable, Mapping, Sequence
+
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from bilayer_core.errors import BilayerError, InputError
+from bilayer_sim_ros.parameters import NodeParameter, Value, accept_all
+
+INTERRUPTED = 130
+"""Exit code after SIGINT or SIGTERM."""
+
+Work = Callable[[Node, Mapping[str, Value], threading.Event], None]
+
+
+def run(executable: str, node_name: str, table: Sequence[NodeParameter], work: Work, argv: list[str] | None) -> int:
+    """Run `work` as a ROS 2 executable.
+
+    `work(node, parameters, stop)` runs on the main thread, beside an executor that serves the node's topics and
+    services; it returns when it is done, or soon after `stop` is set. Signals only set `stop`, however many come.
+
+    Returns
+    -------
+    int
+        0 done, 2 bad input, 3 the simulation could not go on, 130 interrupted.
+    """
+    argv = sys.argv if argv is None else [executable, *argv]
+    options = _parse(executable, table, remove_ros_args(argv)[1:])
+    stop, interrupted = threading.Event(), threading.Event()
+
+    def interrupt(*_):
+        interrupted.set()
+        stop.set()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, interrupt)
+    try:
+        _run_node(node_name, table, work, stop, argv)
+    except BilayerError as error:
+        if options.debug:
+            raise
+        print(f"{executable}: {error}", file=sys.stderr)
+        return error.exit_code
+    return INTERRUPTED if interrupted.is_set() else 0
+
+
+def _parse(executable: str, table: Sequence[NodeParameter], arguments: list[str]) -> argparse.Namespace:
+    """The command line without its ROS part; refuses arguments that nobody would read."""
+    lines = [f"  {p.name:20}{p.description} (default: {p.default!r})" for p in table]
+    parser = argparse.ArgumentParser(
+        prog=executable,
+        usage=f"{executable} [--debug] [--ros-args -p NAME:=VALUE ... --params-file FILE]",
+        epilog="parameters:\n" + "\n".join(lines),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--debug", action="store_true", help="show where an error comes from")
+    return parser.parse_args(arguments)
+
+
+def _run_node(
+    name: str, table: Sequence[NodeParameter], work: Work, stop: threading.Event, argv: list[str]
+) -> None:
+    try:
+        rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise InputError(f"ROS arguments are not understood: {error}") from error
+    executor = SingleThreadedExecutor()
+    thread = threading.Thread(target=_spin, args=(executor,), name="executor", daemon=True)
+    try:
+        node = Node(name, automatically_declare_parameters_from_overrides=True)
+        values = declare(node, table)
+        executor.add_node(node)
+        thread.start()
+        work(node, values, stop)
+    finally:
+        rclpy.try_shutdown()
+        if thread.ident is not None:
+            thread.join()
+
+
+def _spin(executor: SingleThreadedExecutor) -> None:
+    try:
+        executor.spin()
+    except ExternalShutdownException:
+        return
+
+
+def declare(node: Node, table: Sequence[NodeParameter]) -> dict[str, Value]:
+    """Declare the parameters in `table`; their values.
+
+    The node declares overrides by itself, so that a mistyped name is seen; the others are declared here.
+    Parameters are read at the start only, and an integer will do for a number.
+    """
+    overrides = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
+    values = accept_all(table, overrides)
+    for parameter in table:
+        descriptor = ParameterDescriptor(
+            description=parameter.description,
+            additional_constraints=parameter.allowed,
+            read_only=True,
+            dynamic_typing=True,
+        )
+        if node.has_parameter(parameter.name):
+            node.set_descriptor(parameter.name, descriptor)
+        else:
+            node.declare_parameter(parameter.name, parameter.default, descriptor)
+    return values

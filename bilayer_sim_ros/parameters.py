@@ -1,0 +1,121 @@
+"""Parameters of the nodes: one table for each executable, checked before anything starts."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from bilayer_core.errors import InputError
+
+Value = bool | float | int | str
+
+# Parameters that every rclpy node has of itself.
+BUILT_IN = ("use_sim_time", "start_type_description_service")
+BUILT_IN_PREFIX = "qos_overrides."
+
+
+@dataclass(frozen=True)
+class NodeParameter:
+    """One parameter of a node; the type of `default` is that of the parameter.
+
+    Attributes
+    ----------
+    name, description : str
+        The description states the unit.
+    default : bool, float or str
+    minimum : float
+        Smallest value of a number.
+    above_minimum : bool
+        Whether `minimum` itself is excluded.
+    choices : tuple of str
+        All values of a text parameter; empty when any text will do.
+    """
+
+    name: str
+    default: bool | float | str
+    description: str
+    minimum: float = -math.inf
+    above_minimum: bool = False
+    choices: tuple[str, ...] = ()
+
+    @property
+    def allowed(self) -> str:
+        """What may be given, in words."""
+        if isinstance(self.default, bool):
+            return "true or false"
+        if isinstance(self.default, str):
+            return "one of " + ", ".join(self.choices) if self.choices else "a text"
+        if math.isinf(self.minimum):
+            return "a finite number"
+        return f"a finite number {'>' if self.above_minimum else '>='} {self.minimum:g}"
+
+    def accept(self, value: object) -> Value:
+        """`value` as the parameter's type (an integer will do for a number), or InputError."""
+        if self._is_allowed(value):
+            return float(value) if isinstance(self.default, float) else value
+        raise InputError(f"parameter '{self.name}' is {value!r}; allowed is {self.allowed} ({self.description})")
+
+    def _is_allowed(self, value: object) -> bool:
+        if isinstance(self.default, bool) or isinstance(value, bool):
+            return isinstance(value, type(self.default))
+        if isinstance(self.default, str):
+            return isinstance(value, str) and (not self.choices or value in self.choices)
+        if not isinstance(value, (int, float)) or not math.isfinite(value):
+            return False
+        return value > self.minimum if self.above_minimum else value >= self.minimum
+
+
+def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) -> dict[str, Value]:
+    """Values of all parameters in `table`: the default, or what `overrides` says.
+
+    Raises
+    ------
+    InputError
+        For a name that is not in the table, or a value that is not allowed.
+    """
+    known = {parameter.name: parameter for parameter in table}
+    for name in overrides:
+        if name not in known and name not in BUILT_IN and not name.startswith(BUILT_IN_PREFIX):
+            close = difflib.get_close_matches(name, known, n=1)
+            hint = f"did you mean '{close[0]}'? " if close else ""
+            raise InputError(f"there is no parameter '{name}': {hint}There are: {', '.join(known)}")
+    return {name: parameter.accept(overrides.get(name, parameter.default)) for name, parameter in known.items()}
+
+
+SIM_NODE = (
+    NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
+    NodeParameter("rate", 0.0, "frames published and logged per simulated second [Hz]; 0 = as the scene says", 0.0),
+    NodeParameter(
+        "real_time_factor", 1.0, "simulated seconds per second, at most; 0 = as fast as possible", 0.0
+    ),
+    NodeParameter("duration", 0.0, "simulated time after which the node ends [s]; 0 = until it is stopped", 0.0),
+    NodeParameter("publish_clock", True, "publish simulated time on /clock"),
+    NodeParameter("start_paused", False, "wait for the service ~/resume at the start"),
+    NodeParameter(
+        "stimulus_timeout", 0.0, "simulated time without a message after which the fallback acts [s]; 0 = never", 0.0
+    ),
+    NodeParameter(
+        "stimulus_fallback",
+        "hold",
+        "what acts before the first message and after the timeout: the value there is, zero, or the scene's schedule",
+        choices=("hold", "zero", "schedule"),
+    ),
+    NodeParameter("log", "", "MCAP file to write; empty = none"),
+    NodeParameter("rerun", "off", "rerun recording: off, or an .rrd file to write when the run ends"),
+    NodeParameter("model", "auto", "auto, or a model's name"),
+    NodeParameter("dimension", "auto", "auto, 2 or 3"),
+    NodeParameter("dt", 0.0, "time step [s]; 0 = as the scene says", 0.0),
+)
+
+RAMP_CONTROLLER = (
+    NodeParameter("node", "/bilayer_sim", "full name of the simulation node"),
+    NodeParameter("channel", "humidity", "stimulus channel"),
+    NodeParameter("start_value", 0.0, "value at the start, in the channel's unit"),
+    NodeParameter("end_value", 1.0, "value at the end, in the channel's unit"),
+    NodeParameter("duration", 1.0, "time from the start value to the end value [s]", 0.0, above_minimum=True),
+    NodeParameter("rate", 50.0, "messages per second [Hz]", 0.0, above_minimum=True),
+    NodeParameter("resume", False, "call the simulation's service ~/resume once the stimulus topic is connected"),
+    NodeParameter("connection_timeout", 60.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
+)

@@ -1,0 +1,69 @@
+"""Publishers for the topics of a run."""
+
+from __future__ import annotations
+
+import importlib
+import math
+
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from bilayer_core.integrate.frame import Description, Frame
+from bilayer_core.record.encoders import FrameEncoder
+from bilayer_core.record.topics import Rate, TopicSpec
+
+CLOCK_TOPIC = "/clock"
+# Frames come at multiples of the time step, up to rounding; in periods.
+PERIOD_ROUNDING = 1e-6
+
+
+def message_class(ros_type: str) -> type:
+    """Class of a message type such as ``std_msgs/msg/Float64``."""
+    package, name = ros_type.split("/msg/")
+    return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
+def quality_of_service(spec: TopicSpec) -> QoSProfile:
+    """Reliable and volatile, with the topic's depth."""
+    return QoSProfile(
+        depth=spec.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
+    )
+
+
+class FramePublisher:
+    """Publishes frames as ready-made bytes, and only topics that somebody subscribes to.
+
+    Parameters
+    ----------
+    node : Node
+    description : Description
+    rate, marker_rate : float
+        Of frames, and of the topics made to be looked at [Hz]; the smaller one counts for those.
+    clock : bool
+        Whether to publish /clock.
+    """
+
+    def __init__(self, node: Node, description: Description, rate: float, marker_rate: float, clock: bool):
+        self._encoder = FrameEncoder(description)
+        self._display_rate = min(rate, marker_rate)
+        self._display_period = -1
+        self._topics: list[tuple[TopicSpec, Publisher]] = [
+            (spec, node.create_publisher(message_class(spec.type), spec.full_name("~"), quality_of_service(spec)))
+            for spec in self._encoder.topics
+            if clock or spec.name != CLOCK_TOPIC
+        ]
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anybody subscribes to anything."""
+        return any(publisher.get_subscription_count() > 0 for _, publisher in self._topics)
+
+    def publish(self, frame: Frame, everything: bool = False) -> None:
+        """Send `frame` on every topic that has a subscriber and is due, or on every one of them."""
+        period = math.floor(frame.time * self._display_rate + PERIOD_ROUNDING)
+        display = everything or period != self._display_period
+        self._display_period = period
+        for spec, publisher in self._topics:
+            if (display or spec.rate is not Rate.DISPLAY) and publisher.get_subscription_count() > 0:
+                publisher.publish(self._encoder.encode(spec.name, frame))

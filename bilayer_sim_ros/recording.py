@@ -1,0 +1,76 @@
+"""Files that the node writes: an MCAP log and a rerun recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from bilayer_core.integrate.frame import Description, Frame
+from bilayer_core.record.mcap_log import McapRecorder
+
+
+class Recording:
+    """The files of one run, in which time only grows.
+
+    Parameters
+    ----------
+    log_path, rrd_path : str
+        MCAP file and rerun file to write; empty means none.
+    rate, marker_rate : float
+        Of all messages, and of the large ones made to be looked at [Hz].
+    run : int
+        Runs before this one, each ended by a reset; from the second run on the number is part of the file names:
+        ``<name>_1.mcap``.
+
+    Raises
+    ------
+    InputError
+        At once: a file exists already, or its directory cannot be written to.
+    """
+
+    def __init__(self, log_path: str, rrd_path: str, rate: float, marker_rate: float, run: int = 0):
+        self._settings = (log_path, rrd_path, rate, marker_rate)
+        self._run = run
+        self._log = McapRecorder(self._numbered(log_path), rate, marker_rate) if log_path else None
+        self._rrd = None
+        if rrd_path:
+            from bilayer_core.view.rerun_view import RrdRecorder
+
+            self._rrd = RrdRecorder(self._numbered(rrd_path), rate)
+        self._recorders = [recorder for recorder in (self._log, self._rrd) if recorder]
+
+    def _numbered(self, name: str) -> Path:
+        path = Path(name)
+        return path.with_stem(f"{path.stem}_{self._run}") if self._run else path
+
+    def of_next_run(self) -> Recording:
+        """The files of the run that begins with a reset."""
+        return Recording(*self._settings, run=self._run + 1)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether any file is written."""
+        return bool(self._recorders)
+
+    def start(self, description: Description) -> None:
+        """Begin the files."""
+        for recorder in self._recorders:
+            recorder.start(description)
+
+    def observe(self, frame: Frame) -> None:
+        """Hand on a frame."""
+        for recorder in self._recorders:
+            recorder.observe(frame)
+
+    def log_stimulus(self, channel: str, value: float, time: float) -> None:
+        """Log a stimulus at the time [s] from which it acts."""
+        if self._log:
+            self._log.log_stimulus(channel, value, time)
+
+    def close(self, complete: bool, termination: str) -> None:
+        """Finish all files, the second one even if the first cannot be."""
+        try:
+            if self._log:
+                self._log.close(complete, termination)
+        finally:
+            if self._rrd:
+                self._rrd.close(complete)

@@ -1,0 +1,113 @@
+"""Stimuli from topics: which are accepted, and what acts while the topics are silent."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from bilayer_core.errors import InputError
+
+# Simulated times are multiples of the step, up to rounding [s].
+TIME_ROUNDING = 1e-9
+
+
+class Schedule(Protocol):
+    """Stimulus over time as a scene prescribes it."""
+
+    def value(self, t: float) -> float:
+        """Value at time `t` [s]."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One stimulus channel: its range in its unit, and the scene's own schedule."""
+
+    name: str
+    minimum: float
+    maximum: float
+    schedule: Schedule
+
+    def accept(self, value: float) -> float:
+        """`value` as a float; InputError when it is not finite or out of range."""
+        if not (math.isfinite(value) and self.minimum <= value <= self.maximum):
+            raise InputError(
+                f"stimulus '{self.name}' is {value:g}; allowed is {self.minimum:g} to {self.maximum:g}"
+            )
+        return float(value)
+
+
+class StimulusInputs:
+    """Collects what messages ask for (any thread) until the next step begins (the stepping thread).
+
+    Parameters
+    ----------
+    channels : sequence of Channel
+        In the scene's order.
+    timeout : float
+        Simulated time without a message after which the fallback acts [s]; 0 means never.
+    fallback : str
+        What acts before a channel's first message and after the timeout: ``hold`` (the last value, at first that of
+        the schedule's start), ``zero`` (or the value of the range nearest to it), ``schedule``.
+    """
+
+    def __init__(self, channels: Sequence[Channel], timeout: float, fallback: str):
+        self._channels = {channel.name: channel for channel in channels}
+        self._timeout = timeout
+        self._fallback = fallback
+        self._lock = threading.Lock()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all messages, as at the start of a run."""
+        with self._lock:
+            self._received: dict[str, float] = {}
+        self._heard: dict[str, float] = {}
+        self._acting: dict[str, float] = {}
+
+    def receive(self, name: str, value: float) -> None:
+        """Take the value of one channel; InputError leaves the last good one in force."""
+        self._keep({name: self._channels[name].accept(value)})
+
+    def receive_all(self, values: Sequence[float]) -> None:
+        """Take one value a channel in the scene's order; InputError leaves all last good values in force."""
+        if len(values) != len(self._channels):
+            raise InputError(
+                f"a stimulus message has {len(values)} values; expected are {len(self._channels)}: "
+                + ", ".join(self._channels)
+            )
+        pairs = zip(self._channels.values(), values, strict=True)
+        self._keep({channel.name: channel.accept(value) for channel, value in pairs})
+
+    def _keep(self, values: Mapping[str, float]) -> None:
+        with self._lock:
+            self._received.update(values)
+
+    def changes(self, time: float) -> dict[str, float]:
+        """Values to set for the step that begins at `time` [s]: each channel that a message or the fallback changes."""
+        with self._lock:
+            received, self._received = self._received, {}
+        self._heard.update(dict.fromkeys(received, time))
+        wanted = received | {
+            name: value
+            for name in self._channels
+            if name not in received and (value := self._fallback_value(name, time)) is not None
+        }
+        changes = {name: value for name, value in wanted.items() if name in received or value != self._acting.get(name)}
+        self._acting.update(changes)
+        return changes
+
+    def _fallback_value(self, name: str, time: float) -> float | None:
+        """What the fallback asks for at `time`; None while what is in force goes on."""
+        channel, heard = self._channels[name], self._heard.get(name)
+        if heard is not None and (self._timeout == 0.0 or time - heard < self._timeout - TIME_ROUNDING):
+            return None
+        match self._fallback:
+            case "zero":
+                return min(max(0.0, channel.minimum), channel.maximum)
+            case "hold":
+                return channel.schedule.value(0.0) if heard is None else None
+            case _:
+                return channel.schedule.value(time) if heard is not None else None
