@@ -5,10 +5,13 @@ Used by pip (wheel, editable) and by colcon (``ament_python``, plain and ``--sym
 
 import sys
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
 
 NAME = "bilayer_sim_ros"
+# colcon's symlink install runs a link to this file in a directory that has no README.
+README = Path(__file__).resolve().parent / "README.md"
 
 # ROS 2 Kilted as wheels. Every distribution is pinned, those that come along as well: wheels of two ROS releases in
 # one environment end in "Caught an unknown exception!" at the first call.
@@ -52,7 +55,7 @@ setup(
     name=NAME,
     version="0.1.0",
     description="Simulator of bilayer soft robots: discrete elastic rods, contact, stimuli; for Python and ROS 2",
-    long_description=open("README.md", encoding="utf-8").read(),
+    long_description=README.read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
     license="Apache-2.0",
     maintainer="bilayer_sim_ros maintainers",

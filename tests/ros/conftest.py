@@ -1,0 +1,149 @@
+"""Real nodes in processes of their own, and a client node in the test's process; every test has its own ROS domain."""
+
+import itertools
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+NODE = "/bilayer_sim"
+# Longest wait for anything that needs discovery or a first compilation [s].
+LIMIT = 120.0
+
+_numbers = itertools.count()
+
+
+def new_domain() -> int:
+    """A ROS domain that no other test of this run uses at the same time."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    return 1 + (worker * 25 + next(_numbers) % 25) % 100
+
+
+class NodeProcess:
+    """An executable of the package, running or ended, with everything that it printed."""
+
+    def __init__(self, module, directory, domain, parameters=None, arguments=()):
+        command = [sys.executable, "-m", f"bilayer_sim_ros.{module}", *arguments]
+        if parameters:
+            command += ["--ros-args"]
+            for name, value in parameters.items():
+                command += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
+        self._output_path = directory / f"{module}-{next(_numbers)}.txt"
+        self._output = self._output_path.open("w")
+        self._process = subprocess.Popen(
+            command,
+            cwd=directory,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
+            stdout=self._output,
+            stderr=subprocess.STDOUT,
+        )
+
+    @property
+    def output(self) -> str:
+        return self._output_path.read_text()
+
+    @property
+    def running(self) -> bool:
+        return self._process.poll() is None
+
+    def send(self, number):
+        self._process.send_signal(number)
+
+    def wait(self, limit=LIMIT) -> int:
+        """Exit code."""
+        return self._process.wait(limit)
+
+    def end(self):
+        if self.running:
+            self._process.terminate()
+        try:
+            self._process.wait(20)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._output.close()
+
+
+class Client:
+    """A node of the test's own that listens, sends and calls services."""
+
+    def __init__(self, domain):
+        self._context = rclpy.Context()
+        rclpy.init(context=self._context, domain_id=domain)
+        self.node = Node("client", context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+
+    def spin_until(self, condition, what, limit=LIMIT):
+        """Serve callbacks until `condition()` is true; its value."""
+        deadline = time.monotonic() + limit
+        while not (value := condition()):
+            assert time.monotonic() < deadline, f"waited {limit} s for {what}"
+            self._executor.spin_once(timeout_sec=0.05)
+        return value
+
+    def listen(self, message_type, topic) -> list:
+        """A list that grows with every message; it has one already."""
+        messages = []
+        self.node.create_subscription(message_type, topic, messages.append, 10)
+        self.spin_until(lambda: messages, f"a message on {topic}")
+        return messages
+
+    def sender(self, message_type, topic):
+        """A function that publishes on `topic`, once somebody subscribes to it."""
+        publisher = self.node.create_publisher(message_type, topic, 10)
+        self.spin_until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
+        return publisher.publish
+
+    def call(self, name) -> Trigger.Response:
+        """Call the node's service `name`."""
+        client = self.node.create_client(Trigger, f"{NODE}/{name}")
+        self.spin_until(client.service_is_ready, f"the service {name}")
+        future = client.call_async(Trigger.Request())
+        self.spin_until(future.done, f"an answer of {name}")
+        return future.result()
+
+    def close(self):
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+@pytest.fixture(scope="module")
+def start(tmp_path_factory):
+    """Starts executables of the package in a domain; they end with the module."""
+    started = []
+
+    def begin(module, domain, parameters=None, arguments=()):
+        process = NodeProcess(module, tmp_path_factory.mktemp("node"), domain, parameters, arguments)
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        process.end()
+
+
+@pytest.fixture(scope="module")
+def connect():
+    """Makes clients in a domain; they close with the module."""
+    clients = []
+
+    def begin(domain):
+        clients.append(Client(domain))
+        return clients[-1]
+
+    yield begin
+    for client in clients:
+        client.close()
+
+
+@pytest.fixture
+def domain():
+    return new_domain()

@@ -1,0 +1,104 @@
+"""How the node starts, what it refuses, and how it ends."""
+
+import signal
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosgraph_msgs.msg import Clock
+
+from bilayer_core.record.log_reader import read_info
+
+FAST = {"scene": "bending", "real_time_factor": 0}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"sceen": "bending"}, "no parameter 'sceen': did you mean 'scene'?"),
+        ({"rate": "fast"}, "'rate' is 'fast'; allowed is a finite number >= 0"),
+        ({"rate": -1.0}, "'rate' is -1.0; allowed is a finite number >= 0"),
+        ({"dt": ".nan"}, "'dt' is nan; allowed is a finite number >= 0"),
+        ({"publish_clock": 1}, "'publish_clock' is 1; allowed is true or false"),
+        ({"stimulus_fallback": "holt"}, "one of hold, zero, schedule"),
+        ({"scene": "griping"}, "gripping"),
+        ({"model": "three_rod"}, "three_rod"),
+        ({"log": "missing/run.mcap"}, "missing"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_a_bad_parameter_ends_the_node_with_exit_code_2_and_one_message(start, domain, parameters, said):
+    node = start("sim_node", domain, parameters)
+    assert node.wait() == 2
+    assert said in node.output
+    assert "Traceback" not in node.output
+
+
+def test_an_existing_log_is_refused_before_the_simulation_starts(start, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    log.write_bytes(b"dear to somebody")
+    node = start("sim_node", domain, FAST | {"log": log, "duration": 0.1})
+    assert node.wait() == 2
+    assert str(log) in node.output
+    assert log.read_bytes() == b"dear to somebody"
+
+
+def test_an_argument_that_nobody_reads_is_refused(start, domain):
+    node = start("sim_node", domain, arguments=["scene:=bending"])
+    assert node.wait() == 2
+    assert "unrecognized arguments: scene:=bending" in node.output
+
+
+def test_help_lists_the_parameters(start, domain):
+    node = start("sim_node", domain, arguments=["--help"])
+    assert node.wait() == 0
+    assert "stimulus_timeout" in node.output
+
+
+def test_a_run_that_reaches_its_duration_leaves_a_complete_log(start, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    node = start("sim_node", domain, FAST | {"log": log, "duration": 0.1, "rate": 100})
+    assert node.wait() == 0, node.output
+    info = read_info(log)
+    assert info.complete
+    assert info.last_time == pytest.approx(0.1)
+    assert info.topics["/clock"]["count"] == 11
+
+
+@pytest.mark.parametrize("signals", [[signal.SIGINT], [signal.SIGINT] * 2, [signal.SIGTERM]])
+def test_an_interrupted_node_ends_with_130_and_a_log_readable_to_its_end(start, connect, domain, tmp_path, signals):
+    log = tmp_path / "run.mcap"
+    node = start("sim_node", domain, FAST | {"log": log})
+    clock = connect(domain).listen(Clock, "/clock")
+    for number in signals:
+        node.send(number)
+    assert node.wait(30) == 130, node.output
+    assert "Traceback" not in node.output
+    info = read_info(log)
+    assert (info.complete, info.termination) == (False, "interrupted")
+    with log.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        assert reader.get_summary() is not None
+        times = [message.log_time * 1e-9 for _, _, message in reader.iter_messages(topics=["/clock"])]
+    assert times == sorted(times)
+    assert times[-1] >= clock[-1].clock.sec + clock[-1].clock.nanosec * 1e-9
+
+
+def test_a_paused_node_can_be_interrupted(start, connect, domain):
+    node = start("sim_node", domain, FAST | {"start_paused": True})
+    connect(domain).listen(Clock, "/clock")
+    node.send(signal.SIGINT)
+    assert node.wait(30) == 130
+
+
+def test_a_reset_finishes_the_log_and_begins_a_numbered_one(start, connect, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    node = start("sim_node", domain, FAST | {"log": log, "start_paused": True, "rate": 50.0})
+    client = connect(domain)
+    for name in ("step", "step", "reset", "step"):
+        assert client.call(name).success
+    node.send(signal.SIGINT)
+    node.wait(30)
+    assert read_info(log).last_time == pytest.approx(0.04)
+    assert read_info(log).termination == "reset"
+    assert read_info(tmp_path / "run_1.mcap").last_time == pytest.approx(0.02)
