@@ -1,0 +1,1 @@
+"""Time stepping: integrators, control of the step, and the `Simulator`."""

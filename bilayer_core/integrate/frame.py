@@ -1,0 +1,158 @@
+"""What an observer sees: a description of the model that never changes, and one `Frame` per observation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Strand:
+    """One layer of one rod: a chain of nodes joined by edges, in order of arc length.
+
+    Attributes
+    ----------
+    name : str
+        ``"<rod>/<layer>"``, unique in the model, for example ``"arm_0/active"``.
+    rod, layer : str
+        Names of the rod (copies of a pattern are numbered) and of the layer.
+    nodes, edges : slice
+        Where its nodes and edges stand in the arrays of a `Frame`; ``edges`` has one element less.
+    width, thickness : float
+        Of the cross-section [m].
+    """
+
+    name: str
+    rod: str
+    layer: str
+    nodes: slice
+    edges: slice
+    width: float
+    thickness: float
+
+
+@dataclass(frozen=True)
+class BodyInfo:
+    """A rigid body. `radius` [m] is that of a sphere, or 0 for a body without a surface of its own."""
+
+    name: str
+    radius: float
+    prescribed: bool
+
+
+@dataclass(frozen=True)
+class PlaneInfo:
+    """A fixed plane: a point on it [m] and its outward unit normal, shape (3,)."""
+
+    name: str
+    point: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True)
+class Description:
+    """What does not change during a run: names, shapes and settings.
+
+    Attributes
+    ----------
+    scene_name, title : str
+    scene_text : str
+        YAML from which `load_scene` rebuilds the configuration, overrides included.
+    node_count, edge_count : int
+        Nodes of all strands, then contact points of bodies; edges of all strands.
+    strands : tuple of Strand
+    bodies : tuple of BodyInfo
+    obstacles : tuple of PlaneInfo
+    channels : tuple of str
+        Stimulus channels in the scene's order.
+    channel_ranges : tuple of (float, float)
+        Smallest and largest value of each channel, in its unit.
+    state_layout : tuple of (str, tuple of int)
+        Name and shape of each part of `Frame.state`, in order.
+    settings : dict
+        Solver settings and versions, as flat text values.
+    """
+
+    scene_name: str
+    title: str
+    scene_text: str
+    node_count: int
+    edge_count: int
+    strands: tuple[Strand, ...]
+    bodies: tuple[BodyInfo, ...]
+    obstacles: tuple[PlaneInfo, ...]
+    channels: tuple[str, ...]
+    channel_ranges: tuple[tuple[float, float], ...]
+    state_layout: tuple[tuple[str, tuple[int, ...]], ...]
+    settings: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One observation of a run. Arrays are copies that nobody writes to afterwards.
+
+    Attributes
+    ----------
+    time : float
+        Simulated time [s].
+    step : int
+        Number of nominal steps done.
+    positions, velocities : ndarray
+        Of every node [m, m/s], shape (node_count, 3).
+    directors : ndarray
+        Material director m1 (through the thickness, bottom to top) of every edge, unit, shape (edge_count, 3).
+    strain : ndarray
+        Axial strain at every node (mean of its edges), eigenstrain included, shape (node_count,).
+    curvature : ndarray
+        Curvature through the thickness, χ = m1·t′, at every node [1/m], shape (node_count,).
+    contact_forces : ndarray
+        Barrier and friction force on every node [N], shape (node_count, 3).
+    body_positions, body_quaternions : ndarray
+        Mass centre [m], shape (bodies, 3), and orientation x y z w, shape (bodies, 4).
+    body_velocities, body_angular_velocities : ndarray
+        [m/s] and [rad/s] in the world frame, shape (bodies, 3).
+    body_wrenches : ndarray
+        Contact force [N] and moment about the mass centre [N m] on every body, shape (bodies, 6).
+    com : ndarray
+        Mass centre of the robot: rods and clamped bodies, free bodies left out [m], shape (3,).
+    stimulus : ndarray
+        Value of each channel that acted over the step that ended here, in its unit, shape (channels,).
+    energy : dict
+        Energy of each term [J].
+    min_gap : float
+        Smallest contact distance of the model [m]; infinity if there is no contact pair.
+    iterations : int
+        Newton iterations of the steps since the observation before.
+    residual : float
+        Largest velocity correction left at the end of those steps [m/s].
+    substeps : int
+        Steps actually taken since the observation before (more than nominal when steps were halved).
+    cpu_time : float
+        CPU seconds of the stepping thread up to here [s].
+    state : ndarray
+        Flat state for a restart; parts and shapes as in `Description.state_layout`.
+    """
+
+    time: float
+    step: int
+    positions: np.ndarray
+    velocities: np.ndarray
+    directors: np.ndarray
+    strain: np.ndarray
+    curvature: np.ndarray
+    contact_forces: np.ndarray
+    body_positions: np.ndarray
+    body_quaternions: np.ndarray
+    body_velocities: np.ndarray
+    body_angular_velocities: np.ndarray
+    body_wrenches: np.ndarray
+    com: np.ndarray
+    stimulus: np.ndarray
+    energy: dict[str, float]
+    min_gap: float
+    iterations: int
+    residual: float
+    substeps: int
+    cpu_time: float
+    state: np.ndarray

@@ -1,0 +1,184 @@
+"""Frames and descriptions: what observers see of a run."""
+
+from __future__ import annotations
+
+import platform
+
+import numpy as np
+
+from ..jit import kernel
+from ..kinematics.rotation import quaternion_from_matrix
+from ..model.model import Model
+from ..model.state import State
+from .frame import BodyInfo, Description, Frame, PlaneInfo, Strand
+from .stepper import Stepper
+
+Array = np.ndarray
+
+
+@kernel
+def largest_row(rows):
+    """Largest Euclidean norm of the rows of an (n, 3) array; 0 if it is empty."""
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        largest = max(largest, rows[i, 0] ** 2 + rows[i, 1] ** 2 + rows[i, 2] ** 2)
+    return largest**0.5
+
+
+def versions() -> dict[str, str]:
+    """Versions of this package and of what its results depend on."""
+    import numba
+    import scipy
+
+    from bilayer_core import __version__
+
+    return {
+        "bilayer_sim_ros": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+    }
+
+
+def describe(model: Model, state: State, settings: dict[str, str], scene_text: str) -> Description:
+    """The unchanging part of what observers see."""
+    scene = model.scene
+    strands = tuple(
+        Strand(
+            s.name,
+            s.rod,
+            s.layer,
+            slice(s.first_node, s.first_node + s.node_count),
+            slice(s.first_edge, s.first_edge + s.node_count - 1),
+            s.width,
+            s.thickness,
+        )
+        for s in model.strands
+    )
+    bodies = model.bodies
+    return Description(
+        scene_name=scene.name,
+        title=scene.title,
+        scene_text=scene_text,
+        node_count=model.node_count + model.point_count,
+        edge_count=model.edge_count,
+        strands=strands,
+        bodies=tuple(
+            BodyInfo(name, float(bodies.radius[i]), bool(bodies.free_index[i] < 0))
+            for i, name in enumerate(bodies.names)
+        ),
+        obstacles=tuple(
+            PlaneInfo(plane.name, np.array(plane.point), np.array(plane.normal)) for plane in scene.obstacles
+        ),
+        channels=tuple(scene.stimuli),
+        channel_ranges=tuple((channel.minimum, channel.maximum) for channel in scene.stimuli.values()),
+        state_layout=state.layout(),
+        settings=settings,
+    )
+
+
+def positions_with_points(model: Model, state: State) -> Array:
+    """Positions of nodes, then of contact points of bodies [m], shape (n_node + n_point, 3)."""
+    carriers = model.carriers
+    points = state.body_position[carriers.point_body] + carriers.point_position
+    return np.concatenate([state.position, points])
+
+
+def contact_forces(stepper: Stepper) -> Array:
+    """Barrier and friction force on nodes and contact points [N], shape (n_node + n_point, 3)."""
+    model = stepper.model
+    return -stepper.potential.carrier_gradient[: model.node_count + model.point_count]
+
+
+def body_wrenches(stepper: Stepper, state: State) -> Array:
+    """Contact force [N] and moment about its position [N m] on every body, shape (n_body, 6)."""
+    model, carriers = stepper.model, stepper.model.carriers
+    wrench = np.zeros((len(model.bodies.names), 6))
+    wrench[model.bodies.body_of_free] = -stepper.potential.body_contact_gradient
+    first = model.node_count
+    for k, body in enumerate(carriers.point_body):
+        force = -stepper.potential.carrier_gradient[first + k]
+        wrench[body, :3] += force
+        wrench[body, 3:] += np.cross(carriers.point_position[k], force)
+    for k, body in enumerate(carriers.sphere_body):
+        if model.bodies.free_index[body] < 0:
+            wrench[body, :3] -= stepper.potential.carrier_gradient[first + len(carriers.point_body) + k]
+    return wrench
+
+
+def node_strain(model: Model, stepper: Stepper) -> Array:
+    """Axial strain of nodes, the mean of their edges' (eigenstrain included); 0 at contact points, shape (n_node + n_point,)."""
+    strain = np.zeros(model.node_count + model.point_count)
+    edge = stepper.end.length[: model.edge_count] / model.rest_length - 1.0
+    for s in model.strands:
+        own = edge[s.first_edge : s.first_edge + s.node_count - 1]
+        nodes = strain[s.first_node : s.first_node + s.node_count]
+        nodes[0], nodes[-1] = own[0], own[-1]
+        nodes[1:-1] = 0.5 * (own[:-1] + own[1:])
+    return strain
+
+
+def node_curvature(model: Model, stepper: Stepper) -> Array:
+    """Curvature χ at nodes [1/m]; a free end has no bending element and takes its neighbour's, shape (n_node + n_point,)."""
+    curvature = np.zeros(model.node_count + model.point_count)
+    bends = slice(model.bend_count)
+    nodes = model.joint_node[bends]
+    curvature[nodes] = stepper.end.joint_strain[bends, 0] / model.voronoi_length
+    for s in model.strands:
+        first, last = s.first_node, s.first_node + s.node_count - 1
+        for end, neighbour in ((first, first + 1), (last, last - 1)):
+            if end not in model.attached_node:
+                curvature[end] = curvature[neighbour]
+    return curvature
+
+
+def center_of_mass(model: Model, state: State) -> Array:
+    """Mass centre of the rods [m], shape (3,)."""
+    return model.node_mass @ state.position / model.node_mass.sum()
+
+
+def energies(stepper: Stepper, state: State) -> dict[str, float]:
+    """Energy of each term of the last accepted configuration [J]; dissipation potentials are none and are left out."""
+    model, terms = stepper.model, stepper.potential.terms
+    found = {name: float(value) for name, value in terms.items() if name not in ("inertia", "damping", "friction")}
+    kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
+    kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
+    for place, body in enumerate(model.bodies.body_of_free):
+        velocity, spin = state.body_velocity[body], state.body_angular_velocity[body]
+        rotation, second = state.body_rotation[body], model.bodies.second_moment[place]
+        inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
+        kinetic += 0.5 * float(model.bodies.mass[place] * velocity @ velocity + spin @ inertia @ spin)
+    return {"kinetic": kinetic, **found}
+
+
+def make_frame(
+    stepper: Stepper, state: State, time: float, iterations: int, residual: float, substeps: int, cpu_time: float
+) -> Frame:
+    """Snapshot of the last accepted configuration."""
+    model = stepper.model
+    carriers = model.carriers
+    return Frame(
+        time=time,
+        step=int(state.step[0]),
+        positions=positions_with_points(model, state),
+        velocities=np.concatenate([state.velocity, state.body_velocity[carriers.point_body]]),
+        directors=state.director1.copy(),
+        strain=node_strain(model, stepper),
+        curvature=node_curvature(model, stepper),
+        contact_forces=contact_forces(stepper),
+        body_positions=state.body_position.copy(),
+        body_quaternions=np.array([quaternion_from_matrix(r) for r in state.body_rotation]).reshape(-1, 4),
+        body_velocities=state.body_velocity.copy(),
+        body_angular_velocities=state.body_angular_velocity.copy(),
+        body_wrenches=body_wrenches(stepper, state),
+        com=center_of_mass(model, state),
+        stimulus=stepper.stimulus.copy(),
+        energy=energies(stepper, state),
+        min_gap=float(stepper.potential.min_gap),
+        iterations=iterations,
+        residual=residual,
+        substeps=substeps,
+        cpu_time=cpu_time,
+        state=state.flat(),
+    )

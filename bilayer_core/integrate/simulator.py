@@ -1,0 +1,384 @@
+"""The simulator: a scene, its state, and the loop that advances it."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import InputError, SimulationError
+from ..model.build import build_model
+from ..model.plan import make_plan
+from ..model.state import State, initial_state
+from ..scene.config import SceneConfig
+from ..scene.loader import scene_text
+from . import observe
+from .frame import Description, Frame
+from .statistics import RunStatistics
+from .stepper import Stepper, StepReport
+
+Array = np.ndarray
+
+
+class Observer(Protocol):
+    """Something that looks at a run `rate` times in each simulated second."""
+
+    rate: float
+
+    def start(self, description: Description) -> None:
+        """Called once, before the first frame."""
+
+    def observe(self, frame: Frame) -> None:
+        """Called with every frame that is due, the first and the last included."""
+
+    def close(self, complete: bool) -> None:
+        """Called once at the end; `complete` is false if the run was cut short."""
+
+
+class Termination(Enum):
+    """Why a run ended; the value is the message."""
+
+    COMPLETED = "completed"
+    INTERRUPTED = "interrupted"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """How a run went.
+
+    Attributes
+    ----------
+    termination : Termination
+    time : float
+        Simulated time at its end [s].
+    simulated : float
+        Simulated time of this run [s].
+    steps : int
+        Nominal steps of this run.
+    cpu_time, wall_time : float
+        CPU seconds of the stepping thread and elapsed seconds, without compilation.
+    """
+
+    termination: Termination
+    time: float
+    simulated: float
+    steps: int
+    cpu_time: float
+    wall_time: float
+
+
+@dataclass(frozen=True)
+class BodyView:
+    """Pose of a body: position [m], shape (3,), and quaternion x y z w, shape (4,)."""
+
+    position: Array
+    quaternion: Array
+
+
+class Simulator:
+    """A scene in motion.
+
+    Parameters
+    ----------
+    scene : SceneConfig
+        From `bilayer_core.load_scene`.
+    model, dimension, integrator : str or int
+        Override the scene's; ``"auto"`` keeps them.
+    dt : float, optional
+        Overrides the scene's step [s].
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be simulated as asked.
+    PenetrationError
+        If it starts with surfaces inside each other.
+    """
+
+    def __init__(self, scene: SceneConfig, *, model="auto", dimension="auto", integrator="auto", dt: float | None = None):
+        if dt is not None and not (math.isfinite(dt) and dt > 0.0):
+            raise InputError(f"dt: {dt} is not a time step; allowed is a positive number of seconds")
+        self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
+        self.scene = scene
+        self.dt = scene.solver.dt if dt is None else float(dt)
+        self.model = build_model(scene)
+        solver = scene.solver
+        self._stepper = Stepper(
+            self.model, self.dt, solver.tolerance, solver.max_newton_iterations, solver.max_halvings
+        )
+        self._state = initial_state(self.model)
+        self._stepper.rest(self._state)
+        self._compile_time: float | None = None
+        self._start_over()
+
+    def _start_over(self) -> None:
+        self.statistics = RunStatistics(com_max_height=float(self.com[2]), min_gap=self._stepper.potential.min_gap)
+        self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
+        self.termination = Termination.COMPLETED.value
+        self.cpu_time = self.wall_time = 0.0
+        self._since_frame = (0, 0.0, 0)
+
+    # what the scene looks like now
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._state.step[0]) * self.dt
+
+    @property
+    def positions(self) -> Array:
+        """Positions of nodes, layer by layer, then of contact points of bodies [m], shape (nodes, 3)."""
+        return observe.positions_with_points(self.model, self._state)
+
+    @property
+    def velocities(self) -> Array:
+        """Their velocities [m/s], shape (nodes, 3)."""
+        points = self._state.body_velocity[self.model.carriers.point_body]
+        return np.concatenate([self._state.velocity, points])
+
+    @property
+    def contact_forces(self) -> Array:
+        """Barrier and friction force on each of them [N], shape (nodes, 3)."""
+        return observe.contact_forces(self._stepper)
+
+    @property
+    def com(self) -> Array:
+        """Mass centre of the rods [m], shape (3,)."""
+        return observe.center_of_mass(self.model, self._state)
+
+    @property
+    def stimulus(self) -> dict[str, float]:
+        """Value of each channel over the last step, in its unit."""
+        return dict(zip(self.scene.stimuli, self._stepper.stimulus.tolist(), strict=True))
+
+    @property
+    def bodies(self) -> dict[str, BodyView]:
+        """Pose of every body."""
+        state = self._state
+        return {
+            name: BodyView(
+                state.body_position[i].copy(), observe.quaternion_from_matrix(state.body_rotation[i])
+            )
+            for i, name in enumerate(self.model.bodies.names)
+        }
+
+    @property
+    def curvatures(self) -> Array:
+        """Curvature χ through the thickness at every node [1/m], shape (nodes,)."""
+        return observe.node_curvature(self.model, self._stepper)
+
+    def energy(self) -> dict[str, float]:
+        """Energy of each term [J]."""
+        return observe.energies(self._stepper, self._state)
+
+    @property
+    def description(self) -> Description:
+        """What does not change during the run."""
+        settings = {
+            "model": self.plan.model,
+            "dimension": str(self.plan.dimension),
+            "integrator": self.plan.integrator,
+            "dt": repr(self.dt),
+            "tolerance": repr(self.scene.solver.tolerance),
+            **observe.versions(),
+        }
+        return observe.describe(self.model, self._state, settings, scene_text(self.scene))
+
+    def frame(self) -> Frame:
+        """A snapshot; its counts are those since the snapshot before."""
+        iterations, residual, substeps = self._since_frame
+        self._since_frame = (0, 0.0, 0)
+        return observe.make_frame(
+            self._stepper, self._state, self.time, iterations, residual, substeps, self.cpu_time
+        )
+
+    # what changes it
+
+    def set_stimulus(self, channel: str, value: float | None) -> None:
+        """Set a channel from the next step on, in its unit; None gives it back to the scene's schedule.
+
+        Raises
+        ------
+        InputError
+            If there is no such channel, or the value is not finite or out of the channel's range; nothing is changed then.
+        """
+        if channel not in self.scene.stimuli:
+            known = ", ".join(self.scene.stimuli) or "none"
+            raise InputError(f"stimulus {channel!r}: no such channel; the scene {self.scene.name!r} has: {known}")
+        index = list(self.scene.stimuli).index(channel)
+        if value is None:
+            self._state.override[index] = math.nan
+            return
+        allowed = self.scene.stimuli[channel]
+        if not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
+            raise InputError(
+                f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} to {allowed.maximum:g}"
+                f" (unit {allowed.unit})"
+            )
+        self._state.override[index] = float(value)
+
+    def compile(self) -> float:
+        """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took."""
+        if self._compile_time is None:
+            begin = clock.thread_time()
+            trial = State(**{name: array.copy() for name, array in vars(self._state).items()})
+            try:
+                self._stepper.advance(trial)
+            except SimulationError:
+                pass  # the first step of the run meets it again and reports it
+            observe.largest_row(self._state.position)
+            self._stepper.rest(self._state)
+            self._compile_time = clock.thread_time() - begin
+        return self._compile_time
+
+    def step(self) -> StepReport:
+        """Advance by one nominal step.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot be made; the state is that of the last nominal step.
+        """
+        self.compile()
+        begin, wall = clock.thread_time(), clock.perf_counter()
+        try:
+            report = self._stepper.advance(self._state)
+        except SimulationError:
+            self._stepper.rest(self._state)
+            self.termination = Termination.FAILED.value
+            raise
+        self.statistics.update(report, self._stepper, self._state)
+        iterations, residual, substeps = self._since_frame
+        self._since_frame = (
+            iterations + report.iterations, max(residual, report.residual), substeps + report.substeps
+        )
+        self.cpu_time += clock.thread_time() - begin
+        self.wall_time += clock.perf_counter() - wall
+        return report
+
+    def run(
+        self,
+        duration: float | None = None,
+        *,
+        observers: Sequence[Observer] = (),
+        stop: Callable[[], bool] | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> RunResult:
+        """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
+
+        Parameters
+        ----------
+        duration : float, optional
+        observers : sequence of Observer
+            Each sees the first frame, the last, and those at its rate between; all are closed whatever happens.
+        stop : callable, optional
+            Asked after every step; true ends the run as interrupted.
+        progress : callable, optional
+            Called after every step with the simulated time [s].
+
+        Raises
+        ------
+        SimulationError
+            If a step cannot be made. Observers have then seen the last accepted frame and are closed.
+        """
+        left = self.scene.duration - self.time if duration is None else duration
+        if not (math.isfinite(left) and left >= 0.0):
+            raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
+        self.compile()
+        steps = int(round(left / self.dt))
+        begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
+        termination, complete = Termination.COMPLETED, False
+        schedule = _Schedule(observers, self)
+        try:
+            schedule.start()
+            for done in range(1, steps + 1):
+                self.step()
+                schedule.observe_due()
+                if progress is not None:
+                    progress(self.time)
+                if stop is not None and done < steps and stop():
+                    termination = Termination.INTERRUPTED
+                    break
+            complete = termination is Termination.COMPLETED
+        finally:
+            self.termination = termination.value if self.termination != Termination.FAILED.value else self.termination
+            schedule.finish(complete)
+        return RunResult(
+            termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
+        )
+
+    def save_state(self) -> Array:
+        """Flat copy of the state; `load_state` continues from it bit for bit."""
+        return self._state.flat()
+
+    def load_state(self, snapshot: Array) -> None:
+        """Go to a saved state of the same scene.
+
+        Raises
+        ------
+        InputError
+            If it does not fit; nothing is changed then.
+        """
+        self._state.set_flat(snapshot)
+        self._stepper.rest(self._state)
+        self._start_over()
+
+    def reset(self) -> None:
+        """Go back to the start of the scene; stimuli set from outside are forgotten."""
+        self.load_state(initial_state(self.model).flat())
+
+    def summary(self) -> dict:
+        """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for ``--summary``."""
+        from .summary import summarise
+
+        return summarise(self)
+
+
+class _Schedule:
+    """Which observer is due when; a frame is made once for all that are due."""
+
+    def __init__(self, observers: Sequence[Observer], simulator: Simulator):
+        self._observers = list(observers)
+        self._simulator = simulator
+        self._count = [0] * len(self._observers)
+        self._origin = simulator.time
+        self._last_seen = [-1] * len(self._observers)
+
+    def start(self) -> None:
+        if self._observers:
+            description = self._simulator.description
+            for observer in self._observers:
+                observer.start(description)
+            self._show(range(len(self._observers)))
+
+    def observe_due(self) -> None:
+        elapsed = self._simulator.time - self._origin + 1e-9 * self._simulator.dt
+        due = [i for i, observer in enumerate(self._observers) if elapsed >= (self._count[i] + 1) / observer.rate]
+        if due:
+            for i in due:
+                self._count[i] = int(elapsed * self._observers[i].rate)
+            self._show(due)
+
+    def _show(self, which) -> None:
+        frame = self._simulator.frame()
+        for i in which:
+            self._observers[i].observe(frame)
+            self._last_seen[i] = frame.step
+
+    def finish(self, complete: bool) -> None:
+        if not self._observers:
+            return
+        step = round(self._simulator.time / self._simulator.dt)
+        try:
+            missing = [i for i, seen in enumerate(self._last_seen) if seen not in (-1, step)]
+            if missing:
+                self._show(missing)
+        finally:
+            for observer in self._observers:
+                observer.close(complete)

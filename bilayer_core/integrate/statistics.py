@@ -1,0 +1,70 @@
+"""Figures of a run that need a look at every step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..model.state import State
+from .observe import center_of_mass, largest_row
+from .stepper import Stepper, StepReport
+
+
+@dataclass
+class BodyContact:
+    """Contact of a ball with nodes: when it began [s], how many nodes took part at most, and at the end."""
+
+    first_contact: float | None = None
+    most_nodes: int = 0
+    nodes: int = 0
+
+
+@dataclass
+class RunStatistics:
+    """Counts, extremes and first contacts, from `update` after every nominal step.
+
+    Times in s, lengths in m, forces in N, residuals in m/s.
+    """
+
+    steps: int = 0
+    substeps: int = 0
+    rejected: int = 0
+    iterations: int = 0
+    factorisations: int = 0
+    largest_residual: float = 0.0
+    min_gap: float = math.inf
+    max_contact_force: float = 0.0
+    com_max_height: float = -math.inf
+    bodies: dict[str, BodyContact] = field(default_factory=dict)
+
+    def update(self, report: StepReport, stepper: Stepper, state: State) -> None:
+        """Take in one nominal step."""
+        model, potential = stepper.model, stepper.potential
+        self.steps += 1
+        self.substeps += report.substeps
+        self.rejected += report.rejected
+        self.iterations += report.iterations
+        self.factorisations += report.factorisations
+        self.largest_residual = max(self.largest_residual, report.residual)
+        self.com_max_height = max(self.com_max_height, float(center_of_mass(model, state)[2]))
+        if not potential.has_contact:
+            return
+        self.min_gap = min(self.min_gap, potential.min_gap)
+        nodes = potential.carrier_gradient[: model.node_count]
+        self.max_contact_force = max(self.max_contact_force, largest_row(nodes))
+        if potential.has_balls:
+            self._count_contacts(report.time, stepper)
+
+    def _count_contacts(self, time: float, stepper: Stepper) -> None:
+        model, carriers = stepper.model, stepper.model.carriers
+        touching = stepper.potential.pair_gap < model.scene.contact.barrier_distance
+        touching &= carriers.pair_first < model.node_count
+        first_sphere = model.node_count + model.point_count
+        for place, body in enumerate(carriers.sphere_body):
+            found = self.bodies.setdefault(model.bodies.names[body], BodyContact())
+            found.nodes = int(np.count_nonzero(touching & (carriers.pair_second == first_sphere + place)))
+            found.most_nodes = max(found.most_nodes, found.nodes)
+            if found.nodes and found.first_contact is None:
+                found.first_contact = time

@@ -1,0 +1,74 @@
+"""The summary of a run: a plain dictionary, the content of ``--summary``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import observe
+
+if TYPE_CHECKING:
+    from .simulator import Simulator
+
+
+def summarise(simulator: Simulator) -> dict:
+    """Figures of a run since its start; lengths in m, times in s, forces in N, energies in J."""
+    model, statistics, plan = simulator.model, simulator.statistics, simulator.plan
+    positions = simulator.positions
+    curvature = np.abs(simulator.curvatures[: model.node_count])
+    simulated = simulator.time - simulator.start_time
+    cpu = simulator.cpu_time
+    min_gap = statistics.min_gap
+    return {
+        "scene": simulator.scene.name,
+        "model": plan.model,
+        "dimension": plan.dimension,
+        "integrator": plan.integrator,
+        "nodes": len(positions),
+        "dof": model.unknowns,
+        "dt": simulator.dt,
+        "duration": simulator.scene.duration,
+        "simulated": simulated,
+        "steps": statistics.steps,
+        "substeps": statistics.substeps,
+        "rejected_steps": statistics.rejected,
+        "newton_iterations": statistics.iterations,
+        "factorisations": statistics.factorisations,
+        "cpu_time": cpu,
+        "wall_time": simulator.wall_time,
+        "compile_time": simulator.compile(),
+        "real_time_factor": simulated / cpu if cpu > 0.0 else None,
+        "converged": statistics.largest_residual <= simulator.scene.solver.tolerance,
+        "largest_residual": statistics.largest_residual,
+        "termination": simulator.termination,
+        "terms": plan.terms,
+        "com_start": simulator.start_com.tolist(),
+        "com_end": simulator.com.tolist(),
+        "com_max_height": statistics.com_max_height,
+        "max_curvature": float(curvature.max()),
+        "mean_curvature": float(curvature.mean()),
+        "tip_positions": {s.name: positions[s.first_node + s.node_count - 1].tolist() for s in model.strands},
+        "min_gap": min_gap if np.isfinite(min_gap) else None,
+        "max_contact_force": statistics.max_contact_force,
+        "energy": simulator.energy(),
+        "bodies": _bodies(simulator),
+        "versions": observe.versions(),
+    }
+
+
+def _bodies(simulator: Simulator) -> dict:
+    """Where each body began and is, and how nodes touched it."""
+    found = {}
+    for index, name in enumerate(simulator.model.bodies.names):
+        start, end = simulator.start_bodies[index], simulator.bodies[name].position
+        contact = simulator.statistics.bodies.get(name)
+        found[name] = {
+            "start": start.tolist(),
+            "end": end.tolist(),
+            "lift": float(end[2] - start[2]),
+            "first_contact": contact.first_contact if contact else None,
+            "contact_nodes": contact.nodes if contact else 0,
+            "most_contact_nodes": contact.most_nodes if contact else 0,
+        }
+    return found

@@ -1,0 +1,44 @@
+"""The one place with numba options.
+
+Kernels are compiled lazily at their first call, release the GIL and are cached on disk.
+``contract``, ``reassoc``, ``nsz`` and ``arcp`` allow fused and reordered arithmetic but keep
+NaN and infinity, so that a diverging iterate is seen. Finiteness is nevertheless tested outside kernels.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+
+import numba
+
+FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
+_log = logging.getLogger(__name__)
+
+
+def _cache_is_usable() -> bool:
+    """Whether numba finds a directory to write compiled kernels to."""
+    from numba.core.caching import FunctionCache
+
+    def probe():
+        return None
+
+    try:
+        FunctionCache(probe)
+    except RuntimeError as error:
+        _log.warning("compiled kernels cannot be cached (%s): every start compiles again. Set NUMBA_CACHE_DIR to a writable directory.", error)
+        return False
+    return True
+
+
+CACHE = os.environ.get("BILAYER_JIT_CACHE", "1") != "0" and _cache_is_usable()
+
+
+def kernel(function):
+    """Compile `function` as a kernel: nopython, GIL released, cached, NaN-preserving fast arithmetic."""
+    return numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH)(function)
+
+
+def inlined(function):
+    """Compile a small scalar function that kernels call; LLVM inlines it into each of them."""
+    return numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, inline="never")(function)

@@ -1,0 +1,1 @@
+"""Geometry of edges and their material frames."""

@@ -1,0 +1,88 @@
+"""Edges, tangents and material frames carried by parallel transport.
+
+Parallel transport of a vector u perpendicular to the unit tangent a, to the unit tangent b, is the smallest
+rotation that turns a into b:
+
+    P u = u − (u·b)/(1 + a·b) (a + b)        (Bergou et al. 2010, eq. 9; Jawed et al. 2018, ch. 4)
+
+A rigid motion therefore carries the frames with it and costs no energy.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import kernel
+
+
+@kernel
+def edge_geometry(position, edge_node, length_out, tangent_out):
+    """Length [m] and unit tangent of every edge.
+
+    Parameters
+    ----------
+    position : Array
+        Node positions [m], shape (n_node, 3).
+    edge_node : Array
+        First node of each edge; the second is the next one, shape (n_edge,).
+    length_out, tangent_out : Array
+        Written: shapes (≥ n_edge,) and (≥ n_edge, 3).
+    """
+    for k in range(edge_node.shape[0]):
+        i = edge_node[k]
+        x = position[i + 1, 0] - position[i, 0]
+        y = position[i + 1, 1] - position[i, 1]
+        z = position[i + 1, 2] - position[i, 2]
+        length = math.sqrt(x * x + y * y + z * z)
+        length_out[k] = length
+        tangent_out[k, 0] = x / length
+        tangent_out[k, 1] = y / length
+        tangent_out[k, 2] = z / length
+
+
+@kernel
+def transport_directors(count, tangent, director1, director2, angle, new_tangent, director1_out, director2_out):
+    """Carry material frames to new tangents and turn them about these.
+
+    m1' = cos θ · P m1 + sin θ · P m2, made orthonormal again to rounding.
+
+    Parameters
+    ----------
+    count : int
+        Number of edges to carry.
+    tangent, director1, director2 : Array
+        Frames to start from, unit, shape (≥ count, 3).
+    angle : Array
+        Turn θ of each edge about its new tangent [rad], shape (count,).
+    new_tangent : Array
+        Unit, shape (≥ count, 3).
+    director1_out, director2_out : Array
+        Written, shape (≥ count, 3).
+    """
+    for k in range(count):
+        a0, a1, a2 = tangent[k, 0], tangent[k, 1], tangent[k, 2]
+        b0, b1, b2 = new_tangent[k, 0], new_tangent[k, 1], new_tangent[k, 2]
+        u0, u1, u2 = director1[k, 0], director1[k, 1], director1[k, 2]
+        v0, v1, v2 = director2[k, 0], director2[k, 1], director2[k, 2]
+        inverse = 1.0 / (1.0 + a0 * b0 + a1 * b1 + a2 * b2)
+        su = (u0 * b0 + u1 * b1 + u2 * b2) * inverse
+        sv = (v0 * b0 + v1 * b1 + v2 * b2) * inverse
+        c, s = math.cos(angle[k]), math.sin(angle[k])
+        scale = c * su + s * sv
+        p0 = c * u0 + s * v0 - scale * (a0 + b0)
+        p1 = c * u1 + s * v1 - scale * (a1 + b1)
+        p2 = c * u2 + s * v2 - scale * (a2 + b2)
+        along = p0 * b0 + p1 * b1 + p2 * b2
+        p0 -= along * b0
+        p1 -= along * b1
+        p2 -= along * b2
+        norm = 1.0 / math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
+        p0 *= norm
+        p1 *= norm
+        p2 *= norm
+        director1_out[k, 0] = p0
+        director1_out[k, 1] = p1
+        director1_out[k, 2] = p2
+        director2_out[k, 0] = b1 * p2 - b2 * p1
+        director2_out[k, 1] = b2 * p0 - b0 * p2
+        director2_out[k, 2] = b0 * p1 - b1 * p0

@@ -1,0 +1,56 @@
+"""Rotations of rigid bodies: rotation vectors, matrices, quaternions (x y z w)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def skew(vector: np.ndarray) -> np.ndarray:
+    """Matrix [v]× with [v]× u = v × u, shape (3, 3)."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def rotation_matrix(vector: np.ndarray) -> np.ndarray:
+    """exp([v]×) of a rotation vector [rad] by Rodrigues' formula, shape (3, 3)."""
+    angle2 = float(vector @ vector)
+    matrix = skew(vector)
+    if angle2 < 1e-8:  # series to the rounding limit: the next terms are below 1e-17
+        a, b = 1.0 - angle2 / 6.0, 0.5 - angle2 / 24.0
+    else:
+        angle = np.sqrt(angle2)
+        a, b = np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle2
+    return np.eye(3) + a * matrix + b * (matrix @ matrix)
+
+
+def matrix_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a unit quaternion x y z w, shape (3, 3)."""
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Unit quaternion x y z w (w ≥ 0) of a rotation matrix, by its largest component (Shepperd 1978), shape (4,)."""
+    trace = np.trace(matrix)
+    candidates = np.array([matrix[0, 0], matrix[1, 1], matrix[2, 2], trace])
+    largest = int(np.argmax(candidates))
+    quaternion = np.empty(4)
+    if largest == 3:
+        quaternion[3] = 1.0 + trace
+        quaternion[0] = matrix[2, 1] - matrix[1, 2]
+        quaternion[1] = matrix[0, 2] - matrix[2, 0]
+        quaternion[2] = matrix[1, 0] - matrix[0, 1]
+    else:
+        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
+        quaternion[i] = 1.0 + matrix[i, i] - matrix[j, j] - matrix[k, k]
+        quaternion[j] = matrix[j, i] + matrix[i, j]
+        quaternion[k] = matrix[k, i] + matrix[i, k]
+        quaternion[3] = matrix[k, j] - matrix[j, k]
+    quaternion /= np.linalg.norm(quaternion)
+    return quaternion if quaternion[3] >= 0.0 else -quaternion

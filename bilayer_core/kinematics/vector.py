@@ -1,0 +1,105 @@
+"""Three-vectors as tuples of scalars, for kernels: after inlining they live in registers."""
+
+from __future__ import annotations
+
+from ..jit import inlined
+
+
+@inlined
+def row(array, k):
+    """Row k of an (n, ≥3) array as a tuple."""
+    return array[k, 0], array[k, 1], array[k, 2]
+
+
+@inlined
+def dot(a, b):
+    """a·b"""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def cross(a, b):
+    """a × b"""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def scaled(s, a):
+    """s a"""
+    return s * a[0], s * a[1], s * a[2]
+
+
+@inlined
+def combine(s, a, t, b):
+    """s a + t b"""
+    return s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]
+
+
+@inlined
+def combine3(s, a, t, b, r, c):
+    """s a + t b + r c"""
+    return s * a[0] + t * b[0] + r * c[0], s * a[1] + t * b[1] + r * c[1], s * a[2] + t * b[2] + r * c[2]
+
+
+@inlined
+def add_row(array, k, s, a):
+    """array[k, :3] += s a"""
+    array[k, 0] += s * a[0]
+    array[k, 1] += s * a[1]
+    array[k, 2] += s * a[2]
+
+
+@inlined
+def add_column(array, k, column, s, a):
+    """array[k, :3, column] += s a"""
+    array[k, 0, column] += s * a[0]
+    array[k, 1, column] += s * a[1]
+    array[k, 2, column] += s * a[2]
+
+
+@inlined
+def add_outer(array, k, s, a, b):
+    """array[k, :3, :3] += s a bᵀ"""
+    for j in range(3):
+        sb = s * (b[0] if j == 0 else (b[1] if j == 1 else b[2]))
+        array[k, 0, j] += sb * a[0]
+        array[k, 1, j] += sb * a[1]
+        array[k, 2, j] += sb * a[2]
+
+
+@inlined
+def add_identity(array, k, s):
+    """array[k, :3, :3] += s I"""
+    array[k, 0, 0] += s
+    array[k, 1, 1] += s
+    array[k, 2, 2] += s
+
+
+@inlined
+def add_upper_outer(array, k, s, a):
+    """Upper triangle of array[k, :3, :3] += s a aᵀ"""
+    t0, t1 = s * a[0], s * a[1]
+    array[k, 0, 0] += t0 * a[0]
+    array[k, 0, 1] += t0 * a[1]
+    array[k, 0, 2] += t0 * a[2]
+    array[k, 1, 1] += t1 * a[1]
+    array[k, 1, 2] += t1 * a[2]
+    array[k, 2, 2] += s * a[2] * a[2]
+
+
+@inlined
+def add_upper_symmetric(array, k, s, a, b):
+    """Upper triangle of array[k, :3, :3] += s (a bᵀ + b aᵀ)"""
+    array[k, 0, 0] += 2.0 * s * a[0] * b[0]
+    array[k, 0, 1] += s * (a[0] * b[1] + b[0] * a[1])
+    array[k, 0, 2] += s * (a[0] * b[2] + b[0] * a[2])
+    array[k, 1, 1] += 2.0 * s * a[1] * b[1]
+    array[k, 1, 2] += s * (a[1] * b[2] + b[1] * a[2])
+    array[k, 2, 2] += 2.0 * s * a[2] * b[2]
+
+
+@inlined
+def add_upper_projector(array, k, s, a):
+    """Upper triangle of array[k, :3, :3] += s (I − a aᵀ), a a unit vector"""
+    add_identity(array, k, s)
+    add_upper_outer(array, k, -s, a)

@@ -1,0 +1,1 @@
+"""From a validated scene to flat read-only arrays."""

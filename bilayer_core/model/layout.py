@@ -1,0 +1,53 @@
+"""The order of unknowns: the only file that turns a station and a layer into the number of an unknown.
+
+Along each rod, station by station: positions of the layers present, then the angles of their edges that start there. Rods follow each other.
+Elements span three stations of one layer, or two stations of both, which bounds the half-bandwidth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+HALF_BANDWIDTH = {1: 10, 2: 18}  # by number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Numbers of unknowns.
+
+    Attributes
+    ----------
+    size : int
+        Unknowns of nodes and edges.
+    half_bandwidth : int
+        Largest difference of two coupled unknowns; a compile-time constant of the solver.
+    node : ndarray
+        First of the three unknowns of each node, shape (n_node,).
+    edge : ndarray
+        Unknown of each edge's angle, shape (n_edge,).
+    """
+
+    size: int
+    half_bandwidth: int
+    node: np.ndarray
+    edge: np.ndarray
+
+
+def number_unknowns(rods: list[list[tuple[int, int, int, int]]], node_count: int, edge_count: int) -> Layout:
+    """Number the unknowns of rods, each a list of layers (first station, last station, first node, first edge)."""
+    node = np.full(node_count, -1, dtype=np.int64)
+    edge = np.full(edge_count, -1, dtype=np.int64)
+    size = 0
+    for layers in rods:
+        for station in range(min(layer[0] for layer in layers), max(layer[1] for layer in layers) + 1):
+            for first, last, first_node, _ in layers:
+                if first <= station <= last:
+                    node[first_node + station - first] = size
+                    size += 3
+            for first, last, _, first_edge in layers:
+                if first <= station < last:
+                    edge[first_edge + station - first] = size
+                    size += 1
+    return Layout(size, HALF_BANDWIDTH[max(len(layers) for layers in rods)], node, edge)

@@ -1,0 +1,138 @@
+"""The arrays of a model: all that does not change during a run. They are read-only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene.config import SceneConfig
+from .layout import Layout
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class StrandArrays:
+    """One layer of one rod: where its nodes and edges stand."""
+
+    name: str
+    rod: str
+    layer: str
+    first_node: int
+    node_count: int
+    first_edge: int
+    width: float
+    thickness: float
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Rigid bodies, in the scene's order. *Free* bodies have unknowns, in the order in which they occur."""
+
+    names: tuple[str, ...]
+    free_index: Array  # place among the free bodies, −1 for a prescribed one, shape (n_body,)
+    body_of_free: Array  # the reverse, shape (n_free,)
+    start_position: Array  # [m], shape (n_body, 3)
+    start_velocity: Array  # [m/s], shape (n_body, 3)
+    start_angular_velocity: Array  # [rad/s], shape (n_body, 3)
+    mass: Array  # of free bodies [kg], shape (n_free,)
+    second_moment: Array  # ∫ r rᵀ dm of free bodies, body frame [kg m²], shape (n_free, 3, 3)
+    radius: Array  # of the sphere, 0 without one [m], shape (n_body,)
+    times: tuple[Array, ...]  # keyframes of each prescribed body [s]
+    displacements: tuple[Array, ...]  # and its displacements there [m], shape (n_keyframe, 3)
+
+
+@dataclass(frozen=True)
+class Carriers:
+    """Points with a radius that feel surfaces: all nodes, then contact points of bodies, then spheres."""
+
+    weight: Array  # Δl of the barrier [m], shape (n_carrier,)
+    radius: Array  # half thickness, offset, or radius [m], shape (n_carrier,)
+    point_body: Array  # body of each contact point, shape (n_point,)
+    point_position: Array  # in the body's frame [m], shape (n_point, 3)
+    sphere_body: Array  # body of each sphere, shape (n_sphere,)
+    free_body: Array  # free body of a sphere with unknowns, −1 otherwise, shape (n_carrier,)
+    pair_first: Array  # carriers that can meet, shape (n_pair,)
+    pair_second: Array
+    plane_point: Array  # [m], shape (n_plane, 3)
+    plane_normal: Array  # outward unit, shape (n_plane, 3)
+
+
+@dataclass(frozen=True)
+class Model:
+    """Flat arrays of a scene; indices run over strands in order, and along each strand.
+
+    Edges n_edge … n_edge + n_wall − 1 are the fixed directions of clamps ("walls"). *Joints* are pairs of edges with a bending and
+    twisting element: inner nodes and clamps first (`bend_count`), then the rotation bonds of paired layers.
+    """
+
+    scene: SceneConfig
+    strands: tuple[StrandArrays, ...]
+    layout: Layout
+    bodies: Bodies
+    carriers: Carriers
+
+    node_count: int
+    edge_count: int
+    wall_count: int
+    bend_count: int
+
+    start_position: Array  # of nodes [m], shape (n_node, 3)
+    start_director1: Array  # of edges and walls, unit, shape (n_edge + n_wall, 3)
+    wall_tangent: Array  # unit, shape (n_wall, 3)
+    attached_node: Array  # nodes held by bodies, shape (n_attached,)
+    attached_body: Array  # shape (n_attached,)
+    attached_position: Array  # in the body's frame [m], shape (n_attached, 3)
+
+    node_mass: Array  # [kg], shape (n_node,)
+    spin_inertia: Array  # of edges about their tangent [kg m²], shape (n_edge,)
+    half_width: Array  # of each edge [m], shape (n_edge,)
+
+    edge_node: Array  # first node of each edge, shape (n_edge,)
+    rest_length: Array  # [m], shape (n_edge,)
+    axial_stiffness: Array  # EA [N], shape (n_edge,)
+    eigenstrain_law: Array  # index into the laws, −1 for a passive edge, shape (n_edge,)
+    law_channel: Array  # stimulus channel of each law, shape (n_law,)
+    law_gain: Array  # eigenstrain per unit of stimulus, shape (n_law,)
+    law_time_constant: Array  # [s], shape (n_law,)
+
+    joint_a: Array  # first edge of each joint, shape (n_joint,)
+    joint_b: Array  # second edge
+    joint_stiffness: Array  # k₁ k₂ k₃ [N m], shape (n_joint, 3)
+    joint_rest: Array  # κ̄₁ κ̄₂ ψ̄ [rad], shape (n_joint, 3)
+    joint_node: Array  # node at which a bend acts, −1 for bonds, shape (n_joint,)
+    voronoi_length: Array  # of bends and clamps [m], shape (bend_count,)
+
+    pair_top: Array  # paired edges, shape (n_pair,)
+    pair_bottom: Array
+    pair_stiffness: Array  # k_T l [N/m], shape (n_pair,)
+    pair_rest: Array  # offset of the midpoints along m1, m2, m3 [m], shape (n_pair, 3)
+
+    @property
+    def point_count(self) -> int:
+        """Number of contact points of bodies."""
+        return len(self.carriers.point_body)
+
+    @property
+    def free_count(self) -> int:
+        """Number of free bodies."""
+        return len(self.bodies.mass)
+
+    @property
+    def unknowns(self) -> int:
+        """Unknowns that are solved for: those of nodes and edges without the attached ones, six for each free body."""
+        return self.layout.size - 3 * len(self.attached_node) + 6 * self.free_count
+
+
+def body_displacement(times: Array, displacements: Array, time: float) -> Array:
+    """Displacement of a prescribed body [m]: cubic smoothstep between keyframes, constant outside them, shape (3,)."""
+    if len(times) == 0:
+        return np.zeros(3)
+    right = int(np.searchsorted(times, time, side="right"))
+    if right == 0:
+        return displacements[0]
+    if right == len(times):
+        return displacements[-1]
+    s = (time - times[right - 1]) / (times[right] - times[right - 1])
+    return displacements[right - 1] + s * s * (3.0 - 2.0 * s) * (displacements[right] - displacements[right - 1])

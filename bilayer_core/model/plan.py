@@ -1,0 +1,116 @@
+"""What will be computed for a scene, and what is skipped, each with its reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ..errors import SceneError
+from ..scene.config import Free, SceneConfig
+from .validity import validity_warnings
+
+MODELS = ("two_rod",)
+DIMENSIONS = (3,)
+INTEGRATORS = ("implicit_euler",)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a scene is simulated.
+
+    Attributes
+    ----------
+    model, integrator : str
+    dimension : int
+    reasons : dict
+        Why each of these three was chosen.
+    terms : dict
+        Name of each force: ``"active"`` or ``"skipped: reason"``.
+    contact_pairs : tuple of str
+        Which surfaces can meet.
+    warnings : tuple of str
+        Where the validity of the model ends.
+    """
+
+    model: str
+    dimension: int
+    integrator: str
+    reasons: dict[str, str]
+    terms: dict[str, str]
+    contact_pairs: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = field(default=())
+
+
+def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator="auto") -> Plan:
+    """Choose model, dimension and integrator, and the terms that a scene needs.
+
+    Arguments other than ``"auto"`` override the scene's own.
+
+    Raises
+    ------
+    SceneError
+        If a choice does not exist.
+    """
+    reasons = {}
+    chosen_model = _choose(reasons, "model", model, scene.solver.model, MODELS, "the paper's: each layer a rod")
+    chosen_dimension = _choose(reasons, "dimension", dimension, scene.solver.dimension, DIMENSIONS, "positions and frames")
+    chosen_integrator = _choose(reasons, "integrator", integrator, scene.solver.integrator, INTEGRATORS, "the paper's")
+    return Plan(
+        chosen_model,
+        chosen_dimension,
+        chosen_integrator,
+        reasons,
+        _terms(scene),
+        _contact_pairs(scene),
+        tuple(validity_warnings(scene)),
+    )
+
+
+def _choose(reasons: dict[str, str], key: str, asked, of_scene, allowed: tuple, default_reason: str):
+    value, origin = (asked, "asked for") if asked != "auto" else (of_scene, "set by the scene")
+    if value == "auto":
+        reasons[key] = default_reason
+        return allowed[0]
+    if str(value) not in map(str, allowed):
+        raise SceneError(f"{key}: {value} does not exist; allowed: auto, {', '.join(map(str, allowed))}")
+    reasons[key] = origin
+    return next(candidate for candidate in allowed if str(candidate) == str(value))
+
+
+def _terms(scene: SceneConfig) -> dict[str, str]:
+    def state(needed: bool, reason: str) -> str:
+        return "active" if needed else f"skipped: {reason}"
+
+    pairs = _contact_pairs(scene)
+    friction = scene.contact.friction if scene.contact else None
+    free = any(isinstance(body.motion, Free) for body in scene.bodies)
+    driven = any(layer.eigenstrain for rod in scene.rods for layer in rod.layers)
+    return {
+        "stretching": "active",
+        "bending": "active",
+        "twisting": "active",
+        "bond": state(any(len(rod.layers) == 2 for rod in scene.rods), "no rod has two layers"),
+        "eigenstrain": state(driven, "no layer follows a stimulus"),
+        "inertia": "active",
+        "gravity": state(any(scene.gravity), "gravity is zero"),
+        "damping": state(scene.damping.mass > 0.0, "damping.mass is zero"),
+        "bodies": state(free, "no free body"),
+        "barrier": state(bool(pairs), "no surfaces that can meet"),
+        "friction": state(
+            bool(pairs) and friction is not None and friction.coefficient > 0.0,
+            "no surfaces that can meet" if not pairs else "no friction coefficient above zero",
+        ),
+    }
+
+
+def _contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
+    if scene.contact is None:
+        return ()
+    balls = [body for body in scene.bodies if body.surface is not None]
+    free = {body.name for body in scene.bodies if isinstance(body.motion, Free)}
+    touching = ["rods"] + [body.name for body in scene.bodies if body.contact_points or body.surface]
+    pairs = [f"{name} – {plane.name}" for plane in scene.obstacles for name in touching]
+    for index, ball in enumerate(balls):
+        pairs.append(f"rods – {ball.name}")
+        others = [body for body in scene.bodies if body.contact_points and body is not ball] + balls[:index]
+        pairs += [f"{body.name} – {ball.name}" for body in others if {body.name, ball.name} & free]
+    return tuple(pairs)

@@ -1,0 +1,89 @@
+"""The state of a run: everything that the next step depends on, and its flat form for logs and restarts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..errors import InputError
+from .model import Model, body_displacement
+
+Array = np.ndarray
+
+
+@dataclass
+class State:
+    """What is carried from step to step.
+
+    ``save`` and ``restore`` copy it bit for bit; time is an integer number of nominal steps, so that it does not drift.
+    """
+
+    step: Array  # nominal steps done, shape (1,)
+    halvings: Array  # present refinement of the step: dt/2^halvings, shape (1,)
+    position: Array  # of nodes [m], shape (n_node, 3)
+    velocity: Array  # [m/s], shape (n_node, 3)
+    director1: Array  # material director m1 of edges, unit, shape (n_edge, 3)
+    spin: Array  # rate of edges about their tangent [rad/s], shape (n_edge,)
+    twist: Array  # unwrapped twist angle of joints [rad], shape (n_joint,)
+    body_position: Array  # [m], shape (n_body, 3)
+    body_rotation: Array  # shape (n_body, 3, 3)
+    body_velocity: Array  # [m/s], shape (n_body, 3)
+    body_angular_velocity: Array  # [rad/s], shape (n_body, 3)
+    transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
+    override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
+
+    def flat(self) -> Array:
+        """All parts in order, as one array of float64."""
+        return np.concatenate([getattr(self, part.name).ravel() for part in fields(self)])
+
+    def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
+        """Name and shape of each part of `flat`."""
+        return tuple((part.name, getattr(self, part.name).shape) for part in fields(self))
+
+    def set_flat(self, flat: Array) -> None:
+        """Take all parts from a flat array.
+
+        Raises
+        ------
+        InputError
+            If its length or a value does not fit this model; nothing is changed then.
+        """
+        flat = np.asarray(flat, dtype=float)
+        size = sum(getattr(self, part.name).size for part in fields(self))
+        if flat.shape != (size,):
+            raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}")
+        bad = np.flatnonzero(~np.isfinite(flat[: size - self.override.size]))
+        if bad.size:
+            raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
+        start = 0
+        for part in fields(self):
+            array = getattr(self, part.name)
+            array[...] = flat[start : start + array.size].reshape(array.shape)
+            start += array.size
+
+
+def initial_state(model: Model) -> State:
+    """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies."""
+    bodies = model.bodies
+    count = len(bodies.names)
+    channels = list(model.scene.stimuli.values())
+    body_position = bodies.start_position.copy()
+    for index in range(count):
+        body_position[index] += body_displacement(bodies.times[index], bodies.displacements[index], 0.0)
+    first_values = np.array([channel.schedule.value(0.0) for channel in channels])
+    return State(
+        step=np.zeros(1),
+        halvings=np.zeros(1),
+        position=model.start_position.copy(),
+        velocity=np.zeros((model.node_count, 3)),
+        director1=model.start_director1[: model.edge_count].copy(),
+        spin=np.zeros(model.edge_count),
+        twist=np.zeros(len(model.joint_a)),
+        body_position=body_position,
+        body_rotation=np.tile(np.eye(3), (count, 1, 1)),
+        body_velocity=bodies.start_velocity.copy(),
+        body_angular_velocity=bodies.start_angular_velocity.copy(),
+        transduction=first_values[model.law_channel] if len(channels) else np.zeros(0),
+        override=np.full(len(channels), np.nan),
+    )

@@ -1,0 +1,1 @@
+"""The incremental potential of a step, its matrix, its minimum."""

@@ -1,0 +1,219 @@
+"""Newton's method on the incremental potential, with line search and a step bound.
+
+The Hessian is exact. Once factorised it serves several corrections as long as each is less than `KEEP_FACTOR_BELOW` times the one before;
+a new correction of the gradient at hand costs a fraction of a new factorisation. The last of them, not taken, is the measure of convergence:
+what Newton would still change, as the speed of the fastest material point [m/s].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from ..contact.step_bound import step_bound
+from ..model.build import carrier_names
+from ..model.model import Model
+from .configuration import Configuration
+from .potential import IncrementalPotential, StepContext
+
+Array = np.ndarray
+ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 2006, ch. 3)
+KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
+BACKTRACKING = 0.5
+MAX_BACKTRACKS = 30
+ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the potential below it mean nothing
+
+
+class NewtonStatus(Enum):
+    """How an attempt at a step ended; the value is the message."""
+
+    CONVERGED = "converged"
+    MAX_ITERATIONS = "Newton did not converge within the allowed iterations"
+    LINE_SEARCH = "no step along the Newton direction lowers the potential"
+    INDEFINITE = "the Newton matrix cannot be made positive definite"
+    NOT_FINITE = "the potential or its gradient is not finite"
+    BLOCKED = "prescribed motion would push a surface through another one"
+
+
+@dataclass(frozen=True)
+class NewtonReport:
+    """Result of one attempt at a step.
+
+    Attributes
+    ----------
+    status : NewtonStatus
+    iterations : int
+        Corrections taken.
+    factorisations : int
+        Exact Hessians assembled and factorised.
+    residual : float
+        Speed of the correction that was left [m/s].
+    backtracks : int
+        Halvings of the line search, all iterations together.
+    detail : str
+        What a message may add: the blocking node.
+    """
+
+    status: NewtonStatus
+    iterations: int
+    factorisations: int
+    residual: float
+    backtracks: int = 0
+    detail: str = ""
+
+    @property
+    def converged(self) -> bool:
+        """Whether the step may be accepted."""
+        return self.status is NewtonStatus.CONVERGED
+
+
+class NewtonSolver:
+    """Minimises the incremental potential of a model."""
+
+    def __init__(self, model: Model, potential: IncrementalPotential, tolerance: float, max_iterations: int):
+        self._model = model
+        self._potential = potential
+        self._tolerance = tolerance
+        self._max_iterations = max_iterations
+        self._carrier_step = np.zeros((len(model.carriers.weight), 3))
+        self._node_step = model.layout.node[:, None] + np.arange(3)
+        self._ball_radius = model.bodies.radius[model.bodies.body_of_free]
+        self._balls = np.flatnonzero(model.carriers.free_body >= 0)
+        self._free_of_balls = model.carriers.free_body[self._balls]
+
+    def speed(self, step: Array, body_step: Array) -> float:
+        """Largest displacement of a material point in a step, over the length of the time step [m/s]."""
+        model = self._model
+        largest = np.sqrt(np.square(step[self._node_step]).sum(axis=1).max())
+        largest = max(largest, np.abs(step[model.layout.edge] * model.half_width).max())
+        for b in range(model.free_count):
+            turn = self._ball_radius[b] * math.sqrt(body_step[b, 3:] @ body_step[b, 3:])
+            largest = max(largest, math.sqrt(body_step[b, :3] @ body_step[b, :3]) + turn)
+        return float(largest / self._potential.context.length)
+
+    def bound(self, at: Configuration, carrier_step: Array) -> tuple[float, int]:
+        """`contact.step_bound` of carriers at a configuration."""
+        if not self._potential.has_contact:
+            return 1.0, -1
+        carriers = self._model.carriers
+        pairs = slice(None) if self._potential.has_balls else slice(0)
+        planes = slice(None) if self._potential.has_planes else slice(0)
+        return step_bound(
+            at.carrier,
+            carrier_step,
+            carriers.radius,
+            carriers.plane_point[planes],
+            carriers.plane_normal[planes],
+            carriers.pair_first[pairs],
+            carriers.pair_second[pairs],
+        )
+
+    def first_guess(self, context: StepContext, target: Configuration, guess: Configuration) -> NewtonReport | None:
+        """Set `guess` to the start of the step moved by its velocity, prescribed nodes and points to their place.
+
+        Parameters
+        ----------
+        context : StepContext
+        target : Configuration
+            Whose carriers hold the prescribed positions at the end of the step; is overwritten.
+        guess : Configuration
+
+        Returns
+        -------
+        NewtonReport or None
+            A report if prescribed motion is blocked.
+        """
+        model, start = self._model, context.start
+        free = np.ones(len(start.carrier), dtype=bool)
+        free[model.attached_node] = False
+        free[model.node_count :] = model.carriers.free_body[model.node_count :] >= 0
+        move = target.carrier - start.carrier
+        inertial = np.zeros_like(move)
+        inertial[: model.node_count] = context.predicted_position - start.position
+        inertial[self._balls] = (context.predicted_body_position - start.body_position)[self._free_of_balls]
+        fraction = 1.0
+        for retry in (0.5, 0.0, None):
+            move[free] = fraction * inertial[free]
+            alpha, blocking = self.bound(start, move)
+            if alpha >= 1.0:
+                break
+            if retry is None:
+                name = carrier_names(model)[blocking]
+                return NewtonReport(NewtonStatus.BLOCKED, 0, 0, math.inf, detail=f"{name} would reach a surface")
+            fraction *= retry * alpha
+        guess.carrier[:] = start.carrier + move
+        guess.turn[:] = fraction * context.predicted_turn
+        guess.carry_frames(start, guess.turn)
+        guess.joint_strain[:, 2] = start.joint_strain[:, 2]
+        guess.body_position[:] = start.body_position
+        guess.body_position[self._free_of_balls] = guess.carrier[self._balls]
+        guess.body_rotation[:] = start.body_rotation
+        return None
+
+    def minimise(self, at: Configuration, trial: Configuration) -> tuple[NewtonReport, Configuration]:
+        """Move `at` to the minimum of the potential; `trial` is scratch. Returns the report and the final configuration."""
+        potential, matrix = self._potential, self._potential.matrix
+        factor = potential.diagonal_factor()
+        energy = potential.evaluate(at, True)
+        factorisations = iterations = backtracks = 0
+        fresh, previous = True, math.inf
+        status = NewtonStatus.MAX_ITERATIONS
+        residual = math.inf
+        if not math.isfinite(energy):
+            return NewtonReport(NewtonStatus.NOT_FINITE, 0, 0, math.inf), at
+        if not matrix.factorise(factor):
+            return NewtonReport(NewtonStatus.INDEFINITE, 0, 1, math.inf), at
+        factorisations = 1
+        while True:
+            step, body_step = matrix.newton_step(potential.gradient, potential.body_gradient)
+            residual = self.speed(step, body_step)
+            if not math.isfinite(residual):
+                status = NewtonStatus.NOT_FINITE
+                break
+            if residual <= self._tolerance:
+                status = NewtonStatus.CONVERGED
+                break
+            if iterations >= self._max_iterations:
+                break
+            if not fresh and residual > KEEP_FACTOR_BELOW * previous:
+                energy = potential.evaluate(at, True)
+                factorisations += 1
+                fresh, previous = True, math.inf
+                if not matrix.factorise(factor):
+                    status = NewtonStatus.INDEFINITE
+                    break
+                continue
+            moved = self._search(at, trial, step, body_step, energy)
+            if moved is None:
+                if fresh:
+                    status = NewtonStatus.LINE_SEARCH
+                    break
+                previous = 0.0  # a direction of an old matrix: try that of a new one
+                potential.evaluate(at, False)
+                continue
+            energy, halvings = moved
+            backtracks += halvings
+            iterations += 1
+            fresh, previous = False, (residual if halvings == 0 else 0.0)
+            at, trial = trial, at
+        return NewtonReport(status, iterations, factorisations, residual, backtracks), at
+
+    def _search(self, at, trial, step: Array, body_step: Array, energy: float) -> tuple[float, int] | None:
+        """Backtrack from the bound that keeps gaps open until the potential falls; None if it never does."""
+        potential, model = self._potential, self._model
+        slope = float(potential.gradient @ step) + float(np.sum(potential.body_gradient * body_step))
+        noise = ROUNDING * sum(abs(value) for value in potential.terms.values())
+        self._carrier_step[: model.node_count] = step[self._node_step]
+        self._carrier_step[self._balls] = body_step[self._free_of_balls, :3]
+        alpha, _ = self.bound(at, self._carrier_step)
+        bounded = alpha < 1.0
+        for halvings in range(MAX_BACKTRACKS):
+            trial.set_moved(at, step, body_step, alpha)
+            value = potential.evaluate(trial, False)
+            if value <= energy + ARMIJO * alpha * slope + noise:
+                return value, halvings + bounded
+            alpha *= BACKTRACKING
+        return None
