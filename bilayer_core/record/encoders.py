@@ -1,9 +1,100 @@
-"""From a `Frame` to the bytes of ROS messages, for the log and for `publish`."""
+"""From a `Frame` to the bytes of ROS messages, for the log and for `publish`.
+
+Each message is a template whose arrays are overwritten: some microseconds instead of milliseconds.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
 from bilayer_core.integrate.frame import Description, Frame
-from bilayer_core.record.topics import TopicSpec
+from bilayer_core.record.cdr import Template
+from bilayer_core.record.markers import MarkerEncoder
+from bilayer_core.record.node_frames import NodeFrames
+from bilayer_core.record.topics import FRAME_ID, output_topics
+
+POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
+SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")
+_FLOAT32_FIELD = 7  # sensor_msgs/PointField.FLOAT32
+
+
+def state_labels(description: Description) -> list[tuple[str, int]]:
+    """Labels ``name:shape`` of the parts of a state, for example ``positions:393x3``, with their sizes."""
+    return [
+        (f"{name}:{'x'.join(map(str, shape))}", int(np.prod(shape))) for name, shape in description.state_layout
+    ]
+
+
+def clock_template() -> Template:
+    """``rosgraph_msgs/Clock``."""
+    template = Template()
+    template.stamp()
+    return template
+
+
+def float64_template() -> Template:
+    """``std_msgs/Float64``: field ``data``."""
+    template = Template()
+    template.array("data", "<f8", (1,))
+    return template
+
+
+def multi_array_template(labels: Iterable[tuple[str, int]]) -> Template:
+    """``std_msgs/Float64MultiArray`` whose dimensions name consecutive parts of ``data`` with their sizes."""
+    labels = list(labels)
+    template = Template()
+    template.put("<u4", len(labels))
+    for label, size in labels:
+        template.text(label)
+        template.put("<u4", size, size)  # size, stride
+    total = sum(size for _, size in labels)
+    template.put("<u4", 0, total)  # data_offset, length of data
+    template.array("data", "<f8", (total,))
+    return template
+
+
+def stamped_template(numbers: int) -> Template:
+    """A header and some float64: PointStamped (3), WrenchStamped (6), PoseStamped (7); field ``data``."""
+    template = Template()
+    template.header(FRAME_ID)
+    template.array("data", "<f8", (numbers,))
+    return template
+
+
+def pose_array_template(count: int) -> Template:
+    """``geometry_msgs/PoseArray``: field ``poses``, rows x y z and quaternion x y z w."""
+    template = Template()
+    template.header(FRAME_ID)
+    template.put("<u4", count)
+    template.array("poses", "<f8", (count, 7))
+    return template
+
+
+def point_cloud_template(count: int) -> Template:
+    """``sensor_msgs/PointCloud2``: field ``points``, rows of `POINT_FIELDS`."""
+    step = 4 * len(POINT_FIELDS)
+    template = Template()
+    template.header(FRAME_ID)
+    template.put("<u4", 1, count, len(POINT_FIELDS))  # height, width, number of fields
+    for index, name in enumerate(POINT_FIELDS):
+        template.text(name)
+        template.put("<u4", 4 * index)
+        template.put("u1", _FLOAT32_FIELD)
+        template.put("<u4", 1)
+    template.put("u1", 0)  # is_bigendian
+    template.put("<u4", step, step * count, step * count)  # point_step, row_step, length of data
+    template.array("points", "<f4", (count, len(POINT_FIELDS)), alignment=1)
+    template.put("u1", 1)  # is_dense
+    return template
+
+
+def encode_float64(value: float) -> bytes:
+    """A ``std_msgs/Float64``."""
+    template = float64_template()
+    template.views()["data"][0] = value
+    return template.to_bytes()
 
 
 class FrameEncoder:
@@ -22,16 +113,85 @@ class FrameEncoder:
         What `encode` understands, see `output_topics`.
     """
 
-    topics: tuple[TopicSpec, ...]
-
     def __init__(self, description: Description):
-        raise NotImplementedError
+        self.topics = output_topics(description)
+        self._node_frames = NodeFrames(description)
+        self._energy: tuple[tuple[str, ...], Callable[[Frame], bytes]] = ((), lambda frame: b"")
+        self._encoders: dict[str, Callable[[Frame], bytes]] = {
+            "/clock": _simple(clock_template(), None),
+            "stimulus_applied": _simple(
+                multi_array_template((name, 1) for name in description.channels), lambda frame: frame.stimulus
+            ),
+            "com": _simple(stamped_template(3), lambda frame: frame.com),
+            "energy": self._encode_energy,
+            "solver": _simple(
+                multi_array_template((name, 1) for name in SOLVER_LABELS),
+                lambda frame: [getattr(frame, name) for name in SOLVER_LABELS],
+            ),
+            "state": _simple(multi_array_template(state_labels(description)), lambda frame: frame.state),
+            "nodes": self._nodes_encoder(),
+            "points": self._points_encoder(description),
+            "markers": MarkerEncoder(description, self._node_frames).encode,
+        }
+        for index, body in enumerate(description.bodies):
+            self._encoders[f"body_pose/{body.name}"] = _simple(
+                stamped_template(7),
+                lambda frame, i=index: np.concatenate([frame.body_positions[i], frame.body_quaternions[i]]),
+            )
+            self._encoders[f"contact_wrench/{body.name}"] = _simple(
+                stamped_template(6), lambda frame, i=index: frame.body_wrenches[i]
+            )
 
     def encode(self, name: str, frame: Frame) -> bytes:
         """The message of topic `name` (a `TopicSpec.name`) for `frame`; give it to ``publish`` as it is."""
-        raise NotImplementedError
+        return self._encoders[name](frame)
+
+    def _encode_energy(self, frame: Frame) -> bytes:
+        # The terms are known from the first frame on and do not change in a run.
+        terms, encode = self._energy
+        if terms != tuple(frame.energy):
+            template = multi_array_template((name, 1) for name in frame.energy)
+            encode = _simple(template, lambda frame: list(frame.energy.values()))
+            self._energy = (tuple(frame.energy), encode)
+        return encode(frame)
+
+    def _nodes_encoder(self) -> Callable[[Frame], bytes]:
+        nodes = self._node_frames
+        template = pose_array_template(len(nodes.order))
+        poses = template.views()["poses"]
+
+        def encode(frame: Frame) -> bytes:
+            nodes.update(frame)
+            poses[:, :3] = nodes.positions
+            poses[:, 3:] = nodes.quaternions
+            template.set_time(frame.time)
+            return template.to_bytes()
+
+        return encode
+
+    def _points_encoder(self, description: Description) -> Callable[[Frame], bytes]:
+        template = point_cloud_template(description.node_count)
+        points = template.views()["points"]
+
+        def encode(frame: Frame) -> bytes:
+            points[:, :3] = frame.positions
+            points[:, 3] = frame.strain
+            points[:, 4] = frame.curvature
+            points[:, 5:] = frame.contact_forces
+            template.set_time(frame.time)
+            return template.to_bytes()
+
+        return encode
 
 
-def encode_float64(value: float) -> bytes:
-    """A ``std_msgs/Float64``."""
-    raise NotImplementedError
+def _simple(template: Template, values: Callable[[Frame], np.ndarray] | None) -> Callable[[Frame], bytes]:
+    """Encoder of a message with stamps and at most one array, ``data``, which `values` takes from the frame."""
+    data = template.views().get("data")
+
+    def encode(frame: Frame) -> bytes:
+        if values is not None:
+            data[:] = values(frame)
+        template.set_time(frame.time)
+        return template.to_bytes()
+
+    return encode

@@ -6,6 +6,7 @@ Stamps are simulation time, the frame is ``world`` with z up, units are SI.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -95,3 +96,29 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
 def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
     """The topics on which single channels are set; a log holds each value at the time from which it acted."""
     return tuple(TopicSpec(f"stimulus/{name}", "std_msgs/msg/Float64", Rate.EVENT) for name in description.channels)
+
+
+class DisplayGate:
+    """Tells which frames carry the topics of `Rate.DISPLAY`: the first one in each period of their rate.
+
+    Parameters
+    ----------
+    rate : float
+        Of frames [Hz].
+    display_rate : float
+        Wished rate of those topics [Hz]; they cannot come more often than frames.
+    """
+
+    # Frames come at multiples of the time step, up to rounding; in periods.
+    _ROUNDING = 1e-6
+
+    def __init__(self, rate: float, display_rate: float):
+        self._rate = min(rate, display_rate)
+        self._period = -1
+
+    def is_due(self, time: float) -> bool:
+        """Whether the frame at `time` [s] carries them; asked once a frame."""
+        period = math.floor(time * self._rate + self._ROUNDING)
+        due = period != self._period
+        self._period = period
+        return due

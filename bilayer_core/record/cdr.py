@@ -1,0 +1,118 @@
+"""Messages as templates: the CDR bytes are built once, and each frame overwrites the arrays in them.
+
+The encoding is XCDR1, little-endian: a header of four bytes, then every field aligned to its own size (8 at most),
+counted from the end of the header; a string is its length with the closing zero, its bytes, and the zero.
+"""
+
+from __future__ import annotations
+
+import struct
+
+import numpy as np
+
+HEADER = b"\x00\x01\x00\x00"
+_STAMP = struct.Struct("<iI")
+NANOSECONDS = 1_000_000_000
+
+
+def nanoseconds(time: float) -> int:
+    """Simulation time [s] as a whole number of nanoseconds."""
+    return round(time * NANOSECONDS)
+
+
+class Template:
+    """A message whose layout is fixed; written field by field, then overwritten and copied out once a frame.
+
+    Attributes
+    ----------
+    fields : dict
+        Name -> (offset in the message [bytes], dtype, shape) of each array that changes.
+    """
+
+    def __init__(self) -> None:
+        self._buffer = bytearray(HEADER)
+        self._stamps: list[int] = []
+        self.fields: dict[str, tuple[int, np.dtype, tuple[int, ...]]] = {}
+
+    def align(self, size: int) -> None:
+        """Pad to a multiple of `size`."""
+        self._buffer += bytes(-(len(self._buffer) - len(HEADER)) % size)
+
+    def put(self, dtype: str, *values: float) -> None:
+        """Append numbers of one little-endian type, for example ``"<u4"``, that never change."""
+        array = np.array(values, dtype)
+        self.align(array.itemsize)
+        self._buffer += array.tobytes()
+
+    def text(self, text: str) -> None:
+        """Append a string."""
+        data = text.encode() + b"\0"
+        self.put("<u4", len(data))
+        self._buffer += data
+
+    def stamp(self) -> None:
+        """Append a time that `set_time` overwrites."""
+        self.align(4)
+        self._stamps.append(len(self._buffer))
+        self._buffer += bytes(_STAMP.size)
+
+    def header(self, frame_id: str) -> None:
+        """Append a ``std_msgs/Header``."""
+        self.stamp()
+        self.text(frame_id)
+
+    def array(self, name: str, dtype: str, shape: tuple[int, ...], alignment: int | None = None) -> None:
+        """Append zeros that `views` opens for writing. An array without elements has no padding before it."""
+        kind = np.dtype(dtype)
+        size = int(np.prod(shape)) * kind.itemsize
+        if size:
+            self.align(alignment or kind.itemsize)
+        self.fields[name] = (len(self._buffer), kind, shape)
+        self._buffer += bytes(size)
+
+    def views(self) -> dict[str, np.ndarray]:
+        """Writable arrays into the message, one for each field. Nothing can be appended afterwards."""
+        return {name: decode(self._buffer, field) for name, field in self.fields.items()}
+
+    def set_time(self, time: float) -> None:
+        """Write simulation time [s] into every stamp."""
+        seconds, rest = divmod(nanoseconds(time), NANOSECONDS)
+        for offset in self._stamps:
+            _STAMP.pack_into(self._buffer, offset, seconds, rest)
+
+    def __len__(self) -> int:
+        return len(self._buffer)
+
+    def to_bytes(self) -> bytes:
+        """A copy of the message as it stands."""
+        return bytes(self._buffer)
+
+
+def decode(data: bytes | bytearray, field: tuple[int, np.dtype, tuple[int, ...]]) -> np.ndarray:
+    """View of one field (an item of `Template.fields`) of a message, without a copy."""
+    offset, dtype, shape = field
+    return np.frombuffer(data, dtype, int(np.prod(shape)), offset if np.prod(shape) else 0).reshape(shape)
+
+
+def read_float64_multi_array(data: bytes) -> tuple[list[tuple[str, int]], np.ndarray]:
+    """Labels with their sizes, and the values, of a ``std_msgs/Float64MultiArray``."""
+    position = len(HEADER)
+
+    def unsigned() -> int:
+        nonlocal position
+        position += -(position - len(HEADER)) % 4
+        (value,) = struct.unpack_from("<I", data, position)
+        position += 4
+        return value
+
+    labels = []
+    for _ in range(unsigned()):
+        length = unsigned()
+        label = data[position : position + length - 1].decode()
+        position += length
+        labels.append((label, unsigned()))
+        unsigned()  # stride
+    unsigned()  # data_offset
+    count = unsigned()
+    position += -(position - len(HEADER)) % 8 if count else 0
+    return labels, np.frombuffer(data, "<f8", count, position)

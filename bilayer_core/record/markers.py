@@ -1,0 +1,211 @@
+"""Markers for RViz and Foxglove: few, with many points and steady ids, each in a namespace of its own.
+
+================================ =============================================================================
+``strands/<rod>/<layer>``        LINE_LIST: one bar across the width at each node, as thick as the spacing of
+                                 nodes, so that the bars tile the ribbon; coloured by strain, full at `STRAIN_LIMIT`
+``bodies/<name>``                SPHERE, or a small CUBE for a body without a surface
+``obstacles/<name>``             CUBE of `PLANE_SIZE`, its upper face on the plane
+``contact_forces``               LINE_LIST of arrows from nodes and contact points. Contact forces of one scene
+                                 differ by decades, so length is logarithmic: `ARROW_DECADE` times
+                                 log10(1 + force / `ARROW_FORCE`). Deleted while nothing touches.
+================================ =============================================================================
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bilayer_core.integrate.frame import Description, Frame
+from bilayer_core.record.cdr import Template
+from bilayer_core.record.colours import strain_colours
+from bilayer_core.record.node_frames import NodeFrames
+from bilayer_core.record.topics import FRAME_ID
+
+STRAIN_LIMIT = 0.05
+PLANE_SIZE = 1.0  # edge of the square drawn for a plane [m]
+PLANE_THICKNESS = 1e-3  # [m]
+ARROW_DECADE = 0.01  # length of an arrow for each power of ten [m]
+ARROW_FORCE = 1e-4  # force from which arrows grow [N]
+ARROW_SHOWN = 1e-6  # forces below this have no arrow [N]
+ARROW_WIDTH = 6e-4  # [m]
+HEAD_SHARE = 0.25  # of an arrow's length
+HEAD_HALF_WIDTH = 0.1  # of an arrow's length
+
+BODY_COLOUR = (0.93, 0.62, 0.13, 1.0)
+PLANE_COLOUR = (0.42, 0.45, 0.50, 0.6)
+ARROW_COLOUR = (0.10, 0.75, 0.35, 1.0)
+
+CUBE, SPHERE, LINE_LIST = 1, 2, 5
+ADD, DELETE = 0, 2
+_IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def force_arrows(origins: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Ends of the lines of arrows: a shaft and two barbs each.
+
+    Parameters
+    ----------
+    origins, forces : ndarray
+        [m, N], shape (arrows, 3); no force is zero.
+
+    Returns
+    -------
+    ndarray
+        Pairs of points [m], shape (6 arrows, 3).
+    """
+    size = np.linalg.norm(forces, axis=1, keepdims=True)
+    direction = forces / size
+    length = ARROW_DECADE * np.log10(1 + size / ARROW_FORCE)
+    upright = np.abs(direction[:, 2:]) > 0.9
+    sideways = np.cross(direction, np.where(upright, (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    sideways *= HEAD_HALF_WIDTH * length / np.linalg.norm(sideways, axis=1, keepdims=True)
+    tip = origins + length * direction
+    base = tip - HEAD_SHARE * length * direction
+    return np.stack([origins, tip, tip, base + sideways, tip, base - sideways], axis=1).reshape(-1, 3)
+
+
+def plane_pose(point: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Position and quaternion x y z w that put a box of `PLANE_THICKNESS` under a plane, z along its normal."""
+    normal = np.asarray(normal) / np.linalg.norm(normal)
+    # The half-way rotation from z to the normal; a half turn about x if they are opposite.
+    rotation = np.array([-normal[1], normal[0], 0.0, 1.0 + normal[2]])
+    size = np.linalg.norm(rotation)
+    rotation = rotation / size if size > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
+    return np.concatenate([point - 0.5 * PLANE_THICKNESS * normal, rotation])
+
+
+class MarkerEncoder:
+    """Encodes frames as ``visualization_msgs/MarkerArray``; the only marker of changing size, arrows, comes last.
+
+    Parameters
+    ----------
+    description : Description
+    node_frames : NodeFrames
+        Of the same model.
+    """
+
+    def __init__(self, description: Description, node_frames: NodeFrames):
+        self._nodes = node_frames
+        template = Template()
+        template.put("<u4", len(description.strands) + len(description.bodies) + len(description.obstacles) + 1)
+        for index, (strand, own) in enumerate(zip(description.strands, node_frames.ranges, strict=True)):
+            count = 2 * (own.stop - own.start)
+            # The thickness of the bars is the spacing of nodes, known from the first frame.
+            _head(template, f"strands/{strand.name}", LINE_LIST, (1.0, 1.0, 1.0, 1.0), scale_field=f"spacing{index}")
+            template.put("<u4", count)
+            template.array(f"points{index}", "<f8", (count, 3))
+            template.put("<u4", count)
+            template.array(f"colours{index}", "<f4", (count, 4))
+            _tail(template)
+        hub = max(strand.width for strand in description.strands)
+        for index, body in enumerate(description.bodies):
+            shape, size = (SPHERE, 2 * body.radius) if body.radius else (CUBE, hub)
+            _head(template, f"bodies/{body.name}", shape, BODY_COLOUR, (size,) * 3, pose_field=f"pose{index}")
+            template.put("<u4", 0, 0)
+            _tail(template)
+        for plane in description.obstacles:
+            size = (PLANE_SIZE, PLANE_SIZE, PLANE_THICKNESS)
+            pose = plane_pose(plane.point, plane.normal)
+            _head(template, f"obstacles/{plane.name}", CUBE, PLANE_COLOUR, size, pose)
+            template.put("<u4", 0, 0)
+            _tail(template)
+        _head(template, "contact_forces", LINE_LIST, ARROW_COLOUR, (ARROW_WIDTH, 0.0, 0.0), action_field="arrows")
+        template.array("arrow_count", "<u4", (1,))
+        self._arrows_offset = len(template)
+        template.align(8)
+        self._arrows_start = len(template)
+        template.put("<u4", 0)  # colours: none, the marker's own counts
+        _tail(template)
+        self._template = template
+
+        views = template.views()
+        self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
+        strands = range(len(description.strands))
+        self._points = [views[f"points{i}"].reshape(-1, 2, 3) for i in strands]
+        self._colours = [views[f"colours{i}"].reshape(-1, 2, 4) for i in strands]
+        self._spacings = [views[f"spacing{i}"] for i in strands]
+        self._body_poses = [views[f"pose{i}"] for i in range(len(description.bodies))]
+        self._half_width = np.concatenate(
+            [
+                np.full((ranges.stop - ranges.start, 1), 0.5 * strand.width)
+                for strand, ranges in zip(description.strands, node_frames.ranges, strict=True)
+            ]
+        )
+        self._bars = np.empty((len(node_frames.order), 2, 3))
+
+    def encode(self, frame: Frame) -> bytes:
+        """The message for `frame`."""
+        nodes = self._nodes
+        nodes.update(frame)
+        half = self._half_width * nodes.widths
+        np.subtract(nodes.positions, half, out=self._bars[:, 0])
+        np.add(nodes.positions, half, out=self._bars[:, 1])
+        colours = strain_colours(frame.strain[nodes.order], STRAIN_LIMIT)[:, None, :]
+        for own, points, colour, spacing in zip(nodes.ranges, self._points, self._colours, self._spacings, strict=True):
+            points[:] = self._bars[own]
+            colour[:] = colours[own]
+            if spacing[0] == 0.0:
+                steps = np.diff(nodes.positions[own], axis=0)
+                spacing[0] = np.sqrt((steps * steps).sum(axis=1)).mean()
+        for index, pose in enumerate(self._body_poses):
+            pose[:3] = frame.body_positions[index]
+            pose[3:] = frame.body_quaternions[index]
+        self._template.set_time(frame.time)
+
+        forces = frame.contact_forces
+        touching = np.flatnonzero(np.einsum("ij,ij->i", forces, forces) > ARROW_SHOWN**2)
+        self._arrow_action[0] = ADD if len(touching) else DELETE
+        self._arrow_count[0] = 6 * len(touching)
+        message = self._template.to_bytes()
+        if not len(touching):
+            return message[: self._arrows_offset] + message[self._arrows_start :]
+        arrows = force_arrows(frame.positions[touching], forces[touching])
+        return message[: self._arrows_start] + arrows.astype("<f8").tobytes() + message[self._arrows_start :]
+
+
+def _head(
+    template: Template,
+    namespace: str,
+    shape: int,
+    colour: tuple[float, ...],
+    scale: tuple[float, ...] = (),
+    pose: np.ndarray | tuple[float, ...] = _IDENTITY,
+    *,
+    scale_field: str = "",
+    pose_field: str = "",
+    action_field: str = "",
+) -> None:
+    """Append a Marker up to its points; fields with a name change from frame to frame (of the scale, x alone)."""
+    template.header(FRAME_ID)
+    template.text(namespace)
+    template.put("<i4", 0, shape)
+    if action_field:
+        template.array(action_field, "<i4", (1,))
+    else:
+        template.put("<i4", ADD)
+    if pose_field:
+        template.array(pose_field, "<f8", (7,))
+    else:
+        template.put("<f8", *pose)
+    if scale_field:
+        template.array(scale_field, "<f8", (1,))
+        template.put("<f8", 0.0, 0.0)
+    else:
+        template.put("<f8", *scale)
+    template.put("<f4", *colour)
+    template.put("<i4", 0, 0)  # lifetime: for ever
+    template.put("u1", 0)  # frame_locked
+
+
+def _tail(template: Template) -> None:
+    """Append a Marker's fields after its colours, all empty: texture, text and mesh."""
+    template.text("")  # texture_resource
+    template.put("<i4", 0, 0)  # stamp of the texture
+    template.text("")  # frame_id of the texture
+    template.text("")  # format of the texture
+    template.put("<u4", 0, 0)  # texture data, uv_coordinates
+    template.text("")  # text
+    template.text("")  # mesh_resource
+    template.text("")  # filename of the mesh
+    template.put("<u4", 0)  # mesh data
+    template.put("u1", 0)  # mesh_use_embedded_materials
