@@ -1,14 +1,39 @@
-"""The MCAP log: an observer that writes every frame in a thread of its own."""
+"""The MCAP log: an observer that writes every frame in a thread of its own.
+
+A log holds the topics of `bilayer_core.record.topics` as ROS 2 messages (profile ``ros2``), the scene as attachment
+``scene.yaml``, and the metadata records ``versions``, ``settings``, ``description`` (before the first message) and
+``run`` (``complete``, ``termination``, ``last_time``; written at the end, so a log without it was cut off).
+"""
 
 from __future__ import annotations
 
+import os
+import queue
+import threading
+import time as clock
 from pathlib import Path
 
+from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrate.frame import Description, Frame
+from bilayer_core.record.cdr import nanoseconds
+from bilayer_core.record.description_text import to_text
+from bilayer_core.record.encoders import FrameEncoder, encode_float64
+from bilayer_core.record.paths import check_output_path
+from bilayer_core.record.schemas import schema_text
+from bilayer_core.record.topics import DisplayGate, Rate, stimulus_topics
+
+CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
+FLUSH_PERIOD = 0.5  # longest time a message waits for its chunk to be written [s of wall time]
+SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
+QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
+SCENE_ATTACHMENT = "scene.yaml"
 
 
 class McapRecorder:
     """Observer that writes an MCAP log; importing this module does not import mcap.
+
+    Nothing is dropped: when the writer is 64 frames behind, `observe` waits for it. What was handed over more than
+    about a second ago survives a crash of the process or of the machine.
 
     Parameters
     ----------
@@ -28,20 +53,187 @@ class McapRecorder:
     """
 
     def __init__(self, path: str | Path, rate: float = 50.0, marker_rate: float = 20.0, force: bool = False):
-        raise NotImplementedError
+        self.path = check_output_path(path, force)
+        self.rate = rate
+        self._gate = DisplayGate(rate, marker_rate)
+        self._mode = "wb" if force else "xb"
+        self._channels: tuple[str, ...] = ()
+        self._last_time = 0.0
+        self._queue: queue.Queue = queue.Queue(QUEUE_LENGTH)
+        self._thread: threading.Thread | None = None
+        self._failure: Exception | None = None
 
     def start(self, description: Description) -> None:
         """Open the file; write scene and settings, and flush them."""
-        raise NotImplementedError
+        try:
+            log = _LogFile(self.path, self._mode, description, self._gate)
+        except OSError as error:
+            raise InputError(f"{self.path}: cannot be written: {error.strerror or error}") from error
+        self._channels = description.channels
+        # A daemon, so that a program that ends without `close` is not kept alive; its log is then cut off.
+        self._thread = threading.Thread(target=self._write, args=(log,), name="mcap log", daemon=True)
+        self._thread.start()
 
     def observe(self, frame: Frame) -> None:
         """Hand a frame to the writer; waits when the writer is behind. Raises SimulationError once writing failed."""
-        raise NotImplementedError
+        self._last_time = frame.time
+        self._put(frame)
 
     def log_stimulus(self, channel: str, value: float, time: float) -> None:
         """Log a stimulus set from outside at the time [s] from which it acts."""
-        raise NotImplementedError
+        if channel not in self._channels:
+            raise InputError(f"stimulus {channel!r}: no such channel; the log has: {', '.join(self._channels)}")
+        self._put((channel, value, time))
 
     def close(self, complete: bool, termination: str = "") -> None:
-        """Write what is left and finish the file. Raises SimulationError if anything could not be written."""
-        raise NotImplementedError
+        """Write what is left and finish the file. Raises SimulationError if anything could not be written.
+
+        Parameters
+        ----------
+        complete : bool
+            Whether the run reached its end.
+        termination : str
+            Why it ended, for `read_info`; by default ``"completed"`` or ``"stopped"``.
+        """
+        if self._thread is None:
+            return
+        termination = termination or ("completed" if complete else "stopped")
+        ending = {
+            "complete": "true" if complete else "false",
+            "termination": termination,
+            "last_time": repr(float(self._last_time)),
+        }
+        try:
+            self._put(ending)
+            self._thread.join()
+        finally:
+            self._thread = None
+        self._raise_failure()
+
+    def _put(self, item: Frame | tuple[str, float, float] | dict[str, str]) -> None:
+        if self._thread is None and self._failure is None:
+            raise RuntimeError("the recorder has not been started, or is closed")
+        while True:
+            self._raise_failure()
+            try:
+                return self._queue.put(item, timeout=0.1)
+            except queue.Full:
+                continue
+
+    def _raise_failure(self) -> None:
+        if isinstance(self._failure, OSError):
+            reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}"
+            raise SimulationError(reason, self._last_time) from self._failure
+        if self._failure is not None:
+            raise self._failure
+
+    def _write(self, log: _LogFile) -> None:
+        """The writer's thread: until the ending comes or something fails, which the other thread then raises."""
+        try:
+            try:
+                while True:
+                    try:
+                        item = self._queue.get(timeout=log.time_to_flush())
+                    except queue.Empty:
+                        log.flush()
+                        continue
+                    if isinstance(item, dict):
+                        log.finish(item)
+                        return
+                    log.write(item)
+                    if log.time_to_flush() == 0.0:
+                        log.flush()
+            finally:
+                log.close()
+        except Exception as error:
+            self._failure = error
+
+
+class _LogFile:
+    """The file itself, used by one thread at a time."""
+
+    def __init__(self, path: Path, mode: str, description: Description, gate: DisplayGate):
+        import mcap
+        from mcap.writer import CompressionType, Writer
+
+        from bilayer_core.integrate.observe import versions
+
+        self._gate = gate
+        self._encoder = FrameEncoder(description)
+        self._file = open(path, mode)
+        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.LZ4)
+        self._sequence = 0
+        self._unflushed_since: float | None = None
+        self._synced = clock.monotonic()
+        try:
+            used = {**versions(), "mcap": mcap.__version__}
+            self._writer.start(profile="ros2", library=f"bilayer_sim_ros {used['bilayer_sim_ros']}")
+            scene = description.scene_text.encode()
+            self._writer.add_attachment(0, 0, SCENE_ATTACHMENT, "application/yaml", scene)
+            self._writer.add_metadata("versions", used)
+            settings = {key: text for key, text in description.settings.items() if key not in used}
+            self._writer.add_metadata("settings", settings)
+            self._writer.add_metadata("description", to_text(description))
+            schemas: dict[str, int] = {}
+            self._topics: dict[str, int] = {}
+            for spec in (*self._encoder.topics, *stimulus_topics(description)):
+                if spec.type not in schemas:
+                    text = schema_text(spec.type).encode()
+                    schemas[spec.type] = self._writer.register_schema(spec.type, "ros2msg", text)
+                self._topics[spec.name] = self._writer.register_channel(
+                    spec.full_name(), "cdr", schemas[spec.type], {}
+                )
+            self._writer.flush()
+            self._sync()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def write(self, item: Frame | tuple[str, float, float]) -> None:
+        """Write the messages of a frame, or a stimulus."""
+        if isinstance(item, tuple):
+            channel, value, time = item
+            self._add(f"stimulus/{channel}", nanoseconds(time), encode_float64(value))
+        else:
+            stamp = nanoseconds(item.time)
+            display = self._gate.is_due(item.time)
+            for spec in self._encoder.topics:
+                if display or spec.rate is not Rate.DISPLAY:
+                    self._add(spec.name, stamp, self._encoder.encode(spec.name, item))
+            self._sequence += 1
+        if self._unflushed_since is None:
+            self._unflushed_since = clock.monotonic()
+
+    def _add(self, name: str, stamp: int, data: bytes) -> None:
+        self._writer.add_message(self._topics[name], stamp, data, stamp, self._sequence)
+
+    def time_to_flush(self) -> float | None:
+        """Wall time until `flush` is due [s], None if there is nothing to flush."""
+        if self._unflushed_since is None:
+            return None
+        return max(0.0, self._unflushed_since + FLUSH_PERIOD - clock.monotonic())
+
+    def flush(self) -> None:
+        """Write the chunk in hand; every second also to the disk."""
+        self._writer.flush()
+        self._unflushed_since = None
+        if clock.monotonic() - self._synced >= SYNC_PERIOD - FLUSH_PERIOD:
+            self._sync()
+
+    def _sync(self) -> None:
+        os.fsync(self._file.fileno())
+        self._synced = clock.monotonic()
+        if os.fstat(self._file.fileno()).st_nlink == 0:
+            raise OSError(None, "the file was deleted while it was written")
+
+    def finish(self, ending: dict[str, str]) -> None:
+        """Write the metadata ``run`` and the file's index."""
+        self._writer.flush()
+        self._writer.add_metadata("run", ending)
+        self._writer.finish()
+        self._file.flush()
+        self._sync()
+
+    def close(self) -> None:
+        """Close the file as it is."""
+        self._file.close()

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from bilayer_core.integrate.frame import Description, Frame
+from bilayer_core.record.encoders import SOLVER_LABELS
+from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.run_data import RunData
 
 
@@ -31,4 +35,32 @@ class MemoryRecorder:
 
     def run_data(self) -> RunData:
         """The frames as arrays over time."""
-        raise NotImplementedError
+        if self.description is None:
+            raise RuntimeError("no run has been observed yet")
+        frames = self.frames
+        node_frames = NodeFrames(self.description)
+
+        def stack(name: str, dtype: type = float) -> np.ndarray:
+            return np.array([getattr(frame, name) for frame in frames], dtype)
+
+        def material_frames(frame: Frame) -> np.ndarray:
+            node_frames.update(frame)
+            return node_frames.quaternions.astype(np.float32)
+
+        return RunData(
+            description=self.description,
+            times=stack("time"),
+            stimulus=stack("stimulus"),
+            energy={name: np.array([frame.energy[name] for frame in frames]) for name in frames[0].energy},
+            com=stack("com"),
+            body_positions=stack("body_positions"),
+            body_quaternions=stack("body_quaternions"),
+            body_wrenches=stack("body_wrenches"),
+            solver={name: stack(name) for name in SOLVER_LABELS},
+            shape_times=stack("time"),
+            positions=stack("positions", np.float32),
+            contact_forces=stack("contact_forces", np.float32),
+            material_frames=np.array([material_frames(frame) for frame in frames]),
+            strain=stack("strain", np.float32),
+            curvature=stack("curvature", np.float32),
+        )

@@ -50,6 +50,12 @@ def _tangent(positions, start):
     return _unit(combine(1.0, row(positions, start + 1), -1.0, row(positions, start)))
 
 
+def node_order(description: Description) -> np.ndarray:
+    """Index in a `Frame` of every node of a strand, strand by strand, shape (strand nodes,)."""
+    nodes = np.arange(description.node_count)
+    return np.concatenate([nodes[strand.nodes] for strand in description.strands])
+
+
 class NodeFrames:
     """Positions and material frames of the nodes of all strands, strand by strand.
 
@@ -65,13 +71,13 @@ class NodeFrames:
     """
 
     def __init__(self, description: Description):
-        nodes, edges = np.arange(description.node_count), np.arange(description.edge_count)
-        self.order = np.concatenate([nodes[strand.nodes] for strand in description.strands])
+        edges = np.arange(description.edge_count)
+        self.order = node_order(description)
         self._edge_order = np.concatenate([edges[strand.edges] for strand in description.strands])
         before, after, start, ranges = [], [], [], []
         node_count = edge_count = 0
         for strand in description.strands:
-            size = len(nodes[strand.nodes])
+            size = len(edges[strand.edges]) + 1
             own = edge_count + np.arange(size - 1)
             before += [own[0], *own]
             after += [*own, own[-1]]

@@ -1,0 +1,42 @@
+"""A `Description` as text for the metadata of a log, and back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, fields
+
+import numpy as np
+
+from bilayer_core.integrate.frame import BodyInfo, Description, PlaneInfo, Strand
+
+
+def _plain(value):
+    """What JSON has no notation for, as lists."""
+    if isinstance(value, slice):
+        return [value.start, value.stop]
+    return np.asarray(value).tolist()
+
+
+def to_text(description: Description) -> dict[str, str]:
+    """One JSON value for each attribute but the scene's text, which a log holds as an attachment."""
+    attributes = asdict(description)
+    del attributes["scene_text"]
+    return {name: json.dumps(value, default=_plain) for name, value in attributes.items()}
+
+
+def from_text(attributes: dict[str, str], scene_text: str) -> Description:
+    """The description of which `attributes` is `to_text`."""
+    names = [item.name for item in fields(Description) if item.name != "scene_text"]
+    values = {name: json.loads(attributes[name]) for name in names}
+    values["strands"] = tuple(
+        Strand(**{**strand, "nodes": slice(*strand["nodes"]), "edges": slice(*strand["edges"])})
+        for strand in values["strands"]
+    )
+    values["bodies"] = tuple(BodyInfo(**body) for body in values["bodies"])
+    values["obstacles"] = tuple(
+        PlaneInfo(plane["name"], np.array(plane["point"]), np.array(plane["normal"])) for plane in values["obstacles"]
+    )
+    values["channels"] = tuple(values["channels"])
+    values["channel_ranges"] = tuple((lower, upper) for lower, upper in values["channel_ranges"])
+    values["state_layout"] = tuple((name, tuple(shape)) for name, shape in values["state_layout"])
+    return Description(scene_text=scene_text, **values)
