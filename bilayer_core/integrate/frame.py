@@ -123,11 +123,11 @@ class Frame:
     min_gap : float
         Smallest contact distance of the model [m]; infinity if there is no contact pair.
     iterations : int
-        Newton iterations of the steps since the observation before.
+        Newton iterations since the start of the run.
     residual : float
-        Largest velocity correction left at the end of those steps [m/s].
+        Largest velocity correction left in the last step [m/s].
     substeps : int
-        Steps actually taken since the observation before (more than nominal when steps were halved).
+        Parts of steps taken since the start of the run; more than nominal steps where these were halved.
     cpu_time : float
         CPU seconds of the stepping thread up to here [s].
     state : ndarray

@@ -2,14 +2,16 @@
 
     q̃ = qₙ + h vₙ,   minimise ½ |q − q̃|²_M/h² + V(q),   v = (q − qₙ)/h
 
-For rotations R̃ = Rₙ + h [ωₙ]× Rₙ, and [ω]× is the skew part of (R − Rₙ) Rᵀ/h.
+Rotations of bodies are treated likewise on their group: R̃ = exp(h [ω̃]×) Rₙ with ω̃ = ωₙ + h I⁻¹ (I ωₙ × ωₙ) (the torque-free change of a body that is no
+ball), and ω = log(R Rₙᵀ)/h. A ball that spins freely keeps its spin; with R̃ = Rₙ + h [ωₙ]× Rₙ, implicit Euler of the mass points, it
+would lose h ω²/2 of it in each unit of time.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..kinematics.rotation import skew
+from ..kinematics.rotation import rotation_matrix, rotation_vector
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
@@ -22,16 +24,17 @@ ORDER = 1
 def predict(model: Model, state: State, start: Configuration, h: float, eigenstrain: np.ndarray) -> StepContext:
     """Frozen data of a step of length `h` [s] from `state`."""
     free = model.bodies.body_of_free
-    rotation = np.array(
-        [r + h * skew(w) @ r for r, w in zip(start.body_rotation, state.body_angular_velocity[free], strict=True)]
-    )
+    rotation = np.empty((len(free), 3, 3))
+    for place, body in enumerate(free):
+        spin = _torque_free_spin(model, place, start.body_rotation[place], state.body_angular_velocity[body], h)
+        rotation[place] = rotation_matrix(h * spin) @ start.body_rotation[place]
     return StepContext(
         length=h,
         start=start,
         predicted_position=state.position + h * state.velocity,
         predicted_turn=h * state.spin,
         predicted_body_position=start.body_position + h * state.body_velocity[free],
-        predicted_body_rotation=rotation.reshape(-1, 3, 3),
+        predicted_body_rotation=rotation,
         eigenstrain=eigenstrain,
     )
 
@@ -45,13 +48,18 @@ def accept(model: Model, state: State, context: StepContext, end: Configuration)
     state.spin[:] = end.turn / h
     state.twist[:] = end.joint_strain[:, 2]
     for place, body in enumerate(model.bodies.body_of_free):
-        moved = (end.body_rotation[place] - context.start.body_rotation[place]) @ end.body_rotation[place].T
+        turn = end.body_rotation[place] @ context.start.body_rotation[place].T
         state.body_velocity[body] = (end.body_position[place] - context.start.body_position[place]) / h
-        state.body_angular_velocity[body] = (
-            0.5 / h * np.array([moved[2, 1] - moved[1, 2], moved[0, 2] - moved[2, 0], moved[1, 0] - moved[0, 1]])
-        )
+        state.body_angular_velocity[body] = rotation_vector(turn) / h
         state.body_position[body] = end.body_position[place]
         state.body_rotation[body] = _orthonormal(end.body_rotation[place])
+
+
+def _torque_free_spin(model: Model, place: int, rotation: np.ndarray, spin: np.ndarray, h: float) -> np.ndarray:
+    """Angular velocity [rad/s] after a step `h` [s] without torque, to first order; unchanged for a ball."""
+    second = model.bodies.second_moment[place]
+    inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
+    return spin + h * np.linalg.solve(inertia, np.cross(inertia @ spin, spin))
 
 
 def _orthonormal(matrix: np.ndarray) -> np.ndarray:

@@ -6,23 +6,14 @@ import platform
 
 import numpy as np
 
-from ..jit import kernel
 from ..kinematics.rotation import quaternion_from_matrix
 from ..model.model import Model
 from ..model.state import State
+from .statistics import RunStatistics, center_of_mass
 from .frame import BodyInfo, Description, Frame, PlaneInfo, Strand
 from .stepper import Stepper
 
 Array = np.ndarray
-
-
-@kernel
-def largest_row(rows):
-    """Largest Euclidean norm of the rows of an (n, 3) array; 0 if it is empty."""
-    largest = 0.0
-    for i in range(rows.shape[0]):
-        largest = max(largest, rows[i, 0] ** 2 + rows[i, 1] ** 2 + rows[i, 2] ** 2)
-    return largest**0.5
 
 
 def versions() -> dict[str, str]:
@@ -133,11 +124,6 @@ def node_curvature(model: Model, stepper: Stepper) -> Array:
     return curvature
 
 
-def center_of_mass(model: Model, state: State) -> Array:
-    """Mass centre of the rods [m], shape (3,)."""
-    return model.node_mass @ state.position / model.node_mass.sum()
-
-
 def energies(stepper: Stepper, state: State) -> dict[str, float]:
     """Energy of each term of the last accepted configuration [J]; dissipation potentials are none and are left out."""
     model, terms = stepper.model, stepper.potential.terms
@@ -152,9 +138,7 @@ def energies(stepper: Stepper, state: State) -> dict[str, float]:
     return {"kinetic": kinetic, **found}
 
 
-def make_frame(
-    stepper: Stepper, state: State, time: float, iterations: int, residual: float, substeps: int, cpu_time: float
-) -> Frame:
+def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:
     """Snapshot of the last accepted configuration."""
     model = stepper.model
     carriers = model.carriers
@@ -176,9 +160,9 @@ def make_frame(
         stimulus=stepper.stimulus.copy(),
         energy=energies(stepper, state),
         min_gap=float(stepper.potential.min_gap),
-        iterations=iterations,
-        residual=residual,
-        substeps=substeps,
+        iterations=statistics.iterations,
+        residual=statistics.last_residual,
+        substeps=statistics.substeps,
         cpu_time=cpu_time,
         state=state.flat(),
     )

@@ -19,7 +19,7 @@ from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observe
 from .frame import Description, Frame
-from .statistics import RunStatistics
+from .statistics import RunStatistics, center_of_mass, largest_row
 from .stepper import Stepper, StepReport
 
 Array = np.ndarray
@@ -122,7 +122,6 @@ class Simulator:
         self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
-        self._since_frame = (0, 0.0, 0)
 
     # what the scene looks like now
 
@@ -150,7 +149,7 @@ class Simulator:
     @property
     def com(self) -> Array:
         """Mass centre of the rods [m], shape (3,)."""
-        return observe.center_of_mass(self.model, self._state)
+        return center_of_mass(self.model, self._state)
 
     @property
     def stimulus(self) -> dict[str, float]:
@@ -191,12 +190,8 @@ class Simulator:
         return observe.describe(self.model, self._state, settings, scene_text(self.scene))
 
     def frame(self) -> Frame:
-        """A snapshot; its counts are those since the snapshot before."""
-        iterations, residual, substeps = self._since_frame
-        self._since_frame = (0, 0.0, 0)
-        return observe.make_frame(
-            self._stepper, self._state, self.time, iterations, residual, substeps, self.cpu_time
-        )
+        """A snapshot."""
+        return observe.make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
 
     # what changes it
 
@@ -232,7 +227,7 @@ class Simulator:
                 self._stepper.advance(trial)
             except SimulationError:
                 pass  # the first step of the run meets it again and reports it
-            observe.largest_row(self._state.position)
+            largest_row(self._state.position)
             self._stepper.rest(self._state)
             self._compile_time = clock.thread_time() - begin
         return self._compile_time
@@ -254,10 +249,6 @@ class Simulator:
             self.termination = Termination.FAILED.value
             raise
         self.statistics.update(report, self._stepper, self._state)
-        iterations, residual, substeps = self._since_frame
-        self._since_frame = (
-            iterations + report.iterations, max(residual, report.residual), substeps + report.substeps
-        )
         self.cpu_time += clock.thread_time() - begin
         self.wall_time += clock.perf_counter() - wall
         return report

@@ -7,9 +7,24 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..jit import kernel
+from ..model.model import Model
 from ..model.state import State
-from .observe import center_of_mass, largest_row
 from .stepper import Stepper, StepReport
+
+
+@kernel
+def largest_row(rows):
+    """Largest Euclidean norm of the rows of an (n, 3) array; 0 if it is empty."""
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        largest = max(largest, rows[i, 0] ** 2 + rows[i, 1] ** 2 + rows[i, 2] ** 2)
+    return largest**0.5
+
+
+def center_of_mass(model: Model, state: State) -> np.ndarray:
+    """Mass centre of the rods [m], shape (3,)."""
+    return model.node_mass @ state.position / model.node_mass.sum()
 
 
 @dataclass
@@ -34,6 +49,7 @@ class RunStatistics:
     iterations: int = 0
     factorisations: int = 0
     largest_residual: float = 0.0
+    last_residual: float = 0.0
     min_gap: float = math.inf
     max_contact_force: float = 0.0
     com_max_height: float = -math.inf
@@ -47,6 +63,7 @@ class RunStatistics:
         self.rejected += report.rejected
         self.iterations += report.iterations
         self.factorisations += report.factorisations
+        self.last_residual = report.residual
         self.largest_residual = max(self.largest_residual, report.residual)
         self.com_max_height = max(self.com_max_height, float(center_of_mass(model, state)[2]))
         if not potential.has_contact:

@@ -23,6 +23,15 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
     return np.eye(3) + a * matrix + b * (matrix @ matrix)
 
 
+def rotation_vector(matrix: np.ndarray) -> np.ndarray:
+    """Rotation vector [rad] of a rotation matrix by less than half a turn, the inverse of `rotation_matrix`, shape (3,)."""
+    axis = 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    sine, cosine = np.sqrt(axis @ axis), 0.5 * (np.trace(matrix) - 1.0)
+    if sine < 1e-8:
+        return axis
+    return np.arctan2(sine, cosine) / sine * axis
+
+
 def matrix_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
     """Rotation matrix of a unit quaternion x y z w, shape (3, 3)."""
     x, y, z, w = quaternion / np.linalg.norm(quaternion)

@@ -1,4 +1,4 @@
-"""L D Lᵀ of a symmetric band matrix, and solution for several right-hand sides at once.
+"""L D Lᵀ of a symmetric band matrix, and solution for one or several right-hand sides.
 
 Storage is by columns of the lower triangle: ``band[j, r] = A[j + r, j]``, 0 ≤ r ≤ half-bandwidth, with as many rows of padding at the end
 as the half-bandwidth. It is a compile-time constant, so inner loops have fixed lengths. Cost: n b² and 4 n b per right-hand side.
@@ -13,10 +13,10 @@ from ..jit import kernel
 
 @cache
 def band_kernels(half_bandwidth: int):
-    """Compile-time specialised ``factor(band, n)`` and ``solve(band, n, right)``.
+    """Compile-time specialised ``factor(band, n)``, ``solve(band, n, right)`` and ``solve_border(band, n, right)``.
 
-    ``factor`` works in place and returns −1, or the first column whose pivot is not positive. ``solve`` overwrites
-    ``right``, shape (≥ n + half_bandwidth, m); its padding rows must be zero.
+    ``factor`` works in place and returns −1, or the first column whose pivot is not positive. The others overwrite
+    ``right``, of n + half_bandwidth rows whose last half_bandwidth are zero: a vector, or a matrix with the columns of a border.
     """
     b = half_bandwidth
 
@@ -37,19 +37,29 @@ def band_kernels(half_bandwidth: int):
 
     @kernel
     def solve(band, n, right):
+        for j in range(n):
+            value = right[j]
+            for r in range(1, b + 1):
+                right[j + r] -= band[j, r] * value
+        for j in range(n - 1, -1, -1):
+            value = right[j] / band[j, 0]
+            for r in range(1, b + 1):
+                value -= band[j, r] * right[j + r]
+            right[j] = value
+
+    @kernel
+    def solve_border(band, n, right):
         m = right.shape[1]
         for j in range(n):
             for r in range(1, b + 1):
-                multiplier = band[j, r]
                 for c in range(m):
-                    right[j + r, c] -= multiplier * right[j, c]
+                    right[j + r, c] -= band[j, r] * right[j, c]
         for j in range(n - 1, -1, -1):
             inverse = 1.0 / band[j, 0]
             for c in range(m):
                 right[j, c] *= inverse
             for r in range(1, b + 1):
-                multiplier = band[j, r]
                 for c in range(m):
-                    right[j, c] -= multiplier * right[j + r, c]
+                    right[j, c] -= band[j, r] * right[j + r, c]
 
-    return factor, solve
+    return factor, solve, solve_border

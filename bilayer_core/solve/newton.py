@@ -46,9 +46,9 @@ class NewtonReport:
     ----------
     status : NewtonStatus
     iterations : int
-        Corrections taken.
+        Exact Hessians factorised, and further corrections taken with a kept one.
     factorisations : int
-        Exact Hessians assembled and factorised.
+        The former alone.
     residual : float
         Speed of the correction that was left [m/s].
     backtracks : int
@@ -158,7 +158,7 @@ class NewtonSolver:
         potential, matrix = self._potential, self._potential.matrix
         factor = potential.diagonal_factor()
         energy = potential.evaluate(at, True)
-        factorisations = iterations = backtracks = 0
+        backtracks = 0
         fresh, previous = True, math.inf
         status = NewtonStatus.MAX_ITERATIONS
         residual = math.inf
@@ -166,7 +166,7 @@ class NewtonSolver:
             return NewtonReport(NewtonStatus.NOT_FINITE, 0, 0, math.inf), at
         if not matrix.factorise(factor):
             return NewtonReport(NewtonStatus.INDEFINITE, 0, 1, math.inf), at
-        factorisations = 1
+        factorisations = iterations = 1
         while True:
             step, body_step = matrix.newton_step(potential.gradient, potential.body_gradient)
             residual = self.speed(step, body_step)
@@ -181,6 +181,7 @@ class NewtonSolver:
             if not fresh and residual > KEEP_FACTOR_BELOW * previous:
                 energy = potential.evaluate(at, True)
                 factorisations += 1
+                iterations += 1
                 fresh, previous = True, math.inf
                 if not matrix.factorise(factor):
                     status = NewtonStatus.INDEFINITE
@@ -196,7 +197,7 @@ class NewtonSolver:
                 continue
             energy, halvings = moved
             backtracks += halvings
-            iterations += 1
+            iterations += not fresh
             fresh, previous = False, (residual if halvings == 0 else 0.0)
             at, trial = trial, at
         return NewtonReport(status, iterations, factorisations, residual, backtracks), at

@@ -42,8 +42,8 @@ class NewtonMatrix:
         self.ball_turn_hessian = np.zeros((balls, 3, 3))
         self.body_hessian = np.zeros((6 * model.free_count, 6 * model.free_count))
         self._band = np.zeros((size + b, b + 1))
-        self._factor, self._solve = band_kernels(b)
-        self._right = np.zeros((size + b, 1))
+        self._factor, self._solve, self._solve_border = band_kernels(b)
+        self._right = np.zeros(size + b)
         self._held = model.layout.node[model.attached_node]
         self._held_unknowns = (self._held[:, None] + np.arange(3)).ravel()
         self._border = np.zeros((size + b, 6 * model.free_count))
@@ -67,7 +67,7 @@ class NewtonMatrix:
 
     def factorise(self, factor: float) -> bool:
         """Assemble and factorise; `factor` [1/s²] multiplies the masses. False if no shift makes the matrix positive definite."""
-        self._assemble_border()
+        self.assemble_border()
         self.shift = 0.0
         while True:
             if self._try_factorise(factor):
@@ -114,7 +114,8 @@ class NewtonMatrix:
         """U, shape (size, 6 n_free)."""
         return self._border[: self._model.layout.size]
 
-    def _assemble_border(self) -> None:
+    def assemble_border(self) -> None:
+        """Complete D with the forces on balls' centres, and collect U from the balls' contacts with nodes."""
         model, carriers = self._model, self._model.carriers
         free = carriers.free_body
         for carrier in self._balls:
@@ -156,7 +157,7 @@ class NewtonMatrix:
                 )
         if self._coupled:
             self._border_solution[:] = self._border
-            self._solve(self._band, size, self._border_solution)
+            self._solve_border(self._band, size, self._border_solution)
             schur -= self._border.T @ self._border_solution
         try:
             self._schur = cho_factor(schur, check_finite=False)
@@ -168,10 +169,10 @@ class NewtonMatrix:
         """Minus the inverse matrix times the gradient: of rods, shape (size,), and of bodies, shape (n_free, 6)."""
         size = self._model.layout.size
         right = self._right
-        right[:size, 0] = -gradient
+        np.negative(gradient, out=right[:size])
         right[size:] = 0.0
         self._solve(self._band, size, right)
-        step = right[:size, 0].copy()
+        step = right[:size].copy()
         if not self._model.free_count:
             return step, np.zeros((0, 6))
         load = -body_gradient.ravel()

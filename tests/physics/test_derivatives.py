@@ -1,0 +1,154 @@
+"""Gradients and Hessians of every force against differences, at random physical states."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sample_scenes import everything
+
+from bilayer_core.integrate import implicit_euler
+from bilayer_core.integrate.stepper import Stepper
+from bilayer_core.model.build import build_model
+from bilayer_core.model.state import initial_state
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.solve.configuration import Configuration
+
+GRADIENT_LIMIT = 1e-7  # of the largest entry
+HESSIAN_LIMIT = 1e-6
+H = 1e-3  # time step [s]
+
+STIFFNESS = ("axial_stiffness", "joint_stiffness", "pair_stiffness")
+
+
+def only(model, **kept):
+    """The model without elasticity except for what `kept` names."""
+    arrays = {name: getattr(model, name) * 0.0 for name in STIFFNESS}
+    arrays.update(kept)
+    return replace(model, **arrays)
+
+
+def bends(model, column):
+    stiffness = model.joint_stiffness.copy()
+    stiffness[model.bend_count :] = 0.0
+    stiffness[:, [c for c in range(3) if c not in column]] = 0.0
+    return only(model, joint_stiffness=stiffness)
+
+
+def bonds(model):
+    stiffness = model.joint_stiffness.copy()
+    stiffness[: model.bend_count] = 0.0
+    stiffness[model.bend_count :, 1] = stiffness[model.bend_count :, 0]
+    return only(model, joint_stiffness=stiffness)
+
+
+FORCES = {
+    "stretching": lambda m: only(m, axial_stiffness=m.axial_stiffness),
+    "bending": lambda m: bends(m, (0, 1)),
+    "twisting": lambda m: bends(m, (2,)),
+    "bond translation": lambda m: only(m, pair_stiffness=m.pair_stiffness),
+    "bond rotation": bonds,
+    "inertia gravity damping contact friction": only,
+    "everything": lambda m: m,
+}
+
+
+class Problem:
+    """A potential at a random state, as functions of one vector (rods' unknowns, then the ball's six).
+
+    Unknowns that are angles are multiplied with a length, so that all entries are of one kind.
+    """
+
+    def __init__(self, change, seed):
+        rng = np.random.default_rng(seed)
+        model = change(build_model(load_scene(everything())))
+        stepper = Stepper(model, H, 1e-6, 50, 0)
+        state = initial_state(model)
+        rest = Configuration(model)
+        rest.take_state(state, state.body_position)
+        bent = Configuration(model)
+        bent.take_state(state, state.body_position)
+        free = np.setdiff1d(np.arange(model.node_count), model.attached_node)
+        bent.position[free] += 2e-4 * rng.standard_normal((len(free), 3))
+        bent.carry_frames(rest, 0.1 * rng.standard_normal(model.edge_count))
+        state.position[:] = bent.position
+        state.director1[:] = bent.director1[: model.edge_count]
+        state.velocity[free] = 0.05 * rng.standard_normal((len(free), 3))
+        state.spin[:] = rng.standard_normal(model.edge_count)
+        state.body_velocity[1] = 0.02 * rng.standard_normal(3)
+        state.body_angular_velocity[1] = rng.standard_normal(3)
+        start = Configuration(model)
+        start.take_state(state, state.body_position)
+        context = implicit_euler.predict(model, state, start, H, stepper.eigenstrain_of(np.array([0.7])))
+        self.potential = stepper.potential
+        self.potential.start_step(context)
+        size = model.layout.size
+        held = (model.layout.node[model.attached_node][:, None] + np.arange(3)).ravel()
+        self.free = np.setdiff1d(np.arange(size + 6), held)
+        self.scale = np.ones(size + 6)
+        self.scale[model.layout.edge] = 1.0 / 5e-3  # half width
+        self.scale[size + 3 :] = 1.0 / 2e-2  # radius
+        self.size, self.model = size, model
+        self.at, self.trial = Configuration(model), Configuration(model)
+        step = np.zeros(size + 6)
+        step[self.free] = 3e-5 * rng.standard_normal(len(self.free))
+        self._move(start, step, self.at)
+
+    def _move(self, base, vector, out):
+        step = vector * self.scale
+        out.set_moved(base, step[: self.size], step[self.size :].reshape(1, 6), 1.0)
+
+    def value(self, vector):
+        self._move(self.at, vector, self.trial)
+        energy = self.potential.evaluate(self.trial, False)
+        return energy, np.concatenate([self.potential.gradient, self.potential.body_gradient.ravel()]) * self.scale
+
+    def derivatives(self):
+        """Gradient and Hessian of the free unknowns as the package computes them."""
+        potential, size, b = self.potential, self.size, self.model.layout.half_bandwidth
+        potential.evaluate(self.at, True)
+        gradient = np.concatenate([potential.gradient, potential.body_gradient.ravel()]) * self.scale
+        potential.matrix.assemble_border()
+        band = potential.matrix.assemble_band(potential.diagonal_factor())
+        hessian = np.zeros((size + 6, size + 6))
+        for j in range(size):
+            for r in range(min(b, size - 1 - j) + 1):
+                hessian[j + r, j] = hessian[j, j + r] = band[j, r]
+        hessian[:size, size:] = potential.matrix.border
+        hessian[size:, :size] = potential.matrix.border.T
+        hessian[size:, size:] = potential.matrix.body_hessian
+        hessian *= np.outer(self.scale, self.scale)
+        return gradient[self.free], hessian[np.ix_(self.free, self.free)]
+
+    def differences(self, h):
+        """The same by central differences of fourth order with step `h` [m]."""
+        gradient, rows = [], []
+        for i in self.free:
+            unit = np.zeros(self.size + 6)
+            unit[i] = h
+            plus, minus = self.value(unit), self.value(-unit)
+            plus2, minus2 = self.value(2 * unit), self.value(-2 * unit)
+            first, second = ((a[0] - b[0]) for a, b in ((plus, minus), (plus2, minus2)))
+            gradient.append((8 * first - second) / (12 * h))
+            first, second = ((a[1] - b[1]) for a, b in ((plus, minus), (plus2, minus2)))
+            rows.append(((8 * first - second) / (12 * h))[self.free])
+        return np.array(gradient), np.array(rows)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("force", FORCES)
+def test_gradient_and_hessian_agree_with_differences(force, seed):
+    problem = Problem(FORCES[force], seed)
+    gradient, hessian = problem.derivatives()
+    if "contact" in force or force == "everything":
+        assert problem.potential.terms["barrier"] > 0.0 and problem.potential.terms["friction"] > 0.0
+        assert np.abs(problem.potential.matrix.border).max() > 0.0
+    gradient_errors, hessian_errors = [], []
+    for h in (3e-8, 1e-7, 3e-7, 1e-6):
+        by_energy, by_gradient = problem.differences(h)
+        # frames are transported: differences of the gradient are symmetric only up to holonomy
+        symmetric = 0.5 * (by_gradient + by_gradient.T)
+        gradient_errors.append(np.abs(gradient - by_energy).max() / np.abs(gradient).max())
+        hessian_errors.append(np.abs(hessian - symmetric).max() / np.abs(hessian).max())
+    assert min(gradient_errors) < GRADIENT_LIMIT
+    assert min(hessian_errors) < HESSIAN_LIMIT
+    assert np.abs(hessian - hessian.T).max() < 1e-14 * np.abs(hessian).max()

@@ -1,0 +1,133 @@
+"""Motions with a known answer: sliding, rolling, free fall, impact, damping, and the order of the integrator."""
+
+import math
+
+import numpy as np
+import pytest
+from sample_scenes import ball, contact, fixed, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+
+
+def slope(angle):
+    """A plane through the origin, tilted about y so that +x is downhill."""
+    normal = [math.sin(angle), 0.0, math.cos(angle)]
+    return {"name": "slope", "type": "plane", "point": [0, 0, 0], "normal": normal}
+
+
+def tilted_gravity(angle, g=9.81):
+    """Gravity on level ground that acts like a slope: rods lie along x on z = 0."""
+    return [g * math.sin(angle), 0.0, -g * math.cos(angle)]
+
+
+def block(angle, coefficient, dt=1e-3, speed_threshold=1e-4):
+    strip = rod([layer(thickness=2e-3)], length=0.02, stations=5, start=(0, 0, 1.99e-3))
+    return scene(
+        [strip], gravity=tilted_gravity(angle), obstacles=[slope(0.0)],
+        contact=contact(coefficient=coefficient, speed_threshold=speed_threshold), solver={"dt": dt},
+    )  # fmt: skip
+
+
+def test_a_block_slides_down_a_steep_slope_as_coulomb_says():
+    angle, mu = 0.5, 0.3
+    simulator = Simulator(load_scene(block(angle, mu)))
+    simulator.run(0.1)
+    start = simulator.velocities[:, 0].mean()
+    simulator.run(0.2)
+    acceleration = (simulator.velocities[:, 0].mean() - start) / 0.2
+    assert acceleration == pytest.approx(9.81 * (math.sin(angle) - mu * math.cos(angle)), rel=0.005)
+
+
+def test_a_block_on_a_gentle_slope_creeps_at_the_smoothed_laws_speed():
+    angle, mu, threshold = 0.2, 0.5, 1e-3
+    simulator = Simulator(load_scene(block(angle, mu, speed_threshold=threshold)))
+    simulator.run(0.5)
+    expected = threshold * (1.0 - math.sqrt(1.0 - math.tan(angle) / mu))
+    assert simulator.velocities[:, 0] == pytest.approx(np.full(5, expected), rel=0.01)
+
+
+@pytest.mark.parametrize(("shell", "factor"), [(False, 5 / 7), (True, 3 / 5)])
+def test_a_ball_rolls_down_a_slope_without_slipping(shell, factor):
+    angle = 0.3
+    far_away = rod([layer()], length=0.02, stations=3, start=(0, 5, 5), clamp_start="wall")
+    simulator = Simulator(
+        load_scene(
+            scene(
+                [far_away], gravity=tilted_gravity(angle), obstacles=[slope(0.0)],
+                bodies=[fixed(position=(0, 5, 5)), ball((0, 0, 0.0208), shell=shell)],
+                contact=contact(coefficient=0.6, speed_threshold=1e-4),
+            )  # fmt: skip
+        )
+    )
+    simulator.run(0.1)
+    before = simulator.frame()
+    simulator.run(0.2)
+    after = simulator.frame()
+    acceleration = (after.body_velocities[1, 0] - before.body_velocities[1, 0]) / 0.2
+    assert acceleration == pytest.approx(factor * 9.81 * math.sin(angle), rel=0.01)
+    assert after.body_angular_velocities[1, 1] * 0.02 == pytest.approx(after.body_velocities[1, 0], rel=0.01)
+
+
+def test_no_node_crosses_the_ground_however_fast_it_falls():
+    strip = rod([layer()], length=0.05, stations=11, start=(0, 0, 0.3))
+    simulator = Simulator(
+        load_scene(scene([strip], gravity=[0, 0, -2e4], obstacles=[slope(0.0)], contact=contact()))
+    )
+    lowest = math.inf
+    for _ in range(60):
+        simulator.step()  # at impact a node would travel 100 mm in a step
+        lowest = min(lowest, simulator.positions[:, 2].min() - 0.5e-3)
+    assert 0.0 < lowest < 1e-3
+    assert simulator.statistics.min_gap > 0.0
+
+
+def test_mass_damping_slows_a_free_strip_exponentially():
+    strip = rod([layer()], length=0.05, stations=5)
+    errors = []
+    for dt in (2e-3, 1e-3):
+        simulator = Simulator(load_scene(scene([strip], damping={"mass": 3.0}, gravity=[0, 0, -10.0])), dt=dt)
+        simulator.run(0.4)
+        expected = -10.0 / 3.0 * (1.0 - math.exp(-3.0 * 0.4))
+        errors.append(abs(simulator.velocities[:, 2].mean() - expected))
+    assert errors[1] < 2e-3 * abs(expected)
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_implicit_euler_is_of_first_order_in_time_for_a_swinging_bilayer():
+    layers = [
+        layer("bottom"),
+        layer("top", eigenstrain={"stimulus": "heat", "gain": 0.02, "time_constant": 0.02}),
+    ]
+    swinging = scene(
+        [rod(layers, length=0.06, stations=11, clamp_start="wall")], bodies=[fixed()],
+        materials={"gel": {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0}},
+        stimuli={"heat": {"schedule": {"type": "ramp", "start": 0, "end": 0.05, "from": 0, "to": 1}}},
+        solver={"tolerance": 1e-9},
+    )  # fmt: skip
+    tips = []
+    for dt in (1e-3, 5e-4, 2.5e-4, 1.25e-4):
+        simulator = Simulator(load_scene(swinging), dt=dt)
+        simulator.run(0.1)
+        tips.append(simulator.positions[10])
+    differences = np.linalg.norm(np.diff(tips, axis=0), axis=1)
+    order = math.log2(differences[1] / differences[2])
+    assert order == pytest.approx(1.0, abs=0.15)
+
+
+def test_a_lagging_layer_follows_its_stimulus_with_its_time_constant_whatever_the_step():
+    lagging = [layer(eigenstrain={"stimulus": "heat", "gain": 0.01, "time_constant": 0.05})]
+    for dt in (1e-3, 1e-2):
+        simulator = Simulator(
+            load_scene(
+                scene(
+                    [rod(lagging, length=0.02, stations=5)],
+                    stimuli={"heat": {"schedule": {"type": "hold", "value": 0}}},
+                    damping={"mass": 1e5},
+                )
+            ),
+            dt=dt,
+        )
+        simulator.set_stimulus("heat", 1.0)
+        simulator.run(0.05)
+        strain = simulator.frame().strain
+        assert strain == pytest.approx(np.full(5, 0.01 * (1 - math.exp(-1.0))), rel=2e-3)

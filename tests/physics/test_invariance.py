@@ -1,0 +1,144 @@
+"""What no force may do: feel a rigid motion, create momentum; and what twist must cost."""
+
+import numpy as np
+import pytest
+from sample_scenes import ball, contact, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.integrate import implicit_euler
+from bilayer_core.integrate.stepper import Stepper
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.build import build_model
+from bilayer_core.model.section import bond, rectangle
+from bilayer_core.model.state import initial_state
+from bilayer_core.solve.configuration import Configuration
+
+ELASTIC = ("stretching", "bending", "twisting", "bond")
+
+
+def bilayer(stations=9, torsion="laminate", length=0.02):
+    layers = [layer("passive"), layer("active", thickness=1.5e-3)]
+    return scene([rod(layers, length=length, stations=stations, torsion=torsion)])
+
+
+def at_rest(scene_dict):
+    """Model, stepper, and a context in which inertia asks for nothing."""
+    model = build_model(load_scene(scene_dict))
+    stepper = Stepper(model, 1e3, 1e-6, 50, 0)  # so long a step that inertia does not count
+    state = initial_state(model)
+    start = Configuration(model)
+    start.take_state(state, state.body_position)
+    stepper.potential.start_step(implicit_euler.predict(model, state, start, 1e3, np.zeros(model.edge_count)))
+    return model, stepper.potential, start
+
+
+def deformed(model, start, seed=0, amplitude=2e-4):
+    rng = np.random.default_rng(seed)
+    shape = Configuration(model)
+    step = np.zeros(model.layout.size)
+    step[model.layout.node[:, None] + np.arange(3)] = amplitude * rng.standard_normal((model.node_count, 3))
+    step[model.layout.edge] = 0.2 * rng.standard_normal(model.edge_count)
+    shape.set_moved(start, step, np.zeros((0, 6)), 1.0)
+    return shape
+
+
+def elastic_energy(potential, shape):
+    potential.evaluate(shape, False)
+    return sum(potential.terms[name] for name in ELASTIC)
+
+
+def test_rigid_motion_leaves_the_elastic_energy_unchanged():
+    model, potential, start = at_rest(bilayer())
+    shape = deformed(model, start)
+    before = elastic_energy(potential, shape)
+    turn, shift = rotation_matrix(np.array([0.4, -1.1, 2.0])), np.array([0.3, -0.2, 0.7])
+    moved = Configuration(model)
+    moved.position[:] = shape.position @ turn.T + shift
+    for name in ("tangent", "director1", "director2"):
+        getattr(moved, name)[:] = getattr(shape, name) @ turn.T
+    moved.length[:] = shape.length
+    assert before > 1.0
+    assert elastic_energy(potential, moved) == pytest.approx(before, rel=1e-10)
+
+
+def test_frames_carried_along_a_rigid_turn_turn_with_the_body():
+    model, potential, start = at_rest(bilayer())
+    shape = deformed(model, start)
+    before = elastic_energy(potential, shape)
+    axis, steps = np.array([0.3, 0.5, -0.8]), 400
+    turn = rotation_matrix(axis / steps)
+    now, following = shape, Configuration(model)
+    for _ in range(steps):
+        following.position[:] = now.position @ turn.T
+        # a rigid turn spins each edge about its tangent by the turn's component along it
+        tangents = now.tangent[: model.edge_count]
+        following.carry_frames(now, tangents @ (axis / steps))
+        now, following = following, Configuration(model)
+    assert elastic_energy(potential, now) == pytest.approx(before, rel=1e-6)
+
+
+@pytest.mark.parametrize("torsion", ["laminate", "layers"])
+def test_elastic_forces_and_moments_sum_to_zero(torsion):
+    model, potential, start = at_rest(bilayer(torsion=torsion))
+    shape = deformed(model, start)
+    potential.evaluate(shape, False)
+    forces = potential.gradient[model.layout.node[:, None] + np.arange(3)]
+    about_tangent = potential.gradient[model.layout.edge]
+    moment = np.cross(shape.position, forces).sum(axis=0) + about_tangent @ shape.tangent[: model.edge_count]
+    scale = np.abs(forces).sum()
+    assert np.abs(forces.sum(axis=0)).max() < 1e-12 * scale
+    assert np.abs(moment).max() < 1e-12 * scale * 0.02
+
+
+@pytest.mark.parametrize("stations", [21, 41, 81])
+@pytest.mark.parametrize("torsion", ["laminate", "layers"])
+def test_twist_of_a_bonded_strip_costs_its_torsional_stiffness_at_every_mesh(torsion, stations):
+    rate, length = 0.5, 0.1  # [rad/m], [m]: so small that the stretch of the outer fibres does not count
+    model, potential, start = at_rest(bilayer(stations, torsion, length))
+    shape = Configuration(model)
+    x = start.position[:, 0]
+    angle = rate * x
+    shape.position[:] = np.stack(
+        [x, -start.position[:, 2] * np.sin(angle), start.position[:, 2] * np.cos(angle)], axis=1
+    )
+    middle = 0.5 * (angle[model.edge_node] + angle[model.edge_node + 1])
+    shape.carry_frames(start, middle)
+    sections = [rectangle(model.scene.materials["gel"], 0.01, t) for t in (1e-3, 1.5e-3)]
+    tilt = bond(*sections, model.scene.coupling, torsion).tilt
+    stiffness = sum(s.twisting_stiffness for s in sections) + tilt * (0.5 * 2.5e-3) ** 2
+    energy = elastic_energy(potential, shape)
+    # twist has elements at inner nodes only: half an edge at either end is rigid
+    stored = 0.5 * rate**2 * stiffness * length
+    missing = 0.5 * rate**2 * sum(s.twisting_stiffness for s in sections) * length / (stations - 1)
+    assert energy == pytest.approx(stored - missing, rel=2e-3)
+
+
+def test_a_free_strip_keeps_its_linear_momentum():
+    simulator = Simulator(load_scene(bilayer()), dt=1e-4)
+    state = simulator.save_state()
+    layout = dict(simulator.description.state_layout)
+    start = sum(int(np.prod(shape)) for name, shape in list(layout.items())[:3])
+    rng = np.random.default_rng(3)
+    state[start : start + int(np.prod(layout["velocity"]))] = 0.2 * rng.standard_normal(np.prod(layout["velocity"]))
+    simulator.load_state(state)
+    momentum = simulator.model.node_mass @ simulator.velocities
+    simulator.run(0.02)
+    assert np.abs(simulator.model.node_mass @ simulator.velocities - momentum).max() < 1e-9 * np.linalg.norm(momentum)
+
+
+def test_friction_and_barrier_between_ball_and_strip_keep_their_total_momentum():
+    strip = rod([layer()], length=0.04, stations=21, start=(-0.02, 0, 0.0213))
+    sphere = ball((0, 0, 0), velocity=[0.05, 0.1, 0.2], angular_velocity=[3, 0, 5])
+    simulator = Simulator(
+        load_scene(scene([strip], bodies=[sphere], contact=contact(coefficient=0.5, speed_threshold=1e-3)))
+    )
+
+    def momentum():
+        frame = simulator.frame()
+        return simulator.model.node_mass @ simulator.velocities + 2.7e-3 * frame.body_velocities[0]
+
+    before = momentum()
+    simulator.run(0.05)
+    assert simulator.statistics.bodies["ball"].most_nodes > 0
+    assert simulator.frame().body_angular_velocities[0] != pytest.approx([3, 0, 5], abs=1e-3)
+    assert np.abs(momentum() - before).max() < 1e-9 * np.linalg.norm(before)

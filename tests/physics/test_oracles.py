@@ -1,0 +1,165 @@
+"""Each fast kernel against a slow and obvious version."""
+
+import math
+
+import numpy as np
+import pytest
+from oracles import discrete_rod
+
+from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
+from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from bilayer_core.contact.step_bound import KEPT_FRACTION, step_bound
+from bilayer_core.forces.bend_twist import bend_twist
+from bilayer_core.kinematics.frames import transport_directors
+from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
+from bilayer_core.solve.band import band_kernels
+
+
+def random_frames(rng, count):
+    edges = np.array([1.0, 0, 0]) + 0.4 * rng.standard_normal((count, 3))
+    tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    m1 = np.cross(tangents, rng.standard_normal((count, 3)))
+    m1 /= np.linalg.norm(m1, axis=1, keepdims=True)
+    return edges, tangents, m1, np.cross(tangents, m1)
+
+
+def test_bending_and_twist_strains_are_those_of_the_curvature_binormal():
+    rng = np.random.default_rng(0)
+    edges, tangents, m1, m2 = random_frames(rng, 40)
+    a, b = np.arange(0, 40, 2), np.arange(1, 40, 2)
+    strains = np.empty((20, 3))
+    stiffness, rest = np.ones((20, 3)), rng.standard_normal((20, 3))
+    energies = bend_twist(
+        0, 20, a, b, stiffness, rest, np.linalg.norm(edges, axis=1), tangents, m1, m2, np.zeros(20), strains,
+        np.zeros((40, 4)), np.zeros((40, 4, 4)), np.zeros((20, 4, 4)), False,
+    )  # fmt: skip
+    expected = np.array(
+        [
+            (
+                *discrete_rod.curvatures(edges[i], edges[j], (m1[i], m2[i]), (m1[j], m2[j])),
+                discrete_rod.twist(edges[i], edges[j], m1[i], m1[j]),
+            )
+            for i, j in zip(a, b, strict=True)
+        ]
+    )
+    assert strains == pytest.approx(expected, abs=1e-13)
+    assert energies[0] == pytest.approx(0.5 * np.square(expected - rest)[:, :2].sum())
+    assert energies[1] == pytest.approx(0.5 * np.square(expected - rest)[:, 2].sum())
+
+
+def test_twist_is_unwrapped_from_its_value_before():
+    _, tangents, m1, m2 = random_frames(np.random.default_rng(1), 2)
+    strain = np.empty((1, 3))
+    args = (np.zeros((2, 4)), np.zeros((2, 4, 4)), np.zeros((1, 4, 4)), False)
+    found = []
+    for before in (0.0, 4 * math.pi, -6 * math.pi):
+        bend_twist(
+            0, 1, np.array([0]), np.array([1]), np.ones((1, 3)), np.zeros((1, 3)), np.ones(2), tangents, m1, m2,
+            np.array([before]), strain, *args,
+        )  # fmt: skip
+        found.append(strain[0, 2])
+    assert found[1] - found[0] == pytest.approx(4 * math.pi)
+    assert found[2] - found[0] == pytest.approx(-6 * math.pi)
+
+
+def test_directors_follow_parallel_transport_and_turn():
+    rng = np.random.default_rng(2)
+    edges, tangents, m1, m2 = random_frames(rng, 10)
+    increments, angles = 0.3 * rng.standard_normal((10, 3)), rng.standard_normal(10)
+    moved = edges + increments
+    new = moved / np.linalg.norm(moved, axis=1, keepdims=True)
+    out1, out2 = np.empty((10, 3)), np.empty((10, 3))
+    transport_directors(10, tangents, m1, m2, angles, new, out1, out2)
+    for k in range(10):
+        expected = discrete_rod.moved_frame(edges[k], m1[k], increments[k], angles[k])
+        assert out1[k] == pytest.approx(expected[0], abs=1e-14)
+        assert out2[k] == pytest.approx(expected[1], abs=1e-14)
+
+
+@pytest.mark.parametrize("half_bandwidth", [10, 18])
+def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
+    rng = np.random.default_rng(3)
+    n, b = 70, half_bandwidth
+    dense = np.zeros((n, n))
+    for j in range(n):
+        for r in range(min(b, n - 1 - j) + 1):
+            dense[j + r, j] = dense[j, j + r] = rng.standard_normal()
+    dense += (1.0 - np.linalg.eigvalsh(dense)[0]) * np.eye(n)
+    band = np.zeros((n + b, b + 1))
+    for j in range(n):
+        for r in range(min(b, n - 1 - j) + 1):
+            band[j, r] = dense[j + r, j]
+    factor, solve, solve_border = band_kernels(b)
+    indefinite = band.copy()
+    indefinite[41, 0] = -5.0
+    assert factor(band, n) == -1
+    right = np.zeros((n + b, 6))
+    right[:n] = rng.standard_normal((n, 6))
+    expected = np.linalg.solve(dense, right[:n])
+    one = right[:, 2].copy()
+    solve(band, n, one)
+    solve_border(band, n, right)
+    assert one[:n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
+    assert right[:n] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+    assert factor(indefinite, n) == 41
+
+
+def test_barrier_derivatives_agree_with_differences_and_vanish_at_its_distance():
+    d_hat = 1e-3
+    for d in (1e-6, 1e-4, 5e-4, 9.9e-4):
+        h = 1e-5 * d
+        slope = (barrier(d + h, d_hat) - barrier(d - h, d_hat)) / (2 * h)
+        curve = (barrier_gradient(d + h, d_hat) - barrier_gradient(d - h, d_hat)) / (2 * h)
+        assert barrier_gradient(d, d_hat) == pytest.approx(slope, rel=1e-6) and slope < 0
+        assert barrier_hessian(d, d_hat) == pytest.approx(curve, rel=1e-6) and curve > 0
+    for law in (barrier, barrier_gradient, barrier_hessian):
+        assert law(d_hat, d_hat) == 0.0
+
+
+def test_friction_reaches_coulombs_value_at_the_threshold_and_is_the_slope_of_its_potential():
+    threshold = 1e-4
+    for v in (1e-7, 3e-5, 9.99e-5, 1.01e-4, 1.0):
+        h = 1e-4 * v
+        force = (friction_potential(v + h, threshold) - friction_potential(v - h, threshold)) / (2 * h)
+        assert friction_over_speed(v, threshold) * v == pytest.approx(force, rel=1e-6)
+        difference = friction_over_speed(v + h, threshold) * (v + h) - friction_over_speed(v - h, threshold) * (v - h)
+        assert friction_slope(v, threshold) == pytest.approx(difference / (2 * h), rel=1e-5, abs=1e-9)
+    assert friction_over_speed(threshold, threshold) * threshold == pytest.approx(1.0)
+    assert friction_over_speed(0.5 * threshold, threshold) * 0.5 * threshold == pytest.approx(0.75)
+
+
+def test_step_bound_is_the_first_moment_at_which_a_gap_shrinks_to_the_kept_fraction():
+    rng = np.random.default_rng(4)
+    limited = 0
+    for _ in range(200):
+        position = np.vstack([rng.standard_normal((3, 3)) * 0.5 + [0, 0, 2.0], [[0, 0, 4.0]]])
+        step = 3.0 * rng.standard_normal((4, 3))
+        radius = np.array([0.01, 0.02, 0.0, 0.5])
+        pairs = np.array([0, 1, 2]), np.array([3, 3, 3])
+        planes = np.zeros((1, 3)), np.array([[0, 0, 1.0]])
+        at = np.array([position + t * step for t in np.linspace(0.0, 1.0, 4001)])
+        gaps = np.concatenate(
+            [at[:, :, 2] - radius, np.linalg.norm(at[:, :3] - at[:, 3:], axis=2) - radius[:3] - radius[3]], axis=1
+        )
+        if gaps[0].min() <= 0.0:
+            continue
+        alpha, blocking = step_bound(position, step, radius, *planes, *pairs)
+        below = np.flatnonzero((gaps < KEPT_FRACTION * gaps[0]).any(axis=1))
+        expected = below[0] / 4000 if below.size else 1.0
+        assert alpha == pytest.approx(expected, abs=3e-4)
+        assert (blocking >= 0) == (alpha < 1.0)
+        limited += alpha < 1.0
+    assert limited > 50
+
+
+def test_quaternions_and_rotation_vectors_describe_the_same_rotation():
+    rng = np.random.default_rng(5)
+    for vector in [*rng.standard_normal((20, 3)), np.array([math.pi, 0, 0]), np.array([1e-6, 2e-6, 0]), np.zeros(3)]:
+        matrix = rotation_matrix(vector)
+        assert matrix @ matrix.T == pytest.approx(np.eye(3), abs=1e-14)
+        assert matrix_from_quaternion(quaternion_from_matrix(matrix)) == pytest.approx(matrix, abs=1e-14)
+        if 0 < np.linalg.norm(vector) < math.pi:
+            axis = vector / np.linalg.norm(vector)
+            expected = math.sin(np.linalg.norm(vector) / 2) * axis
+            quaternion = quaternion_from_matrix(matrix)
+            assert quaternion[:3] == pytest.approx(expected, abs=1e-12)
