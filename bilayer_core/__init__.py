@@ -1,0 +1,42 @@
+"""Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
+
+``load_scene``, ``Simulator`` and ``__version__`` are loaded at their first use: importing the package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from bilayer_core.integrate.simulator import Simulator
+    from bilayer_core.scene.loader import load_scene
+
+    __version__: str
+
+DISTRIBUTION = "bilayer_sim_ros"
+_HOME = {"Simulator": "bilayer_core.integrate.simulator", "load_scene": "bilayer_core.scene.loader"}
+
+__all__ = ["Simulator", "__version__", "load_scene"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return _installed_version()
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])
+
+
+def _installed_version() -> str:
+    """Version of the installed distribution; a checkout that is only on the import path has none and says so."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(DISTRIBUTION)
+    except PackageNotFoundError:
+        return "not installed"

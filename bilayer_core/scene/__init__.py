@@ -1,0 +1,1 @@
+"""From a scene file to a validated, frozen configuration in SI units."""

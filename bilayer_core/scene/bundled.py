@@ -1,0 +1,80 @@
+"""Where the bundled scenes are: one lookup for a checkout, a wheel, an editable install and both colcon installs."""
+
+from __future__ import annotations
+
+import os
+import sys
+import sysconfig
+from collections.abc import Iterator
+from pathlib import Path
+
+import bilayer_core
+from bilayer_core.errors import SceneError
+from bilayer_core.scene.faults import suggestion
+
+_SHARED = Path("share") / bilayer_core.DISTRIBUTION / "config" / "scenes"
+"""Below the prefix that the package is installed to."""
+
+
+def _candidates() -> Iterator[Path]:
+    """Directories in which the scenes may be, the likeliest first."""
+    # A checkout, an editable install, a colcon symlink install: the package is a link into the checkout.
+    yield Path(bilayer_core.__file__).resolve().parents[1] / "config" / "scenes"
+    for prefix in dict.fromkeys((sysconfig.get_path("data"), sys.prefix)):
+        yield Path(prefix) / _SHARED
+    yield from _recorded()
+    for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
+        yield Path(prefix) / _SHARED
+
+
+def _recorded() -> Iterator[Path]:
+    """Where the installer says that it put them (``pip install --user``, ``--prefix``)."""
+    from importlib.metadata import PackageNotFoundError, files
+
+    try:
+        recorded = files(bilayer_core.DISTRIBUTION) or []
+    except PackageNotFoundError:
+        return
+    parents = (Path(file.locate()).resolve().parent for file in recorded if file.suffix == ".yaml")
+    yield from dict.fromkeys(parent for parent in parents if parent.parts[-len(_SHARED.parts) :] == _SHARED.parts)
+
+
+def scenes_directory() -> Path:
+    """The directory of the bundled scenes.
+
+    Raises
+    ------
+    SceneError
+        If there is none; lists where it was looked for.
+    """
+    looked = []
+    for directory in _candidates():
+        if directory in looked:
+            continue
+        if any(directory.glob("*.yaml")):
+            return directory
+        looked.append(directory)
+    places = "".join(f"\n  {directory}" for directory in looked)
+    raise SceneError(f"the bundled scenes are not installed; looked in:{places}")
+
+
+def bundled_scenes() -> dict[str, Path]:
+    """File of each bundled scene by its name, in alphabetical order."""
+    return {path.stem: path for path in sorted(scenes_directory().glob("*.yaml"))}
+
+
+def bundled_scene(name: str) -> Path:
+    """File of a bundled scene.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene; suggests the nearest name and lists all.
+    """
+    scenes = bundled_scenes()
+    if name in scenes:
+        return scenes[name]
+    raise SceneError(
+        f"{name}: neither a scene file nor a bundled scene{suggestion(name, scenes)}; "
+        f"bundled are {', '.join(scenes)} (in {scenes_directory()})"
+    )

@@ -1,0 +1,198 @@
+"""Faults of a scene: how checks report them, and how they are told to the user.
+
+One line a fault: file, key path (items of lists by their names), the value found, what is allowed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import types
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+LONGEST_VALUE = 60
+"""Characters of a found value that are shown."""
+
+Location = tuple[str | int, ...]
+Fault = tuple[Location, Any, str]
+"""Where (keys and indices), the value found, and what is allowed (a text that goes on after "found ...;")."""
+
+_DEMANDS = {
+    "missing": "is missing",
+    "string_type": "must be text",
+    "string_pattern_mismatch": "must be a name: letters, digits and single underscores, a letter first",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "list_type": "must be a list",
+    "tuple_type": "must be a list",
+    "dict_type": "must be a mapping of keys to values",
+    "model_type": "must be a mapping of keys to values",
+    "model_attributes_type": "must be a mapping of keys to values",
+}
+"""What pydantic's own kinds of error demand; the kinds with a number or a choice in them are in `_demand`."""
+
+
+def refuse(demand: str, note: str = "") -> PydanticCustomError:
+    """The exception by which a validator of one value says what is allowed; `note` is about the value found."""
+    return PydanticCustomError("fault", "{demand}", {"demand": demand, "note": note})
+
+
+def refuse_all(title: str, faults: Sequence[Fault]) -> None:
+    """Raise pydantic's ValidationError with every fault in its place, if there is any."""
+    if faults:
+        details = [InitErrorDetails(type=refuse(demand), loc=where, input=found) for where, found, demand in faults]
+        raise ValidationError.from_exception_data(title, details)
+
+
+def one_of(what: str, found: object, allowed: Iterable[str]) -> str:
+    """The demand that a name be one of those allowed, with the nearest one suggested."""
+    names = [str(name) for name in allowed]
+    listed = ", ".join(names) if names else "there are none"
+    return f"must be one of the {what} ({listed}){suggestion(found, names)}"
+
+
+def suggestion(found: object, allowed: Iterable[str]) -> str:
+    """The name nearest to the one found, as a question; empty if none is near."""
+    near = difflib.get_close_matches(str(found), list(allowed), n=1)
+    return f", did you mean {near[0]}?" if near else ""
+
+
+def tell(error: ValidationError, schema: type[BaseModel], data: Any, source: str) -> str:
+    """All faults of `error` as lines of text.
+
+    Parameters
+    ----------
+    error : ValidationError
+        What validation of `data` against `schema` raised.
+    data : Any
+        The raw content of the scene, for the names of list items.
+    source : str
+        File, or another origin, to begin each line with.
+    """
+    return "\n".join(f"{source}: {_line(fault, schema, data)}" for fault in error.errors(include_url=False))
+
+
+def _line(fault: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
+    path = key_path(fault["loc"], data)
+    if fault["type"] == "missing":
+        return f"{path}: is missing; {_expected(schema, fault['loc'])}"
+    if fault["type"] == "extra_forbidden":
+        keys = _keys(_annotation_at(schema, fault["loc"][:-1]))
+        return f"{path}: unknown key{suggestion(fault['loc'][-1], keys)}; allowed are {', '.join(keys)}"
+    note = fault.get("ctx", {}).get("note")
+    return f"{path}: found {_shown(fault['input'])}{f', {note}' if note else ''}; {_demand(fault)}"
+
+
+def _demand(fault: ErrorDetails) -> str:
+    kind, context = fault["type"], fault.get("ctx", {})
+    if kind == "fault":
+        return context["demand"]
+    if kind == "literal_error":
+        return f"must be {context['expected']}"
+    if kind == "union_tag_invalid":
+        return f"`{context['discriminator'].strip(chr(39))}` must be one of {context['expected_tags']}" + suggestion(
+            context["tag"], [tag.strip(" '") for tag in context["expected_tags"].split(",")]
+        )
+    if kind == "union_tag_not_found":
+        return f"the key {context['discriminator']} is missing"
+    if kind == "too_short":
+        return f"must have at least {context['min_length']} entries, has {context['actual_length']}"
+    if kind == "too_long":
+        return f"must have at most {context['max_length']} entries, has {context['actual_length']}"
+    return _DEMANDS.get(kind, fault["msg"])
+
+
+def key_path(location: Location, data: Any) -> str:
+    """Key path as a user writes it, such as ``rods.arm.layers.active.thickness`` or ``gravity[2]``.
+
+    pydantic puts the chosen type of a union into its location; that is not a key of the file and is left out.
+    """
+    path, here = "", data
+    for place, part in enumerate(location):
+        if part == "[key]":
+            continue
+        if isinstance(part, int):
+            item = here[part] if isinstance(here, list | tuple) and part < len(here) else None
+            name = item.get("name") if isinstance(item, dict) else None
+            path += f".{name}" if isinstance(name, str) else f"[{part}]"
+            here = item
+        elif isinstance(here, dict) and part not in here and place < len(location) - 1:
+            continue
+        else:
+            path += f".{part}"
+            here = here.get(part) if isinstance(here, dict) else None
+    return path.removeprefix(".") or "scene"
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value, default=str, ensure_ascii=False) if not isinstance(value, BaseModel) else str(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
+
+
+# What the schema expects at a place, from the annotations of its classes
+
+
+def _bare(annotation: Any) -> Any:
+    """An annotation without ``Annotated`` and without ``| None``."""
+    while True:
+        if get_origin(annotation) is Annotated:
+            annotation = get_args(annotation)[0]
+            continue
+        members = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else ()
+        rest = [member for member in members if member is not type(None)]
+        if len(rest) != 1:
+            return annotation
+        annotation = rest[0]
+
+
+def _field(model: type[BaseModel], key: str | int) -> Any:
+    for name, field in model.model_fields.items():
+        if key == (field.alias or name):
+            return Annotated[field.annotation, *field.metadata] if field.metadata else field.annotation
+    return Any
+
+
+def _annotation_at(schema: Any, location: Location) -> Any:
+    for part in location:
+        bare = _bare(schema)
+        if isinstance(bare, type) and issubclass(bare, BaseModel):
+            schema = _field(bare, part)
+        elif get_origin(bare) in (Union, types.UnionType):
+            schema = next((member for member in get_args(bare) if part in _tags(member)), Any)
+        elif get_origin(bare) is dict:
+            schema = get_args(bare)[1]
+        elif get_origin(bare) in (list, tuple):
+            schema = get_args(bare)[0]
+    return schema
+
+
+def _tags(member: Any) -> tuple[Any, ...]:
+    """Values by which a member of a discriminated union is chosen."""
+    choices = [field.annotation for field in member.model_fields.values() if get_origin(field.annotation) is Literal]
+    return tuple(tag for choice in choices for tag in get_args(choice))
+
+
+def _keys(annotation: Any) -> list[str]:
+    model = _bare(annotation)
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def _expected(schema: type[BaseModel], location: Location) -> str:
+    """What to write for a missing key."""
+    annotation = _annotation_at(schema, location)
+    for extra in get_args(annotation)[1:] if get_origin(annotation) is Annotated else ():
+        describe = getattr(getattr(extra, "func", None), "describe", None)
+        if describe:
+            return f"must be {describe()}"
+    bare = _bare(annotation)
+    if get_origin(bare) is Literal:
+        return f"must be {' or '.join(repr(value) for value in get_args(bare))}"
+    if get_origin(bare) in (list, tuple):
+        return "must be a list"
+    if bare is str:
+        return "must be text"
+    return "must be a mapping of keys to values"

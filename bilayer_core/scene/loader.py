@@ -1,0 +1,93 @@
+"""Load scenes, and write them out again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from bilayer_core.errors import SceneError
+from bilayer_core.scene.bundled import bundled_scene
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.faults import tell
+from bilayer_core.scene.overrides import apply_override
+from bilayer_core.scene.text import read_yaml, write_yaml
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> SceneConfig:
+    """Load and validate a scene.
+
+    Parameters
+    ----------
+    scene : str, Path or mapping
+        Path of a YAML file, name of a bundled scene, or the content of a scene.
+    overrides : sequence of str
+        Values to change, ``PATH=VALUE`` each, such as ``rods.arm.stations=100``.
+
+    Returns
+    -------
+    SceneConfig
+        Frozen, in SI units.
+
+    Raises
+    ------
+    SceneError
+        One line for each fault: file, key path, the value found, what is allowed.
+    """
+    if isinstance(scene, Mapping):
+        return _validated(dict(scene), "scene", overrides)
+    path = _find(scene)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise SceneError(f"{path}: is not UTF-8 text: {error.reason} at byte {error.start}") from None
+    return parse_scene(text, str(path), overrides)
+
+
+def parse_scene(text: str, source: str, overrides: Sequence[str] = ()) -> SceneConfig:
+    """Validate the text of a scene; `source` begins each line of an error. Otherwise as `load_scene`."""
+    return _validated(read_yaml(text, source), source, overrides)
+
+
+def scene_text(config: SceneConfig) -> str:
+    """YAML that loads to the same configuration bit for bit: every value is written out, in SI units."""
+    return write_yaml(_content(config))
+
+
+def _content(config: SceneConfig) -> dict[str, Any]:
+    return config.model_dump(mode="json", by_alias=True)
+
+
+def _find(scene: str | Path) -> Path:
+    """A path if it is one or looks like one, else that of the bundled scene of this name."""
+    path = Path(scene)
+    if isinstance(scene, Path) or path.suffix in SUFFIXES or len(path.parts) > 1 or path.is_file():
+        return path
+    return bundled_scene(scene)
+
+
+def _validated(data: Any, source: str, overrides: Sequence[str]) -> SceneConfig:
+    if not isinstance(data, dict):
+        raise SceneError(
+            f"{source}: found {type(data).__name__}; must be a mapping of keys to values, see the bundled scenes"
+        )
+    config = _validate(data, source)
+    if not overrides:
+        return config
+    data = _content(config)
+    for override in overrides:
+        apply_override(data, override)
+    return _validate(data, f"{source} with --set {' '.join(overrides)}")
+
+
+def _validate(data: dict[str, Any], source: str) -> SceneConfig:
+    try:
+        return SceneConfig.model_validate(data)
+    except ValidationError as error:
+        raise SceneError(tell(error, SceneConfig, data, source)) from None

@@ -1,0 +1,103 @@
+"""Stimulus over time, as a scene prescribes it: linear between points, constant outside them."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.units import NonNegativeTime, PlainNumber, Time
+
+
+class Hold(BaseModel):
+    """One value at all times."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    type: Literal["hold"]
+    held_value: PlainNumber = Field(alias="value")
+    """In the unit of the channel."""
+
+    def value(self, t: float) -> float:
+        """Value at time `t` [s], in the unit of the channel."""
+        return self.held_value
+
+    def points(self) -> dict[tuple[str | int, ...], float]:
+        """Values between which all others lie, by their keys."""
+        return {("value",): self.held_value}
+
+
+class Ramp(BaseModel):
+    """From one value to another at a constant rate."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    type: Literal["ramp"]
+    start: Time
+    end: Time
+    from_value: PlainNumber = Field(alias="from")
+    to_value: PlainNumber = Field(alias="to")
+    """In the unit of the channel."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Ramp:
+        if self.end <= self.start:
+            refuse_all("Ramp", [(("end",), self.end, f"must be later than `start` ({self.start:g} s)")])
+        return self
+
+    def value(self, t: float) -> float:
+        """Value at time `t` [s], in the unit of the channel."""
+        part = min(max((t - self.start) / (self.end - self.start), 0.0), 1.0)
+        return (1.0 - part) * self.from_value + part * self.to_value
+
+    def points(self) -> dict[tuple[str | int, ...], float]:
+        """Values between which all others lie, by their keys."""
+        return {("from",): self.from_value, ("to",): self.to_value}
+
+
+class Table(BaseModel):
+    """Values at given times."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    type: Literal["table"]
+    times: list[NonNegativeTime] = Field(min_length=1)
+    values: list[PlainNumber] = Field(min_length=1)
+    """In the unit of the channel."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Table:
+        refuse_all("Table", faults_of_times(self.times, ("values",), self.values))
+        return self
+
+    def value(self, t: float) -> float:
+        """Value at time `t` [s], in the unit of the channel."""
+        right = bisect_right(self.times, t)
+        if right == 0:
+            return self.values[0]
+        if right == len(self.times):
+            return self.values[-1]
+        before, after = self.times[right - 1], self.times[right]
+        part = (t - before) / (after - before)
+        return (1.0 - part) * self.values[right - 1] + part * self.values[right]
+
+    def points(self) -> dict[tuple[str | int, ...], float]:
+        """Values between which all others lie, by their keys."""
+        return {("values", index): value for index, value in enumerate(self.values)}
+
+
+Schedule = Annotated[Hold | Ramp | Table, Field(discriminator="type")]
+
+
+def faults_of_times(times: list[float], key: tuple[str], values: list) -> list[Fault]:
+    """Faults of a list of times [s] that has to increase and to be as long as the list under `key`."""
+    faults: list[Fault] = [
+        (("times", index), after, f"must be later than the time before it ({before:g} s)")
+        for index, (before, after) in enumerate(zip(times, times[1:], strict=False), start=1)
+        if after <= before
+    ]
+    if len(times) != len(values):
+        faults.append((key, f"{len(values)} entries", f"must be as many as `times`, {len(times)}"))
+    return faults

@@ -1,0 +1,173 @@
+"""Numbers of a scene: plain ones are SI, texts such as ``1 mm`` or ``-10 m/s^2`` are converted.
+
+A `Quantity` is the validator of one kind of number. The units library is imported when the first text occurs:
+it takes longer than everything else that a scene needs.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
+
+from bilayer_core.scene.faults import refuse
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>[A-Za-zµμ°%][\w°%*/^ ().-]*?)?\s*")
+
+
+@cache
+def _registry():
+    """The units library. It counts in decimals, so that ``53.9 mm`` is the very number that ``0.0539`` is."""
+    from pint import UnitRegistry
+
+    return UnitRegistry(non_int_type=Decimal)
+
+
+def parse_quantity(text: str, unit: str) -> float:
+    """Value of a text such as ``1 mm`` in `unit` (``"1"``: dimensionless); a bare number is in `unit` already.
+
+    Angles are a dimension of their own here: ``1 Hz`` is not ``1 rad/s`` and ``40 deg`` is not a plain number.
+
+    Raises
+    ------
+    ValueError
+        With a text that says what the quantity is instead.
+    """
+    match = _TEXT.fullmatch(text)
+    if match is None:
+        raise ValueError("not a number with a unit")
+    if match["unit"] is None:
+        return float(match["number"])
+    from pint import PintError
+
+    units = _registry()
+    try:
+        found = units.Quantity(Decimal(match["number"]), units.parse_units(match["unit"]))
+        expected = units.Quantity(Decimal(1), units.parse_units(unit))
+        if found.to_root_units().units != expected.to_root_units().units:
+            raise ValueError(_dimension(found))
+        return float(found.to(expected.units).magnitude)
+    except (PintError, AssertionError, ArithmeticError):
+        raise ValueError(f"whose unit {match['unit']!r} is not known") from None
+
+
+def _dimension(quantity: Any) -> str:
+    base = quantity.to_base_units().units
+    return f"a quantity in {base:~}" if f"{base:~}" else "a quantity without dimension"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Validator of a number with a unit and a range.
+
+    Attributes
+    ----------
+    what : str
+        What it is, with its article: "a length".
+    unit : str
+        SI unit of plain numbers; ``"1"`` for dimensionless ones, ``""`` where no unit may be written.
+    example : str
+        A text that is acceptable.
+    above, at_least, at_most : float or None
+        Range of the value in `unit`.
+    """
+
+    what: str
+    unit: str
+    example: str = ""
+    above: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+
+    def describe(self) -> str:
+        """What is allowed, with the unit."""
+        unit = f" [{self.unit}]" if self.unit not in ("", "1") else ""
+        limits = [
+            f"{word} {limit:g}"
+            for word, limit in (("above", self.above), ("at least", self.at_least), ("at most", self.at_most))
+            if limit is not None
+        ]
+        example = f", such as {self.example}" if self.example else ""
+        return f"{self.what}{unit}" + (f" {' and '.join(limits)}" if limits else "") + example
+
+    def __call__(self, value: Any) -> float:
+        """The number in SI, or a fault that says what is allowed."""
+        number = self._number(value)
+        inside = (
+            math.isfinite(number)
+            and (self.above is None or number > self.above)
+            and (self.at_least is None or number >= self.at_least)
+            and (self.at_most is None or number <= self.at_most)
+        )
+        if not inside:
+            raise refuse(f"must be {self.describe()}")
+        return number
+
+    def _number(self, value: Any) -> float:
+        if isinstance(value, str):
+            try:
+                return parse_quantity(value, self.unit) if self.unit else float(value)
+            except ValueError as error:
+                raise refuse(f"must be {self.describe()}", str(error) if self.unit else "") from None
+        if isinstance(value, bool) or not isinstance(value, numbers.Real):
+            raise refuse(f"must be {self.describe()}")
+        try:
+            return float(value)
+        except OverflowError:
+            return math.inf
+
+
+@dataclass(frozen=True)
+class Count:
+    """Validator of a whole number of at least `at_least`."""
+
+    at_least: int
+
+    def describe(self) -> str:
+        """What is allowed."""
+        return f"a whole number of at least {self.at_least}"
+
+    def __call__(self, value: Any) -> int:
+        """The number, or a fault that says what is allowed."""
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < self.at_least:
+            raise refuse(f"must be {self.describe()}")
+        return int(value)
+
+
+def real(*arguments: Any, **limits: float) -> Any:
+    """Annotation of a real number; the arguments are those of `Quantity`."""
+    return Annotated[float, BeforeValidator(Quantity(*arguments, **limits))]
+
+
+def whole(at_least: int) -> Any:
+    """Annotation of a whole number."""
+    return Annotated[int, BeforeValidator(Count(at_least))]
+
+
+PlainNumber = real("a plain number", "")
+Number = real("a number", "1", "0.5")
+NonNegativeNumber = real("a number", "1", "0.5", at_least=0.0)
+PositiveNumber = real("a number", "1", "10", above=0.0)
+Length = real("a length", "m", "1 mm")
+NonNegativeLength = real("a length", "m", "1 mm", at_least=0.0)
+PositiveLength = real("a length", "m", "1 mm", above=0.0)
+Time = real("a time", "s", "0.5 s")
+NonNegativeTime = real("a time", "s", "0.5 s", at_least=0.0)
+PositiveTime = real("a time", "s", "1 ms", above=0.0)
+PositiveMass = real("a mass", "kg", "2.7 g", above=0.0)
+PositiveInertia = real("a moment of inertia", "kg*m^2", "7.2e-7", above=0.0)
+PositiveDensity = real("a density", "kg/m^3", "1000", above=0.0)
+PositivePressure = real("a pressure", "Pa", "100 MPa", above=0.0)
+PositiveSpeed = real("a speed", "m/s", "0.1 mm/s", above=0.0)
+Speed = real("a speed", "m/s", "1 m/s")
+AngularSpeed = real("an angular speed", "rad/s", "60 rpm")
+Acceleration = real("an acceleration", "m/s^2", "-9.81")
+PositiveRate = real("a rate", "Hz", "50", above=0.0)
+NonNegativeRate = real("a rate", "1/s", "2", at_least=0.0)
