@@ -113,12 +113,11 @@ class Simulator:
             self.model, self.dt, solver.tolerance, solver.max_newton_iterations, solver.max_halvings
         )
         self._state = initial_state(self.model)
-        self._stepper.rest(self._state)
         self._compile_time: float | None = None
         self._start_over()
 
     def _start_over(self) -> None:
-        self.statistics = RunStatistics(com_max_height=float(self.com[2]), min_gap=self._stepper.potential.min_gap)
+        self.statistics = RunStatistics(com_max_height=float(self.com[2]))
         self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
@@ -144,6 +143,7 @@ class Simulator:
     @property
     def contact_forces(self) -> Array:
         """Barrier and friction force on each of them [N], shape (nodes, 3)."""
+        self.compile()
         return observe.contact_forces(self._stepper)
 
     @property
@@ -154,6 +154,7 @@ class Simulator:
     @property
     def stimulus(self) -> dict[str, float]:
         """Value of each channel over the last step, in its unit."""
+        self.compile()
         return dict(zip(self.scene.stimuli, self._stepper.stimulus.tolist(), strict=True))
 
     @property
@@ -170,10 +171,12 @@ class Simulator:
     @property
     def curvatures(self) -> Array:
         """Curvature χ through the thickness at every node [1/m], shape (nodes,)."""
+        self.compile()
         return observe.node_curvature(self.model, self._stepper)
 
     def energy(self) -> dict[str, float]:
         """Energy of each term [J]."""
+        self.compile()
         return observe.energies(self._stepper, self._state)
 
     @property
@@ -191,6 +194,7 @@ class Simulator:
 
     def frame(self) -> Frame:
         """A snapshot."""
+        self.compile()
         return observe.make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
 
     # what changes it
@@ -219,9 +223,14 @@ class Simulator:
         self._state.override[index] = float(value)
 
     def compile(self) -> float:
-        """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took."""
+        """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took.
+
+        Whatever needs them calls it; calling it first keeps its time apart from that of the simulation.
+        """
         if self._compile_time is None:
             begin = clock.thread_time()
+            self._compile_time = 0.0
+            self._stepper.rest(self._state)
             trial = State(**{name: array.copy() for name, array in vars(self._state).items()})
             try:
                 self._stepper.advance(trial)
@@ -317,6 +326,7 @@ class Simulator:
             If it does not fit; nothing is changed then.
         """
         self._state.set_flat(snapshot)
+        self.compile()
         self._stepper.rest(self._state)
         self._start_over()
 
