@@ -2,32 +2,71 @@
 
 from __future__ import annotations
 
+import importlib.util
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from bilayer_core.errors import InputError
 from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.record.paths import check_output_path
 from bilayer_core.record.run_data import RunData
 
 
 def write_rrd(run: RunData, rrd_path: str | Path) -> None:
-    """Write a run as a rerun recording with its layout inside."""
-    raise NotImplementedError
+    """Write a run as a rerun recording with its layout inside. An existing file is replaced."""
+    _require_rerun()
+    from bilayer_core.view.rrd_writer import write_recording
+
+    write_recording(run, rrd_path)
 
 
 def convert_log(mcap_path: str | Path, rrd_path: str | Path) -> None:
-    """Convert an MCAP log, whole or cut off, to a rerun recording."""
-    raise NotImplementedError
+    """Convert an MCAP log, whole or cut off, to a rerun recording. An existing recording is replaced."""
+    from bilayer_core.record.log_reader import read_log
+
+    write_rrd(read_log(mcap_path), rrd_path)
 
 
 class RrdRecorder(MemoryRecorder):
-    """Observer that writes a rerun recording when the run ends (parameters as `McapRecorder`, path checked at once)."""
+    """Observer that writes a rerun recording when the run ends; frames wait in memory until then.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write.
+    rate : float
+        Observations per simulated second [Hz].
+    force : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    InputError
+        At once: the path cannot be written to, or rerun is not installed.
+    """
 
     def __init__(self, path: str | Path, rate: float = 50.0, force: bool = False):
-        raise NotImplementedError
+        super().__init__(rate)
+        _require_rerun()
+        self.path = check_output_path(path, force)
+
+    def close(self, complete: bool) -> None:
+        """Write the recording, also of a run that ended early."""
+        super().close(complete)
+        if self.frames:
+            write_rrd(self.run_data(), self.path)
 
 
 def open_viewer(path: str | Path, web: bool = False) -> None:
     """Show an ``.rrd`` or ``.mcap`` file in the rerun viewer (or a browser) and wait until it is closed."""
-    raise NotImplementedError
+    _require_rerun()
+    from bilayer_core.view.viewer_process import show
+
+    with _as_recording(path) as recording:
+        show(recording, web)
 
 
 def screenshot(path: str | Path, png_path: str | Path, time: float | None = None) -> None:
@@ -35,4 +74,35 @@ def screenshot(path: str | Path, png_path: str | Path, time: float | None = None
 
     Raises InputError naming the missing Debian packages when there is no Vulkan driver.
     """
-    raise NotImplementedError
+    _require_rerun()
+    from bilayer_core.view.viewer_process import take_picture
+
+    with _as_recording(path) as recording:
+        picture = take_picture(recording, time)
+    try:
+        Path(png_path).write_bytes(picture)
+    except OSError as error:
+        raise InputError(f"{png_path}: cannot be written: {error.strerror or error}") from error
+
+
+@contextmanager
+def _as_recording(path: str | Path) -> Iterator[Path]:
+    """The file itself, or the recording that a log was converted to, deleted afterwards."""
+    path = Path(path)
+    if path.suffix == ".rrd":
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such file")
+        yield path.resolve()
+        return
+    directory = Path(tempfile.mkdtemp(prefix="bilayer_view_"))
+    try:
+        recording = directory / f"{path.stem}.rrd"
+        convert_log(path, recording)
+        yield recording
+    finally:
+        shutil.rmtree(directory, ignore_errors=True)
+
+
+def _require_rerun() -> None:
+    if importlib.util.find_spec("rerun") is None:
+        raise InputError("the viewer is not installed; install it with: pip install 'bilayer_sim_ros[viewer]'")

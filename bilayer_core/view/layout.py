@@ -1,0 +1,80 @@
+"""How a recording is shown: views, camera, and the text beside them."""
+
+from __future__ import annotations
+
+import rerun.blueprint as rrb
+
+from bilayer_core.record.run_data import RunData
+from bilayer_core.view.scales import Scales
+
+TIMELINE = "sim_time"
+BACKGROUND = (28, 30, 34)
+CHANNEL_COLOURS = (
+    (90, 168, 255),
+    (255, 159, 67),
+    (64, 224, 148),
+    (255, 107, 129),
+    (190, 140, 255),
+    (240, 220, 90),
+    (120, 220, 230),
+    (210, 210, 210),
+)
+
+
+def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
+    """The robot at the left, large, over its legend; curves at the right."""
+    robot = rrb.Spatial3DView(
+        name="Robot",
+        origin="world",
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
+        ),
+    )
+    legend = rrb.Spatial2DView(
+        name="Strain",
+        origin="legend",
+        background=BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=[-12, 269], y_range=[-4, 40]),
+    )
+    text = rrb.TextDocumentView(name="Run", origin="summary")
+    plots = [("stimulus", "Stimulus")] if run.description.channels else []
+    plots += [("contact_force", "Contact force on bodies [N]")] if run.body_wrenches.any() else []
+    plots += [("height", "Height of mass centres [mm]"), ("energy", "Energy [mJ]"), ("solver", "Solver")]
+    curves = [
+        rrb.TimeSeriesView(name=name, origin=f"plots/{group}", plot_legend=rrb.Corner2D.LeftTop)
+        for group, name in plots
+    ]
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(robot, rrb.Horizontal(legend, text, column_shares=[2, 3]), row_shares=[5, 1]),
+            rrb.Vertical(*curves),
+            column_shares=[5, 3],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="paused"),
+        rrb.BlueprintPanel(state="hidden"),
+        rrb.SelectionPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def summary(run: RunData, scales: Scales) -> str:
+    """What is shown and at which scales, in Markdown."""
+    description = run.description
+    nodes = sum(strand.nodes.stop - strand.nodes.start for strand in description.strands)
+    settings = ", ".join(f"{name} {text}" for name, text in description.settings.items())
+    return "\n".join(
+        [
+            f"## {description.scene_name}: {description.title}",
+            f"{len(description.strands)} strands, {nodes} nodes, {run.times[-1] - run.times[0]:.6g} s simulated.",
+            "",
+            f"- **Colour:** axial strain, from −{100 * scales.strain_limit:g} % (blue) over 0 (grey) to"
+            f" +{100 * scales.strain_limit:g} % (red).",
+            f"- **Arrows:** contact force on each node, 1 N is {1e3 * scales.metres_per_newton:.4g} mm long.",
+            f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.",
+            "",
+            settings,
+        ]
+    )

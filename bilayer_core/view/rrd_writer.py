@@ -1,0 +1,177 @@
+"""A run as a rerun recording: entities, time columns, and the layout stored in the file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from bilayer_core.errors import InputError
+from bilayer_core.record.colours import STRAIN_MAP, strain_colours
+from bilayer_core.record.run_data import RunData
+from bilayer_core.view import geometry
+from bilayer_core.view.layout import CHANNEL_COLOURS, TIMELINE, blueprint, summary
+from bilayer_core.view.scales import Scales, choose_scales
+
+CHUNK = 150  # frames in a chunk: chunks are what the viewer loads, caches and drops
+SIDE_SHADE = 0.55  # brightness of the narrow faces of ribbons
+GROUND_COLOURS = ((74, 79, 88), (62, 66, 74), (28, 30, 34))
+BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
+HUB_COLOUR = (52, 58, 70)
+ARROW_COLOUR = (64, 224, 148)
+LEGEND_HEIGHT = 14  # pixels of the colour bar
+
+
+def write_recording(run: RunData, rrd_path: str | Path) -> None:
+    """Write `run` to an ``.rrd`` file. InputError if the run holds no frame, or the file cannot be written."""
+    if not len(run.times) or not len(run.shape_times):
+        raise InputError(f"{run.description.scene_name}: the run holds no frame, there is nothing to show")
+    scales = choose_scales(run)
+    recording = rr.RecordingStream("bilayer_sim")
+    try:
+        recording.save(str(rrd_path), default_blueprint=blueprint(run, scales))
+    except RuntimeError as error:
+        raise InputError(f"{rrd_path}: cannot be written: {error}") from error
+    recording.send_recording_name(f"{run.description.scene_name}: {run.description.title}")
+    recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    recording.log("summary", rr.TextDocument(summary(run, scales), media_type="text/markdown"), static=True)
+    _log_legend(recording, scales)
+    _log_ground(recording, run, scales)
+    _send_strands(recording, run, scales)
+    _send_bodies(recording, run)
+    _send_forces(recording, run, scales)
+    _send_series(recording, run)
+    recording.flush()
+    recording.disconnect()
+
+
+def _chunks(count: int):
+    return (slice(first, min(first + CHUNK, count)) for first in range(0, count, CHUNK))
+
+
+def _time(times: np.ndarray) -> list[rr.TimeColumn]:
+    return [rr.TimeColumn(TIMELINE, duration=times)]
+
+
+def _bytes(colours: np.ndarray) -> np.ndarray:
+    """Colours from 0 to 1 as uint8."""
+    return np.rint(colours * 255).astype(np.uint8)
+
+
+def _log_legend(recording: rr.RecordingStream, scales: Scales) -> None:
+    """The colour bar of strain with three labels."""
+    bar = np.tile(_bytes(STRAIN_MAP[:, :3]), (LEGEND_HEIGHT, 1, 1))
+    recording.log("legend", rr.Image(bar), static=True)
+    limit = 100 * scales.strain_limit
+    ticks = np.array([[6.0, LEGEND_HEIGHT + 8], [len(STRAIN_MAP) / 2, LEGEND_HEIGHT + 8], [len(STRAIN_MAP) - 6.0, LEGEND_HEIGHT + 8]])
+    labels = rr.Points2D(
+        ticks, labels=[f"−{limit:g} %", "0", f"+{limit:g} %"], radii=0.01, colors=(200, 200, 200), show_labels=True
+    )
+    recording.log("legend/ticks", labels, static=True)
+
+
+def _log_ground(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+    for plane in run.description.obstacles:
+        vertices, colours, triangles = geometry.plane_mesh(
+            plane, scales.target, scales.size + 2 * scales.extent, scales.cell, GROUND_COLOURS
+        )
+        mesh = rr.Mesh3D(vertex_positions=vertices, vertex_colors=colours, triangle_indices=triangles)
+        recording.log(f"world/obstacles/{plane.name}", mesh, static=True)
+
+
+def _send_strands(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+    first = 0
+    for strand in run.description.strands:
+        path = f"world/strands/{strand.name}"
+        positions, strain = run.positions[:, strand.nodes], run.strain[:, strand.nodes]
+        nodes = positions.shape[1]
+        frames = run.material_frames[:, first : first + nodes]
+        first += nodes
+        triangles = geometry.ribbon_triangles(nodes)
+        recording.log(path, rr.Mesh3D.from_fields(triangle_indices=triangles), static=True)
+        shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
+        for part in _chunks(len(run.shape_times)):
+            vertices = geometry.ribbon_vertices(strand, positions[part], frames[part])
+            colours = _bytes(strain_colours(strain[part], scales.strain_limit)[:, :, None, :3] * shade)
+            sizes = [nodes * geometry.CORNERS] * len(vertices)
+            recording.send_columns(
+                path,
+                _time(run.shape_times[part]),
+                rr.Mesh3D.columns(
+                    vertex_positions=vertices.reshape(-1, 3), vertex_colors=colours.reshape(-1, 3)
+                ).partition(sizes),
+            )
+
+
+def _send_bodies(recording: rr.RecordingStream, run: RunData) -> None:
+    width = max(strand.width for strand in run.description.strands)
+    thickness = max(strand.thickness for strand in run.description.strands)
+    for index, body in enumerate(run.description.bodies):
+        path = f"world/bodies/{body.name}"
+        if body.radius:
+            vertices, normals, colours, triangles = geometry.ball_mesh(body.radius, BALL_COLOURS)
+            shape = rr.Mesh3D(
+                vertex_positions=vertices, vertex_normals=normals, vertex_colors=colours, triangle_indices=triangles
+            )
+        else:
+            half = (0.6 * width, 0.6 * width, 2.2 * thickness)
+            shape = rr.Boxes3D(half_sizes=[half], colors=HUB_COLOUR, fill_mode="solid")
+        recording.log(path, shape, static=True)
+        for part in _chunks(len(run.times)):
+            recording.send_columns(
+                path,
+                _time(run.times[part]),
+                rr.Transform3D.columns(
+                    translation=run.body_positions[part, index], quaternion=run.body_quaternions[part, index]
+                ),
+            )
+
+
+def _send_forces(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+    path = "world/contact_forces"
+    style = rr.Arrows3D.from_fields(colors=ARROW_COLOUR, radii=0.004 * scales.size)
+    recording.log(path, style, static=True)
+    shown = np.linalg.norm(run.contact_forces, axis=2) > scales.shown_force
+    for part in _chunks(len(run.shape_times)):
+        which = shown[part]
+        recording.send_columns(
+            path,
+            _time(run.shape_times[part]),
+            rr.Arrows3D.columns(
+                origins=run.positions[part][which],
+                vectors=run.contact_forces[part][which] * scales.metres_per_newton,
+            ).partition(which.sum(axis=1)),
+        )
+
+
+def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
+    """Curves: stimulus, contact force on each body, heights, energies, the solver's health."""
+    groups: dict[str, dict[str, np.ndarray]] = {
+        "stimulus": {name: run.stimulus[:, i] for i, name in enumerate(run.description.channels)},
+        "contact_force": {
+            body.name: np.linalg.norm(run.body_wrenches[:, i, :3], axis=1)
+            for i, body in enumerate(run.description.bodies)
+            if np.any(run.body_wrenches[:, i])
+        },
+        "height": {
+            "robot": 1e3 * run.com[:, 2],
+            **{
+                body.name: 1e3 * run.body_positions[:, i, 2]
+                for i, body in enumerate(run.description.bodies)
+                if not body.prescribed
+            },
+        },
+        "energy": {name: 1e3 * values for name, values in run.energy.items() if np.any(values)},
+        "solver": {
+            "iterations per step": run.solver["iterations"] / np.maximum(run.solver["substeps"], 1),
+            "smallest gap [mm]": 1e3 * np.where(np.isfinite(run.solver["min_gap"]), run.solver["min_gap"], np.nan),
+        },
+    }
+    for group, series in groups.items():
+        for index, (name, values) in enumerate(series.items()):
+            path = f"plots/{group}/{name.split(' [')[0].replace(' ', '_')}"
+            colour = CHANNEL_COLOURS[index % len(CHANNEL_COLOURS)]
+            recording.log(path, rr.SeriesLines(names=name, colors=colour, widths=2), static=True)
+            for part in _chunks(len(run.times)):
+                recording.send_columns(path, _time(run.times[part]), rr.Scalars.columns(scalars=values[part]))

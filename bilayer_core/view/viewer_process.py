@@ -1,0 +1,187 @@
+"""The viewer as a process of its own: with a window, in a browser, or without a screen for pictures."""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib.util
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time as clock
+from pathlib import Path
+
+from bilayer_core.errors import InputError
+from bilayer_core.view.layout import TIMELINE
+
+WINDOW_SIZE = "1920x1080"
+START_LIMIT = 60.0  # longest wait for the viewer to answer [s]; a software driver on a busy machine is slow
+DRAW_LIMIT = 120.0  # longest wait for a finished picture [s]
+DRAW_PERIOD = 1.0  # between two looks at whether the picture still changes [s]
+EXIT_LIMIT = 5.0  # longest wait for the viewer to end before it is killed [s]
+DRIVER_DIRECTORIES = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
+DRIVER_VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
+MISSING_DRIVER = (
+    "there is no Vulkan driver to draw with; on Debian and Ubuntu install Mesa's software driver with: "
+    "sudo apt-get install mesa-vulkan-drivers libvulkan1"
+)
+_PR_SET_PDEATHSIG = 1
+
+
+def show(recording: Path, web: bool) -> None:
+    """Open a recording in a window or a browser; return when the viewer is closed or interrupted."""
+    command = [str(viewer_executable()), str(recording)]
+    if web:
+        command += ["--web-viewer", "--bind", "127.0.0.1", "--port", "0", "--web-viewer-port", "0"]
+    else:
+        command += ["--new"]
+    try:
+        code = subprocess.call(command, env=viewer_environment())
+    except KeyboardInterrupt:
+        return
+    if code:
+        raise InputError(f"the viewer could not show {recording} (exit code {code}); is there a screen?")
+
+
+def take_picture(recording: Path, time: float | None = None) -> bytes:
+    """PNG of a recording at `time` [s] (default: its end)."""
+    with HeadlessViewer() as viewer:
+        viewer.open(recording)
+        viewer.set_time(time)
+        return viewer.picture()
+
+
+def viewer_executable() -> Path:
+    """The viewer's own program: killing the script of that name on PATH would leave the viewer running."""
+    spec = importlib.util.find_spec("rerun_cli")
+    if spec is None or spec.origin is None:
+        raise InputError("the viewer is not installed; install it with: pip install 'bilayer_sim_ros[viewer]'")
+    directory = Path(spec.origin).parent
+    bundled = directory / "Rerun.app" / "Contents" / "MacOS" / "Rerun"
+    return bundled if sys.platform == "darwin" and bundled.exists() else directory / "rerun"
+
+
+def viewer_environment() -> dict[str, str]:
+    """Environment of the viewer: it sends no usage statistics where CI is set, and asks no questions."""
+    return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true"}
+
+
+def drawing_environment() -> dict[str, str]:
+    """The same for drawing without a screen: with Mesa's software driver unless the user has chosen one."""
+    environment = viewer_environment()
+    if sys.platform != "linux" or any(environment.get(name) for name in DRIVER_VARIABLES):
+        return environment
+    drivers = [path for directory in DRIVER_DIRECTORIES for path in sorted(directory.glob("*.json"))]
+    if not drivers or ctypes.util.find_library("vulkan") is None:
+        raise InputError(MISSING_DRIVER)
+    software = [path for path in drivers if path.name.startswith("lvp_icd")]
+    if software:
+        environment[DRIVER_VARIABLES[1]] = str(software[0])
+    return environment
+
+
+class HeadlessViewer:
+    """A viewer without a window, ended with the ``with`` block, and by the system if this process dies."""
+
+    def __enter__(self) -> HeadlessViewer:
+        from rerun.experimental import ViewerClient
+
+        self._output = tempfile.TemporaryFile()
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        command = [str(viewer_executable()), "--headless", "--hide-welcome-screen", "--window-size", WINDOW_SIZE]
+        command += ["--bind", "127.0.0.1", "--port", str(port)]
+        libc = ctypes.CDLL(None) if sys.platform == "linux" else None
+        self._process = subprocess.Popen(
+            command,
+            env=drawing_environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=self._output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            preexec_fn=(lambda: libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)) if libc else None,
+        )
+        try:
+            self._wait_for(port)
+            self._client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def __exit__(self, exception_type, exception, traceback) -> None:
+        self._process.terminate()
+        try:
+            self._process.wait(EXIT_LIMIT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._output.close()
+
+    def open(self, recording: Path) -> None:
+        """Load a recording and wait until all of it has arrived."""
+        self._client.open(str(recording))
+        deadline = clock.monotonic() + DRAW_LIMIT
+        while True:
+            state = self._client.get_state()
+            if not state.loading and any(self._timeline(item) for item in state.recordings):
+                return
+            self._check(deadline, "load the recording")
+
+    def set_time(self, time: float | None) -> None:
+        """Stop at `time` [s], or at the end."""
+        state = self._client.get_state()
+        shown = next(item for item in state.recordings if item.store_id == state.active_recording)
+        if time is None:
+            time = self._timeline(shown).end / 1e9
+        self._client.set_time(TIMELINE, duration=float(time), play_state="paused")
+
+    def picture(self) -> bytes:
+        """PNG of the whole viewer, taken once two looks in a row show the same."""
+        deadline = clock.monotonic() + DRAW_LIMIT
+        before = None
+        while True:
+            now = self._client.take_screenshot()
+            if now == before:
+                return now
+            before = now
+            self._check(deadline, "finish the picture")
+
+    def complaints(self) -> list[str]:
+        """What the viewer could not show, and the errors and warnings in its log."""
+        reports = [
+            f"{view.name}: {report.severity}: {report.summary}: {report.details}"
+            for view in self._client.get_state().views
+            for report in view.reports
+        ]
+        return reports + [
+            f"{entry.level}: {entry.message}" for entry in self._client.get_logs() if entry.level in ("WARN", "ERROR")
+        ]
+
+    @staticmethod
+    def _timeline(recording):
+        """The timeline of simulated time, None while nothing is on it."""
+        return next((item for item in recording.timelines if item.name == TIMELINE and item.end is not None), None)
+
+    def _wait_for(self, port: int) -> None:
+        deadline = clock.monotonic() + START_LIMIT
+        while True:
+            try:
+                socket.create_connection(("127.0.0.1", port), timeout=DRAW_PERIOD).close()
+                return
+            except OSError:
+                self._check(deadline, "start", 0.1)
+
+    def _check(self, deadline: float, what: str, wait: float = DRAW_PERIOD) -> None:
+        """Wait a little; raise if the viewer has ended or the time is over."""
+        clock.sleep(wait)
+        if self._process.poll() is None and clock.monotonic() < deadline:
+            return
+        self._output.seek(0)
+        said = self._output.read().decode(errors="replace").strip()[-2000:]
+        if "No graphics adapter" in said or "adapter" in said.lower():
+            raise InputError(f"{MISSING_DRIVER}\nThe viewer said:\n{said}")
+        raise InputError(f"the viewer did not {what}; it said:\n{said}")
