@@ -19,7 +19,8 @@ from pydantic import BeforeValidator
 from bilayer_core.scene.faults import refuse
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>[A-Za-zµμ°%][\w°%*/^ ().-]*?)?\s*")
+_UNIT = r"(?:1?\s*/\s*)?[A-Za-zµμ°%][\w°%*/^ ().-]*?"
+_TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>{_UNIT})?\s*")
 
 
 @cache
@@ -45,17 +46,22 @@ def parse_quantity(text: str, unit: str) -> float:
         raise ValueError("not a number with a unit")
     if match["unit"] is None:
         return float(match["number"])
-    from pint import PintError
-
-    units = _registry()
+    expected, found = _unit(unit), _registry().Quantity(Decimal(match["number"]), _unit(match["unit"]))
     try:
-        found = units.Quantity(Decimal(match["number"]), units.parse_units(match["unit"]))
-        expected = units.Quantity(Decimal(1), units.parse_units(unit))
-        if found.to_root_units().units != expected.to_root_units().units:
+        if found.to_root_units().units != (1 * expected).to_root_units().units:
             raise ValueError(_dimension(found))
-        return float(found.to(expected.units).magnitude)
-    except (PintError, AssertionError, ArithmeticError):
-        raise ValueError(f"whose unit {match['unit']!r} is not known") from None
+        return float(found.to(expected).magnitude)
+    except ArithmeticError:
+        raise ValueError("too large a number") from None
+
+
+@cache
+def _unit(text: str) -> Any:
+    """The unit that a text such as ``m/s^2`` or ``/s`` names."""
+    try:
+        return _registry().Unit(f"1{text}" if text.startswith("/") else text)
+    except Exception:  # what the library raises on text that is no unit has no base in common
+        raise ValueError(f"whose unit {text!r} is not known") from None
 
 
 def _dimension(quantity: Any) -> str:
