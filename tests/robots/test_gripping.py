@@ -1,0 +1,76 @@
+"""What the gripper does, from its scene file alone."""
+
+import numpy as np
+import pytest
+
+from bilayer_core import Simulator, load_scene
+
+pytestmark = pytest.mark.slow
+
+
+class Gaps:
+    """Watches the smallest gap and the ball, a hundred times a second."""
+
+    rate = 100.0
+
+    def start(self, description):
+        self.ball = [body.name for body in description.bodies].index("ball")
+        self.times, self.heights, self.smallest = [], [], np.inf
+
+    def observe(self, frame):
+        self.times.append(frame.time)
+        self.heights.append(frame.body_positions[self.ball, 2])
+        self.smallest = min(self.smallest, frame.min_gap)
+
+    def close(self, complete):
+        assert complete
+
+
+@pytest.fixture(scope="module", params=[0.5, 0.0], ids=["friction", "no friction"])
+def gripped(request):
+    """A whole run, with the scene's friction and without any."""
+    simulator = Simulator(load_scene("gripping", [f"contact.friction.coefficient={request.param}"]))
+    gaps = Gaps()
+    simulator.run(observers=[gaps])
+    return simulator, gaps
+
+
+def test_the_gripper_has_the_papers_parameters():
+    simulator = Simulator(load_scene("gripping"))
+    strands = simulator.model.strands
+    passive = sum(s.node_count for s in strands if s.layer == "passive") + simulator.model.point_count  # with the hub
+    active = sum(s.node_count for s in strands if s.layer == "active")
+    assert (passive, active, simulator.dt) == (201, 192, 1e-3)
+    assert {s.width for s in strands} == {0.01} and {s.thickness for s in strands} == {1e-3}
+    scene = simulator.scene
+    assert scene.gravity == (0.0, 0.0, -10.0)
+    assert {(m.youngs_modulus, m.density) for m in scene.materials.values()} == {(1e8, 1000.0)}
+    assert (scene.contact.barrier_distance, scene.contact.stiffness) == (1e-3, 1e7)
+
+
+def test_the_arms_close_on_the_ball_before_the_stimulus_is_complete(gripped):
+    simulator, _ = gripped
+    contact = simulator.statistics.bodies["ball"]
+    assert 10.0 < contact.first_contact < 13.30
+    assert contact.nodes >= 4
+
+
+def test_the_ball_lies_still_until_the_arms_touch_it(gripped):
+    simulator, gaps = gripped
+    before = np.array(gaps.heights)[np.array(gaps.times) < simulator.statistics.bodies["ball"].first_contact]
+    assert len(before) > 1000
+    assert np.ptp(before) < 1e-7
+
+
+def test_the_ball_is_held_by_form_and_lifted_by_100_mm(gripped):
+    simulator, gaps = gripped
+    lift = gaps.heights[-1] - gaps.heights[0]
+    assert lift == pytest.approx(0.1, abs=1e-3)
+    settled = np.array(gaps.heights)[np.array(gaps.times) > simulator.time - 0.5]
+    assert np.ptp(settled) < 1e-4
+
+
+def test_no_surface_is_ever_crossed_and_every_step_converges(gripped):
+    simulator, gaps = gripped
+    assert 0.0 < simulator.statistics.min_gap <= gaps.smallest < 1e-3
+    assert simulator.summary()["converged"] is True
