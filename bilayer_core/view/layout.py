@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
+from bilayer_core.integrate.observe import versions
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.scales import Scales
 
@@ -40,7 +41,7 @@ def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
     )
     text = rrb.TextDocumentView(name="Run", origin="summary")
     plots = [("stimulus", "Stimulus")] if run.description.channels else []
-    plots += [("contact_force", "Contact force on bodies [N]")] if run.body_wrenches.any() else []
+    plots += [("contact_force", "Contact force [N]")] if run.contact_forces.any() else []
     plots += [("height", "Height of mass centres [mm]"), ("energy", "Energy [mJ]"), ("solver", "Solver")]
     curves = [
         rrb.TimeSeriesView(name=name, origin=f"plots/{group}", plot_legend=rrb.Corner2D.LeftTop)
@@ -48,7 +49,7 @@ def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
     ]
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Vertical(robot, rrb.Horizontal(legend, text, column_shares=[2, 3]), row_shares=[5, 1]),
+            rrb.Vertical(robot, rrb.Horizontal(legend, text, column_shares=[3, 5]), row_shares=[9, 2]),
             rrb.Vertical(*curves),
             column_shares=[5, 3],
         ),
@@ -64,17 +65,17 @@ def summary(run: RunData, scales: Scales) -> str:
     """What is shown and at which scales, in Markdown."""
     description = run.description
     nodes = sum(strand.nodes.stop - strand.nodes.start for strand in description.strands)
-    settings = ", ".join(f"{name} {text}" for name, text in description.settings.items())
+    settings = [f"{name} {text}" for name, text in description.settings.items() if name not in versions()]
     return "\n".join(
         [
-            f"## {description.scene_name}: {description.title}",
+            f"**{description.scene_name}: {description.title}**",
+            "",
             f"{len(description.strands)} strands, {nodes} nodes, {run.times[-1] - run.times[0]:.6g} s simulated.",
             "",
             f"- **Colour:** axial strain, from −{100 * scales.strain_limit:g} % (blue) over 0 (grey) to"
             f" +{100 * scales.strain_limit:g} % (red).",
-            f"- **Arrows:** contact force on each node, 1 N is {1e3 * scales.metres_per_newton:.4g} mm long.",
+            f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.",
             f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.",
-            "",
-            settings,
+            f"- **Computed with:** {', '.join(settings)}.",
         ]
     )

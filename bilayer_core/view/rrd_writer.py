@@ -18,7 +18,7 @@ CHUNK = 150  # frames in a chunk: chunks are what the viewer loads, caches and d
 SIDE_SHADE = 0.55  # brightness of the narrow faces of ribbons
 GROUND_COLOURS = ((74, 79, 88), (62, 66, 74), (28, 30, 34))
 BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
-HUB_COLOUR = (52, 58, 70)
+HUB_COLOUR = (128, 140, 160)
 ARROW_COLOUR = (64, 224, 148)
 LEGEND_HEIGHT = 14  # pixels of the colour bar
 
@@ -64,7 +64,8 @@ def _log_legend(recording: rr.RecordingStream, scales: Scales) -> None:
     bar = np.tile(_bytes(STRAIN_MAP[:, :3]), (LEGEND_HEIGHT, 1, 1))
     recording.log("legend", rr.Image(bar), static=True)
     limit = 100 * scales.strain_limit
-    ticks = np.array([[6.0, LEGEND_HEIGHT + 8], [len(STRAIN_MAP) / 2, LEGEND_HEIGHT + 8], [len(STRAIN_MAP) - 6.0, LEGEND_HEIGHT + 8]])
+    steps = len(STRAIN_MAP)
+    ticks = [[x, LEGEND_HEIGHT + 8] for x in (6, steps / 2, steps - 6)]
     labels = rr.Points2D(
         ticks, labels=[f"−{limit:g} %", "0", f"+{limit:g} %"], radii=0.01, colors=(200, 200, 200), show_labels=True
     )
@@ -130,7 +131,7 @@ def _send_bodies(recording: rr.RecordingStream, run: RunData) -> None:
 
 def _send_forces(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
     path = "world/contact_forces"
-    style = rr.Arrows3D.from_fields(colors=ARROW_COLOUR, radii=0.004 * scales.size)
+    style = rr.Arrows3D.from_fields(colors=ARROW_COLOUR, radii=0.005 * scales.size)
     recording.log(path, style, static=True)
     shown = np.linalg.norm(run.contact_forces, axis=2) > scales.shown_force
     for part in _chunks(len(run.shape_times)):
@@ -150,7 +151,7 @@ def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
     groups: dict[str, dict[str, np.ndarray]] = {
         "stimulus": {name: run.stimulus[:, i] for i, name in enumerate(run.description.channels)},
         "contact_force": {
-            body.name: np.linalg.norm(run.body_wrenches[:, i, :3], axis=1)
+            f"on {body.name}": np.linalg.norm(run.body_wrenches[:, i, :3], axis=1)
             for i, body in enumerate(run.description.bodies)
             if np.any(run.body_wrenches[:, i])
         },
@@ -170,8 +171,19 @@ def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
     }
     for group, series in groups.items():
         for index, (name, values) in enumerate(series.items()):
-            path = f"plots/{group}/{name.split(' [')[0].replace(' ', '_')}"
-            colour = CHANNEL_COLOURS[index % len(CHANNEL_COLOURS)]
-            recording.log(path, rr.SeriesLines(names=name, colors=colour, widths=2), static=True)
-            for part in _chunks(len(run.times)):
-                recording.send_columns(path, _time(run.times[part]), rr.Scalars.columns(scalars=values[part]))
+            _send_curve(recording, f"plots/{group}", name, index, run.times, values)
+    if run.contact_forces.any():
+        # Forces that hold a body cancel in their sum; this shows how hard it is held.
+        total = np.linalg.norm(run.contact_forces, axis=2).sum(axis=1)
+        index = len(groups["contact_force"])
+        _send_curve(recording, "plots/contact_force", "on nodes, sizes summed", index, run.shape_times, total)
+
+
+def _send_curve(
+    recording: rr.RecordingStream, group: str, name: str, index: int, times: np.ndarray, values: np.ndarray
+) -> None:
+    path = f"{group}/{name.split(' [')[0].replace(' ', '_').replace(',', '')}"
+    colour = CHANNEL_COLOURS[index % len(CHANNEL_COLOURS)]
+    recording.log(path, rr.SeriesLines(names=name, colors=colour, widths=2), static=True)
+    for part in _chunks(len(times)):
+        recording.send_columns(path, _time(times[part]), rr.Scalars.columns(scalars=values[part]))

@@ -8,16 +8,18 @@ import numpy as np
 
 from bilayer_core.record.run_data import RunData
 
-_STEPS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
+_STEPS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0])
 SMALLEST_STRAIN = 1e-4
 ARROW_SHARE = 0.25  # length of the arrow of the reference force, in sizes of the robot
 SHOWN_SHARE = 0.005  # forces below this share of the reference force have no arrow
 VIEW_DIRECTION = np.array([0.62, -0.72, 0.30])  # from what is looked at to the eye
-VIEW_DISTANCE = 1.18  # in diagonals of the box that is framed; fits the viewer's field of view
+VIEW_SLOPE = 0.44  # tangent of the angle over and under the line of sight that is filled; the viewer shows 0.52
+VIEW_ASPECT = 1.5  # width of the view over its height
+VIEW_FRAMES = 200  # how many frames of a run decide on the camera
 
 
 def rounded_up(value: float) -> float:
-    """The next number 1, 1.5, 2, 3, 4, 5, 6, 8 times a power of ten."""
+    """The next number 1, 1.5, 2, 3, 4, 5, 6, 7, 8 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * _STEPS[np.searchsorted(_STEPS, value / power - 1e-9)])
 
@@ -41,7 +43,7 @@ class Scales:
     eye, target : ndarray
         From where to where a picture looks [m], shape (3,).
     extent : float
-        Half the diagonal of all that moves [m].
+        Half the diagonal of the box of all that moves [m].
     """
 
     strain_limit: float
@@ -62,19 +64,51 @@ def choose_scales(run: RunData) -> Scales:
     largest = np.linalg.norm(run.contact_forces, axis=2).max(axis=1)
     largest = largest[largest > 0]
     reference = float(np.percentile(largest, 95)) if len(largest) else 1.0
-    lower, upper = run.positions.min(axis=(0, 1)).astype(float), run.positions.max(axis=(0, 1)).astype(float)
+    metres_per_newton = 1.0 / rounded_up(reference / (ARROW_SHARE * size))
+    every = slice(None, None, max(1, len(run.shape_times) // VIEW_FRAMES))
+    positions = run.positions[every].reshape(-1, 3).astype(float)
+    points = [positions, positions + metres_per_newton * run.contact_forces[every].reshape(-1, 3)]
     for index, body in enumerate(run.description.bodies):
-        lower = np.minimum(lower, run.body_positions[:, index].min(axis=0) - body.radius)
-        upper = np.maximum(upper, run.body_positions[:, index].max(axis=0) + body.radius)
-    target, diagonal = 0.5 * (lower + upper), float(np.linalg.norm(upper - lower))
-    direction = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+        poles = body.radius * np.concatenate([np.eye(3), -np.eye(3)])
+        points.append((run.body_positions[:, index, None] + poles).reshape(-1, 3))
+    seen = np.concatenate(points)
+    eye, target = place_eye(seen)
     return Scales(
         strain_limit=rounded_up(strain),
-        metres_per_newton=1.0 / rounded_up(reference / (ARROW_SHARE * size)),
+        metres_per_newton=metres_per_newton,
         shown_force=SHOWN_SHARE * reference,
         size=size,
         cell=rounded_up(size / 8),
-        eye=target + VIEW_DISTANCE * diagonal * direction,
+        eye=eye,
         target=target,
-        extent=0.5 * diagonal,
+        extent=0.5 * float(np.linalg.norm(np.ptp(seen, axis=0))),
     )
+
+
+def place_eye(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nearest place along `VIEW_DIRECTION` from which all `points` are in the picture, and what it looks at.
+
+    Parameters
+    ----------
+    points : ndarray
+        [m], shape (points, 3).
+
+    Returns
+    -------
+    eye, target : ndarray
+        [m], shape (3,).
+    """
+    back = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    axes = np.stack([right, np.cross(back, right), back])
+    seen = points @ axes.T
+    middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
+    for _ in range(3):  # near points spread more than far ones: centre what is seen, not what is there
+        offset = np.abs(seen - middle)
+        needed = np.maximum(offset[:, 0] / VIEW_ASPECT, offset[:, 1]) / VIEW_SLOPE + seen[:, 2] - middle[2]
+        distance = needed.max()
+        slopes = (seen - middle)[:, :2] / (distance + middle[2] - seen[:, 2:])
+        middle[:2] += 0.5 * distance * (slopes.min(axis=0) + slopes.max(axis=0))
+    target = middle @ axes
+    return target + distance * back, target
