@@ -90,7 +90,6 @@ class MarkerEncoder:
         template.put("<u4", len(description.strands) + len(description.bodies) + len(description.obstacles) + 1)
         for index, (strand, own) in enumerate(zip(description.strands, node_frames.ranges, strict=True)):
             count = 2 * (own.stop - own.start)
-            # The thickness of the bars is the spacing of nodes, known from the first frame.
             _head(template, f"strands/{strand.name}", LINE_LIST, (1.0, 1.0, 1.0, 1.0), scale_field=f"spacing{index}")
             template.put("<u4", count)
             template.array(f"points{index}", "<f8", (count, 3))
@@ -140,13 +139,13 @@ class MarkerEncoder:
         half = self._half_width * nodes.widths
         np.subtract(nodes.positions, half, out=self._bars[:, 0])
         np.add(nodes.positions, half, out=self._bars[:, 1])
+        steps = nodes.positions[1:] - nodes.positions[:-1]
+        lengths = np.sqrt(np.einsum("ij,ij->i", steps, steps))
         colours = strain_colours(frame.strain[nodes.order], STRAIN_LIMIT)[:, None, :]
         for own, points, colour, spacing in zip(nodes.ranges, self._points, self._colours, self._spacings, strict=True):
             points[:] = self._bars[own]
             colour[:] = colours[own]
-            if spacing[0] == 0.0:
-                steps = np.diff(nodes.positions[own], axis=0)
-                spacing[0] = np.sqrt((steps * steps).sum(axis=1)).mean()
+            spacing[0] = lengths[own.start : own.stop - 1].mean()
         for index, pose in enumerate(self._body_poses):
             pose[:3] = frame.body_positions[index]
             pose[3:] = frame.body_quaternions[index]

@@ -34,7 +34,7 @@ def show(recording: Path, web: bool) -> None:
     """Open a recording in a window or a browser; return when the viewer is closed or interrupted."""
     command = [str(viewer_executable()), str(recording)]
     if web:
-        command += ["--web-viewer", "--bind", "127.0.0.1", "--port", "0", "--web-viewer-port", "0"]
+        command += ["--web-viewer", "--bind", "127.0.0.1", "--port", "auto", "--web-viewer-port", "0"]
     else:
         command += ["--new"]
     try:
@@ -42,7 +42,7 @@ def show(recording: Path, web: bool) -> None:
     except KeyboardInterrupt:
         return
     if code:
-        raise InputError(f"the viewer could not show {recording} (exit code {code}); is there a screen?")
+        raise InputError(f"the viewer ended with exit code {code}; without a screen take a screenshot, or use a browser")
 
 
 def take_picture(recording: Path, time: float | None = None) -> bytes:

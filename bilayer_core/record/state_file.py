@@ -1,0 +1,69 @@
+"""Saved states: one file holds all that a run needs to go on bit for bit, beside its scene."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from bilayer_core.errors import InputError
+from bilayer_core.integrate.frame import Description
+
+LOG_SUFFIX = ".mcap"
+
+
+def write_state(path: str | Path, state: np.ndarray, description: Description) -> None:
+    """Write a flat state with the layout and the scene that it belongs to, as numpy's ``.npz``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    try:
+        with open(path, "wb") as file:
+            layout = json.dumps(description.state_layout)
+            np.savez(file, state=state, layout=np.array(layout), scene=np.array(description.scene_text))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def read_saved_state(path: str | Path, description: Description) -> np.ndarray:
+    """Flat state from a file of `write_state`, or the last one of an MCAP log.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or its state has other parts than those of `description`.
+    """
+    path = Path(path)
+    if path.suffix == LOG_SUFFIX:
+        from bilayer_core.record.log_reader import read_description, read_state
+
+        saved, state = read_description(path).state_layout, read_state(path)[0]
+    else:
+        saved, state = _read(path)
+    if saved != description.state_layout:
+        raise InputError(f"{path}: holds a state of another scene: {_difference(dict(saved), description)}")
+    return state
+
+
+def _read(path: Path) -> tuple[tuple, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            layout = json.loads(str(content["layout"]))
+            return tuple((name, tuple(shape)) for name, shape in layout), content["state"]
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (KeyError, TypeError, ValueError, zipfile.BadZipFile, EOFError) as error:
+        raise InputError(f"{path}: is not a saved state") from error
+
+
+def _difference(saved: dict[str, tuple[int, ...]], description: Description) -> str:
+    """The first part that is not the same."""
+    for name, shape in description.state_layout:
+        if saved.get(name) != shape:
+            return f"{name} has shape {saved.get(name)}, in {description.scene_name} it has {shape}"
+    return "it has more parts"

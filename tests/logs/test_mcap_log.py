@@ -1,0 +1,284 @@
+"""Logs: written whole, cut off by a kill, refused, and on a disk that fails."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+import synthetic_run
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.record import mcap_log
+from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
+from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.record.memory import MemoryRecorder
+
+TIMES = np.arange(0, 51) * 0.02
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    recorder = McapRecorder(path, rate=50.0, marker_rate=50.0)
+    recorder.start(synthetic_run.description())
+    for step, moment in enumerate(TIMES):
+        if step == 25:
+            recorder.log_stimulus("humidity", 0.25, moment)
+        recorder.observe(synthetic_run.frame(float(moment), TIMES[-1]))
+    recorder.close(True)
+    return path
+
+
+def assert_equal_descriptions(found, expected):
+    for item in fields(expected):
+        one, other = getattr(found, item.name), getattr(expected, item.name)
+        if item.name == "obstacles":
+            assert [plane.name for plane in one] == [plane.name for plane in other]
+            np.testing.assert_array_equal([plane.normal for plane in one], [plane.normal for plane in other])
+        else:
+            assert one == other
+
+
+def test_info_says_what_the_log_holds(log):
+    info = read_info(log)
+    assert (info.scene, info.title) == ("synthetic", "Four ribbons and a ball")
+    assert (info.start_time, info.last_time, info.duration) == (0.0, 1.0, 1.0)
+    assert (info.complete, info.termination, info.channels) == (True, "completed", ("humidity",))
+    assert info.topics["/bilayer_sim/markers"] == {"type": "visualization_msgs/msg/MarkerArray", "count": 51}
+    assert info.topics["/bilayer_sim/stimulus/humidity"]["count"] == 1
+    assert info.settings == {"model": "two_rod", "integrator": "implicit_euler", "dt": "0.001"}
+    assert info.versions["numpy"] == np.__version__
+    assert info.size == log.stat().st_size
+
+
+def test_the_scene_and_the_description_come_back(log):
+    assert scene_from_log(log) == synthetic_run.SCENE_TEXT
+    assert_equal_descriptions(read_description(log), synthetic_run.description())
+
+
+def test_arrays_read_from_the_log_are_those_that_were_observed(log):
+    memory = MemoryRecorder()
+    synthetic_run.run(memory, TIMES)
+    expected, found = memory.run_data(), read_log(log)
+    for item in fields(expected):
+        one, other = getattr(found, item.name), getattr(expected, item.name)
+        if isinstance(other, np.ndarray):
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-9, err_msg=item.name)
+        elif isinstance(other, dict):
+            assert list(one) == list(other)
+            for name in other:
+                np.testing.assert_array_equal(one[name], other[name])
+
+
+def test_a_state_is_read_back_exactly(log):
+    last, last_time = read_state(log)
+    assert last_time == 1.0
+    np.testing.assert_array_equal(last, synthetic_run.frame(1.0, 1.0).state)
+    earlier, earlier_time = read_state(log, 0.515)
+    assert earlier_time == 0.5
+    np.testing.assert_array_equal(earlier, synthetic_run.frame(0.5, 1.0).state)
+    with pytest.raises(InputError, match="holds no state at or before t = -1 s"):
+        read_state(log, -1.0)
+
+
+def test_rosbags_reads_every_message(log):
+    with AnyReader([log]) as reader:
+        counts = {connection.topic: connection.msgcount for connection in reader.connections}
+        decoded = [reader.deserialize(raw, connection.msgtype) for connection, _, raw in reader.messages()]
+    assert len(decoded) == sum(counts.values()) == 13 * 51 + 1
+
+
+def test_mcap_ros2_reads_every_message_in_order_of_time(log):
+    with log.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == "ros2"
+        assert [item.name for item in reader.iter_attachments()] == ["scene.yaml"]
+        last = {}
+        for _, channel, message, decoded in reader.iter_decoded_messages():
+            last[channel.topic] = (message.log_time, decoded)
+    assert len(last) == 14
+    stamp, pose = last["/bilayer_sim/body_pose/ball"]
+    assert stamp == 10**9
+    assert (pose.header.stamp.sec, pose.header.frame_id) == (1, "world")
+    assert pose.pose.position.z == pytest.approx(synthetic_run.RADIUS + 1e-3 + synthetic_run.LIFT)
+    assert last["/bilayer_sim/stimulus/humidity"][0] == 500_000_000
+
+
+def test_an_interrupted_run_is_not_complete(tmp_path):
+    recorder = McapRecorder(tmp_path / "run.mcap")
+    recorder.start(synthetic_run.description())
+    recorder.observe(synthetic_run.frame(0.0))
+    recorder.close(False, "interrupted")
+    info = read_info(tmp_path / "run.mcap")
+    assert (info.complete, info.termination, info.last_time) == (False, "interrupted", 0.0)
+
+
+KILLED = """
+import sys, time
+import synthetic_run
+from bilayer_core.record.mcap_log import McapRecorder
+
+recorder = McapRecorder(sys.argv[1])
+recorder.start(synthetic_run.description())
+step = 0
+while True:
+    recorder.observe(synthetic_run.frame(0.02 * step))
+    step += 1
+    print(step, flush=True)
+    time.sleep(0.02)
+"""
+
+
+def test_a_log_of_a_killed_process_is_readable_up_to_its_last_second(tmp_path, root):
+    path = tmp_path / "run.mcap"
+    environment = {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{root / 'tests'}"}
+    writer = subprocess.Popen(
+        [sys.executable, "-c", KILLED, path], env=environment, stdout=subprocess.PIPE, text=True
+    )
+    with writer:
+        observed = []
+        for line in writer.stdout:
+            observed.append(time.monotonic())
+            if int(line) == 100:
+                writer.send_signal(signal.SIGKILL)
+                break
+    info = read_info(path)
+    assert (info.complete, info.termination, info.scene) == (False, "cut off", "synthetic")
+    survivors = info.topics["/clock"]["count"]
+    assert info.last_time == pytest.approx(0.02 * (survivors - 1))
+    assert observed[-1] - observed[survivors - 1] < 1.0
+    run = read_log(path)
+    assert len(run.times) == survivors
+    assert read_state(path)[1] == info.last_time
+
+
+@pytest.mark.parametrize("missing", [1, 7, 500, 30_000, 100_000])
+def test_a_log_cut_at_any_byte_loses_only_what_was_cut(log, tmp_path, missing):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(log.read_bytes()[:-missing])
+    info = read_info(cut)
+    assert info.scene == "synthetic"
+    assert len(read_log(cut).times) == info.topics["/bilayer_sim/com"]["count"] > 20
+
+
+@pytest.mark.parametrize("content", [b"", b"no log at all, but long enough for some records", None])
+def test_a_file_that_is_no_log_is_refused(content, tmp_path):
+    path = tmp_path / "file.mcap"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=r"file\.mcap"):
+        read_info(path)
+
+
+def test_a_damaged_chunk_is_noticed(log, tmp_path):
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(data)
+    with pytest.raises(InputError, match="damaged"):
+        read_log(damaged)
+
+
+def test_bad_paths_are_refused_before_anything_is_computed(tmp_path):
+    existing = tmp_path / "old.mcap"
+    existing.write_bytes(b"precious")
+    with pytest.raises(InputError, match=r"old\.mcap: exists already"):
+        McapRecorder(existing)
+    with pytest.raises(InputError, match=r"there is no directory .*missing"):
+        McapRecorder(tmp_path / "missing" / "run.mcap")
+    with pytest.raises(InputError, match="is a directory"):
+        McapRecorder(tmp_path, force=True)
+    assert existing.read_bytes() == b"precious"
+
+
+def test_force_replaces_a_file_when_the_run_starts_and_not_before(tmp_path):
+    path = tmp_path / "old.mcap"
+    path.write_bytes(b"precious")
+    recorder = McapRecorder(path, force=True)
+    assert path.read_bytes() == b"precious"
+    synthetic_run.run(recorder, TIMES[:2])
+    assert read_info(path).complete
+
+
+def test_a_full_disk_surfaces_as_an_error_of_the_run():
+    recorder = McapRecorder(Path("/dev/full"), force=True)
+    with pytest.raises((InputError, SimulationError), match="/dev/full.*No space left on device"):
+        recorder.start(synthetic_run.description())
+        for moment in TIMES:
+            recorder.observe(synthetic_run.frame(float(moment)))
+        recorder.close(True)
+
+
+class FullDisk:
+    """A file that takes some bytes and then says that the disk is full."""
+
+    def __init__(self, file, room):
+        self._file, self._room = file, room
+
+    def write(self, data):
+        self._room -= len(data)
+        if self._room < 0:
+            raise OSError(28, "No space left on device")
+        return self._file.write(data)
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+
+def test_a_disk_that_fills_up_stops_the_run_and_is_told_again_at_the_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        mcap_log, "open", lambda path, mode: FullDisk(path.open(mode), 300_000), raising=False
+    )
+    recorder = McapRecorder(tmp_path / "run.mcap")
+    recorder.start(synthetic_run.description())
+    with pytest.raises(SimulationError, match=r"run\.mcap could not be written: No space left") as raised:
+        for step in range(10_000):
+            recorder.observe(synthetic_run.frame(0.01 * step))
+    assert raised.value.exit_code == 3
+    with pytest.raises(SimulationError, match="No space left"):
+        recorder.close(False)
+    assert len(read_log(tmp_path / "run.mcap").times) > 0
+
+
+def test_a_log_whose_directory_disappears_is_reported(tmp_path):
+    directory = tmp_path / "runs"
+    directory.mkdir()
+    recorder = McapRecorder(directory / "run.mcap")
+    recorder.start(synthetic_run.description())
+    recorder.observe(synthetic_run.frame(0.0))
+    (directory / "run.mcap").unlink()
+    directory.rmdir()
+    with pytest.raises(SimulationError, match="was deleted while it was written"):
+        recorder.close(True)
+
+
+def test_a_slow_disk_holds_the_run_back_and_loses_nothing(tmp_path, monkeypatch):
+    write = mcap_log._LogFile.write
+
+    def slow(self, item):
+        time.sleep(0.005)
+        write(self, item)
+
+    monkeypatch.setattr(mcap_log._LogFile, "write", slow)
+    monkeypatch.setattr(mcap_log, "QUEUE_LENGTH", 4)
+    recorder = McapRecorder(tmp_path / "run.mcap")
+    start = time.monotonic()
+    synthetic_run.run(recorder, np.arange(60) * 0.02)
+    assert time.monotonic() - start > 0.3
+    assert read_info(tmp_path / "run.mcap").topics["/clock"]["count"] == 60
+
+
+def test_an_unknown_channel_is_not_logged(tmp_path):
+    recorder = McapRecorder(tmp_path / "run.mcap")
+    recorder.start(synthetic_run.description())
+    with pytest.raises(InputError, match="'light': no such channel; the log has: humidity"):
+        recorder.log_stimulus("light", 0.1, 0.0)
+    recorder.close(False)
