@@ -26,7 +26,11 @@ def _cache_is_usable() -> bool:
     try:
         FunctionCache(probe)
     except RuntimeError as error:
-        _log.warning("compiled kernels cannot be cached (%s): every start compiles again. Set NUMBA_CACHE_DIR to a writable directory.", error)
+        _log.warning(
+            "compiled kernels cannot be cached (%s): every start compiles again. "
+            "Set NUMBA_CACHE_DIR to a writable directory.",
+            error,
+        )
         return False
     return True
 
@@ -35,10 +39,8 @@ CACHE = os.environ.get("BILAYER_JIT_CACHE", "1") != "0" and _cache_is_usable()
 
 
 def kernel(function):
-    """Compile `function` as a kernel: nopython, GIL released, cached, NaN-preserving fast arithmetic."""
+    """Compile `function`: nopython, GIL released, cached, NaN-preserving fast arithmetic.
+
+    Small scalar functions take it too; LLVM inlines them into the kernels that call them.
+    """
     return numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH)(function)
-
-
-def inlined(function):
-    """Compile a small scalar function that kernels call; LLVM inlines it into each of them."""
-    return numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, inline="never")(function)

@@ -15,16 +15,27 @@ def rod(layers, length=0.1, stations=21, start=(0, 0, 0), name="rod", width=0.01
     """A straight rod along x, its normal along z."""
     path = {"shape": "straight", "start": list(start), "direction": [1, 0, 0], "length": length}
     return {
-        "name": name, "width": width, "path": path, "normal": [0, 0, 1], "stations": stations, "layers": layers, **more
-    }  # fmt: skip
+        "name": name,
+        "width": width,
+        "path": path,
+        "normal": [0, 0, 1],
+        "stations": stations,
+        "layers": layers,
+        **more,
+    }
 
 
 def scene(rods, **more):
     """A scene without gravity, contact, stimuli or bodies."""
     base = {
-        "schema": 1, "name": "sample", "title": "A sample", "duration": 1.0, "gravity": [0, 0, 0],
-        "materials": {"gel": GEL}, "rods": rods,
-    }  # fmt: skip
+        "schema": 1,
+        "name": "sample",
+        "title": "A sample",
+        "duration": 1.0,
+        "gravity": [0, 0, 0],
+        "materials": {"gel": GEL},
+        "rods": rods,
+    }
     return copy.deepcopy({**base, **more})
 
 
@@ -36,17 +47,21 @@ def fixed(name="wall", position=(0, 0, 0), **more):
 def ball(position, radius=0.02, mass=2.7e-3, **motion):
     """A free ball."""
     return {
-        "name": "ball", "position": list(position), "motion": {"type": "free", "mass": mass, **motion},
+        "name": "ball",
+        "position": list(position),
+        "motion": {"type": "free", "mass": mass, **motion},
         "surface": {"shape": "sphere", "radius": radius},
-    }  # fmt: skip
+    }
 
 
 def contact(barrier_distance=1e-3, coefficient=None, speed_threshold=1e-4):
     """Contact settings of the paper, with friction if a coefficient is given."""
     friction = {"coefficient": coefficient, "speed_threshold": speed_threshold}
     return {
-        "barrier_distance": barrier_distance, "stiffness": 1e7, "friction": friction if coefficient is not None else None
-    }  # fmt: skip
+        "barrier_distance": barrier_distance,
+        "stiffness": 1e7,
+        "friction": friction if coefficient is not None else None,
+    }
 
 
 def everything(stations=6):
@@ -58,9 +73,14 @@ def everything(stations=6):
         eigenstrain={"stimulus": "humidity", "gain": 0.06},
     )
     arm = rod(
-        [layer("passive"), active], length=spacing * (stations - 1), stations=stations, start=(0.002, 0, 0.0425), name="arm",
-        clamp_start="hub", pattern={"count": 2},
-    )  # fmt: skip
+        [layer("passive"), active],
+        length=spacing * (stations - 1),
+        stations=stations,
+        start=(0.002, 0, 0.0425),
+        name="arm",
+        clamp_start="hub",
+        pattern={"count": 2},
+    )
     point = {"position": [0, 0, -0.0005], "length": 0.01, "offset": 0.0005}
     return scene(
         [arm],

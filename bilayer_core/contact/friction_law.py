@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-from ..jit import inlined
+from ..jit import kernel
 
 
-@inlined
+@kernel
 def friction_potential(v, threshold):
     """f₀(v) = v²/ε − v³/(3ε²), continued by v − ε/3 [m/s]."""
     if v >= threshold:
@@ -16,7 +16,7 @@ def friction_potential(v, threshold):
     return v * v / threshold * (1.0 - v / (3.0 * threshold))
 
 
-@inlined
+@kernel
 def friction_over_speed(v, threshold):
     """f₁(v)/v, finite at rest [s/m]."""
     if v >= threshold:
@@ -24,7 +24,7 @@ def friction_over_speed(v, threshold):
     return (2.0 - v / threshold) / threshold
 
 
-@inlined
+@kernel
 def friction_slope(v, threshold):
     """f₁′(v) [s/m]."""
     if v >= threshold:

@@ -1,6 +1,7 @@
 """The largest fraction of a step over which every gap keeps a tenth of its present size.
 
-Carriers move along straight lines within an iterate, so the bound is exact: a node cannot jump over a surface however long the step
+Carriers move along straight lines within an iterate, so the bound is exact: a node cannot jump over a surface however
+long the step
 (continuous collision detection; Li et al. 2020, sec. 5).
 """
 

@@ -2,7 +2,8 @@
 
     B = ½ k₁ (κ₁ − κ̄₁)² + ½ k₂ (κ₂ − κ̄₂)² + ½ k₃ (ψ − ψ̄)²        (paper, eqs. 9 to 12)
 
-At an inner node k₁ = EI₁/Δl, k₂ = EI₂/Δl, k₃ = GJ/Δl and κ₁ = χ Δl, κ₂ = ξ Δl, ψ = τ Δl with the Voronoi length Δl. The same
+At an inner node k₁ = EI₁/Δl, k₂ = EI₂/Δl, k₃ = GJ/Δl and κ₁ = χ Δl, κ₂ = ξ Δl, ψ = τ Δl with the Voronoi length Δl.
+The same
 element with other stiffnesses ties the frames of two bonded layers together (`coupling`).
 
 Strains. With unit tangents a, b, directors mα of either edge, and c = 1 + a·b, the curvature binormal 2 a×b/c projected
@@ -10,16 +11,19 @@ on the mean of the directors is
 
     κ_α = (b·mα_a − a·mα_b)/c,   α = 1, 2,
 
-because (a×b)·m2_a = b·m1_a and so on (κ₁ belongs to bending through the thickness, χ = m1·t′). ψ is the angle about b from the
+because (a×b)·m2_a = b·m1_a and so on (κ₁ belongs to bending through the thickness, χ = m1·t′). ψ is the angle about b
+from the
 parallel-transported m1_a to m1_b.
 
-Derivatives. An increment (ε, θ) of an edge of length l moves its frame by parallel transport and turns it by θ; to second order, with
+Derivatives. An increment (ε, θ) of an edge of length l moves its frame by parallel transport and turns it by θ; to
+second order, with
 ε⊥ = P ε, P = I − a aᵀ, and m′ = ∂m/∂θ (m1′ = m2, m2′ = −m1):
 
     a → a + ε⊥/l − (a·ε) ε⊥/l² − ½ |ε⊥|² a/l²
     m → m − a (m·ε)/l + θ m′ + a (m·ε)(a·ε)/l² − ½ (m·ε) ε⊥/l² − θ a (m′·ε)/l − ½ θ² m
 
-Insert both into f = (b·M_a − a·M_b)/c for any fixed combination M = G₁ m1 + G₂ m2 (M′ = G₁ m2 − G₂ m1), write a_p = P_b a,
+Insert both into f = (b·M_a − a·M_b)/c for any fixed combination M = G₁ m1 + G₂ m2 (M′ = G₁ m2 − G₂ m1), write a_p =
+P_b a,
 b_p = P_a b, f = (b·M_a − a·M_b)/c and collect:
 
     u = (a·b) M_a + P_a M_b + f b_p,        ∂f/∂ε_a = −u/(c l_a)
@@ -32,7 +36,8 @@ b_p = P_a b, f = (b·M_a − a·M_b)/c and collect:
     ∂²f/∂θ_b∂ε_b =  [(a·b) M′_b − f_b a_p]/(c l_b),    ∂²f/∂θ_b∂ε_a = −[P_a M′_b + f_b b_p]/(c l_a)
     ∂²f/∂θ_a²    = −b·M_a/c,    ∂²f/∂θ_b² = a·M_b/c,    ∂²f/∂θ_a∂θ_b = 0
 
-With G_α = k_α (κ_α − κ̄_α) this f gives all of Σ G_α ∇²κ_α at once, and u = Σ G_α u_α. For the twist, with the curvature binormal
+With G_α = k_α (κ_α − κ̄_α) this f gives all of Σ G_α ∇²κ_α at once, and u = Σ G_α u_α. For the twist, with the
+curvature binormal
 k = 2 a×b/c and T = (a + b)/c (Bergou et al. 2010; Panetta et al. 2019):
 
     ∂ψ/∂ε_a = k/(2 l_a),  ∂ψ/∂ε_b = k/(2 l_b),  ∂ψ/∂θ_b = −∂ψ/∂θ_a = 1

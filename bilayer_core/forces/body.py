@@ -1,10 +1,12 @@
 """Inertia, damping and gravity of free rigid bodies.
 
-A body is the continuum of its mass points y = X + R r. Their squared distance from where inertia alone would take them is
+A body is the continuum of its mass points y = X + R r. Their squared distance from where inertia alone would take
+them is
 
     m/(2h²) |X − X̃|² + tr((R − R̃) J (R − R̃)ᵀ)/(2h²),    J = ∫ r rᵀ dm = ½ tr(I) 1 − I
 
-(Ferguson et al. 2021, eq. 6; X̃ and R̃ come from the integrator). With R → exp([φ]×) R, A = R̃ J Rᵀ and ax(A) = (A₃₂ − A₂₃, A₁₃ − A₃₁, A₂₁ − A₁₂):
+(Ferguson et al. 2021, eq. 6; X̃ and R̃ come from the integrator). With R → exp([φ]×) R, A = R̃ J Rᵀ and ax(A) = (A₃₂
+− A₂₃, A₁₃ − A₃₁, A₂₁ − A₁₂):
 
     gradient −ax(A)/h²,    Hessian (tr(A) 1 − ½ (A + Aᵀ))/h²
 

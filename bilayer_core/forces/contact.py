@@ -1,10 +1,13 @@
 """Barrier contact of carriers with planes and with each other.
 
-    C = K_c b(d) Δl,   force −K_c b′(d) Δl n, repulsive along the outward normal n        (paper, eq. 20; bracket's sign put right)
+    C = K_c b(d) Δl,   force −K_c b′(d) Δl n, repulsive along the outward normal n        (paper, eq. 20; bracket's
+    sign put right)
 
-Plane: d = n·(x − p) − r. Two carriers: d = |x_i − x_j| − r_i − r_j, n = (x_i − x_j)/|x_i − x_j|. With b′, b″ at d, P = I − n nᵀ:
+Plane: d = n·(x − p) − r. Two carriers: d = |x_i − x_j| − r_i − r_j, n = (x_i − x_j)/|x_i − x_j|. With b′, b″ at d, P
+= I − n nᵀ:
 
-    gradient  K_c Δl b′ n,      Hessian  K_c Δl (b″ n nᵀ + b′/|x_i − x_j| P)   (the second part for two carriers; it is negative)
+    gradient  K_c Δl b′ n,      Hessian  K_c Δl (b″ n nᵀ + b′/|x_i − x_j| P)   (the second part for two carriers; it
+    is negative)
 """
 
 from __future__ import annotations

@@ -2,15 +2,21 @@
 
     C_T = ½ k_T l Σ_α (p·m̄_α − d_α)²,   m̄_α = ½ (m_α^t + m_α^b),   α = 1, 2, 3        (paper, eqs. 16 and 17)
 
-p joins the midpoints of the paired edges, bottom to top; m3 is the tangent; l is the rest length of the station, d_α the value in the
-initial shape: (c, 0, 0) for a straight bilayer, c half its thickness. k_T is an energy per unit length [N/m²], independent of the mesh:
-k_T = 10 EA_r/c², EA_r = EA₁EA₂/(EA₁ + EA₂). (Printed is h₁ + h₂ instead of c, which makes the curvature a third too small.)
+p joins the midpoints of the paired edges, bottom to top; m3 is the tangent; l is the rest length of the station, d_α
+the value in the
+initial shape: (c, 0, 0) for a straight bilayer, c half its thickness. k_T is an energy per unit length [N/m²],
+independent of the mesh:
+k_T = 10 EA_r/c², EA_r = EA₁EA₂/(EA₁ + EA₂). (Printed is h₁ + h₂ instead of c, which makes the curvature a third too
+small.)
 
-Rotation: k_b l about m2 with k_b = 10 EA_r, k_τ l about the tangent with k_τ = 10 min(GJ)/c², and about m1 only what the shear
-of the bond supplies: k_φ = (GJ_lam − ΣGJ)/c² for ``torsion: laminate``, 0 for ``torsion: layers``. (In a twisted strip the two centrelines
+Rotation: k_b l about m2 with k_b = 10 EA_r, k_τ l about the tangent with k_τ = 10 min(GJ)/c², and about m1 only what
+the shear
+of the bond supplies: k_φ = (GJ_lam − ΣGJ)/c² for ``torsion: laminate``, 0 for ``torsion: layers``. (In a twisted
+strip the two centrelines
 tilt against each other by c τ about m1: a penalty there, as printed, locks twist.)
 
-Derivatives follow from the expansions of a frame to second order (see `bend_twist`) and of the tangent; for one edge of length l, with
+Derivatives follow from the expansions of a frame to second order (see `bend_twist`) and of the tangent; for one edge
+of length l, with
 V = Σ_{α=1,2} Q_α m_α, V′ = Q₁ m2 − Q₂ m1, Q_α = ½ k_T l (p·m̄_α − d_α), p⊥ = P p:
 
     ∂/∂ε: −(p·t) V/l + Q₃ p⊥/l                      ∂/∂θ: p·V′
@@ -20,7 +26,7 @@ V = Σ_{α=1,2} Q_α m_α, V′ = Q₁ m2 − Q₂ m1, Q_α = ½ k_T l (p·m̄_�
 
 from __future__ import annotations
 
-from ..jit import inlined, kernel
+from ..jit import kernel
 from ..kinematics.vector import (
     add_column,
     add_identity,
@@ -37,7 +43,7 @@ from ..kinematics.vector import (
 )
 
 
-@inlined
+@kernel
 def _force_on_frame(edge, p, q1, q2, q3, length, t, m1, m2, edge_gradient_out):
     """First derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ)."""
     inverse = 1.0 / length
@@ -47,7 +53,7 @@ def _force_on_frame(edge, p, q1, q2, q3, length, t, m1, m2, edge_gradient_out):
     edge_gradient_out[edge, 3] += q1 * dot(p, m2) - q2 * dot(p, m1)
 
 
-@inlined
+@kernel
 def _curvature_on_frame(edge, pair, p, q1, q2, q3, length, t, m1, m2, edge_hessian_out, mixed_hessian_out):
     """Second derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ), and to p and these."""
     inverse = 1.0 / length
@@ -66,7 +72,7 @@ def _curvature_on_frame(edge, pair, p, q1, q2, q3, length, t, m1, m2, edge_hessi
     add_column(mixed_hessian_out, pair, 3, 1.0, v_turned)
 
 
-@inlined
+@kernel
 def _strain_gradients(p, length, t, m1, m2):
     """∂(p·m_α/2)/∂ε for α = 1, 2, 3 and ∂/∂θ for α = 1, 2 of one edge."""
     half = 0.5 / length

@@ -1,14 +1,19 @@
 """Smoothed Coulomb friction, lagged once per step.
 
-With normal force λ, normal n and contact points taken at the start of the step, the slip u of the contact points over the step of length h
+With normal force λ, normal n and contact points taken at the start of the step, the slip u of the contact points over
+the step of length h
 gives the dissipation potential (Li et al. 2020, eq. 14)
 
-    D = μ λ h f₀(|u_t|/h),   u_t = (I − n nᵀ) u,   force −μ λ f₁(|u_t|/h) u_t/|u_t|        (paper, eqs. 21 and 22, f₁ and u_t put right)
+    D = μ λ h f₀(|u_t|/h),   u_t = (I − n nᵀ) u,   force −μ λ f₁(|u_t|/h) u_t/|u_t|        (paper, eqs. 21 and 22, f₁
+    and u_t put right)
 
-    ∂D/∂u = μ λ f₁/|u_t| u_t =: G,    ∂²D/∂u² = μ λ [f₁/|u_t| (T − û ûᵀ) + f₁′/h û ûᵀ] =: F,   T = I − n nᵀ, û = u_t/|u_t|
+    ∂D/∂u = μ λ f₁/|u_t| u_t =: G,    ∂²D/∂u² = μ λ [f₁/|u_t| (T − û ûᵀ) + f₁′/h û ûᵀ] =: F,   T = I − n nᵀ, û =
+    u_t/|u_t|
 
-The contact point of a ball moves with it: y = X + a, where the arm a turns with the ball, δa = δφ×a + ½ δφ×(δφ×a). So u depends on both
-carriers' positions and rotations, and the force on one is opposite to that on the other, moment included. F is positive semidefinite.
+The contact point of a ball moves with it: y = X + a, where the arm a turns with the ball, δa = δφ×a + ½ δφ×(δφ×a). So
+u depends on both
+carriers' positions and rotations, and the force on one is opposite to that on the other, moment included. F is
+positive semidefinite.
 """
 
 from __future__ import annotations
@@ -19,7 +24,7 @@ import numpy as np
 
 from ..contact.barrier import barrier_gradient
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from ..jit import inlined, kernel
+from ..jit import kernel
 
 
 @kernel
@@ -42,8 +47,10 @@ def lag_friction(
 ):
     """List the contacts at the start of a step: who, μλ [N] and outward normal; return how many.
 
-    Carrier and pair arrays are as in `forces.contact`. Outputs have room for every candidate: `first_out`, `second_out` (−1 for a plane),
-    `pair_out` (index of the pair, −1 for a plane), `load_out` [N], `normal_out` shape (·, 3) from the second to the first.
+    Carrier and pair arrays are as in `forces.contact`. Outputs have room for every candidate: `first_out`,
+    `second_out` (−1 for a plane),
+    `pair_out` (index of the pair, −1 for a plane), `load_out` [N], `normal_out` shape (·, 3) from the second to the
+    first.
     """
     count = 0
     for m in range(plane_normal.shape[0]):
@@ -76,7 +83,7 @@ def lag_friction(
     return count
 
 
-@inlined
+@kernel
 def _arm(carrier, body, sign, radius, normal, k, turn, arm_out):
     """Arm from a ball's centre to its contact point, turned since the start of the step; zero for a point."""
     for i in range(3):
@@ -252,7 +259,7 @@ def friction(
     return energy
 
 
-@inlined
+@kernel
 def _add_skew(matrix, column, s, a):
     """matrix[:, column:column+3] += s [a]×"""
     matrix[0, column + 1] -= s * a[2]
@@ -263,7 +270,7 @@ def _add_skew(matrix, column, s, a):
     matrix[2, column + 1] += s * a[0]
 
 
-@inlined
+@kernel
 def _add_turning(local, base, s, arm, g):
     """Second derivative of g·a under δa = ½ δφ×(δφ×a): ½ (a gᵀ + g aᵀ) − (a·g) I, times s."""
     product = arm[0] * g[0] + arm[1] * g[1] + arm[2] * g[2]

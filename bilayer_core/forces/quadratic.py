@@ -6,7 +6,8 @@ Over a step of length h from qₙ with velocity vₙ:
     mass damping, force −α M v               ½ α M/h |q − qₙ|²
     gravity                                  −M g·x
 
-M is diagonal: a node carries half the mass of each of its edges, from reference lengths (growth keeps mass); the angle of an edge carries
+M is diagonal: a node carries half the mass of each of its edges, from reference lengths (growth keeps mass); the
+angle of an edge carries
 ρ w h (w² + h²)/12 per length. The Hessians are multiples of M and are added where the matrix is assembled.
 """
 

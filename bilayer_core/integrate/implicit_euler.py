@@ -2,8 +2,10 @@
 
     q̃ = qₙ + h vₙ,   minimise ½ |q − q̃|²_M/h² + V(q),   v = (q − qₙ)/h
 
-Rotations of bodies are treated likewise on their group: R̃ = exp(h [ω̃]×) Rₙ with ω̃ = ωₙ + h I⁻¹ (I ωₙ × ωₙ) (the torque-free change of a body that is no
-ball), and ω = log(R Rₙᵀ)/h. A ball that spins freely keeps its spin; with R̃ = Rₙ + h [ωₙ]× Rₙ, implicit Euler of the mass points, it
+Rotations of bodies are treated likewise on their group: R̃ = exp(h [ω̃]×) Rₙ with ω̃ = ωₙ + h I⁻¹ (I ωₙ × ωₙ) (the
+torque-free change of a body that is no
+ball), and ω = log(R Rₙᵀ)/h. A ball that spins freely keeps its spin; with R̃ = Rₙ + h [ωₙ]× Rₙ, implicit Euler of the
+mass points, it
 would lose h ω²/2 of it in each unit of time.
 """
 
@@ -63,5 +65,7 @@ def _torque_free_spin(model: Model, place: int, rotation: np.ndarray, spin: np.n
 
 
 def _orthonormal(matrix: np.ndarray) -> np.ndarray:
-    """The rotation matrix nearest to `matrix` to first order in its error: 1.5 R − 0.5 R Rᵀ R (a Newton–Schulz step)."""
+    """The rotation matrix nearest to `matrix` to first order in its error: 1.5 R − 0.5 R Rᵀ R (a Newton–Schulz
+    step).
+    """
     return 1.5 * matrix - 0.5 * matrix @ matrix.T @ matrix

@@ -9,8 +9,8 @@ import numpy as np
 from ..kinematics.rotation import quaternion_from_matrix
 from ..model.model import Model
 from ..model.state import State
-from .statistics import RunStatistics, center_of_mass
 from .frame import BodyInfo, Description, Frame, PlaneInfo, Strand
+from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper
 
 Array = np.ndarray
@@ -72,8 +72,16 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
 def positions_with_points(model: Model, state: State) -> Array:
     """Positions of nodes, then of contact points of bodies [m], shape (n_node + n_point, 3)."""
     carriers = model.carriers
-    points = state.body_position[carriers.point_body] + carriers.point_position
-    return np.concatenate([state.position, points])
+    arms = np.einsum("kij,kj->ki", state.body_rotation[carriers.point_body], carriers.point_position)
+    return np.concatenate([state.position, state.body_position[carriers.point_body] + arms])
+
+
+def velocities_with_points(model: Model, state: State) -> Array:
+    """Their velocities [m/s], shape (n_node + n_point, 3)."""
+    body, carriers = model.carriers.point_body, model.carriers
+    arms = np.einsum("kij,kj->ki", state.body_rotation[body], carriers.point_position)
+    points = state.body_velocity[body] + np.cross(state.body_angular_velocity[body], arms)
+    return np.concatenate([state.velocity, points])
 
 
 def contact_forces(stepper: Stepper) -> Array:
@@ -89,6 +97,8 @@ def body_wrenches(stepper: Stepper, state: State) -> Array:
     wrench[model.bodies.body_of_free] = -stepper.potential.body_contact_gradient
     first = model.node_count
     for k, body in enumerate(carriers.point_body):
+        if model.bodies.free_index[body] >= 0:
+            continue
         force = -stepper.potential.carrier_gradient[first + k]
         wrench[body, :3] += force
         wrench[body, 3:] += np.cross(carriers.point_position[k], force)
@@ -99,7 +109,9 @@ def body_wrenches(stepper: Stepper, state: State) -> Array:
 
 
 def node_strain(model: Model, stepper: Stepper) -> Array:
-    """Axial strain of nodes, the mean of their edges' (eigenstrain included); 0 at contact points, shape (n_node + n_point,)."""
+    """Axial strain of nodes, the mean of their edges' (eigenstrain included); 0 at contact points, shape (n_node +
+    n_point,).
+    """
     strain = np.zeros(model.node_count + model.point_count)
     edge = stepper.end.length[: model.edge_count] / model.rest_length - 1.0
     for s in model.strands:
@@ -111,7 +123,9 @@ def node_strain(model: Model, stepper: Stepper) -> Array:
 
 
 def node_curvature(model: Model, stepper: Stepper) -> Array:
-    """Curvature χ at nodes [1/m]; a free end has no bending element and takes its neighbour's, shape (n_node + n_point,)."""
+    """Curvature χ at nodes [1/m]; a free end has no bending element and takes its neighbour's, shape (n_node +
+    n_point,).
+    """
     curvature = np.zeros(model.node_count + model.point_count)
     bends = slice(model.bend_count)
     nodes = model.joint_node[bends]
@@ -141,12 +155,11 @@ def energies(stepper: Stepper, state: State) -> dict[str, float]:
 def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:
     """Snapshot of the last accepted configuration."""
     model = stepper.model
-    carriers = model.carriers
     return Frame(
         time=time,
         step=int(state.step[0]),
         positions=positions_with_points(model, state),
-        velocities=np.concatenate([state.velocity, state.body_velocity[carriers.point_body]]),
+        velocities=velocities_with_points(model, state),
         directors=state.director1.copy(),
         strain=node_strain(model, stepper),
         curvature=node_curvature(model, stepper),

@@ -101,7 +101,9 @@ class Simulator:
         If it starts with surfaces inside each other.
     """
 
-    def __init__(self, scene: SceneConfig, *, model="auto", dimension="auto", integrator="auto", dt: float | None = None):
+    def __init__(
+        self, scene: SceneConfig, *, model="auto", dimension="auto", integrator="auto", dt: float | None = None
+    ):
         if dt is not None and not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt: {dt} is not a time step; allowed is a positive number of seconds")
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
@@ -137,8 +139,7 @@ class Simulator:
     @property
     def velocities(self) -> Array:
         """Their velocities [m/s], shape (nodes, 3)."""
-        points = self._state.body_velocity[self.model.carriers.point_body]
-        return np.concatenate([self._state.velocity, points])
+        return observe.velocities_with_points(self.model, self._state)
 
     @property
     def contact_forces(self) -> Array:
@@ -162,9 +163,7 @@ class Simulator:
         """Pose of every body."""
         state = self._state
         return {
-            name: BodyView(
-                state.body_position[i].copy(), observe.quaternion_from_matrix(state.body_rotation[i])
-            )
+            name: BodyView(state.body_position[i].copy(), observe.quaternion_from_matrix(state.body_rotation[i]))
             for i, name in enumerate(self.model.bodies.names)
         }
 
@@ -205,7 +204,8 @@ class Simulator:
         Raises
         ------
         InputError
-            If there is no such channel, or the value is not finite or out of the channel's range; nothing is changed then.
+            If there is no such channel, or the value is not finite or out of the channel's range; nothing is changed
+            then.
         """
         if channel not in self.scene.stimuli:
             known = ", ".join(self.scene.stimuli) or "none"
@@ -217,8 +217,8 @@ class Simulator:
         allowed = self.scene.stimuli[channel]
         if not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
             raise InputError(
-                f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} to {allowed.maximum:g}"
-                f" (unit {allowed.unit})"
+                f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
+                f"to {allowed.maximum:g} (unit {allowed.unit})"
             )
         self._state.override[index] = float(value)
 
@@ -335,7 +335,9 @@ class Simulator:
         self.load_state(initial_state(self.model).flat())
 
     def summary(self) -> dict:
-        """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for ``--summary``."""
+        """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for
+        ``--summary``.
+        """
         from .summary import summarise
 
         return summarise(self)

@@ -108,7 +108,8 @@ class Stepper:
         Raises
         ------
         SimulationError
-            If the smallest part does not converge either. `state` is then that of the last accepted part whose end is a nominal step:
+            If the smallest part does not converge either. `state` is then that of the last accepted part whose end is
+            a nominal step:
             nothing is changed.
         """
         parts = 2**self.max_halvings
@@ -140,9 +141,7 @@ class Stepper:
             level += 1
         state.step += 1.0
         state.halvings[0] = level
-        return StepReport(
-            float(state.step[0]) * self.dt, substeps, rejected, iterations, factorisations, residual
-        )
+        return StepReport(float(state.step[0]) * self.dt, substeps, rejected, iterations, factorisations, residual)
 
     def _attempt(self, state: State, h: float, time: float) -> NewtonReport:
         """Try one part of length `h` [s] that ends at `time` [s]; `state` changes only if it converged."""
@@ -178,5 +177,6 @@ class Stepper:
         text = f"{report.status.value} in the step to t = {time:.6g} s, tried down to {h:.3g} s"
         if np.isfinite(report.residual):
             tolerance = self.model.scene.solver.tolerance
-            text += f" (correction left {report.residual:.3g} m/s, allowed {tolerance:.3g} m/s, {report.iterations} iterations)"
+            text += f" (correction left {report.residual:.3g} m/s, allowed {tolerance:.3g} m/s, "
+            text += f"{report.iterations} iterations)"
         return text + (f": {report.detail}" if report.detail else "")

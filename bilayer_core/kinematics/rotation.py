@@ -24,7 +24,9 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
 
 
 def rotation_vector(matrix: np.ndarray) -> np.ndarray:
-    """Rotation vector [rad] of a rotation matrix by less than half a turn, the inverse of `rotation_matrix`, shape (3,)."""
+    """Rotation vector [rad] of a rotation matrix by less than half a turn, the inverse of `rotation_matrix`, shape
+    (3,).
+    """
     axis = 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
     sine, cosine = np.sqrt(axis @ axis), 0.5 * (np.trace(matrix) - 1.0)
     if sine < 1e-8:

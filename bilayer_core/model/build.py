@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import PenetrationError
 from ..kinematics.rotation import rotation_matrix
-from ..scene.config import Body, Free, Layer, Rod, SceneConfig
+from ..scene.config import Body, Free, Layer, Prescribed, Rod, SceneConfig
 from .layout import number_unknowns
 from .model import Bodies, Carriers, Model, StrandArrays, body_displacement
 from .section import Bond, Section, bond, rectangle
@@ -54,7 +54,7 @@ def build_model(scene: SceneConfig) -> Model:
         for copy, name in enumerate(rod.copies):
             _add_rod(found, scene, rod, name, _turn_of_copy(rod, copy), body_index)
     edge_count, bond_joints = found.edge_count, "bond_"
-    bodies = _build_bodies(scene)
+    bodies = _build_bodies(scene, found)
     walls = found.column("wall_tangent", width=3)
     wall_a = _resolve_walls(found.column("joint_a", np.int64), edge_count)
     wall_b = _resolve_walls(found.column("joint_b", np.int64), edge_count)
@@ -67,7 +67,7 @@ def build_model(scene: SceneConfig) -> Model:
     model = Model(
         scene=scene,
         strands=tuple(found.strands),
-        layout=number_unknowns(found.rods, found.node_count, edge_count),
+        layout=number_unknowns(found.rods, found.node_count, edge_count, found.column("attached_node", np.int64)),
         bodies=bodies,
         carriers=_build_carriers(scene, found, bodies),
         node_count=found.node_count,
@@ -80,6 +80,8 @@ def build_model(scene: SceneConfig) -> Model:
         attached_node=found.column("attached_node", np.int64),
         attached_body=found.column("attached_body", np.int64),
         attached_position=found.column("attached_position", width=3),
+        wall_body=found.column("attached_body", np.int64),
+        wall_joint=_joints_of_walls(wall_a, wall_b, edge_count, len(walls)),
         node_mass=found.column("node_mass"),
         spin_inertia=found.column("spin_inertia"),
         half_width=found.column("half_width"),
@@ -110,8 +112,19 @@ def _resolve_walls(edges: np.ndarray, edge_count: int) -> np.ndarray:
     return np.where(edges < 0, edge_count - 1 - edges, edges)
 
 
+def _joints_of_walls(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int, walls: int) -> np.ndarray:
+    """The joint that each wall takes part in, shape (n_wall,)."""
+    joints = np.empty(walls, dtype=np.int64)
+    for edges in (joint_a, joint_b):
+        of_wall = np.flatnonzero(edges >= edge_count)
+        joints[edges[of_wall] - edge_count] = of_wall
+    return joints
+
+
 def _turn_of_copy(rod: Rod, copy: int):
-    """Function that turns points (about the pattern's centre) or directions of the rod to those of one of its copies."""
+    """Function that turns points (about the pattern's centre) or directions of the rod to those of one of its
+    copies.
+    """
     if rod.pattern is None:
         return lambda vectors, about=False: vectors
     turn = rotation_matrix(2.0 * np.pi * copy / rod.pattern.count * np.array(rod.pattern.axis))
@@ -137,7 +150,14 @@ def _add_rod(found: _Collected, scene: SceneConfig, rod: Rod, name: str, turn, b
         positions = turn(start + height * normal + np.outer(arc, tangent), about=True)
         spans.append((first, last, found.node_count, found.edge_count))
         strand = StrandArrays(
-            f"{name}/{layer.name}", name, layer.name, found.node_count, len(arc), found.edge_count, rod.width, layer.thickness
+            f"{name}/{layer.name}",
+            name,
+            layer.name,
+            found.node_count,
+            len(arc),
+            found.edge_count,
+            rod.width,
+            layer.thickness,
         )
         clamps = []
         if rod.clamp_start is not None and first == 0:
@@ -240,16 +260,33 @@ def _add_bond(found: _Collected, law: Bond, edge_length: float, distance: float,
     )
 
 
-def _build_bodies(scene: SceneConfig) -> Bodies:
-    free = [index for index, body in enumerate(scene.bodies) if isinstance(body.motion, Free)]
+def _build_bodies(scene: SceneConfig, found: _Collected) -> Bodies:
+    free = [index for index, body in enumerate(scene.bodies) if not isinstance(body.motion, Prescribed)]
     count = len(scene.bodies)
     velocity, angular_velocity = np.zeros((count, 3)), np.zeros((count, 3))
-    for index in free:
-        velocity[index] = scene.bodies[index].motion.velocity
-        angular_velocity[index] = scene.bodies[index].motion.angular_velocity
+    freedom, reach = [], []
+    arms = found.column("attached_position", width=3)
+    for place, index in enumerate(free):
+        body, motion = scene.bodies[index], scene.bodies[index].motion
+        allowed = np.zeros((6 * len(free), 6 if isinstance(motion, Free) else 1))
+        if isinstance(motion, Free):
+            velocity[index], angular_velocity[index] = motion.velocity, motion.angular_velocity
+            allowed[6 * place : 6 * place + 6] = np.eye(6)
+        else:
+            velocity[index] = motion.speed * np.array(motion.axis)
+            allowed[6 * place : 6 * place + 3, 0] = motion.axis
+        freedom.append(allowed)
+        own = [
+            arms[found.column("attached_body", np.int64) == index],
+            [point.position for point in body.contact_points],
+        ]
+        lengths = [np.linalg.norm(arm) for part in own for arm in part]
+        reach.append(max([body.surface.radius if body.surface else 0.0, *lengths]))
     free_index = np.full(count, -1, dtype=np.int64)
     free_index[free] = np.arange(len(free))
-    keyframes = [([], []) if i in free else (b.motion.times, b.motion.displacements) for i, b in enumerate(scene.bodies)]
+    keyframes = [
+        ([], []) if i in free else (b.motion.times, b.motion.displacements) for i, b in enumerate(scene.bodies)
+    ]
     return Bodies(
         names=tuple(body.name for body in scene.bodies),
         free_index=free_index,
@@ -259,6 +296,8 @@ def _build_bodies(scene: SceneConfig) -> Bodies:
         start_angular_velocity=angular_velocity,
         mass=np.array([scene.bodies[index].motion.mass for index in free]),
         second_moment=np.array([_second_moment(scene.bodies[index]) for index in free]).reshape(len(free), 3, 3),
+        freedom=np.concatenate(freedom, axis=1) if freedom else np.zeros((0, 0)),
+        reach=np.array(reach),
         radius=np.array([body.surface.radius if body.surface else 0.0 for body in scene.bodies]),
         times=tuple(np.array(times, dtype=float) for times, _ in keyframes),
         displacements=tuple(np.array(moves, dtype=float).reshape(-1, 3) for _, moves in keyframes),
@@ -266,9 +305,13 @@ def _build_bodies(scene: SceneConfig) -> Bodies:
 
 
 def _second_moment(body: Body) -> np.ndarray:
-    """J = ½ tr(I) 1 − I of a free body [kg m²]; I = 2/5 m r² for a solid ball, 2/3 m r² for a shell."""
+    """J = ½ tr(I) 1 − I of a free body [kg m²]; I = 2/5 m r² for a solid ball, 2/3 m r² for a shell. A guided body
+    does not turn: any I.
+    """
     motion = body.motion
-    if motion.inertia is not None:
+    if not isinstance(motion, Free):
+        inertia = np.eye(3)
+    elif motion.inertia is not None:
         inertia = np.diag(motion.inertia)
     else:
         inertia = (2.0 / 3.0 if motion.shell else 0.4) * motion.mass * body.surface.radius**2 * np.eye(3)
@@ -316,7 +359,12 @@ def start_carriers(model: Model) -> np.ndarray:
     """Positions of all carriers at the start [m], shape (n_carrier, 3)."""
     bodies, carriers = model.bodies, model.carriers
     moved = np.array(
-        [p + body_displacement(t, d, 0.0) for p, t, d in zip(bodies.start_position, bodies.times, bodies.displacements)]
+        [
+            position + body_displacement(times, displacements, 0.0)
+            for position, times, displacements in zip(
+                bodies.start_position, bodies.times, bodies.displacements, strict=True
+            )
+        ]
     ).reshape(-1, 3)
     points = moved[carriers.point_body] + carriers.point_position
     return np.concatenate([model.start_position, points, moved[carriers.sphere_body]])
@@ -336,6 +384,7 @@ def _refuse_penetration(model: Model) -> None:
         depth, carrier, surface = min(faults)
         raise PenetrationError(
             f"{model.scene.name}: the scene starts in penetration: {names[carrier]} at "
-            f"({', '.join(f'{1e3 * c:.3f}' for c in position[carrier])}) mm is {-1e3 * depth:.4g} mm behind the surface of {surface}"
-            f"{f', and {len(faults) - 1} more' if len(faults) > 1 else ''}; all gaps must be positive at the start"
+            f"({', '.join(f'{1e3 * c:.3f}' for c in position[carrier])}) mm is {-1e3 * depth:.4g} mm behind "
+            f"the surface of {surface}{f', and {len(faults) - 1} more' if len(faults) > 1 else ''}; "
+            "all gaps must be positive at the start"
         )

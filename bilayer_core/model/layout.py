@@ -1,6 +1,7 @@
 """The order of unknowns: the only file that turns a station and a layer into the number of an unknown.
 
-Along each rod, station by station: positions of the layers present, then the angles of their edges that start there. Rods follow each other.
+Along each rod, station by station: positions of the layers present, then the angles of their edges that start there.
+Rods follow each other.
 Elements span three stations of one layer, or two stations of both, which bounds the half-bandwidth.
 """
 
@@ -10,7 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-HALF_BANDWIDTH = {1: 10, 2: 18}  # by number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
+HALF_BANDWIDTH = {
+    1: 10,
+    2: 18,
+}  # by number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
 
 
 @dataclass(frozen=True)
@@ -27,15 +31,23 @@ class Layout:
         First of the three unknowns of each node, shape (n_node,).
     edge : ndarray
         Unknown of each edge's angle, shape (n_edge,).
+    attached : ndarray
+        First unknown of each node that a body holds, shape (n_attached,).
+    attached_of_unknown : ndarray
+        Attached node to which an unknown belongs, −1 for the others, shape (size,).
     """
 
     size: int
     half_bandwidth: int
     node: np.ndarray
     edge: np.ndarray
+    attached: np.ndarray
+    attached_of_unknown: np.ndarray
 
 
-def number_unknowns(rods: list[list[tuple[int, int, int, int]]], node_count: int, edge_count: int) -> Layout:
+def number_unknowns(
+    rods: list[list[tuple[int, int, int, int]]], node_count: int, edge_count: int, attached_node: np.ndarray
+) -> Layout:
     """Number the unknowns of rods, each a list of layers (first station, last station, first node, first edge)."""
     node = np.full(node_count, -1, dtype=np.int64)
     edge = np.full(edge_count, -1, dtype=np.int64)
@@ -50,4 +62,7 @@ def number_unknowns(rods: list[list[tuple[int, int, int, int]]], node_count: int
                 if first <= station < last:
                     edge[first_edge + station - first] = size
                     size += 1
-    return Layout(size, HALF_BANDWIDTH[max(len(layers) for layers in rods)], node, edge)
+    attached = node[attached_node]
+    attached_of_unknown = np.full(size, -1, dtype=np.int64)
+    attached_of_unknown[(attached[:, None] + np.arange(3)).ravel()] = np.repeat(np.arange(len(attached)), 3)
+    return Layout(size, HALF_BANDWIDTH[max(len(layers) for layers in rods)], node, edge, attached, attached_of_unknown)

@@ -28,7 +28,9 @@ class StrandArrays:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Rigid bodies, in the scene's order. *Free* bodies have unknowns, in the order in which they occur."""
+    """Rigid bodies, in the scene's order. *Free* bodies, guided ones among them, have unknowns, in the order in which
+    they occur.
+    """
 
     names: tuple[str, ...]
     free_index: Array  # place among the free bodies, −1 for a prescribed one, shape (n_body,)
@@ -38,6 +40,10 @@ class Bodies:
     start_angular_velocity: Array  # [rad/s], shape (n_body, 3)
     mass: Array  # of free bodies [kg], shape (n_free,)
     second_moment: Array  # ∫ r rᵀ dm of free bodies, body frame [kg m²], shape (n_free, 3, 3)
+    freedom: (
+        Array  # motions (X, φ) that free bodies are allowed, one a column, orthonormal, shape (6 n_free, n_freedom)
+    )
+    reach: Array  # largest distance of a point of a free body from its position [m], shape (n_free,)
     radius: Array  # of the sphere, 0 without one [m], shape (n_body,)
     times: tuple[Array, ...]  # keyframes of each prescribed body [s]
     displacements: tuple[Array, ...]  # and its displacements there [m], shape (n_keyframe, 3)
@@ -63,7 +69,8 @@ class Carriers:
 class Model:
     """Flat arrays of a scene; indices run over strands in order, and along each strand.
 
-    Edges n_edge … n_edge + n_wall − 1 are the fixed directions of clamps ("walls"). *Joints* are pairs of edges with a bending and
+    Edges n_edge … n_edge + n_wall − 1 are the fixed directions of clamps ("walls"). *Joints* are pairs of edges with
+    a bending and
     twisting element: inner nodes and clamps first (`bend_count`), then the rotation bonds of paired layers.
     """
 
@@ -84,6 +91,8 @@ class Model:
     attached_node: Array  # nodes held by bodies, shape (n_attached,)
     attached_body: Array  # shape (n_attached,)
     attached_position: Array  # in the body's frame [m], shape (n_attached, 3)
+    wall_body: Array  # body of each wall, shape (n_wall,)
+    wall_joint: Array  # joint of each wall, shape (n_wall,)
 
     node_mass: Array  # [kg], shape (n_node,)
     spin_inertia: Array  # of edges about their tangent [kg m²], shape (n_edge,)
@@ -121,8 +130,20 @@ class Model:
 
     @property
     def unknowns(self) -> int:
-        """Unknowns that are solved for: those of nodes and edges without the attached ones, six for each free body."""
-        return self.layout.size - 3 * len(self.attached_node) + 6 * self.free_count
+        """Unknowns that are solved for: those of nodes and edges without the attached ones, and the freedom of
+        bodies.
+        """
+        return self.layout.size - 3 * len(self.attached_node) + self.bodies.freedom.shape[1]
+
+    @property
+    def attached_free(self) -> Array:
+        """Free body of each attached node, −1 if its body is prescribed, shape (n_attached,)."""
+        return self.bodies.free_index[self.attached_body]
+
+    @property
+    def wall_free(self) -> Array:
+        """Free body of each wall, −1 if its body is prescribed, shape (n_wall,)."""
+        return self.bodies.free_index[self.wall_body]
 
 
 def body_displacement(times: Array, displacements: Array, time: float) -> Array:

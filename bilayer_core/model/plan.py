@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..errors import SceneError
-from ..scene.config import Free, SceneConfig
+from ..scene.config import Prescribed, SceneConfig
 from .validity import validity_warnings
 
 MODELS = ("two_rod",)
@@ -52,7 +52,9 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
     """
     reasons = {}
     chosen_model = _choose(reasons, "model", model, scene.solver.model, MODELS, "the paper's: each layer a rod")
-    chosen_dimension = _choose(reasons, "dimension", dimension, scene.solver.dimension, DIMENSIONS, "positions and frames")
+    chosen_dimension = _choose(
+        reasons, "dimension", dimension, scene.solver.dimension, DIMENSIONS, "positions and frames"
+    )
     chosen_integrator = _choose(reasons, "integrator", integrator, scene.solver.integrator, INTEGRATORS, "the paper's")
     return Plan(
         chosen_model,
@@ -82,7 +84,7 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
 
     pairs = _contact_pairs(scene)
     friction = scene.contact.friction if scene.contact else None
-    free = any(isinstance(body.motion, Free) for body in scene.bodies)
+    free = any(not isinstance(body.motion, Prescribed) for body in scene.bodies)
     driven = any(layer.eigenstrain for rod in scene.rods for layer in rod.layers)
     return {
         "stretching": "active",
@@ -106,7 +108,7 @@ def _contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
     if scene.contact is None:
         return ()
     balls = [body for body in scene.bodies if body.surface is not None]
-    free = {body.name for body in scene.bodies if isinstance(body.motion, Free)}
+    free = {body.name for body in scene.bodies if not isinstance(body.motion, Prescribed)}
     touching = ["rods"] + [body.name for body in scene.bodies if body.contact_points or body.surface]
     pairs = [f"{name} – {plane.name}" for plane in scene.obstacles for name in touching]
     for index, ball in enumerate(balls):

@@ -78,8 +78,10 @@ class Bond:
 def bond(bottom: Section, top: Section, multiples: Coupling, torsion: str) -> Bond:
     """Bond of two sections whose centrelines are c = (h₁ + h₂)/2 apart.
 
-    k_T = 10 EA_r/c², k_b = 10 EA_r, k_τ = 10 min(GJ)/c² with the default multiples, EA_r = EA₁EA₂/(EA₁ + EA₂): the error of the penalty is
-    below 0.04 %, and curvature gradients do not lock. For ``torsion: laminate`` k_φ = 4 w G₁h₁G₂h₂/(G₁h₁ + G₂h₂): in a strip of twist τ
+    k_T = 10 EA_r/c², k_b = 10 EA_r, k_τ = 10 min(GJ)/c² with the default multiples, EA_r = EA₁EA₂/(EA₁ + EA₂): the
+    error of the penalty is
+    below 0.04 %, and curvature gradients do not lock. For ``torsion: laminate`` k_φ = 4 w G₁h₁G₂h₂/(G₁h₁ + G₂h₂): in
+    a strip of twist τ
     the centrelines tilt by c τ, and ½ k_φ c² τ² is the missing part of GJ_lam = ΣGJ + k_φ c².
     """
     distance2 = 0.25 * (bottom.thickness + top.thickness) ** 2

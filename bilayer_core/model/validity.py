@@ -18,32 +18,40 @@ def validity_warnings(scene: SceneConfig) -> Iterator[str]:
         thickness = sum(layer.thickness for layer in rod.layers)
         if rod.path.length < SLENDER * rod.width:
             yield (
-                f"rods.{rod.name}: length/width is {rod.path.length / rod.width:.2g}; below {SLENDER:g} it is a plate more than a rod"
+                f"rods.{rod.name}: length/width is {rod.path.length / rod.width:.2g}; "
+                f"below {SLENDER:g} it is a plate more than a rod"
             )
         strain = max((_largest_eigenstrain(scene, layer) for layer in rod.layers), default=0.0)
         if strain > LARGE_STRAIN:
-            yield f"rods.{rod.name}: eigenstrain up to {100 * strain:.3g} %; the material law is linear, meant for up to {100 * LARGE_STRAIN:g} %"
+            yield (
+                f"rods.{rod.name}: eigenstrain up to {100 * strain:.3g} %; "
+                f"the material law is linear, meant for up to {100 * LARGE_STRAIN:g} %"
+            )
         curvature = _free_curvature(scene, rod)
         if curvature * thickness > THICK_CURVATURE:
             yield (
-                f"rods.{rod.name}: curvature × thickness reaches {curvature * thickness:.2g}; above {THICK_CURVATURE:g} it is no thin rod"
+                f"rods.{rod.name}: curvature × thickness reaches {curvature * thickness:.2g}; "
+                f"above {THICK_CURVATURE:g} it is no thin rod"
             )
         ratio = rod.width**2 * curvature / thickness
         if PLATE_RANGE[0] <= ratio <= PLATE_RANGE[1]:
             yield (
-                f"rods.{rod.name}: w²κ/H reaches {ratio:.2g}, between beam and plate: an experiment may be up to 1/(1−ν²) stiffer "
-                "and its swelling curvature 1+ν higher; agreement below 30 % means nothing"
+                f"rods.{rod.name}: w²κ/H reaches {ratio:.2g}, between beam and plate: "
+                "an experiment may be up to 1/(1−ν²) stiffer and its swelling curvature 1+ν higher; "
+                "agreement below 30 % means nothing"
             )
         if scene.contact is not None:
             distance = scene.contact.barrier_distance
             if distance > 0.5 * thickness:
                 yield (
-                    f"contact.barrier_distance: {1e3 * distance:g} mm against {1e3 * thickness:g} mm of thickness of rods.{rod.name}: "
-                    "surfaces float visibly apart; 0.1 to 0.2 mm is closer"
+                    f"contact.barrier_distance: {1e3 * distance:g} mm against "
+                    f"{1e3 * thickness:g} mm of thickness of rods.{rod.name}: surfaces float visibly apart; "
+                    "0.1 to 0.2 mm is closer"
                 )
             if rod.edge_length > 2.0 * thickness + 2.0 * distance:
                 yield (
-                    f"rods.{rod.name}: edges are {1e3 * rod.edge_length:.3g} mm long; only nodes feel surfaces, and a small obstacle fits between them"
+                    f"rods.{rod.name}: edges are {1e3 * rod.edge_length:.3g} mm long; "
+                    "only nodes feel surfaces, and a small obstacle fits between them"
                 )
 
 

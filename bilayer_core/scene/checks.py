@@ -98,20 +98,18 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
 
 
 def _clamps(scene: SceneConfig) -> Iterator[Fault]:
-    motions = {body.name: body.motion.type for body in scene.bodies}
+    names = [body.name for body in scene.bodies]
     for number, rod in enumerate(scene.rods):
         for end in ("clamp_start", "clamp_end"):
             name = getattr(rod, end)
-            if name is not None and name not in motions:
-                yield ("rods", number, end), name, one_of("bodies", name, motions)
-            elif name is not None and motions[name] == "free":
-                yield ("rods", number, end), name, "must be a prescribed body; free ones cannot hold clamps yet"
+            if name is not None and name not in names:
+                yield ("rods", number, end), name, one_of("bodies", name, names)
 
 
 def _surfaces(scene: SceneConfig) -> Iterator[Fault]:
     for index, body in enumerate(scene.bodies):
-        if body.motion.type == "free" and body.surface is None:
-            yield ("bodies", index, "surface"), None, "must be a sphere; a free body needs a surface"
+        if body.motion.type == "free" and body.surface is None and body.motion.inertia is None:
+            yield ("bodies", index, "motion", "inertia"), None, "must be given for a free body that is no sphere"
     touching = [plane.name for plane in scene.obstacles] + [
         body.name for body in scene.bodies if body.surface is not None or body.contact_points
     ]

@@ -164,7 +164,7 @@ class Free(_Part):
     type: Literal["free"]
     mass: PositiveMass
     inertia: tuple[PositiveInertia, PositiveInertia, PositiveInertia] | None = None
-    """Principal moments of inertia; without them those of a solid sphere, or of a hollow one if `shell` is true."""
+    """Principal moments of inertia; without them those of a solid ball, or of a hollow one if `shell` is true."""
     shell: bool = False
     velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
     angular_velocity: tuple[AngularSpeed, AngularSpeed, AngularSpeed] = (0.0, 0.0, 0.0)
@@ -173,6 +173,16 @@ class Free(_Part):
     def _check(self) -> Free:
         refuse_all("Free", checks.faults_of_inertia(self))
         return self
+
+
+class Guided(_Part):
+    """A body on a rail: it slides along an axis as the forces on it demand, and does not turn."""
+
+    type: Literal["guided"]
+    axis: Direction
+    mass: PositiveMass
+    speed: Speed = 0.0
+    """At the start, along the axis."""
 
 
 class Prescribed(_Part):
@@ -216,7 +226,7 @@ class Body(_Part):
 
     name: Name
     position: Point
-    motion: Annotated[Free | Prescribed, Field(discriminator="type")]
+    motion: Annotated[Free | Guided | Prescribed, Field(discriminator="type")]
     surface: Sphere | None = None
     contact_points: list[ContactPoint] = []
 

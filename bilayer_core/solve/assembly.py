@@ -1,19 +1,29 @@
 """From edge space to unknowns: gradient and band matrix.
 
-With e = x₁ − x₀ an edge vector and p = ½ (x_t0 + x_t1) − ½ (x_b0 + x_b1) the vector between paired edges, a derivative with respect to e
-or p is handed to the nodes with the factors −1, +1 and ±½. This is the only file that joins second derivatives to the numbers of unknowns.
+With e = x₁ − x₀ an edge vector and p = ½ (x_t0 + x_t1) − ½ (x_b0 + x_b1) the vector between paired edges, a
+derivative with respect to e
+or p is handed to the nodes with the factors −1, +1 and ±½. This is the only file that joins second derivatives to the
+numbers of unknowns.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..jit import inlined, kernel
+from ..jit import kernel
 
 
 @kernel
 def expand_gradient(
-    edge_node, node_unknown, edge_unknown, pair_top, pair_bottom, edge_gradient, pair_gradient, node_gradient, gradient_out
+    edge_node,
+    node_unknown,
+    edge_unknown,
+    pair_top,
+    pair_bottom,
+    edge_gradient,
+    pair_gradient,
+    node_gradient,
+    gradient_out,
 ):
     """Gradient with respect to the unknowns [N, N m] from nodes, edges and pairs; written, shape (size,)."""
     for k in range(edge_node.shape[0]):
@@ -35,7 +45,7 @@ def expand_gradient(
             gradient_out[node_unknown[i] + c] = node_gradient[i, c]
 
 
-@inlined
+@kernel
 def _add(band, row, column, value):
     """A[row, column] += value in either triangle."""
     if row >= column:
@@ -44,7 +54,7 @@ def _add(band, row, column, value):
         band[row, column - row] += value
 
 
-@inlined
+@kernel
 def _add_block(band, row, column, s, block, k):
     """A[row:row+3, column:column+3] += s block[k, :3, :3], for row > column."""
     for n in range(3):
@@ -52,7 +62,7 @@ def _add_block(band, row, column, s, block, k):
             band[column + n, row + m - column - n] += s * block[k, m, n]
 
 
-@inlined
+@kernel
 def _add_transposed_block(band, row, column, s, block, k):
     """A[row:row+3, column:column+3] += s block[k, :3, :3]ᵀ, for row > column."""
     for n in range(3):
@@ -60,7 +70,7 @@ def _add_transposed_block(band, row, column, s, block, k):
             band[column + n, row + m - column - n] += s * block[k, n, m]
 
 
-@inlined
+@kernel
 def _add_own_block(band, start, s, block, k):
     """A[start:start+3, start:start+3] += s (upper triangle of block[k])."""
     for m in range(3):
@@ -68,7 +78,7 @@ def _add_own_block(band, start, s, block, k):
             band[start + m, n - m] += s * block[k, m, n]
 
 
-@inlined
+@kernel
 def _add_symmetrised_block(band, start, s, block, k):
     """A[start:start+3, start:start+3] += s (block + blockᵀ)."""
     for m in range(3):
@@ -110,7 +120,9 @@ def expand_edges(
 
 
 @kernel
-def expand_bends(bend_count, edge_count, joint_a, joint_b, edge_node, node_unknown, edge_unknown, cross_hessian, band_out):
+def expand_bends(
+    bend_count, edge_count, joint_a, joint_b, edge_node, node_unknown, edge_unknown, cross_hessian, band_out
+):
     """Add the cross blocks of bending elements to the band; those of clamps have none."""
     for k in range(bend_count):
         a, b = joint_a[k], joint_b[k]
@@ -145,7 +157,8 @@ def expand_pairs(
 ):
     """Add the blocks of bonds to the band.
 
-    The unknowns of a bond are consecutive: x_b0, x_t0, θ_b, θ_t of one station and x_b1, x_t1 of the next (`model.layout`).
+    The unknowns of a bond are consecutive: x_b0, x_t0, θ_b, θ_t of one station and x_b1, x_t1 of the next
+    (`model.layout`).
     Their local matrix is collected first, its lower triangle then added.
     """
     local = np.empty((14, 14))

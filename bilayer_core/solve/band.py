@@ -1,7 +1,9 @@
 """L D Lᵀ of a symmetric band matrix, and solution for one or several right-hand sides.
 
-Storage is by columns of the lower triangle: ``band[j, r] = A[j + r, j]``, 0 ≤ r ≤ half-bandwidth, with as many rows of padding at the end
-as the half-bandwidth. It is a compile-time constant, so inner loops have fixed lengths. Cost: n b² and 4 n b per right-hand side.
+Storage is by columns of the lower triangle: ``band[j, r] = A[j + r, j]``, 0 ≤ r ≤ half-bandwidth, with as many rows
+of padding at the end
+as the half-bandwidth. It is a compile-time constant, so inner loops have fixed lengths. Cost: n b² and 4 n b per
+right-hand side.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ def band_kernels(half_bandwidth: int):
     """Compile-time specialised ``factor(band, n)``, ``solve(band, n, right)`` and ``solve_border(band, n, right)``.
 
     ``factor`` works in place and returns −1, or the first column whose pivot is not positive. The others overwrite
-    ``right``, of n + half_bandwidth rows whose last half_bandwidth are zero: a vector, or a matrix with the columns of a border.
+    ``right``, of n + half_bandwidth rows whose last half_bandwidth are zero: a vector, or a matrix with the columns
+    of a border.
     """
     b = half_bandwidth
 

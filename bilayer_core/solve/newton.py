@@ -1,7 +1,9 @@
 """Newton's method on the incremental potential, with line search and a step bound.
 
-The Hessian is exact. Once factorised it serves several corrections as long as each is less than `KEEP_FACTOR_BELOW` times the one before;
-a new correction of the gradient at hand costs a fraction of a new factorisation. The last of them, not taken, is the measure of convergence:
+The Hessian is exact. Once factorised it serves several corrections as long as each is less than `KEEP_FACTOR_BELOW`
+times the one before;
+a new correction of the gradient at hand costs a fraction of a new factorisation. The last of them, not taken, is the
+measure of convergence:
 what Newton would still change, as the speed of the fastest material point [m/s].
 """
 
@@ -80,9 +82,8 @@ class NewtonSolver:
         self._max_iterations = max_iterations
         self._carrier_step = np.zeros((len(model.carriers.weight), 3))
         self._node_step = model.layout.node[:, None] + np.arange(3)
-        self._ball_radius = model.bodies.radius[model.bodies.body_of_free]
-        self._balls = np.flatnonzero(model.carriers.free_body >= 0)
-        self._free_of_balls = model.carriers.free_body[self._balls]
+        self._reach = model.bodies.reach
+        self._moving = _Moving(model)
 
     def speed(self, step: Array, body_step: Array) -> float:
         """Largest displacement of a material point in a step, over the length of the time step [m/s]."""
@@ -90,7 +91,7 @@ class NewtonSolver:
         largest = np.sqrt(np.square(step[self._node_step]).sum(axis=1).max())
         largest = max(largest, np.abs(step[model.layout.edge] * model.half_width).max())
         for b in range(model.free_count):
-            turn = self._ball_radius[b] * math.sqrt(body_step[b, 3:] @ body_step[b, 3:])
+            turn = self._reach[b] * math.sqrt(body_step[b, 3:] @ body_step[b, 3:])
             largest = max(largest, math.sqrt(body_step[b, :3] @ body_step[b, :3]) + turn)
         return float(largest / self._potential.context.length)
 
@@ -127,13 +128,11 @@ class NewtonSolver:
             A report if prescribed motion is blocked.
         """
         model, start = self._model, context.start
-        free = np.ones(len(start.carrier), dtype=bool)
-        free[model.attached_node] = False
-        free[model.node_count :] = model.carriers.free_body[model.node_count :] >= 0
+        free = self._moving.free
         move = target.carrier - start.carrier
         inertial = np.zeros_like(move)
         inertial[: model.node_count] = context.predicted_position - start.position
-        inertial[self._balls] = (context.predicted_body_position - start.body_position)[self._free_of_balls]
+        self._moving.add_bodies(context.predicted_body_position - start.body_position, inertial)
         fraction = 1.0
         for retry in (0.5, 0.0, None):
             move[free] = fraction * inertial[free]
@@ -146,17 +145,20 @@ class NewtonSolver:
             fraction *= retry * alpha
         guess.carrier[:] = start.carrier + move
         guess.turn[:] = fraction * context.predicted_turn
+        guess.body_position[:] = start.body_position + fraction * (
+            context.predicted_body_position - start.body_position
+        )
+        guess.body_rotation[:] = start.body_rotation
+        guess.place_held()
         guess.carry_frames(start, guess.turn)
         guess.joint_strain[:, 2] = start.joint_strain[:, 2]
-        guess.body_position[:] = start.body_position
-        guess.body_position[self._free_of_balls] = guess.carrier[self._balls]
-        guess.body_rotation[:] = start.body_rotation
         return None
 
     def minimise(self, at: Configuration, trial: Configuration) -> tuple[NewtonReport, Configuration]:
-        """Move `at` to the minimum of the potential; `trial` is scratch. Returns the report and the final configuration."""
-        potential, matrix = self._potential, self._potential.matrix
-        factor = potential.diagonal_factor()
+        """Move `at` to the minimum of the potential; `trial` is scratch. Returns the report and the final
+        configuration.
+        """
+        potential = self._potential
         energy = potential.evaluate(at, True)
         backtracks = 0
         fresh, previous = True, math.inf
@@ -164,11 +166,11 @@ class NewtonSolver:
         residual = math.inf
         if not math.isfinite(energy):
             return NewtonReport(NewtonStatus.NOT_FINITE, 0, 0, math.inf), at
-        if not matrix.factorise(factor):
+        if not potential.factorise(at):
             return NewtonReport(NewtonStatus.INDEFINITE, 0, 1, math.inf), at
         factorisations = iterations = 1
         while True:
-            step, body_step = matrix.newton_step(potential.gradient, potential.body_gradient)
+            step, body_step = potential.newton_step()
             residual = self.speed(step, body_step)
             if not math.isfinite(residual):
                 status = NewtonStatus.NOT_FINITE
@@ -183,7 +185,7 @@ class NewtonSolver:
                 factorisations += 1
                 iterations += 1
                 fresh, previous = True, math.inf
-                if not matrix.factorise(factor):
+                if not potential.factorise(at):
                     status = NewtonStatus.INDEFINITE
                     break
                 continue
@@ -208,7 +210,7 @@ class NewtonSolver:
         slope = float(potential.gradient @ step) + float(np.sum(potential.body_gradient * body_step))
         noise = ROUNDING * sum(abs(value) for value in potential.terms.values())
         self._carrier_step[: model.node_count] = step[self._node_step]
-        self._carrier_step[self._balls] = body_step[self._free_of_balls, :3]
+        self._moving.add_bodies(body_step[:, :3], self._carrier_step)
         alpha, _ = self.bound(at, self._carrier_step)
         bounded = alpha < 1.0
         for halvings in range(MAX_BACKTRACKS):
@@ -218,3 +220,30 @@ class NewtonSolver:
                 return value, halvings + bounded
             alpha *= BACKTRACKING
         return None
+
+
+class _Moving:
+    """Which carriers move freely, and which of them a free body carries.
+
+    Contact points and nodes on a turning body move on arcs. The bound follows straight lines, so a turn is added to
+    the motion as what it is to first order by the
+    line search itself: a trial behind a surface has an infinite potential and is halved.
+    """
+
+    def __init__(self, model: Model):
+        carriers = model.carriers
+        body = np.full(len(carriers.weight), -1, dtype=np.int64)
+        body[model.attached_node] = model.attached_free
+        body[model.node_count : model.node_count + model.point_count] = model.bodies.free_index[carriers.point_body]
+        balls = carriers.free_body >= 0
+        body[balls] = carriers.free_body[balls]
+        self._carried = np.flatnonzero(body >= 0)
+        self._body = body[self._carried]
+        self.free = np.zeros(len(carriers.weight), dtype=bool)
+        self.free[: model.node_count] = True
+        self.free[model.attached_node] = False
+        self.free[self._carried] = True
+
+    def add_bodies(self, displacement: Array, carrier_step: Array) -> None:
+        """Write the displacement of free bodies [m], shape (n_free, 3), into the steps of what they carry."""
+        carrier_step[self._carried] = displacement[self._body]

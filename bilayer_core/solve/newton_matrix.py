@@ -1,10 +1,13 @@
-"""The Newton matrix: a band for rods, bordered by six unknowns for each free body, and its factorisation.
+"""The Newton matrix: a band for rods, bordered by the unknowns of free bodies, and its factorisation.
 
     [ A   U ] [ δ   ]     [ g   ]
     [ Uᵀ  D ] [ δ_b ] = − [ g_b ]
 
-A is factorised as L D Lᵀ in linear time, S = D − Uᵀ A⁻¹ U by Cholesky. Where no ball is near a node U vanishes and is left out.
-If a pivot is not positive the matrix is not convex there; multiples of the mass matrix are added until it is, so that the step is a descent direction.
+A is factorised as L D Lᵀ in linear time, S = D − Uᵀ A⁻¹ U by Cholesky, after both are restricted to the motions that
+bodies are allowed.
+While no free body touches or holds a rod, U vanishes and is left out.
+If a pivot is not positive the matrix is not convex there; multiples of the mass matrix are added until it is, so that
+the step is a descent direction.
 """
 
 from __future__ import annotations
@@ -12,9 +15,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
+from ..kinematics.rotation import skew
 from ..model.model import Model
 from .assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
 from .band import band_kernels
+from .clamps import hand_nodes_to_bodies, hand_walls_to_bodies
+from .configuration import Configuration
 
 Array = np.ndarray
 FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
@@ -25,9 +31,10 @@ LARGEST_SHIFT = 1e8
 class NewtonMatrix:
     """Second derivatives in edge space, filled by the forces, and the factorised matrix of the unknowns."""
 
-    def __init__(self, model: Model, has_contact: bool, has_balls: bool):
+    def __init__(self, model: Model, has_contact: bool, has_balls: bool, carrier_gradient: Array):
         self._model = model
         self._has_contact = has_contact
+        self.carrier_gradient = carrier_gradient
         edges = model.edge_count + model.wall_count
         pairs, carriers = len(model.pair_top), model.carriers
         size, b = model.layout.size, model.layout.half_bandwidth
@@ -44,13 +51,23 @@ class NewtonMatrix:
         self._band = np.zeros((size + b, b + 1))
         self._factor, self._solve, self._solve_border = band_kernels(b)
         self._right = np.zeros(size + b)
-        self._held = model.layout.node[model.attached_node]
-        self._held_unknowns = (self._held[:, None] + np.arange(3)).ravel()
         self._border = np.zeros((size + b, 6 * model.free_count))
-        self._border_solution = np.zeros_like(self._border)
+        self._border_free = np.zeros((size + b, model.bodies.freedom.shape[1]))
+        self._border_solution = np.zeros_like(self._border_free)
+        self._corner = np.zeros_like(self.body_hessian)
+        self._held_unknowns = (model.layout.attached[:, None] + np.arange(3)).ravel()
+        self._body_masses = np.concatenate(
+            [np.repeat([m, np.trace(j)], 3) for m, j in zip(model.bodies.mass, model.bodies.second_moment, strict=True)]
+            or [np.zeros(0)]
+        )
         self._schur = None
         self._coupled = False
-        self._balls = np.flatnonzero(carriers.free_body >= 0)
+        points = model.bodies.free_index[carriers.point_body]
+        self._carriers = [model.node_count + k for k in np.flatnonzero(points >= 0)]
+        self._carrier_body = [points[k - model.node_count] for k in self._carriers]
+        balls = np.flatnonzero(carriers.free_body >= 0)
+        self._carriers += balls.tolist()
+        self._carrier_body += carriers.free_body[balls].tolist()
         self.shift = 0.0
 
     def clear(self) -> None:
@@ -60,24 +77,53 @@ class NewtonMatrix:
         for array in (self.carrier_hessian, self.ball_hessian, self.ball_turn_hessian, self.body_hessian):
             array.fill(0.0)
 
-    def add_balls_to_gradient(self, carrier_gradient: Array, body_gradient: Array) -> None:
-        """Hand the force on the centre of each ball to its body."""
-        for carrier in self._balls:
-            body_gradient[self._model.carriers.free_body[carrier], :3] += carrier_gradient[carrier]
+    def add_carriers_to_bodies(self, carrier_gradient: Array, at: Configuration, body_gradient: Array) -> None:
+        """Hand the force on the centre of each ball and on each contact point to its free body."""
+        for carrier, free in zip(self._carriers, self._carrier_body, strict=True):
+            body_gradient[free, :3] += carrier_gradient[carrier]
+            arm = at.carrier[carrier] - at.body_position[free]
+            body_gradient[free, 3:] += np.cross(arm, carrier_gradient[carrier])
 
-    def factorise(self, factor: float) -> bool:
-        """Assemble and factorise; `factor` [1/s²] multiplies the masses. False if no shift makes the matrix positive definite."""
-        self.assemble_border()
+    def factorise(self, factor: float, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> bool:
+        """Assemble and factorise; false if no shift makes the matrix positive definite.
+
+        Parameters
+        ----------
+        factor : float
+            Of the masses in the Hessian [1/s²].
+        at : Configuration
+            Where the second derivatives were evaluated.
+        edge_gradient, attached_gradient : Array
+            First derivatives there, of edges and of attached nodes before they were handed to bodies.
+        """
         self.shift = 0.0
         while True:
-            if self._try_factorise(factor):
+            self.assemble(factor * (1.0 + self.shift), at, edge_gradient, attached_gradient)
+            if self._factorise(factor):
                 return True
             self.shift = max(FIRST_SHIFT, self.shift * SHIFT_GROWTH)
             if self.shift > LARGEST_SHIFT:
                 return False
 
-    def assemble_band(self, factor: float) -> Array:
-        """Band of the rods' unknowns, not factorised, see `solve.band`."""
+    def assemble(
+        self, factor: float, at: Configuration, edge_gradient: Array, attached_gradient: Array
+    ) -> tuple[Array, Array, Array]:
+        """A as a band (see `solve.band`), U and D; parameters as for `factorise`. Attached nodes are rows of the
+        identity.
+        """
+        model, layout = self._model, self._model.layout
+        self._assemble_band(factor)
+        self._border.fill(0.0)
+        self._corner[:] = self.body_hessian
+        self._coupled = False
+        if model.free_count:
+            self._add_contact_of_bodies(at)
+            if (model.attached_free >= 0).any():
+                self._add_clamps(at, edge_gradient, attached_gradient)
+        hold_unknowns(layout.attached, layout.half_bandwidth, self._band)
+        return self._band, self._border[: layout.size], self._corner
+
+    def _assemble_band(self, factor: float) -> None:
         model, layout, band = self._model, self._model.layout, self._band
         band.fill(0.0)
         expand_edges(
@@ -106,59 +152,99 @@ class NewtonMatrix:
                 self.cross_hessian,
                 band,
             )
-        hold_unknowns(self._held, layout.half_bandwidth, band)
-        return band
 
-    @property
-    def border(self) -> Array:
-        """U, shape (size, 6 n_free)."""
-        return self._border[: self._model.layout.size]
-
-    def assemble_border(self) -> None:
-        """Complete D with the forces on balls' centres, and collect U from the balls' contacts with nodes."""
-        model, carriers = self._model, self._model.carriers
-        free = carriers.free_body
-        for carrier in self._balls:
-            rows = slice(6 * free[carrier], 6 * free[carrier] + 3)
+    def _add_contact_of_bodies(self, at: Configuration) -> None:
+        """Contact of carriers on free bodies, with planes (D), with nodes (U) and with each other (D)."""
+        model, carriers, corner = self._model, self._model.carriers, self._corner
+        if not self._has_contact:
+            return
+        jacobian = {}
+        for carrier, free in zip(self._carriers, self._carrier_body, strict=True):
             own = self.carrier_hessian[carrier]
-            self.body_hessian[rows, rows] += own + np.triu(own, 1).T
-        self._coupled = False
-        self._border.fill(0.0)
-        active = np.flatnonzero(self.ball_hessian.any(axis=(1, 2)))
-        for k in active:
-            i, j = carriers.pair_first[k], free[carriers.pair_second[k]]
-            if j < 0:
-                continue
+            arm = at.carrier[carrier] - at.body_position[free]
+            jacobian[carrier] = np.hstack([np.eye(3), -skew(arm)])
+            rows = slice(6 * free, 6 * free + 6)
+            corner[rows, rows] += jacobian[carrier].T @ (own + np.triu(own, 1).T) @ jacobian[carrier]
+            if arm.any():
+                force = self.carrier_gradient[carrier]
+                turning = 0.5 * (np.outer(arm, force) + np.outer(force, arm)) - (arm @ force) * np.eye(3)
+                corner[rows, rows][3:, 3:] += turning
+        for k in np.flatnonzero(self.ball_hessian.any(axis=(1, 2))):
+            i, j = carriers.pair_first[k], carriers.pair_second[k]
+            ball = carriers.free_body[j]
             if i < model.node_count:
-                rows = slice(model.layout.node[i], model.layout.node[i] + 3)
-                self._border[rows, 6 * j : 6 * j + 3] += self.ball_hessian[k]
-                self._border[rows, 6 * j + 3 : 6 * j + 6] += self.ball_turn_hessian[k]
-                self._coupled = True
-            elif free[i] >= 0:
-                rows, columns = slice(6 * free[i], 6 * free[i] + 3), slice(6 * j, 6 * j + 3)
-                self.body_hessian[rows, columns] += self.ball_hessian[k]
-                self.body_hessian[columns, rows] += self.ball_hessian[k].T
-        self._border[self._held_unknowns] = 0.0
+                if ball >= 0:
+                    rows = slice(model.layout.node[i], model.layout.node[i] + 3)
+                    self._border[rows, 6 * ball : 6 * ball + 3] += self.ball_hessian[k]
+                    self._border[rows, 6 * ball + 3 : 6 * ball + 6] += self.ball_turn_hessian[k]
+                    self._coupled = True
+            elif i in jacobian and ball >= 0:
+                block = np.hstack([self.ball_hessian[k], self.ball_turn_hessian[k]])
+                first = self._carrier_body[self._carriers.index(i)]
+                rows, columns = slice(6 * first, 6 * first + 6), slice(6 * ball, 6 * ball + 6)
+                block = jacobian[i].T @ block
+                corner[rows, columns] += block
+                corner[columns, rows] += block.T
 
-    def _try_factorise(self, factor: float) -> bool:
-        size = self._model.layout.size
-        self.assemble_band(factor * (1.0 + self.shift))
+    def _add_clamps(self, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> None:
+        """Rows of nodes attached to free bodies, from the band and the border, and clamps' elements: into U and D."""
+        model, layout = self._model, self._model.layout
+        self._coupled = True
+        for k in np.flatnonzero(model.attached_free >= 0):
+            free, rows = model.attached_free[k], slice(layout.attached[k], layout.attached[k] + 3)
+            block = np.hstack([np.eye(3), -skew(at.arm[k])]).T @ self._border[rows]
+            own = slice(6 * free, 6 * free + 6)
+            self._corner[own] += block
+            self._corner[:, own] += block.T
+        attached = (layout.attached, model.attached_free)
+        hand_nodes_to_bodies(
+            *attached,
+            layout.attached_of_unknown,
+            at.arm,
+            attached_gradient,
+            layout.half_bandwidth,
+            layout.size,
+            self._band,
+            self._border,
+            self._corner,
+        )
+        hand_walls_to_bodies(
+            model.wall_free,
+            model.wall_joint,
+            model.joint_a,
+            model.joint_b,
+            model.edge_count,
+            model.edge_node,
+            layout.node,
+            layout.edge,
+            layout.attached_of_unknown,
+            *attached,
+            at.arm,
+            at.tangent,
+            edge_gradient,
+            self.edge_hessian,
+            self.cross_hessian,
+            self._border,
+            self._corner,
+        )
+
+    def _factorise(self, factor: float) -> bool:
+        model, size = self._model, self._model.layout.size
         if self._factor(self._band, size) >= 0:
             return False
-        if not self._model.free_count:
+        if not model.free_count:
             return True
-        schur = self.body_hessian.copy()
+        freedom = model.bodies.freedom
+        schur = self._corner
         if self.shift:
-            bodies = self._model.bodies
-            for b, mass in enumerate(bodies.mass):
-                inertia = np.trace(bodies.second_moment[b])
-                schur[range(6 * b, 6 * b + 6), range(6 * b, 6 * b + 6)] += self.shift * factor * np.repeat(
-                    [mass, inertia], 3
-                )
+            schur = schur + self.shift * factor * np.diag(self._body_masses)
+        schur = freedom.T @ schur @ freedom
         if self._coupled:
-            self._border_solution[:] = self._border
+            self._border[self._held_unknowns] = 0.0
+            self._border_free[:] = self._border @ freedom
+            self._border_solution[:] = self._border_free
             self._solve_border(self._band, size, self._border_solution)
-            schur -= self._border.T @ self._border_solution
+            schur -= self._border_free.T @ self._border_solution
         try:
             self._schur = cho_factor(schur, check_finite=False)
         except LinAlgError:
@@ -175,10 +261,11 @@ class NewtonMatrix:
         step = right[:size].copy()
         if not self._model.free_count:
             return step, np.zeros((0, 6))
-        load = -body_gradient.ravel()
+        freedom = self._model.bodies.freedom
+        load = -freedom.T @ body_gradient.ravel()
         if self._coupled:
-            load = load - self._border[:size].T @ step
+            load = load - self._border_free[:size].T @ step
         body_step = cho_solve(self._schur, load, check_finite=False)
         if self._coupled:
             step -= self._border_solution[:size] @ body_step
-        return step, body_step.reshape(-1, 6)
+        return step, (freedom @ body_step).reshape(-1, 6)

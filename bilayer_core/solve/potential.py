@@ -1,4 +1,6 @@
-"""The incremental potential of one implicit step: the sum of all terms that a scene needs, its gradient and its Newton matrix."""
+"""The incremental potential of one implicit step: the sum of all terms that a scene needs, its gradient and its
+Newton matrix.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +18,7 @@ from ..forces.quadratic import angle_spring, gravity, node_spring
 from ..forces.stretch import stretch
 from ..model.model import Model
 from .assembly import expand_gradient
+from .clamps import hand_gradient_to_bodies
 from .configuration import Configuration
 from .newton_matrix import NewtonMatrix
 
@@ -54,8 +57,10 @@ class StepContext:
 class IncrementalPotential:
     """Terms of a model, their accumulators, and the frozen data of the present step.
 
-    After `evaluate`, `terms` has each term's energy [J], `gradient` that of the unknowns (zero where nodes are held), shape (size,), and
-    `body_gradient` that of free bodies, shape (n_free, 6). `carrier_gradient`, shape (n_carrier, 3), and `body_contact_gradient`
+    After `evaluate`, `terms` has each term's energy [J], `gradient` that of the unknowns (zero where nodes are held),
+    shape (size,), and
+    `body_gradient` that of free bodies, shape (n_free, 6). `carrier_gradient`, shape (n_carrier, 3), and
+    `body_contact_gradient`
     are the parts of contact and friction alone.
     """
 
@@ -85,9 +90,9 @@ class IncrementalPotential:
         self.edge_gradient = np.zeros((edges, 4))
         self._node_gradient = np.zeros((model.node_count, 3))
         self._pair_gradient = np.zeros((pairs, 3))
-        self.matrix = NewtonMatrix(model, self.has_contact, self.has_balls)
-        self._held = model.layout.node[model.attached_node]
-        self._held_unknowns = (self._held[:, None] + np.arange(3)).ravel()
+        self.matrix = NewtonMatrix(model, self.has_contact, self.has_balls, self.carrier_gradient)
+        self.attached_gradient = np.zeros((len(model.attached_node), 3))
+        self._attached_free, self._wall_free = model.attached_free, model.wall_free
         self._joint_count = joints
         room = len(carriers.weight) * len(carriers.plane_point) + len(carriers.pair_first) if self.has_friction else 0
         self._contact_first = np.zeros(room, dtype=np.int64)
@@ -124,7 +129,9 @@ class IncrementalPotential:
             )
 
     def evaluate(self, at: Configuration, with_hessian: bool) -> float:
-        """Potential at a configuration [J]; infinite behind a surface. Gradient always, second derivatives on request."""
+        """Potential at a configuration [J]; infinite behind a surface. Gradient always, second derivatives on
+        request.
+        """
         model, context, matrix = self.model, self.context, self.matrix
         for array in (self._node_gradient, self.edge_gradient, self._pair_gradient, self.body_gradient):
             array.fill(0.0)
@@ -171,7 +178,7 @@ class IncrementalPotential:
             others = self.body_gradient.copy()
             self._add_contact(at, with_hessian)
             self._node_gradient += self.carrier_gradient[: model.node_count]
-            matrix.add_balls_to_gradient(self.carrier_gradient, self.body_gradient)
+            matrix.add_carriers_to_bodies(self.carrier_gradient, at, self.body_gradient)
             self.body_contact_gradient = self.body_gradient - others
         expand_gradient(
             model.edge_node,
@@ -184,7 +191,18 @@ class IncrementalPotential:
             self._node_gradient,
             self.gradient,
         )
-        self.gradient[self._held_unknowns] = 0.0
+        hand_gradient_to_bodies(
+            model.layout.attached,
+            self._attached_free,
+            at.arm,
+            self._wall_free,
+            at.tangent,
+            self.edge_gradient,
+            model.edge_count,
+            self.gradient,
+            self.attached_gradient,
+            self.body_gradient,
+        )
         return sum(terms.values())
 
     def _add_inertia_and_gravity(self, at: Configuration, with_hessian: bool) -> None:
@@ -200,9 +218,7 @@ class IncrementalPotential:
         terms["inertia"] += angle_spring(model.spin_inertia, inertia, at.turn, context.predicted_turn, edge_out)
         if self.has_bodies:
             predicted = (context.predicted_body_position, context.predicted_body_rotation)
-            terms["inertia"] += body_spring(
-                bodies.mass, bodies.second_moment, inertia, *body_at, *predicted, *body_out
-            )
+            terms["inertia"] += body_spring(bodies.mass, bodies.second_moment, inertia, *body_at, *predicted, *body_out)
         if self.has_damping:
             terms["damping"] = node_spring(model.node_mass, damping, at.position, start.position, node_out)
             terms["damping"] += angle_spring(model.spin_inertia, damping, at.turn, start.turn, edge_out)
@@ -259,6 +275,16 @@ class IncrementalPotential:
                 matrix.body_hessian,
                 with_hessian,
             )
+
+    def factorise(self, at: Configuration) -> bool:
+        """Factorise the Newton matrix of the last evaluation, that of `at`; false if it cannot be made positive
+        definite.
+        """
+        return self.matrix.factorise(self.diagonal_factor(), at, self.edge_gradient, self.attached_gradient)
+
+    def newton_step(self) -> tuple[Array, Array]:
+        """Minus the inverse of the factorised matrix times the present gradient; see `NewtonMatrix.newton_step`."""
+        return self.matrix.newton_step(self.gradient, self.body_gradient)
 
     def diagonal_factor(self) -> float:
         """Factor of the mass matrix in the Hessian: 1/h² + α/h [1/s²]."""

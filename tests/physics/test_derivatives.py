@@ -51,16 +51,23 @@ FORCES = {
     "everything": lambda m: m,
 }
 
+HUBS = {
+    "prescribed hub": {"type": "prescribed"},
+    "free hub": {"type": "free", "mass": 1e-3, "inertia": [2e-8, 3e-8, 4e-8]},
+}
+
 
 class Problem:
-    """A potential at a random state, as functions of one vector (rods' unknowns, then the ball's six).
+    """A potential at a random state, as functions of one vector (rods' unknowns, then six for each free body).
 
     Unknowns that are angles are multiplied with a length, so that all entries are of one kind.
     """
 
-    def __init__(self, change, seed):
+    def __init__(self, change, hub, seed):
         rng = np.random.default_rng(seed)
-        model = change(build_model(load_scene(everything())))
+        scene = everything()
+        scene["bodies"][0]["motion"] = HUBS[hub]
+        model = change(build_model(load_scene(scene)))
         stepper = Stepper(model, H, 1e-6, 50, 0)
         state = initial_state(model)
         rest = Configuration(model)
@@ -74,8 +81,9 @@ class Problem:
         state.director1[:] = bent.director1[: model.edge_count]
         state.velocity[free] = 0.05 * rng.standard_normal((len(free), 3))
         state.spin[:] = rng.standard_normal(model.edge_count)
-        state.body_velocity[1] = 0.02 * rng.standard_normal(3)
-        state.body_angular_velocity[1] = rng.standard_normal(3)
+        for body in model.bodies.body_of_free:
+            state.body_velocity[body] = 0.02 * rng.standard_normal(3)
+            state.body_angular_velocity[body] = rng.standard_normal(3)
         start = Configuration(model)
         start.take_state(state, state.body_position)
         context = implicit_euler.predict(model, state, start, H, stepper.eigenstrain_of(np.array([0.7])))
@@ -83,19 +91,20 @@ class Problem:
         self.potential.start_step(context)
         size = model.layout.size
         held = (model.layout.node[model.attached_node][:, None] + np.arange(3)).ravel()
-        self.free = np.setdiff1d(np.arange(size + 6), held)
-        self.scale = np.ones(size + 6)
+        total = size + 6 * model.free_count
+        self.free = np.setdiff1d(np.arange(total), held)
+        self.scale = np.ones(total)
         self.scale[model.layout.edge] = 1.0 / 5e-3  # half width
-        self.scale[size + 3 :] = 1.0 / 2e-2  # radius
+        self.scale[size:].reshape(-1, 6)[:, 3:] = 1.0 / 2e-2  # radius
         self.size, self.model = size, model
         self.at, self.trial = Configuration(model), Configuration(model)
-        step = np.zeros(size + 6)
+        step = np.zeros(total)
         step[self.free] = 3e-5 * rng.standard_normal(len(self.free))
         self._move(start, step, self.at)
 
     def _move(self, base, vector, out):
         step = vector * self.scale
-        out.set_moved(base, step[: self.size], step[self.size :].reshape(1, 6), 1.0)
+        out.set_moved(base, step[: self.size], step[self.size :].reshape(-1, 6), 1.0)
 
     def value(self, vector):
         self._move(self.at, vector, self.trial)
@@ -107,15 +116,17 @@ class Problem:
         potential, size, b = self.potential, self.size, self.model.layout.half_bandwidth
         potential.evaluate(self.at, True)
         gradient = np.concatenate([potential.gradient, potential.body_gradient.ravel()]) * self.scale
-        potential.matrix.assemble_border()
-        band = potential.matrix.assemble_band(potential.diagonal_factor())
-        hessian = np.zeros((size + 6, size + 6))
+        band, border, corner = potential.matrix.assemble(
+            potential.diagonal_factor(), self.at, potential.edge_gradient, potential.attached_gradient
+        )
+        self.coupling = np.abs(border).max()
+        hessian = np.zeros((len(self.scale), len(self.scale)))
         for j in range(size):
             for r in range(min(b, size - 1 - j) + 1):
                 hessian[j + r, j] = hessian[j, j + r] = band[j, r]
-        hessian[:size, size:] = potential.matrix.border
-        hessian[size:, :size] = potential.matrix.border.T
-        hessian[size:, size:] = potential.matrix.body_hessian
+        hessian[:size, size:] = border
+        hessian[size:, :size] = border.T
+        hessian[size:, size:] = corner
         hessian *= np.outer(self.scale, self.scale)
         return gradient[self.free], hessian[np.ix_(self.free, self.free)]
 
@@ -123,7 +134,7 @@ class Problem:
         """The same by central differences of fourth order with step `h` [m]."""
         gradient, rows = [], []
         for i in self.free:
-            unit = np.zeros(self.size + 6)
+            unit = np.zeros(len(self.scale))
             unit[i] = h
             plus, minus = self.value(unit), self.value(-unit)
             plus2, minus2 = self.value(2 * unit), self.value(-2 * unit)
@@ -135,13 +146,14 @@ class Problem:
 
 
 @pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("hub", HUBS)
 @pytest.mark.parametrize("force", FORCES)
-def test_gradient_and_hessian_agree_with_differences(force, seed):
-    problem = Problem(FORCES[force], seed)
+def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
+    problem = Problem(FORCES[force], hub, seed)
     gradient, hessian = problem.derivatives()
     if "contact" in force or force == "everything":
         assert problem.potential.terms["barrier"] > 0.0 and problem.potential.terms["friction"] > 0.0
-        assert np.abs(problem.potential.matrix.border).max() > 0.0
+        assert problem.coupling > 0.0
     gradient_errors, hessian_errors = [], []
     for h in (3e-8, 1e-7, 3e-7, 1e-6):
         by_energy, by_gradient = problem.differences(h)

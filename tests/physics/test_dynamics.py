@@ -23,9 +23,12 @@ def tilted_gravity(angle, g=9.81):
 def block(angle, coefficient, dt=1e-3, speed_threshold=1e-4):
     strip = rod([layer(thickness=2e-3)], length=0.02, stations=5, start=(0, 0, 1.99e-3))
     return scene(
-        [strip], gravity=tilted_gravity(angle), obstacles=[slope(0.0)],
-        contact=contact(coefficient=coefficient, speed_threshold=speed_threshold), solver={"dt": dt},
-    )  # fmt: skip
+        [strip],
+        gravity=tilted_gravity(angle),
+        obstacles=[slope(0.0)],
+        contact=contact(coefficient=coefficient, speed_threshold=speed_threshold),
+        solver={"dt": dt},
+    )
 
 
 def test_a_block_slides_down_a_steep_slope_as_coulomb_says():
@@ -53,10 +56,12 @@ def test_a_ball_rolls_down_a_slope_without_slipping(shell, factor):
     simulator = Simulator(
         load_scene(
             scene(
-                [far_away], gravity=tilted_gravity(angle), obstacles=[slope(0.0)],
+                [far_away],
+                gravity=tilted_gravity(angle),
+                obstacles=[slope(0.0)],
                 bodies=[fixed(position=(0, 5, 5)), ball((0, 0, 0.0208), shell=shell)],
                 contact=contact(coefficient=0.6, speed_threshold=1e-4),
-            )  # fmt: skip
+            )
         )
     )
     simulator.run(0.1)
@@ -70,9 +75,7 @@ def test_a_ball_rolls_down_a_slope_without_slipping(shell, factor):
 
 def test_no_node_crosses_the_ground_however_fast_it_falls():
     strip = rod([layer()], length=0.05, stations=11, start=(0, 0, 0.3))
-    simulator = Simulator(
-        load_scene(scene([strip], gravity=[0, 0, -2e4], obstacles=[slope(0.0)], contact=contact()))
-    )
+    simulator = Simulator(load_scene(scene([strip], gravity=[0, 0, -2e4], obstacles=[slope(0.0)], contact=contact())))
     lowest = math.inf
     for _ in range(60):
         simulator.step()  # at impact a node would travel 100 mm in a step
@@ -99,11 +102,12 @@ def test_implicit_euler_is_of_first_order_in_time_for_a_swinging_bilayer():
         layer("top", eigenstrain={"stimulus": "heat", "gain": 0.02, "time_constant": 0.02}),
     ]
     swinging = scene(
-        [rod(layers, length=0.06, stations=11, clamp_start="wall")], bodies=[fixed()],
+        [rod(layers, length=0.06, stations=11, clamp_start="wall")],
+        bodies=[fixed()],
         materials={"gel": {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0}},
         stimuli={"heat": {"schedule": {"type": "ramp", "start": 0, "end": 0.05, "from": 0, "to": 1}}},
         solver={"tolerance": 1e-9},
-    )  # fmt: skip
+    )
     tips = []
     for dt in (1e-3, 5e-4, 2.5e-4, 1.25e-4):
         simulator = Simulator(load_scene(swinging), dt=dt)

@@ -30,9 +30,23 @@ def test_bending_and_twist_strains_are_those_of_the_curvature_binormal():
     strains = np.empty((20, 3))
     stiffness, rest = np.ones((20, 3)), rng.standard_normal((20, 3))
     energies = bend_twist(
-        0, 20, a, b, stiffness, rest, np.linalg.norm(edges, axis=1), tangents, m1, m2, np.zeros(20), strains,
-        np.zeros((40, 4)), np.zeros((40, 4, 4)), np.zeros((20, 4, 4)), False,
-    )  # fmt: skip
+        0,
+        20,
+        a,
+        b,
+        stiffness,
+        rest,
+        np.linalg.norm(edges, axis=1),
+        tangents,
+        m1,
+        m2,
+        np.zeros(20),
+        strains,
+        np.zeros((40, 4)),
+        np.zeros((40, 4, 4)),
+        np.zeros((20, 4, 4)),
+        False,
+    )
     expected = np.array(
         [
             (
@@ -54,9 +68,20 @@ def test_twist_is_unwrapped_from_its_value_before():
     found = []
     for before in (0.0, 4 * math.pi, -6 * math.pi):
         bend_twist(
-            0, 1, np.array([0]), np.array([1]), np.ones((1, 3)), np.zeros((1, 3)), np.ones(2), tangents, m1, m2,
-            np.array([before]), strain, *args,
-        )  # fmt: skip
+            0,
+            1,
+            np.array([0]),
+            np.array([1]),
+            np.ones((1, 3)),
+            np.zeros((1, 3)),
+            np.ones(2),
+            tangents,
+            m1,
+            m2,
+            np.array([before]),
+            strain,
+            *args,
+        )
         found.append(strain[0, 2])
     assert found[1] - found[0] == pytest.approx(4 * math.pi)
     assert found[2] - found[0] == pytest.approx(-6 * math.pi)

@@ -134,7 +134,9 @@ def test_a_solver_that_cannot_go_on_says_what_and_when_and_keeps_the_last_state(
     simulator = Simulator(load_scene(hopeless))
     before = simulator.save_state()
     recorder = Recorder(100.0)
-    with pytest.raises(SimulationError, match=r"stopped at t = 0 s: .*tried down to 0\.0005 s \(correction left .* m/s"):
+    with pytest.raises(
+        SimulationError, match=r"stopped at t = 0 s: .*tried down to 0\.0005 s \(correction left .* m/s"
+    ):
         simulator.run(0.05, observers=[recorder])
     assert np.array_equal(simulator.save_state(), before, equal_nan=True)
     assert recorder.closed is False and recorder.frames[-1].time == 0.0
@@ -154,9 +156,7 @@ def test_a_step_that_does_not_converge_is_halved_and_the_steps_grow_again():
 
 
 def test_a_scene_that_starts_in_penetration_names_the_node_and_the_depth():
-    sunk = scene(
-        [rod([layer()], start=(0, 0, 0.4e-3), stations=11)], obstacles=[GROUND], contact=contact()
-    )
+    sunk = scene([rod([layer()], start=(0, 0, 0.4e-3), stations=11)], obstacles=[GROUND], contact=contact())
     with pytest.raises(PenetrationError, match=r"node \d+ of rod/only at .* is 0\.1 mm behind the surface of ground"):
         Simulator(load_scene(sunk))
 

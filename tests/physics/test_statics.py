@@ -72,9 +72,12 @@ def test_a_ribbon_rests_at_the_same_gap_on_every_mesh_and_its_weight_on_the_grou
     simulator = Simulator(
         load_scene(
             scene(
-                [strip], gravity=[0, 0, -9.81], obstacles=[GROUND], contact=contact(),
+                [strip],
+                gravity=[0, 0, -9.81],
+                obstacles=[GROUND],
+                contact=contact(),
                 solver={"dt": 0.01, "tolerance": 1e-10},
-            )  # fmt: skip
+            )
         )
     )
     simulator.run(2.0)
