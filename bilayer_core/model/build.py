@@ -205,11 +205,12 @@ def _add_strand(
     )
     bend = np.array([*section.bending_stiffness, section.twisting_stiffness])
     inner = voronoi[1:-1]
+    natural = np.array([layer.natural_curvature, 0.0, layer.natural_twist])
     found.add(
         joint_a=first_edge + np.arange(edges - 1),
         joint_b=first_edge + np.arange(1, edges),
         joint_stiffness=bend / inner[:, None],
-        joint_rest=np.zeros((edges - 1, 3)),
+        joint_rest=natural * inner[:, None],
         joint_node=strand.first_node + np.arange(1, nodes - 1),
         voronoi_length=inner,
     )
@@ -226,7 +227,7 @@ def _add_strand(
             joint_a=wall if end == 0 else edge,
             joint_b=edge if end == 0 else wall,
             joint_stiffness=(bend / voronoi[end])[None],
-            joint_rest=np.zeros((1, 3)),
+            joint_rest=(natural * voronoi[end])[None],
             joint_node=node,
             voronoi_length=voronoi[end],
         )

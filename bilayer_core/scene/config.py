@@ -13,6 +13,7 @@ from bilayer_core.scene.schedule import Schedule, faults_of_times
 from bilayer_core.scene.units import (
     Acceleration,
     AngularSpeed,
+    Curvature,
     Length,
     NonNegativeLength,
     NonNegativeNumber,
@@ -30,6 +31,7 @@ from bilayer_core.scene.units import (
     PositiveSpeed,
     PositiveTime,
     Speed,
+    Twist,
     real,
     whole,
 )
@@ -116,6 +118,10 @@ class Layer(_Part):
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
     eigenstrain: Eigenstrain | None = None
+    natural_curvature: Curvature = 0.0
+    """Of the layer by itself, through the thickness: positive where it bends towards the normal."""
+    natural_twist: Twist = 0.0
+    """Of the layer by itself, about the path."""
 
 
 class Rod(_Part):
