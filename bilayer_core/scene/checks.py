@@ -11,8 +11,8 @@ from bilayer_core.scene.faults import Fault, Location, one_of
 if TYPE_CHECKING:
     from bilayer_core.scene.config import Free, Rod, SceneConfig, Stimulus
 
-PERPENDICULAR_TOLERANCE = 1e-9
-"""Largest cosine between a rod's normal and its path that counts as rounding."""
+ROUNDING = 1e-9
+"""Relative difference of typed numbers that is not taken for a fault."""
 
 
 def faults_of_range(stimulus: Stimulus) -> list[Fault]:
@@ -31,7 +31,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     """Its normal, and where its layers begin and end."""
     faults: list[Fault] = []
     cosine = sum(a * b for a, b in zip(rod.normal, rod.path.direction, strict=True))
-    if abs(cosine) > PERPENDICULAR_TOLERANCE:
+    if abs(cosine) > ROUNDING:
         tilt = math.degrees(math.asin(min(abs(cosine), 1.0)))
         faults.append((("normal",), rod.normal, f"must be perpendicular to the path, is {tilt:.3g} deg off"))
     names = [(("layers", index, "name"), layer.name) for index, layer in enumerate(rod.layers)]
@@ -40,7 +40,8 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         if layer.interval is None:
             continue
         first, last = rod.covered_stations(layer)
-        if layer.interval[0] >= layer.interval[1] or last > rod.stations - 1:
+        begin, end = layer.interval
+        if begin >= end or end > rod.path.length * (1.0 + ROUNDING):
             demand = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
             faults.append((("layers", index, "interval"), layer.interval, demand))
         elif last - first < 2:
@@ -58,7 +59,7 @@ def faults_of_inertia(motion: Free) -> list[Fault]:
     if motion.shell:
         return [(("shell",), True, "must be left out where `inertia` is given")]
     small, middle, large = sorted(motion.inertia)
-    if large > (1.0 + 1e-9) * (small + middle):
+    if large > (1.0 + ROUNDING) * (small + middle):
         return [(("inertia",), motion.inertia, "must be such that none exceeds the sum of the other two")]
     return []
 

@@ -83,7 +83,7 @@ def _validated(data: Any, source: str, overrides: Sequence[str]) -> SceneConfig:
     data = _content(config)
     for override in overrides:
         apply_override(data, override)
-    return _validate(data, f"{source} with --set {' '.join(overrides)}")
+    return _validate(data, f"{source} with {' '.join(overrides)}")
 
 
 def _validate(data: dict[str, Any], source: str) -> SceneConfig:

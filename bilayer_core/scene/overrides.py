@@ -28,14 +28,14 @@ def apply_override(data: dict, text: str) -> None:
     path, equals, value = text.partition("=")
     keys = path.strip().split(".")
     if not equals or not all(keys):
-        raise SceneError(f"--set {text}: must be PATH=VALUE, such as rods.arm.stations=100")
+        raise SceneError(f"override {text}: must be PATH=VALUE, such as rods.arm.stations=100")
     here: Any = data
     for depth, key in enumerate(keys):
         place = _place(here, key)
         if place is None:
-            raise SceneError(f"--set {text}: {_absent(here, key, '.'.join(keys[:depth]))}")
+            raise SceneError(f"override {text}: {_absent(here, key, '.'.join(keys[:depth]))}")
         if depth == len(keys) - 1:
-            here[place] = read_yaml(value, f"--set {text}")
+            here[place] = read_yaml(value, f"override {text}")
         else:
             here = here[place]
 

@@ -1,0 +1,65 @@
+"""The verbs about logs: ``info`` and ``view``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import click
+
+from bilayer_core.cli.options import Duration, Verb
+
+
+@click.command(cls=Verb)
+@click.argument("file", metavar="FILE.mcap")
+@click.option("--json", "as_json", is_flag=True, help="As JSON.")
+def info(file: str, as_json: bool) -> None:
+    """Say what a log holds."""
+    from bilayer_core.record.log_reader import read_info
+
+    found = read_info(file)
+    if as_json:
+        click.echo(json.dumps(asdict(found), indent=2, ensure_ascii=False))
+        return
+    rows = {
+        "scene": f"{found.scene} ({found.title})",
+        "time": f"{found.start_time:g} s to {found.last_time:g} s",
+        "complete": f"{'yes' if found.complete else 'no'} ({found.termination})",
+        "size": f"{found.size / 1e6:.3g} MB",
+        "stimuli": ", ".join(found.channels) or "none",
+        "settings": ", ".join(f"{key} {value}" for key, value in found.settings.items()),
+        "versions": ", ".join(f"{key} {value}" for key, value in found.versions.items()),
+    }
+    for name, text in rows.items():
+        click.echo(f"{name:10}{text}")
+    for topic, content in found.topics.items():
+        click.echo(f"  {topic:36}{content['type']:40}{content['count']} messages")
+
+
+@click.command(cls=Verb)
+@click.argument("file", metavar="FILE.mcap|FILE.rrd")
+@click.option("--web", is_flag=True, help="In a browser.")
+@click.option("--save", metavar="FILE.rrd", help="Write a rerun recording instead of opening the viewer.")
+@click.option("--screenshot", "picture", metavar="FILE.png", help="Write a picture, without a screen.")
+@click.option("--time", "moment", type=Duration(), help="Simulated time of the picture; default: the end.")
+@click.option("--force", is_flag=True, help="Replace existing files.")
+def view(file: str, web: bool, save: str | None, picture: str | None, moment: float | None, force: bool) -> None:
+    """Show a run in rerun."""
+    from bilayer_core.errors import InputError
+    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.view.rerun_view import convert_log, open_viewer, screenshot
+
+    if moment is not None and picture is None:
+        raise InputError("--time: is the time of a picture; give --screenshot FILE.png as well")
+    if save and file.endswith(".rrd"):
+        raise InputError(f"--save: {file} is a rerun recording already")
+    for path in filter(None, (save, picture)):
+        check_output_path(path, force)
+    if save:
+        convert_log(file, save)
+        click.echo(f"recording  {save}")
+    if picture:
+        screenshot(save or file, picture, moment)
+        click.echo(f"picture    {picture}")
+    if not save and not picture:
+        open_viewer(file, web)

@@ -1,0 +1,78 @@
+"""What the verbs share: the option --debug and the type of times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C."""
+
+
+@dataclass
+class Settings:
+    """What holds for the whole program."""
+
+    debug: bool = False
+
+
+def _remember_debug(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    settings = context.find_object(Settings)
+    settings.debug = settings.debug or wanted
+    if wanted:
+        import logging
+
+        logging.basicConfig(level=logging.INFO)
+
+
+def _debug_option() -> click.Option:
+    return click.Option(
+        ["--debug"], is_flag=True, is_eager=True, expose_value=False, callback=_remember_debug, help="Show tracebacks."
+    )
+
+
+class Verb(click.Command):
+    """A command that takes --debug after its name too."""
+
+    def __init__(self, *arguments: Any, **settings: Any):
+        super().__init__(*arguments, **settings)
+        self.params.append(_debug_option())
+
+
+class VerbGroup(click.Group):
+    """The program: verbs in the order in which they were added, and --debug before the verb."""
+
+    def __init__(self, *arguments: Any, **settings: Any):
+        super().__init__(*arguments, **settings)
+        self.params.append(_debug_option())
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        """Names of the verbs."""
+        return list(self.commands)
+
+
+class Duration(click.ParamType):
+    """A time above zero, in seconds or with a unit."""
+
+    name = "time"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
+        """The time [s]."""
+        from pydantic import TypeAdapter, ValidationError
+
+        from bilayer_core.scene.units import PositiveTime
+
+        try:
+            return TypeAdapter(PositiveTime).validate_python(value)
+        except ValidationError as error:
+            fault = error.errors()[0]
+            note = f", {fault['ctx']['note']}" if fault["ctx"]["note"] else ""
+            self.fail(f"found {value!r}{note}; {fault['msg']}", param, context)
+
+
+scene_argument = click.argument("scene", metavar="SCENE")
+set_option = click.option(
+    "--set", "overrides", multiple=True, metavar="PATH=VALUE", help="Change a value of the scene: rods.arm.stations=100"
+)

@@ -1,0 +1,73 @@
+"""The program itself: its verbs, and how each way of ending becomes an exit code and at most one message."""
+
+from __future__ import annotations
+
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+from bilayer_core.cli.logs import info, view
+from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
+from bilayer_core.cli.run import run
+from bilayer_core.cli.scenes import check, scenes
+from bilayer_core.errors import BilayerError
+
+INTERNAL_ERROR = 70
+"""A fault of this program and not of its input; what sysexits.h calls EX_SOFTWARE."""
+
+
+def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from bilayer_core import DISTRIBUTION, __version__
+
+        click.echo(f"{DISTRIBUTION} {__version__}")
+        context.exit()
+
+
+@click.group(cls=VerbGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=_show_version, help="The version.")
+def program() -> None:
+    """Simulate bilayer soft robots.
+
+    SCENE is a scene file, or the name of a bundled scene (bilayer scenes lists them).
+
+    Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the simulation could not go on, 130 interrupted.
+    """
+
+
+for verb in (scenes, check, run, info, view):
+    program.add_command(verb)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return its exit code."""
+    settings = Settings()
+    try:
+        return program.main(arguments, prog_name="bilayer", standalone_mode=False, obj=settings) or 0
+    except click.Abort:
+        click.echo("bilayer: interrupted", err=True)
+        return INTERRUPTED
+    except click.ClickException as error:
+        error.show()
+        return BilayerError.exit_code
+    except BrokenPipeError:
+        # The reader of our output, such as `head`, has gone; the interpreter must not try to flush to it.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except BilayerError as error:
+        _explain(settings, str(error))
+        return error.exit_code
+    except Exception as error:
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        _explain(settings, f"internal error: {text}\nPlease report it, with what the same command prints with --debug.")
+        return INTERNAL_ERROR
+
+
+def _explain(settings: Settings, message: str) -> None:
+    """The message, after the traceback of the exception in hand if the user asked for it."""
+    if settings.debug:
+        traceback.print_exc()
+    click.echo(f"bilayer: {message}", err=True)

@@ -1,0 +1,37 @@
+"""The summary of a run as lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+
+def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
+    """What a user wants to know first.
+
+    Parameters
+    ----------
+    summary : dict
+        As `Simulator.summary` gives it.
+    moved : set of str
+        Names of the bodies whose motion is a result and not prescribed.
+    """
+    factor = summary["real_time_factor"]
+    halved = f", {summary['rejected_steps']} halved" if summary["rejected_steps"] else ""
+    steps = f"{summary['simulated']:g} s in {summary['steps']} steps{halved}"
+    yield f"{summary['scene']}: {summary['termination']}, {steps}"
+    size = f"{summary['nodes']} nodes, {summary['dof']} unknowns"
+    yield f"  {'model':22}{summary['model']}, {summary['integrator']}, {size}"
+    yield f"  {'CPU time':22}{summary['cpu_time']:.3g} s" + (f", real-time factor {factor:.3g}" if factor else "")
+    yield f"  {'Newton iterations':22}{summary['newton_iterations']}"
+    yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m"
+    if summary["min_gap"] is not None:
+        yield f"  {'smallest gap':22}{1e3 * summary['min_gap']:.4g} mm"
+        yield f"  {'largest contact force':22}{1e3 * summary['max_contact_force']:.3g} mN on a node"
+    for name, body in summary["bodies"].items():
+        if body["first_contact"] is not None:
+            now, most = body["contact_nodes"], body["most_contact_nodes"]
+            touched = f"first at {body['first_contact']:.3f} s, by {now} nodes at the end, by {most} at most"
+            yield f"  {name + ' touched':22}{touched}"
+        if name in moved:
+            yield f"  {name + ' lifted by':22}{1e3 * body['lift']:.2f} mm"

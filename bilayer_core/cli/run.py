@@ -1,0 +1,170 @@
+"""The verb ``run``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from bilayer_core.cli.options import INTERRUPTED, Duration, Verb, scene_argument, set_option
+from bilayer_core.cli.report import summary_lines
+from bilayer_core.cli.watch import Interrupt, notice_of_compilation, progress_bar
+from bilayer_core.errors import InputError, SimulationError
+
+if TYPE_CHECKING:
+    from bilayer_core.integrate.frame import Description, Frame
+    from bilayer_core.integrate.simulator import Simulator
+    from bilayer_core.record.mcap_log import McapRecorder
+    from bilayer_core.scene.config import SceneConfig
+
+SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
+OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
+
+
+@click.command(cls=Verb)
+@scene_argument
+@click.option("--duration", type=Duration(), help="Simulated time of this run; default: to the end of the scene.")
+@click.option("--dt", metavar="TIME", help="Time step.")
+@click.option("--model", metavar="NAME", help="auto or two_rod.")
+@click.option("--dimension", metavar="D", help="auto or 3.")
+@click.option("--integrator", metavar="NAME", help="auto or implicit_euler.")
+@click.option("--tolerance", metavar="SPEED", help="Largest velocity correction that a step may leave.")
+@set_option
+@click.option("--log", metavar="FILE.mcap", help="Write a log.")
+@click.option("--log-rate", metavar="HZ", help="Frames recorded per simulated second.")
+@click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
+@click.option("--summary", metavar="FILE.json", help="Write all figures of the run.")
+@click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
+@click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
+@click.option("--force", is_flag=True, help="Replace existing files.")
+@click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
+def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> int:
+    """Simulate SCENE as fast as this machine can."""
+    from bilayer_core.scene.loader import load_scene
+
+    changes = [*overrides, *(f"solver.{key}={options[key]}" for key in SOLVER_OPTIONS if options[key] is not None)]
+    if options["log_rate"] is not None:
+        changes.append(f"output.rate={options['log_rate']}")
+    config = load_scene(scene, changes)
+    interrupt = Interrupt()
+    observers = _open_outputs(config, options, interrupt)
+    simulator = _make_simulator(config, options["from_state"], quiet)
+    duration = _duration(simulator, duration)
+    failure = _simulate(simulator, duration, observers, interrupt, quiet)
+    _finish(simulator, duration, failure, options, quiet)
+    if failure is not None:
+        raise failure
+    return INTERRUPTED if interrupt.granted else 0
+
+
+def _open_outputs(config: SceneConfig, options: dict[str, Any], interrupt: Interrupt) -> list:
+    """The recorders; whatever cannot be written is refused here, before anything is computed."""
+    from bilayer_core.record.mcap_log import McapRecorder
+    from bilayer_core.record.paths import check_output_path
+
+    force, output = options["force"], config.output
+    paths = [Path(options[key]).resolve() for key in OUTPUT_OPTIONS if options[key]]
+    for path in paths:
+        if paths.count(path) > 1:
+            raise InputError(f"{path}: is named for two outputs; give each a file of its own")
+        check_output_path(path, force)
+    observers = []
+    if options["log"]:
+        observers.append(_Log(McapRecorder(options["log"], output.rate, output.marker_rate, force), interrupt))
+    if options["rrd"]:
+        from bilayer_core.view.rerun_view import RrdRecorder
+
+        observers.append(RrdRecorder(options["rrd"], output.rate, force))
+    return observers
+
+
+def _make_simulator(config: SceneConfig, from_state: str | None, quiet: bool) -> Simulator:
+    """A simulator that is ready to step."""
+    from bilayer_core.integrate.simulator import Simulator
+
+    simulator = Simulator(config)
+    if from_state is not None:
+        from bilayer_core.record.state_file import read_saved_state
+
+        simulator.load_state(read_saved_state(from_state, simulator.description))
+    with notice_of_compilation(quiet):
+        simulator.compile()
+    return simulator
+
+
+def _duration(simulator: Simulator, asked: float | None) -> float:
+    """Simulated time of this run [s]."""
+    if asked is not None:
+        return asked
+    left = simulator.scene.duration - simulator.time
+    if left <= 0.0:
+        raise InputError(
+            f"--from-state: is at t = {simulator.time:g} s, the scene ends at {simulator.scene.duration:g} s; "
+            "say with --duration how long to go on"
+        )
+    return left
+
+
+def _simulate(
+    simulator: Simulator, duration: float, observers: list, interrupt: Interrupt, quiet: bool
+) -> SimulationError | None:
+    """Run; what stopped the simulation, if anything did, is returned, for the outputs to be completed first."""
+    begin = simulator.time
+    try:
+        with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
+            simulator.run(duration, observers=observers, stop=interrupt.grant, progress=show)
+    except SimulationError as failure:
+        return failure
+    return None
+
+
+def _finish(
+    simulator: Simulator, duration: float, failure: SimulationError | None, options: dict[str, Any], quiet: bool
+) -> None:
+    """Write the last state and the summary, and tell the user what happened."""
+    from bilayer_core.integrate.simulator import Termination
+
+    summary = {**simulator.summary(), "duration": duration}
+    if failure is not None:
+        summary |= {"termination": Termination.FAILED.value, "reason": failure.reason}
+    if options["save_state"]:
+        from bilayer_core.record.state_file import write_state
+
+        write_state(options["save_state"], simulator.save_state(), simulator.description)
+    if options["summary"]:
+        try:
+            Path(options["summary"]).write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{options['summary']}: cannot be written: {error.strerror or error}") from error
+    if quiet:
+        return
+    moved = {body.name for body in simulator.scene.bodies if body.motion.type != "prescribed"}
+    for line in summary_lines(summary, moved):
+        click.echo(line)
+    for key in OUTPUT_OPTIONS:
+        if options[key]:
+            click.echo(f"  {key.replace('_', ' '):22}{options[key]}")
+
+
+class _Log:
+    """The log as an observer; it also says why a run ended early."""
+
+    def __init__(self, recorder: McapRecorder, interrupt: Interrupt):
+        self.rate = recorder.rate
+        self._recorder = recorder
+        self._interrupt = interrupt
+
+    def start(self, description: Description) -> None:
+        """Begin the file."""
+        self._recorder.start(description)
+
+    def observe(self, frame: Frame) -> None:
+        """Hand on a frame."""
+        self._recorder.observe(frame)
+
+    def close(self, complete: bool) -> None:
+        """Finish the file."""
+        ending = "completed" if complete else "interrupted" if self._interrupt.wished else "failed"
+        self._recorder.close(complete, ending)

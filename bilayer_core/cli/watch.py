@@ -1,0 +1,102 @@
+"""What goes on beside a run: signals that ask it to end, its progress, a word about compilation."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import click
+
+COMPILING_NOTICE = 2.0
+"""Wall time after which a start is not one from the cache, and the user is told [s]."""
+REFRESH = 0.1
+"""Wall time between two updates of the progress bar [s]."""
+
+
+class Interrupt:
+    """Turns Ctrl-C, and the signal by which other programs end this one, into a wish that is granted after the step.
+
+    The second signal is not put off.
+    """
+
+    SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+    def __init__(self):
+        self.wished = False
+        self.granted = False
+
+    def __enter__(self) -> Interrupt:
+        self._before = {number: signal.signal(number, self._note) for number in self.SIGNALS}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def grant(self) -> bool:
+        """Whether to end now; asked between steps."""
+        self.granted = self.wished
+        return self.granted
+
+    def _note(self, *_: object) -> None:
+        if self.wished:
+            raise KeyboardInterrupt
+        self.wished = True
+
+
+@contextmanager
+def notice_of_compilation(quiet: bool) -> Iterator[None]:
+    """Tell the user why nothing seems to happen, when it takes long."""
+    text = "compiling kernels (first start, cached afterwards) ..."
+    timer = threading.Timer(COMPILING_NOTICE, click.echo, (text,), {"err": True})
+    timer.daemon = True
+    if not quiet:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+@contextmanager
+def progress_bar(name: str, begin: float, end: float, quiet: bool) -> Iterator[Callable[[float], None]]:
+    """A bar on stderr: simulated time, real-time factor, time left. Yields the function that takes the simulated time.
+
+    Parameters
+    ----------
+    name : str
+        Of the scene.
+    begin, end : float
+        Simulated time at the ends of the bar [s].
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda time: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.fields[time]:.2f}/{task.fields[end]:g} s"),
+        TextColumn("real time x {task.fields[factor]:.2f}"),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )
+    started = shown = clock.perf_counter()
+    with bar:
+        task = bar.add_task(name, total=end - begin, time=begin, end=end, factor=0.0)
+
+        def show(time: float) -> None:
+            nonlocal shown
+            now = clock.perf_counter()
+            if now - shown >= REFRESH or time >= end:
+                shown = now
+                bar.update(task, completed=time - begin, time=time, factor=(time - begin) / (now - started))
+
+        yield show

@@ -1,0 +1,245 @@
+"""Every fault of a scene is refused with its key path, the value found and what is allowed."""
+
+import pytest
+import yaml
+from sample_scenes import ball, everything, fixed, layer, rod, scene
+
+from bilayer_core import load_scene
+from bilayer_core.errors import SceneError
+
+DELETE = object()
+RAMP = {"type": "ramp", "start": 0, "end": 1, "from": 0, "to": 1}
+TABLE = {"type": "table", "times": [0, 1], "values": [0, 1]}
+MOVE = {"type": "prescribed", "times": [0], "displacements": [[0, 0, 0]]}
+
+
+def changed(path, value):
+    """A sound scene with one value changed; items of lists are addressed by name."""
+    content = everything()
+    *parents, last = path.replace("[", ".").replace("]", "").split(".")
+    here = content
+    for part in parents:
+        named = {item["name"]: item for item in here if isinstance(item, dict)} if isinstance(here, list) else here
+        here = named[part]
+    if value is DELETE:
+        del here[last]
+    else:
+        here[int(last) if last.isdecimal() else last] = value
+    return content
+
+
+def faults_of(content) -> list[str]:
+    with pytest.raises(SceneError) as refused:
+        load_scene(content)
+    return str(refused.value).splitlines()
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "fault"),
+    [
+        # keys
+        ("foo", 1, "unknown key; allowed are schema, name, title"),
+        ("rods.arm.widht", 0.01, "unknown key, did you mean width?; allowed are name, width, path"),
+        ("bodies.ball.motion.mas", 1, "unknown key, did you mean mass?; allowed are type, mass, inertia"),
+        ("rods", DELETE, "is missing; must be a list"),
+        ("schema", DELETE, "is missing; must be 1"),
+        ("title", DELETE, "is missing; must be text"),
+        ("rods.arm.path", DELETE, "is missing; must be a mapping of keys to values"),
+        ("rods.arm.width", DELETE, "is missing; must be a length [m] above 0, such as 1 mm"),
+        ("rods.arm.stations", DELETE, "is missing; must be a whole number of at least 3"),
+        ("bodies.ball.motion.mass", DELETE, "is missing; must be a mass [kg] above 0, such as 2.7 g"),
+        ("contact.friction.speed_threshold", DELETE, "is missing; must be a speed [m/s] above 0, such as 0.1 mm/s"),
+        # types
+        ("title", 3, "found 3; must be text"),
+        ("gravity", "down", 'found "down"; must be a list'),
+        ("gravity", [0, 0, 0, 0], "found [0, 0, 0, 0]; must have at most 3 entries, has 4"),
+        ("contact", 3, "found 3; must be a mapping of keys to values"),
+        ("materials", [], "found []; must be a mapping of keys to values"),
+        ("rods.arm.layers", {}, "found {}; must be a list"),
+        ("rods.arm.layers", [], "found []; must have at least 1 entries, has 0"),
+        ("rods.arm.stations", 2, "found 2; must be a whole number of at least 3"),
+        ("rods.arm.stations", 10.5, "found 10.5; must be a whole number of at least 3"),
+        ("bodies.ball.motion.shell", "perhaps", 'found "perhaps"; must be true or false'),
+        # numbers and units
+        ("duration", float("nan"), "found NaN; must be a time [s] above 0"),
+        ("gravity[2]", float("-inf"), "found -Infinity; must be an acceleration [m/s^2]"),
+        ("rods.arm.layers.active.thickness", -1e-3, "found -0.001; must be a length [m] above 0"),
+        ("rods.arm.layers.active.thickness", "-1 mm", 'found "-1 mm"; must be a length [m] above 0'),
+        ("rods.arm.layers.active.thickness", "1 kg", 'found "1 kg", a quantity in kg; must be a length [m]'),
+        ("rods.arm.layers.active.thickness", "1 mn", "found \"1 mn\", whose unit 'mn' is not known; must be a length"),
+        ("materials.gel.poisson_ratio", 0.6, "found 0.6; must be Poisson's ratio above -1 and at most 0.5"),
+        ("materials.gel.poisson_ratio", -1, "found -1; must be Poisson's ratio above -1 and at most 0.5"),
+        ("materials.gel.youngs_modulus", 0, "found 0; must be a pressure [Pa] above 0, such as 100 MPa"),
+        ("contact.friction.coefficient", -0.1, "found -0.1; must be a number at least 0"),
+        # choices and names
+        ("schema", 2, "found 2; must be 1"),
+        ("rods.arm.torsion", "layer", "found \"layer\"; must be 'laminate' or 'layers'"),
+        ("rods.arm.path.shape", "arc", "found \"arc\"; must be 'straight'"),
+        ("stimuli.humidity.schedule", {"value": 1}, "found {\"value\": 1}; the key 'type' is missing"),
+        (
+            "rods.arm.layers.active.material",
+            "gell",
+            'found "gell"; must be one of the materials (gel), did you mean gel?',
+        ),
+        ("rods.arm.clamp_end", "hubs", 'found "hubs"; must be one of the bodies (hub, ball), did you mean hub?'),
+        # geometry
+        ("rods.arm.normal", [1, 0, 1], "found [0.70710678"),
+        ("rods.arm.normal", [0, 0, 0], "found [0, 0, 0]; must be a direction, with a length above 0"),
+        ("rods.arm.layers.active.interval", [0.0, 0.2], "found [0.0, 0.2]; must be two increasing lengths [m] along"),
+        (
+            "rods.arm.layers.active.interval",
+            [0.0, 0.0056],
+            "found [0.0, 0.0056]; must be two increasing lengths [m] along",
+        ),
+        ("rods.arm.layers.active.interval", [0.004, 0.001], "found [0.004, 0.001]; must be two increasing lengths [m]"),
+        (
+            "rods.arm.layers.active.interval",
+            [0.001, 0.0022],
+            "found [0.001, 0.0022]; must span two edges or more; an edge",
+        ),
+        # parts that need another
+        (
+            "contact",
+            None,
+            "found null; must be given (barrier_distance, stiffness): there is something to touch, ground",
+        ),
+    ],
+)
+def test_a_fault_is_told_with_its_place_the_value_found_and_what_is_allowed(path, value, fault):
+    lines = faults_of(changed(path, value))
+    assert any(line.startswith(f"scene: {path}: {fault}") for line in lines), lines
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "fault"),
+    [
+        ("gravity", [0, 0], "gravity[2]: is missing; must be an acceleration [m/s^2], such as -9.81"),
+        ("solver", {"model": "two_rods"}, "solver.model: found \"two_rods\"; must be 'auto' or 'two_rod'"),
+        ("rods.arm.name", DELETE, "rods[0].name: is missing; must be text"),
+        ("rods.arm.name", "a/b", 'rods.a/b.name: found "a/b"; must be a name: letters, digits and single underscores'),
+        (
+            "rods.arm.name",
+            "a__b",
+            'rods.a__b.name: found "a__b"; must be a name: letters, digits and single underscores',
+        ),
+        (
+            "stimuli.2nd",
+            {"schedule": {"type": "hold", "value": 0}},
+            'stimuli.2nd: found "2nd"; must be a name: letters',
+        ),
+        (
+            "bodies.ball.name",
+            "ground",
+            'obstacles.ground.name: found "ground"; must be a name of its own among the rods',
+        ),
+        ("bodies.hub.name", "arm_1", 'bodies.arm_1.name: found "arm_1"; must be a name of its own among the rods'),
+        (
+            "rods.arm.layers",
+            [layer("a"), layer("a")],
+            'layers.a.name: found "a"; must be a name of its own among the layers',
+        ),
+        ("rods.arm.layers", [layer("a"), layer("b"), layer("c")], "must have at most 2 entries, has 3"),
+        ("rods.arm.normal", [1, 0, 1], "must be perpendicular to the path, is 45 deg off"),
+        (
+            "rods.arm.layers.passive.interval",
+            [0.0, 0.0033],
+            "rods.arm.layers: found [[0.0, 0.0033], [0.0011, 0.0044]]; one",
+        ),
+        (
+            "bodies.ball.motion.inertia",
+            [1, 1, 1],
+            "motion.shell: found true; must be left out where `inertia` is given",
+        ),
+        (
+            "bodies.ball.surface",
+            None,
+            "ball.motion.inertia: found null; must be given for a free body that is no sphere",
+        ),
+        ("stimuli.humidity.maximum", -1, "stimuli.humidity.maximum: found -1.0; must be above `minimum` (0)"),
+        (
+            "rods.arm.layers.active.eigenstrain.stimulus",
+            "humidty",
+            'stimulus: found "humidty"; must be one of the stimuli (humidity), did you mean humidity?',
+        ),
+    ],
+)
+def test_a_fault_that_concerns_several_values_is_told_at_one_of_them(path, value, fault):
+    lines = faults_of(changed(path, value))
+    assert any(fault in line for line in lines), lines
+
+
+@pytest.mark.parametrize(
+    ("schedule", "fault"),
+    [
+        (
+            {"type": "rampe"},
+            ": found {\"type\": \"rampe\"}; `type` must be one of 'hold', 'ramp', 'table', did you mean ramp?",
+        ),
+        ({"type": "hold", "value": 1.5}, ".value: found 1.5; must lie in the range of the channel, 0 to 1 [1]"),
+        ({"type": "hold", "value": "50 %"}, '.value: found "50 %"; must be a plain number'),
+        ({**RAMP, "to": 2}, ".to: found 2.0; must lie in the range of the channel, 0 to 1 [1]"),
+        ({**RAMP, "end": 0}, ".end: found 0.0; must be later than `start` (0 s)"),
+        ({key: RAMP[key] for key in RAMP if key != "to"}, ".to: is missing; must be a plain number"),
+        ({**TABLE, "values": [0, 2]}, ".values[1]: found 2.0; must lie in the range of the channel, 0 to 1 [1]"),
+        ({**TABLE, "values": [0]}, '.values: found "1 entries"; must be as many as `times`, 2'),
+        ({**TABLE, "times": [1, 1]}, ".times[1]: found 1.0; must be later than the time before it (1 s)"),
+        ({**TABLE, "times": [-1, 1]}, ".times[0]: found -1; must be a time [s] at least 0, such as 0.5 s"),
+        ({"type": "table", "times": [], "values": []}, ".times: found []; must have at least 1 entries, has 0"),
+    ],
+)
+def test_a_fault_of_a_schedule_is_told_without_its_type_in_the_key_path(schedule, fault):
+    assert faults_of(changed("stimuli.humidity.schedule", schedule))[0] == f"scene: stimuli.humidity.schedule{fault}"
+
+
+@pytest.mark.parametrize(
+    ("motion", "fault"),
+    [
+        ({**MOVE, "displacements": [[0, 0, 1]]}, ".displacements[0]: found [0.0, 0.0, 1.0]; must be [0, 0, 0]"),
+        ({**MOVE, "displacements": []}, '.displacements: found "0 entries"; must be as many as `times`, 1'),
+        (
+            {**MOVE, "times": [0, 0], "displacements": [[0, 0, 0]] * 2},
+            ".times[1]: found 0.0; must be later than the time",
+        ),
+        ({"type": "fre"}, ": found {\"type\": \"fre\"}; `type` must be one of 'free', 'guided', 'prescribed', did"),
+    ],
+)
+def test_a_prescribed_motion_starts_at_the_position_and_goes_forward_in_time(motion, fault):
+    assert faults_of(changed("bodies.hub.motion", motion))[0].startswith(f"scene: bodies.hub.motion{fault}")
+
+
+def test_all_faults_are_told_at_once_each_on_a_line_that_begins_with_the_file(tmp_path):
+    content = changed("rods.arm.widht", 1)
+    content["duration"] = "1 kg"
+    content["materials"]["gel"]["density"] = -1
+    path = tmp_path / "robot.yaml"
+    path.write_text(yaml.safe_dump(content))
+    lines = faults_of(str(path))
+    assert len(lines) == 3
+    assert all(line.startswith(f"{path}: ") for line in lines)
+
+
+def test_a_body_without_mass_distribution_is_refused():
+    body = ball((0, 0, 0.0209), inertia=[1e-7, 1e-7, 3e-7])
+    assert "none exceeds the sum of the other two" in faults_of({**everything(), "bodies": [fixed("hub"), body]})[0]
+
+
+@pytest.mark.parametrize("part", ["obstacle", "ball", "contact point"])
+def test_whatever_can_touch_needs_contact_settings(part):
+    content = scene([rod([layer()])])
+    point = {"position": [0, 0, 0], "length": 0.01, "offset": 0}
+    if part == "obstacle":
+        content["obstacles"] = everything()["obstacles"]
+    else:
+        content["bodies"] = [ball((0, 0, 1)) if part == "ball" else fixed(contact_points=[point])]
+    assert "contact: found null" in faults_of(content)[0]
+
+
+def test_two_layers_that_cover_the_path_only_together_are_refused():
+    halves = [layer("near", interval=[0, 0.05]), layer("far", interval=[0.05, 0.1])]
+    assert "one layer must cover the whole path" in faults_of(scene([rod(halves)]))[0]
+
+
+def test_a_layer_covers_the_stations_nearest_to_its_interval():
+    strip = rod([layer("passive"), layer("active", interval=[0.0129, 0.0871])], length=0.1, stations=21)
+    config = load_scene(scene([strip]))
+    assert config.rods[0].covered_stations(config.rods[0].layers[1]) == (3, 17)
