@@ -293,7 +293,9 @@ def _messages(path: Path, topics: set[str] | None = None) -> Iterator[tuple[str,
                     yield *known, record.log_time, record.data
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
-            elif isinstance(record, Channel) and record.id not in channels and (topics is None or record.topic in topics):
+            elif isinstance(record, Channel) and record.id not in channels:
+                if topics is not None and record.topic not in topics:
+                    continue
                 channels[record.id] = (record.topic, schemas[record.schema_id])
                 yield *channels[record.id], 0, None
 

@@ -56,9 +56,11 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray) -> np.ndarray:
     size = np.linalg.norm(forces, axis=1, keepdims=True)
     direction = forces / size
     length = ARROW_DECADE * np.log10(1 + size / ARROW_FORCE)
-    upright = np.abs(direction[:, 2:]) > 0.9
-    sideways = np.cross(direction, np.where(upright, (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
-    sideways *= HEAD_HALF_WIDTH * length / np.linalg.norm(sideways, axis=1, keepdims=True)
+    x, y, z = direction.T
+    zero = np.zeros_like(x)
+    # Across the arrow: direction × z, or direction × x if it is upright.
+    sideways = np.where(np.abs(z) > 0.9, (zero, z, -y), (y, -x, zero)).T
+    sideways = sideways * (HEAD_HALF_WIDTH * length / np.linalg.norm(sideways, axis=1, keepdims=True))
     tip = origins + length * direction
     base = tip - HEAD_SHARE * length * direction
     return np.stack([origins, tip, tip, base + sideways, tip, base - sideways], axis=1).reshape(-1, 3)

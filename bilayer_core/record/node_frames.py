@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.integrate.frame import Description, Frame
-from bilayer_core.jit import inlined, kernel
+from bilayer_core.jit import kernel
 from bilayer_core.kinematics.vector import combine, cross, dot, row, scaled
 
 
@@ -38,13 +38,13 @@ def _frames_at_nodes(positions, directors, edge_before, edge_after, start_node, 
         widths_out[node, 0], widths_out[node, 1], widths_out[node, 2] = m2
 
 
-@inlined
+@kernel
 def _unit(a):
     """a/|a|"""
     return scaled(1.0 / np.sqrt(dot(a, a)), a)
 
 
-@inlined
+@kernel
 def _tangent(positions, start):
     """Unit tangent of the edge from node `start` to the next."""
     return _unit(combine(1.0, row(positions, start + 1), -1.0, row(positions, start)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes.util
 import importlib.util
+import logging
 import os
 import signal
 import socket
@@ -11,7 +12,9 @@ import subprocess
 import sys
 import tempfile
 import time as clock
+from collections.abc import Callable
 from pathlib import Path
+from typing import TypeVar
 
 from bilayer_core.errors import InputError
 from bilayer_core.view.layout import TIMELINE
@@ -27,7 +30,11 @@ MISSING_DRIVER = (
     "there is no Vulkan driver to draw with; on Debian and Ubuntu install Mesa's software driver with: "
     "sudo apt-get install mesa-vulkan-drivers libvulkan1"
 )
+DRIVER_FAILURES = ("No graphics adapter", "Failed to get render context")  # what the viewer says without a driver
+SHOWN_LINES = 5  # of what the viewer said before it failed
 _PR_SET_PDEATHSIG = 1
+_log = logging.getLogger(__name__)
+Answer = TypeVar("Answer")
 
 
 def show(recording: Path, web: bool) -> None:
@@ -42,7 +49,7 @@ def show(recording: Path, web: bool) -> None:
     except KeyboardInterrupt:
         return
     if code:
-        raise InputError(f"the viewer ended with exit code {code}; without a screen take a screenshot, or use a browser")
+        raise InputError(f"the viewer ended with exit code {code}; without a screen use a browser or a screenshot")
 
 
 def take_picture(recording: Path, time: float | None = None) -> bytes:
@@ -50,7 +57,10 @@ def take_picture(recording: Path, time: float | None = None) -> bytes:
     with HeadlessViewer() as viewer:
         viewer.open(recording)
         viewer.set_time(time)
-        return viewer.picture()
+        picture = viewer.picture()
+        for complaint in viewer.complaints():
+            _log.warning("the picture is not complete: %s", complaint)
+        return picture
 
 
 def viewer_executable() -> Path:
@@ -65,7 +75,7 @@ def viewer_executable() -> Path:
 
 def viewer_environment() -> dict[str, str]:
     """Environment of the viewer: it sends no usage statistics where CI is set, and asks no questions."""
-    return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true"}
+    return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "NO_COLOR": "1"}
 
 
 def drawing_environment() -> dict[str, str]:
@@ -83,7 +93,15 @@ def drawing_environment() -> dict[str, str]:
 
 
 class HeadlessViewer:
-    """A viewer without a window, ended with the ``with`` block, and by the system if this process dies."""
+    """A viewer without a window, ended with the ``with`` block, and by the system if this process dies.
+
+    Attributes
+    ----------
+    client : rerun.experimental.ViewerClient
+        For anything else that can be asked of it.
+    pid : int
+        Of the viewer's process.
+    """
 
     def __enter__(self) -> HeadlessViewer:
         from rerun.experimental import ViewerClient
@@ -104,9 +122,10 @@ class HeadlessViewer:
             start_new_session=True,
             preexec_fn=(lambda: libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)) if libc else None,
         )
+        self.pid = self._process.pid
         try:
             self._wait_for(port)
-            self._client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            self.client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
         except BaseException:
             self.__exit__(None, None, None)
             raise
@@ -123,43 +142,52 @@ class HeadlessViewer:
 
     def open(self, recording: Path) -> None:
         """Load a recording and wait until all of it has arrived."""
-        self._client.open(str(recording))
         deadline = clock.monotonic() + DRAW_LIMIT
+        self._ask("load the recording", deadline, lambda: self.client.open(str(recording)))
         while True:
-            state = self._client.get_state()
+            state = self._ask("load the recording", deadline, self.client.get_state)
             if not state.loading and any(self._timeline(item) for item in state.recordings):
                 return
             self._check(deadline, "load the recording")
 
     def set_time(self, time: float | None) -> None:
         """Stop at `time` [s], or at the end."""
-        state = self._client.get_state()
+        state = self.client.get_state()
         shown = next(item for item in state.recordings if item.store_id == state.active_recording)
         if time is None:
             time = self._timeline(shown).end / 1e9
-        self._client.set_time(TIMELINE, duration=float(time), play_state="paused")
+        self.client.set_time(TIMELINE, duration=float(time), play_state="paused")
 
     def picture(self) -> bytes:
         """PNG of the whole viewer, taken once two looks in a row show the same."""
         deadline = clock.monotonic() + DRAW_LIMIT
         before = None
         while True:
-            now = self._client.take_screenshot()
+            now = self._ask("finish the picture", deadline, self.client.take_screenshot)
             if now == before:
                 return now
             before = now
             self._check(deadline, "finish the picture")
 
     def complaints(self) -> list[str]:
-        """What the viewer could not show, and the errors and warnings in its log."""
+        """What the viewer could not show, and the errors in its log."""
         reports = [
             f"{view.name}: {report.severity}: {report.summary}: {report.details}"
-            for view in self._client.get_state().views
+            for view in self.client.get_state().views
             for report in view.reports
         ]
         return reports + [
-            f"{entry.level}: {entry.message}" for entry in self._client.get_logs() if entry.level in ("WARN", "ERROR")
+            f"{entry.level}: {entry.message}" for entry in self.client.get_logs() if entry.level == "ERROR"
         ]
+
+    def _ask(self, what: str, deadline: float, question: Callable[[], Answer]) -> Answer:
+        """The viewer's answer; it may need several attempts, because the viewer gives up on each after 15 s."""
+        while True:
+            try:
+                return question()
+            except (OSError, RuntimeError) as error:
+                _log.debug("the viewer did not answer: %s", error)
+                self._check(deadline, what)
 
     @staticmethod
     def _timeline(recording):
@@ -181,7 +209,8 @@ class HeadlessViewer:
         if self._process.poll() is None and clock.monotonic() < deadline:
             return
         self._output.seek(0)
-        said = self._output.read().decode(errors="replace").strip()[-2000:]
-        if "No graphics adapter" in said or "adapter" in said.lower():
-            raise InputError(f"{MISSING_DRIVER}\nThe viewer said:\n{said}")
-        raise InputError(f"the viewer did not {what}; it said:\n{said}")
+        said = self._output.read().decode(errors="replace").partition("stack backtrace:")[0].strip()
+        last = "\n".join(said.splitlines()[-SHOWN_LINES:])
+        if any(sign in said for sign in DRIVER_FAILURES):
+            raise InputError(f"{MISSING_DRIVER}\nThe viewer said:\n{last}")
+        raise InputError(f"the viewer did not {what}; it said:\n{last}")

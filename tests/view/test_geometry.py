@@ -1,0 +1,82 @@
+"""Surfaces and scales of pictures."""
+
+import numpy as np
+import pytest
+import synthetic_run
+
+from bilayer_core.integrate.frame import PlaneInfo
+from bilayer_core.record.colours import strain_colours
+from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.view import geometry
+from bilayer_core.view.scales import VIEW_ASPECT, VIEW_DIRECTION, place_eye, rounded_up
+
+
+def closed_volume(vertices, triangles):
+    """Volume inside a surface whose triangles turn anticlockwise seen from outside."""
+    a, b, c = (vertices[triangles[:, i]].astype(float) for i in range(3))
+    return np.einsum("ij,ij->", a, np.cross(b, c)) / 6
+
+
+def test_the_surface_of_a_ribbon_is_closed_and_holds_its_volume():
+    memory = MemoryRecorder()
+    synthetic_run.run(memory, np.array([0.0, 2.0]))
+    run = memory.run_data()
+    strand = run.description.strands[3]
+    vertices = geometry.ribbon_vertices(strand, run.positions[:, strand.nodes], run.material_frames[:, strand.nodes])
+    triangles = geometry.ribbon_triangles(synthetic_run.NODES)
+    area = strand.width * strand.thickness
+    flat, curled = (closed_volume(part.reshape(-1, 3), triangles) for part in vertices)
+    assert flat == pytest.approx(area * synthetic_run.LENGTH, rel=1e-3)
+    # The centreline of the upper layer is longer by the curvature times its distance from the interface.
+    assert curled == pytest.approx(area * synthetic_run.LENGTH * (1 + 42.0 * 0.0005), rel=2e-3)
+
+
+def test_the_surface_of_a_ball_holds_its_volume_and_has_segments_of_both_colours():
+    colours = ((1, 2, 3), (4, 5, 6))
+    vertices, normals, shades, triangles = geometry.ball_mesh(0.02, colours)
+    assert closed_volume(vertices, triangles) == pytest.approx(4 / 3 * np.pi * 0.02**3, rel=0.01)
+    np.testing.assert_allclose(vertices, 0.02 * normals, rtol=1e-6)
+    assert {tuple(shade) for shade in shades.tolist()} == set(colours)
+
+
+def test_squares_of_a_plane_lie_in_it_and_stay_where_they_are():
+    normal = np.array([0.6, 0.0, 0.8])
+    plane = PlaneInfo("slope", np.array([0.1, 0.0, 0.2]), normal)
+    colours = ((100, 100, 100), (50, 50, 50), (0, 0, 0))
+    here, shades, triangles = geometry.plane_mesh(plane, np.zeros(3), 0.1, 0.02, colours)
+    there, _, _ = geometry.plane_mesh(plane, np.array([0.0, 0.013, 0.0]), 0.1, 0.02, colours)
+    np.testing.assert_allclose((here - plane.point) @ normal, 0.0, atol=1e-8)
+    shared = {tuple(row) for row in np.round(here, 6).tolist()} & {tuple(row) for row in np.round(there, 6).tolist()}
+    assert len(shared) > 60
+    assert (shades.min(), shades.max()) == (0, 100)
+    a, b, c = (here[triangles[:, i]] for i in range(3))
+    assert np.all(np.cross(b - a, c - a) @ normal > 0)
+
+
+def test_everything_is_in_the_picture_and_fills_it():
+    points = np.random.default_rng(0).uniform([-0.3, -0.1, 0.0], [0.1, 0.1, 0.2], (500, 3))
+    eye, target = place_eye(points)
+    back = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
+    np.testing.assert_allclose((eye - target) / np.linalg.norm(eye - target), back, atol=1e-12)
+    right = np.cross([0, 0, 1], back) / np.linalg.norm(np.cross([0, 0, 1], back))
+    depth = (eye - points) @ back
+    across, up = (points - eye) @ right / depth, (points - eye) @ np.cross(back, right) / depth
+    shown = np.tan(np.radians(55 / 2))  # the viewer's field of view
+    filled = max(np.abs(across).max() / (shown * VIEW_ASPECT), np.abs(up).max() / shown)
+    assert 0.7 < filled < 0.95
+    assert across.max() == pytest.approx(-across.min(), rel=0.1)
+
+
+@pytest.mark.parametrize(("value", "scale"), [(0.052, 0.06), (0.06, 0.06), (9.1e-5, 1e-4), (1.2, 1.5), (70.0, 70.0)])
+def test_scales_are_round_numbers(value, scale):
+    assert rounded_up(value) == pytest.approx(scale)
+
+
+def test_colours_of_strain_run_from_blue_over_grey_to_red_and_saturate():
+    colours = strain_colours(np.array([-9.0, -0.05, 0.0, 0.05, 9.0]), 0.05)
+    np.testing.assert_array_equal(colours[0], colours[1])
+    np.testing.assert_array_equal(colours[3], colours[4])
+    blue, grey, red = colours[[1, 2, 3], :3]
+    assert blue[2] > 2 * blue[0] and red[0] > 2 * red[2] and np.ptp(grey) < 0.03
+    lightness = strain_colours(np.linspace(-0.05, 0.05, 41), 0.05)[:, :3] @ [0.2126, 0.7152, 0.0722]
+    assert np.all(np.diff(lightness[:21]) > 0) and np.all(np.diff(lightness[20:]) < 0)
