@@ -77,6 +77,7 @@ def screenshot(path: str | Path, png_path: str | Path, time: float | None = None
     _require_rerun()
     from bilayer_core.view.viewer_process import take_picture
 
+    check_output_path(png_path, force=True)
     with _as_recording(path) as recording:
         picture = take_picture(recording, time)
     try:

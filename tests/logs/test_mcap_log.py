@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import synthetic_run
+import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
+from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.record import mcap_log
 from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
@@ -87,6 +89,17 @@ def test_a_state_is_read_back_exactly(log):
     np.testing.assert_array_equal(earlier, synthetic_run.frame(0.5, 1.0).state)
     with pytest.raises(InputError, match="holds no state at or before t = -1 s"):
         read_state(log, -1.0)
+
+
+def test_a_run_goes_on_from_its_log_bit_for_bit(tmp_path):
+    path = tmp_path / "run.mcap"
+    Simulator(load_scene("gripping")).run(0.04, observers=[McapRecorder(path)])
+    again = Simulator(load_scene(yaml.safe_load(scene_from_log(path))))
+    middle, moment = read_state(path, 0.02)
+    assert moment == 0.02
+    again.load_state(middle)
+    again.run(0.02)
+    np.testing.assert_array_equal(again.save_state(), read_state(path)[0])
 
 
 def test_rosbags_reads_every_message(log):
