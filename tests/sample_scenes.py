@@ -90,4 +90,5 @@ def everything(stations=6):
         obstacles=[GROUND],
         contact=contact(coefficient=0.5, speed_threshold=1e-2),
         damping={"mass": 2.0},
+        fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05]},
     )

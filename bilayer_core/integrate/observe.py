@@ -141,7 +141,9 @@ def node_curvature(model: Model, stepper: Stepper) -> Array:
 def energies(stepper: Stepper, state: State) -> dict[str, float]:
     """Energy of each term of the last accepted configuration [J]; dissipation potentials are none and are left out."""
     model, terms = stepper.model, stepper.potential.terms
-    found = {name: float(value) for name, value in terms.items() if name not in ("inertia", "damping", "friction")}
+    found = {
+        name: float(value) for name, value in terms.items() if name not in ("inertia", "damping", "drag", "friction")
+    }
     kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
     kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
     for place, body in enumerate(model.bodies.body_of_free):

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import PenetrationError
 from ..kinematics.rotation import rotation_matrix
-from ..scene.config import Body, Free, Layer, Prescribed, Rod, SceneConfig
+from ..scene.config import Body, Fluid, Free, Layer, Prescribed, Rod, SceneConfig
 from .layout import number_unknowns
 from .model import Bodies, Carriers, Model, StrandArrays, body_displacement
 from .section import Bond, Section, bond, rectangle
@@ -82,6 +82,9 @@ def build_model(scene: SceneConfig) -> Model:
         attached_position=found.column("attached_position", width=3),
         wall_body=found.column("attached_body", np.int64),
         wall_joint=_joints_of_walls(wall_a, wall_b, edge_count, len(walls)),
+        drag_node=found.column("drag_node", np.int64),
+        drag_edge=found.column("drag_edge", np.int64, 2),
+        drag_coefficient=found.column("drag_coefficient", width=3),
         node_mass=found.column("node_mass"),
         spin_inertia=found.column("spin_inertia"),
         half_width=found.column("half_width"),
@@ -166,6 +169,8 @@ def _add_rod(found: _Collected, scene: SceneConfig, rod: Rod, name: str, turn, b
             clamps.append((body_index[rod.clamp_end], -1))
         _add_strand(found, scene, rod, layer, section, strand, positions, turn(tangent), turn(normal), clamps)
     found.rods.append(spans)
+    if scene.fluid is not None:
+        _add_drag(found, scene.fluid, rod, spans)
     if len(spans) == 2:
         law = bond(sections[0], sections[1], scene.coupling, rod.torsion)
         _add_bond(found, law, rod.edge_length, heights[1] - heights[0], spans)
@@ -233,6 +238,31 @@ def _add_strand(
         )
     found.node_count += nodes
     found.edge_count += edges
+
+
+def _add_drag(found: _Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, int, int, int]]) -> None:
+    """Drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts at
+    the middle.
+    """
+    length = np.full(rod.stations, rod.edge_length)
+    length[[0, -1]] *= 0.5
+    thickness = np.zeros(rod.stations)
+    for (first, last, _, _), layer in zip(spans, rod.layers, strict=True):
+        thickness[first : last + 1] += layer.thickness
+    along, across = fluid.drag_along * rod.width, fluid.drag_across * rod.width
+    whole = np.stack(
+        [np.full(rod.stations, along), np.full(rod.stations, across), fluid.drag_across * thickness], axis=1
+    )
+    for (first, last, first_node, first_edge), layer in zip(spans, rod.layers, strict=True):
+        station = np.arange(last - first + 1)
+        covered = slice(first, last + 1)
+        share = fluid.density * length[covered] * layer.thickness / thickness[covered]
+        edges = np.stack([np.maximum(station - 1, 0), np.minimum(station, last - first - 1)], axis=1)
+        found.add(
+            drag_node=first_node + station,
+            drag_edge=first_edge + edges,
+            drag_coefficient=share[:, None] * whole[covered],
+        )
 
 
 def _law_of_layer(found: _Collected, scene: SceneConfig, layer: Layer) -> int:

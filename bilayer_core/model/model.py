@@ -94,6 +94,10 @@ class Model:
     wall_body: Array  # body of each wall, shape (n_wall,)
     wall_joint: Array  # joint of each wall, shape (n_wall,)
 
+    drag_node: Array  # nodes that carry a share of their station's drag, shape (n_drag,)
+    drag_edge: Array  # edges before and after each, shape (n_drag, 2)
+    drag_coefficient: Array  # ρ_f A C along t, m1, m2 [kg/m], shape (n_drag, 3)
+
     node_mass: Array  # [kg], shape (n_node,)
     spin_inertia: Array  # of edges about their tangent [kg m²], shape (n_edge,)
     half_width: Array  # of each edge [m], shape (n_edge,)

@@ -94,6 +94,7 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
         "eigenstrain": state(driven, "no layer follows a stimulus"),
         "inertia": "active",
         "gravity": state(any(scene.gravity), "gravity is zero"),
+        "drag": state(scene.fluid is not None, "no fluid"),
         "damping": state(scene.damping.mass > 0.0, "damping.mass is zero"),
         "bodies": state(free, "no free body"),
         "barrier": state(bool(pairs), "no surfaces that can meet"),

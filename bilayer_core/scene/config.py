@@ -262,6 +262,18 @@ class Contact(_Part):
     friction: Friction | None = None
 
 
+class Fluid(_Part):
+    """A fluid around the rods, and its quadratic drag on them."""
+
+    density: PositiveDensity = 1000.0
+    velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
+    """Of a uniform flow."""
+    drag_along: NonNegativeNumber
+    """Coefficient for motion along the tangent, with the width as area per length."""
+    drag_across: NonNegativeNumber
+    """Coefficient for motion across: with the width through the thickness, with the thickness sideways."""
+
+
 class Damping(_Part):
     """Damping of the rods."""
 
@@ -312,6 +324,7 @@ class SceneConfig(_Part):
     bodies: list[Body] = []
     obstacles: list[Plane] = []
     contact: Contact | None = None
+    fluid: Fluid | None = None
     damping: Damping = Damping()
     coupling: Coupling = Coupling()
     solver: Solver = Solver()

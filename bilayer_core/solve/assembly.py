@@ -96,15 +96,15 @@ def expand_edges(
     factor,
     edge_hessian,
     carrier_hessian,
-    with_contact,
+    with_node_blocks,
     band_out,
 ):
-    """Add edge blocks, factor × mass, and contact blocks of nodes to the band."""
+    """Add edge blocks, factor × mass, and blocks of single nodes (contact, drag) to the band."""
     for i in range(node_unknown.shape[0]):
         d = node_unknown[i]
         for c in range(3):
             band_out[d + c, 0] += factor * node_mass[i]
-        if with_contact:
+        if with_node_blocks:
             _add_own_block(band_out, d, 1.0, carrier_hessian, i)
     for k in range(edge_node.shape[0]):
         d0, d1, t = node_unknown[edge_node[k]], node_unknown[edge_node[k] + 1], edge_unknown[k]

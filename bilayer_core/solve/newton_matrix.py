@@ -31,9 +31,9 @@ LARGEST_SHIFT = 1e8
 class NewtonMatrix:
     """Second derivatives in edge space, filled by the forces, and the factorised matrix of the unknowns."""
 
-    def __init__(self, model: Model, has_contact: bool, has_balls: bool, carrier_gradient: Array):
+    def __init__(self, model: Model, has_node_blocks: bool, has_balls: bool, carrier_gradient: Array):
         self._model = model
-        self._has_contact = has_contact
+        self._has_node_blocks = has_node_blocks
         self.carrier_gradient = carrier_gradient
         edges = model.edge_count + model.wall_count
         pairs, carriers = len(model.pair_top), model.carriers
@@ -44,7 +44,7 @@ class NewtonMatrix:
         self.pair_hessian = np.zeros((pairs, 3, 3))
         self.top_hessian = np.zeros((pairs, 3, 4))
         self.bottom_hessian = np.zeros((pairs, 3, 4))
-        self.carrier_hessian = np.zeros((len(carriers.weight) if has_contact else 0, 3, 3))
+        self.carrier_hessian = np.zeros((len(carriers.weight) if has_node_blocks else 0, 3, 3))
         self.ball_hessian = np.zeros((balls, 3, 3))
         self.ball_turn_hessian = np.zeros((balls, 3, 3))
         self.body_hessian = np.zeros((6 * model.free_count, 6 * model.free_count))
@@ -135,7 +135,7 @@ class NewtonMatrix:
             factor,
             self.edge_hessian,
             self.carrier_hessian,
-            self._has_contact,
+            self._has_node_blocks,
             band,
         )
         joints = (model.joint_a, model.joint_b, model.edge_node, layout.node, layout.edge)
@@ -156,7 +156,7 @@ class NewtonMatrix:
     def _add_contact_of_bodies(self, at: Configuration) -> None:
         """Contact of carriers on free bodies, with planes (D), with nodes (U) and with each other (D)."""
         model, carriers, corner = self._model, self._model.carriers, self._corner
-        if not self._has_contact:
+        if not self._has_node_blocks:
             return
         jacobian = {}
         for carrier, free in zip(self._carriers, self._carrier_body, strict=True):

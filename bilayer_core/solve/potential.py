@@ -13,6 +13,7 @@ from ..forces.bend_twist import bend_twist
 from ..forces.body import body_gravity, body_spring
 from ..forces.contact import pair_contact, plane_contact
 from ..forces.coupling import bond_translation
+from ..forces.drag import drag, lag_directions
 from ..forces.friction import friction, lag_friction
 from ..forces.quadratic import angle_spring, gravity, node_spring
 from ..forces.stretch import stretch
@@ -78,6 +79,7 @@ class IncrementalPotential:
         self.has_contact = self.has_planes or self.has_balls
         law = scene.contact.friction if scene.contact else None
         self.has_friction = self.has_contact and law is not None and law.coefficient > 0.0
+        self.has_drag = len(model.drag_node) > 0
         self.has_bodies = model.free_count > 0
 
         self.terms: dict[str, float] = {}
@@ -90,7 +92,7 @@ class IncrementalPotential:
         self.edge_gradient = np.zeros((edges, 4))
         self._node_gradient = np.zeros((model.node_count, 3))
         self._pair_gradient = np.zeros((pairs, 3))
-        self.matrix = NewtonMatrix(model, self.has_contact, self.has_balls, self.carrier_gradient)
+        self.matrix = NewtonMatrix(model, self.has_contact or self.has_drag, self.has_balls, self.carrier_gradient)
         self.attached_gradient = np.zeros((len(model.attached_node), 3))
         self._attached_free, self._wall_free = model.attached_free, model.wall_free
         self._joint_count = joints
@@ -101,12 +103,18 @@ class IncrementalPotential:
         self._contact_load = np.zeros(room)
         self._contact_normal = np.zeros((room, 3))
         self._contact_count = 0
+        self._drag_direction = np.zeros((len(model.drag_node), 3, 3))
+        self._flow = np.array(scene.fluid.velocity if scene.fluid else (0.0, 0.0, 0.0))
         self._turn = np.zeros((model.free_count, 3, 3))
         self.context: StepContext | None = None
 
     def start_step(self, context: StepContext) -> None:
-        """Freeze what a step depends on, friction's contacts included."""
+        """Freeze what a step depends on: friction's contacts and drag's directions among it."""
         self.context = context
+        if self.has_drag:
+            before, after = self.model.drag_edge.T
+            start = context.start
+            lag_directions(self.model.drag_node, before, after, start.tangent, start.director1, self._drag_direction)
         if self.has_friction:
             model, contact = self.model, self.model.scene.contact
             carriers = model.carriers
@@ -174,6 +182,19 @@ class IncrementalPotential:
             )
             terms["bond"] = sum(rotation) + translation
         self._add_inertia_and_gravity(at, with_hessian)
+        if self.has_drag:
+            terms["drag"] = drag(
+                model.drag_node,
+                model.drag_coefficient,
+                self._drag_direction,
+                self._flow,
+                context.length,
+                at.position,
+                context.start.position,
+                self._node_gradient,
+                matrix.carrier_hessian,
+                with_hessian,
+            )
         if self.has_contact:
             others = self.body_gradient.copy()
             self._add_contact(at, with_hessian)

@@ -47,7 +47,7 @@ FORCES = {
     "twisting": lambda m: bends(m, (2,)),
     "bond translation": lambda m: only(m, pair_stiffness=m.pair_stiffness),
     "bond rotation": bonds,
-    "inertia gravity damping contact friction": only,
+    "inertia gravity damping drag contact friction": only,
     "everything": lambda m: m,
 }
 
@@ -152,7 +152,7 @@ def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
     problem = Problem(FORCES[force], hub, seed)
     gradient, hessian = problem.derivatives()
     if "contact" in force or force == "everything":
-        assert problem.potential.terms["barrier"] > 0.0 and problem.potential.terms["friction"] > 0.0
+        assert all(problem.potential.terms[term] > 0.0 for term in ("barrier", "friction", "drag", "damping"))
         assert problem.coupling > 0.0
     gradient_errors, hessian_errors = [], []
     for h in (3e-8, 1e-7, 3e-7, 1e-6):

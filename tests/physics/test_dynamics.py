@@ -135,3 +135,44 @@ def test_a_lagging_layer_follows_its_stimulus_with_its_time_constant_whatever_th
         simulator.run(0.05)
         strain = simulator.frame().strain
         assert strain == pytest.approx(np.full(5, 0.01 * (1 - math.exp(-1.0))), rel=2e-3)
+
+
+WHOLE, HALVES = [layer(thickness=2e-3)], [layer("bottom"), layer("top")]
+
+
+@pytest.mark.parametrize(
+    ("layers", "gravity", "area", "coefficient"),
+    [
+        (WHOLE, [5.0, 0, 0], 0.01, 0.4),
+        (WHOLE, [0, 5.0, 0], 2e-3, 1.2),
+        (WHOLE, [0, 0, 5.0], 0.01, 1.2),
+        (HALVES, [0, 0, 5.0], 0.01, 1.2),
+    ],
+    ids=["along", "sideways", "across the face", "across the face, two layers"],
+)
+def test_a_strip_sinks_at_its_terminal_velocity(layers, gravity, area, coefficient):
+    sinking = scene(
+        [rod(layers, length=0.05, stations=11)],
+        gravity=gravity,
+        fluid={"density": 800.0, "drag_along": 0.4, "drag_across": 1.2, "velocity": [0.2, 0.1, -0.3]},
+    )
+    simulator = Simulator(load_scene(sinking), dt=5e-3)
+    simulator.run(10.0)
+    speed = math.sqrt(5.0 * 1000.0 * 0.01 * 2e-3 / (0.5 * 800.0 * area * coefficient))
+    expected = np.array([0.2, 0.1, -0.3]) + speed * np.array(gravity) / 5.0
+    moving = np.array(gravity) > 0  # the flow takes the rest of the strip along, ever more slowly
+    assert simulator.velocities[:, moving] == pytest.approx(expected[moving][0], rel=1e-3)
+
+
+def test_a_fluid_at_rest_slows_a_strip_as_the_quadratic_law_says():
+    strip = rod([layer()], length=0.05, stations=5)
+    drifting = scene([strip], gravity=[0, 0, 0], fluid={"drag_along": 0.5, "drag_across": 1.0})
+    simulator = Simulator(load_scene(drifting), dt=1e-5)
+    state = simulator.save_state()
+    sizes = [(name, int(np.prod(shape))) for name, shape in simulator.description.state_layout]
+    start = sum(size for _, size in sizes[: [name for name, _ in sizes].index("velocity")])
+    state[start : start + 15] = np.tile([0.0, 0.0, 2.0], 5)
+    simulator.load_state(state)
+    simulator.run(0.02)
+    rate = 0.5 * 1000.0 * 0.01 * 1.0 / (1000.0 * 0.01 * 1e-3)  # ½ ρ_f w C/(ρ w h)
+    assert simulator.velocities[:, 2] == pytest.approx(np.full(5, 2.0 / (1.0 + 2.0 * rate * 0.02)), rel=5e-3)

@@ -1,4 +1,6 @@
-"""A naturally helical layer bonded to a straight one (Fig. 4 of the paper) against the minimum of its energy per length."""
+"""A naturally helical layer bonded to a straight one (Fig. 4 of the paper) against the minimum of its energy per
+length.
+"""
 
 import numpy as np
 import pytest

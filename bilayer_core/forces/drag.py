@@ -1,0 +1,97 @@
+"""Quadratic drag of a fluid at rest or in uniform flow, once for the whole section of a rod.
+
+    F = −½ ρ_f Δl (w C∥ |v_t| v_t t + w C⊥ |v₁| v₁ m1 + h C⊥ |v₂| v₂ m2)        (paper, eq. 23)
+
+v is the velocity relative to the fluid, v_t, v₁, v₂ its components along the tangent, through the thickness and
+across the width; w is the
+width, h the thickness of the section, Δl the Voronoi length; the layers of a section share its drag. (The paper has
+the width for the sideways part as well, a flat ribbon's broad face.)
+
+The directions are those at the start of the step. Then each component has a convex dissipation potential in the
+displacement u of the
+step, v = u/h_t − U (h_t the step, U the flow):
+
+    D = h_t ρ_f A C |v·n|³/6,    ∂D/∂u = ½ ρ_f A C |v·n| (v·n) n,    ∂²D/∂u² = ρ_f A C |v·n|/h_t n nᵀ
+
+The drag is implicit: it cannot overshoot, however long the step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..jit import kernel
+
+
+@kernel
+def lag_directions(node, edge_before, edge_after, tangent, director1, direction_out):
+    """Mean directions (t, m1, m2) at nodes, made orthonormal; written, shape (n_drag, 3, 3).
+
+    `edge_before` and `edge_after` are the edges that meet at each of `node`; at an end they are the same.
+    """
+    for k in range(node.shape[0]):
+        a, b = edge_before[k], edge_after[k]
+        t = tangent[a] + tangent[b]
+        t /= np.sqrt((t * t).sum())
+        m = director1[a] + director1[b]
+        m -= (m * t).sum() * t
+        m /= np.sqrt((m * m).sum())
+        for c in range(3):
+            direction_out[k, 0, c] = t[c]
+            direction_out[k, 1, c] = m[c]
+        direction_out[k, 2, 0] = t[1] * m[2] - t[2] * m[1]
+        direction_out[k, 2, 1] = t[2] * m[0] - t[0] * m[2]
+        direction_out[k, 2, 2] = t[0] * m[1] - t[1] * m[0]
+
+
+@kernel
+def drag(
+    node,
+    coefficient,
+    direction,
+    flow,
+    step_length,
+    position,
+    start_position,
+    node_gradient_out,
+    node_hessian_out,
+    with_hessian,
+):
+    """Add the dissipation potential of drag and return it [J].
+
+    Parameters
+    ----------
+    node : Array
+        Nodes that carry drag, shape (n_drag,).
+    coefficient : Array
+        ρ_f A C along t, m1 and m2 [kg/m], shape (n_drag, 3).
+    direction : Array
+        From `lag_directions`.
+    flow : Array
+        Velocity of the fluid [m/s], shape (3,).
+    step_length : float
+        [s]
+    position, start_position : Array
+        Of nodes now and at the start of the step [m], shape (n_node, 3).
+    node_gradient_out, node_hessian_out : Array
+        Shapes (n_node, 3) and (n_node, 3, 3) (upper triangle); added to.
+    with_hessian : bool
+    """
+    energy = 0.0
+    for k in range(node.shape[0]):
+        i = node[k]
+        for d in range(3):
+            speed = 0.0
+            for c in range(3):
+                speed += direction[k, d, c] * ((position[i, c] - start_position[i, c]) / step_length - flow[c])
+            size = abs(speed)
+            energy += step_length * coefficient[k, d] * size**3 / 6.0
+            force = 0.5 * coefficient[k, d] * size * speed
+            for c in range(3):
+                node_gradient_out[i, c] += force * direction[k, d, c]
+            if with_hessian:
+                curve = coefficient[k, d] * size / step_length
+                for m in range(3):
+                    for n in range(m, 3):
+                        node_hessian_out[i, m, n] += curve * direction[k, d, m] * direction[k, d, n]
+    return energy
