@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import traceback
 from collections.abc import Sequence
 
@@ -53,10 +51,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except click.ClickException as error:
         error.show()
         return BilayerError.exit_code
-    except BrokenPipeError:
-        # The reader of our output, such as `head`, has gone; the interpreter must not try to flush to it.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except SystemExit:
+        return 0  # by which click tells that the reader of our output, such as `head`, has gone
     except BilayerError as error:
         _explain(settings, str(error))
         return error.exit_code

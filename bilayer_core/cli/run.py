@@ -65,11 +65,11 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any], interrupt: Inter
     from bilayer_core.record.paths import check_output_path
 
     force, output = options["force"], config.output
-    paths = [Path(options[key]).resolve() for key in OUTPUT_OPTIONS if options[key]]
-    for path in paths:
-        if paths.count(path) > 1:
-            raise InputError(f"{path}: is named for two outputs; give each a file of its own")
+    paths = [options[key] for key in OUTPUT_OPTIONS if options[key]]
+    for place, path in enumerate(paths):
         check_output_path(path, force)
+        if Path(path).resolve() in {Path(other).resolve() for other in paths[:place]}:
+            raise InputError(f"{path}: is named for two outputs; give each a file of its own")
     observers = []
     if options["log"]:
         observers.append(_Log(McapRecorder(options["log"], output.rate, output.marker_rate, force), interrupt))

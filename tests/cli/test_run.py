@@ -1,0 +1,233 @@
+"""`bilayer run`: outputs, restarts, ways of ending."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+from processes import TIMEOUT, command, environment
+
+from bilayer_core import load_scene
+from bilayer_core.cli import main, watch
+from bilayer_core.record.log_reader import read_info, read_log, read_state, scene_from_log
+from bilayer_core.scene.loader import parse_scene
+
+SUMMARY_KEYS = """
+    scene model dimension integrator nodes dof dt duration simulated steps rejected_steps newton_iterations cpu_time
+    wall_time compile_time real_time_factor converged termination terms com_start com_end com_max_height max_curvature
+    mean_curvature tip_positions min_gap max_contact_force energy versions
+""".split()
+HOPELESS = ["--set", "solver.max_newton_iterations=1", "--set", "solver.max_halvings=0", "--tolerance", "1e-15"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty directory to run in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
+    outputs = ["--log", "run.mcap", "--log-rate", "100", "--summary", "run.json"]
+    assert main(["run", "cantilever", "--duration", "50 ms", *outputs]) == 0
+    summary = json.loads((here / "run.json").read_text())
+    assert not set(SUMMARY_KEYS) - set(summary)
+    assert summary["steps"] == 50 and summary["duration"] == 0.05 and summary["converged"] is True
+    info = read_info("run.mcap")
+    assert info.complete and info.termination == "completed" and info.last_time == pytest.approx(0.05)
+    assert info.topics["/bilayer_sim/com"]["count"] == 6
+    told = capsys.readouterr().out
+    assert told.startswith("cantilever: completed, 0.05 s in 50 steps\n")
+    assert "real-time factor" in told and "run.mcap" in told
+
+
+def test_the_log_holds_the_scene_with_all_changes(here):
+    options = ["--dt", "2 ms", "--set", "rods.strip.stations=21", "--log-rate", "10", "--quiet", "--log", "run.mcap"]
+    assert main(["run", "cantilever", "--duration", "0.01", *options]) == 0
+    changes = ["rods.strip.stations=21", "solver.dt=0.002", "output.rate=10"]
+    assert parse_scene(scene_from_log("run.mcap"), "log") == load_scene("cantilever", changes)
+
+
+def test_quiet_prints_nothing(here, capfd):
+    assert main(["run", "cantilever", "--duration", "0.002", "--quiet"]) == 0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_info_tells_what_the_log_holds(here, capsys):
+    assert main(["run", "bending", "--duration", "0.01", "--quiet", "--log", "run.mcap"]) == 0
+    assert main(["info", "run.mcap"]) == 0
+    text = capsys.readouterr().out
+    assert "complete  yes (completed)" in text and "stimuli   swelling" in text and "/bilayer_sim/state" in text
+    assert main(["info", "run.mcap", "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["complete"] is True and content["channels"] == ["swelling"]
+
+
+@pytest.mark.parametrize("saved", ["half.npz", "half.mcap"])
+def test_a_run_in_two_parts_is_the_whole_run_bit_for_bit(here, saved):
+    first = ["--duration", "0.02", "--quiet", "--save-state", "half.npz", "--log", "half.mcap"]
+    assert main(["run", "cantilever", *first]) == 0
+    assert (
+        main(["run", "cantilever", "--duration", "0.02", "--quiet", "--from-state", saved, "--log", "rest.mcap"]) == 0
+    )
+    assert main(["run", "cantilever", "--duration", "0.04", "--quiet", "--log", "whole.mcap"]) == 0
+    np.testing.assert_array_equal(read_state("rest.mcap")[0], read_state("whole.mcap")[0])
+    assert read_state("rest.mcap")[1] == pytest.approx(0.04)
+
+
+def test_a_state_of_another_scene_is_refused(here, capsys):
+    assert main(["run", "cantilever", "--duration", "0.001", "--quiet", "--save-state", "state.npz"]) == 0
+    assert main(["run", "bending", "--from-state", "state.npz"]) == 2
+    assert "state.npz: holds a state of another scene: position has shape (51, 3)" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 broken", b"text\n"])
+def test_a_file_that_is_no_state_is_refused(here, capsys, content):
+    (here / "state.npz").write_bytes(content)
+    assert main(["run", "cantilever", "--from-state", "state.npz"]) == 2
+    assert "state.npz: is not a saved state" in capsys.readouterr().err
+
+
+def test_a_state_at_the_end_of_the_scene_needs_a_duration(here, capsys):
+    short = ["run", "cantilever", "--set", "duration=0.002", "--quiet"]
+    assert main([*short, "--save-state", "end.npz"]) == 0
+    assert main([*short, "--from-state", "end.npz"]) == 2
+    assert "the scene ends at 0.002 s; say with --duration how long to go on" in capsys.readouterr().err
+
+
+@pytest.fixture
+def no_simulation(monkeypatch):
+    """Nothing may be simulated."""
+
+    def refuse(scene):
+        raise AssertionError("a simulation was started")
+
+    monkeypatch.setattr("bilayer_core.integrate.simulator.Simulator", refuse)
+
+
+@pytest.mark.parametrize("option", ["--log", "--rrd", "--summary", "--save-state"])
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("there", "there: exists already; choose another name, or replace it with --force"),
+        ("absent/file", "absent/file: cannot be written: there is no directory absent"),
+        (".", "cannot be written: it is a directory"),
+    ],
+)
+def test_an_output_that_cannot_be_written_is_refused_before_the_simulation(
+    here, capsys, no_simulation, option, path, message
+):
+    (here / "there").write_text("precious")
+    assert main(["run", "cantilever", option, path]) == 2
+    assert message in capsys.readouterr().err
+    assert (here / "there").read_text() == "precious"
+
+
+@pytest.mark.parametrize("option", ["--log", "--summary"])
+def test_a_directory_without_permission_is_refused_before_the_simulation(
+    here, capsys, no_simulation, option, monkeypatch
+):
+    monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write everywhere
+    assert main(["run", "cantilever", option, "file"]) == 2
+    assert "file: cannot be written: no permission to write in" in capsys.readouterr().err
+
+
+def test_one_file_for_two_outputs_is_refused(here, capsys, no_simulation):
+    assert main(["run", "cantilever", "--log", "a", "--summary", "./a"]) == 2
+    assert "is named for two outputs" in capsys.readouterr().err
+
+
+def test_force_replaces_a_log(here):
+    (here / "run.mcap").write_text("old")
+    assert main(["run", "cantilever", "--duration", "0.002", "--quiet", "--force", "--log", "run.mcap"]) == 0
+    assert read_info("run.mcap").complete
+
+
+def test_a_simulation_that_cannot_go_on_ends_with_3_and_whole_files(here, capsys):
+    assert main(["run", "cantilever", *HOPELESS, "--log", "run.mcap", "--summary", "run.json"]) == 3
+    printed = capsys.readouterr()
+    assert printed.err.startswith("bilayer: stopped at t = ") and "Traceback" not in printed.err
+    assert printed.out.startswith("cantilever: failed")
+    summary = json.loads((here / "run.json").read_text())
+    assert summary["termination"] == "failed" and summary["reason"] in printed.err
+    info = read_info("run.mcap")
+    assert not info.complete and info.termination == "failed"
+
+
+def start_long_run(here):
+    """A run of minutes in a process of its own, once its log has grown."""
+    options = ["--dt", "0.1 ms", "--duration", "1000", "--log", "run.mcap", "--summary", "run.json"]
+    arguments, pipe = command("run", "cantilever", *options), subprocess.PIPE
+    run = subprocess.Popen(arguments, env=environment(), stdout=pipe, stderr=pipe, text=True)
+    deadline = time.monotonic() + TIMEOUT
+    while not (here / "run.mcap").exists() or (here / "run.mcap").stat().st_size < 100_000:
+        assert run.poll() is None and time.monotonic() < deadline, run.communicate()
+        time.sleep(0.05)
+    return run
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_ends_with_130_and_whole_files(here, number):
+    run = start_long_run(here)
+    run.send_signal(number)
+    out, err = run.communicate(timeout=60)
+    assert run.returncode == 130, err
+    assert out.startswith("cantilever: interrupted") and "Traceback" not in err
+    info = read_info("run.mcap")
+    assert not info.complete and info.termination == "interrupted"
+    summary = json.loads((here / "run.json").read_text())
+    assert summary["termination"] == "interrupted"
+    assert summary["simulated"] == pytest.approx(info.last_time) and summary["simulated"] > 0.0
+    assert read_log("run.mcap").times[-1] == pytest.approx(info.last_time)
+
+
+def test_a_second_signal_is_not_put_off():
+    with watch.Interrupt() as interrupt:
+        os.kill(os.getpid(), signal.SIGINT)
+        assert interrupt.wished and not interrupt.granted
+        with pytest.raises(KeyboardInterrupt):
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(1.0)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_on_a_terminal_progress_shows_simulated_time_and_real_time_factor(here):
+    terminal, end = pty.openpty()
+    run = subprocess.Popen(
+        command("run", "cantilever", "--duration", "0.5"),
+        env={**environment(), "COLUMNS": "120", "TERM": "xterm"},
+        stdout=subprocess.DEVNULL,
+        stderr=end,
+    )
+    os.close(end)
+    shown = b""
+    try:
+        while part := os.read(terminal, 4096):
+            shown += part
+    except OSError:  # what Linux says when the other side is closed
+        pass
+    os.close(terminal)
+    assert run.wait(TIMEOUT) == 0
+    text = shown.decode()
+    assert "0.50/0.5 s" in text and "real time x" in text and "left" in text
+
+
+def test_a_long_start_says_that_it_compiles_and_a_short_one_says_nothing(monkeypatch, capfd):
+    with watch.notice_of_compilation(quiet=False):
+        pass
+    assert capfd.readouterr().err == ""
+    monkeypatch.setattr(watch, "COMPILING_NOTICE", 0.01)
+    with watch.notice_of_compilation(quiet=False):
+        time.sleep(0.5)
+    assert capfd.readouterr().err == "compiling kernels (first start, cached afterwards) ...\n"
+
+
+def test_a_quiet_start_does_not_say_that_it_compiles(monkeypatch, capfd):
+    monkeypatch.setattr(watch, "COMPILING_NOTICE", 0.01)
+    with watch.notice_of_compilation(quiet=True):
+        time.sleep(0.2)
+    assert capfd.readouterr().err == ""

@@ -1,0 +1,54 @@
+"""`bilayer view`: what it hands to the viewer's functions."""
+
+import pytest
+
+from bilayer_core.cli import main
+
+
+@pytest.fixture
+def viewer(monkeypatch, tmp_path):
+    """Notes what the viewer's functions are asked to do instead of doing it; the directory is empty."""
+    asked = []
+    for name in ("convert_log", "open_viewer", "screenshot"):
+        monkeypatch.setattr(
+            f"bilayer_core.view.rerun_view.{name}", lambda *arguments, name=name: asked.append((name, *arguments))
+        )
+    monkeypatch.chdir(tmp_path)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("arguments", "asked"),
+    [
+        (["run.mcap"], [("open_viewer", "run.mcap", False)]),
+        (["run.rrd", "--web"], [("open_viewer", "run.rrd", True)]),
+        (["run.mcap", "--save", "run.rrd"], [("convert_log", "run.mcap", "run.rrd")]),
+        (["run.mcap", "--screenshot", "run.png"], [("screenshot", "run.mcap", "run.png", None)]),
+        (["run.rrd", "--screenshot", "run.png", "--time", "500 ms"], [("screenshot", "run.rrd", "run.png", 0.5)]),
+        (
+            ["run.mcap", "--save", "run.rrd", "--screenshot", "run.png"],
+            [("convert_log", "run.mcap", "run.rrd"), ("screenshot", "run.rrd", "run.png", None)],
+        ),
+    ],
+)
+def test_the_viewer_is_asked_for_what_the_options_say(viewer, arguments, asked):
+    assert main(["view", *arguments]) == 0
+    assert viewer == asked
+
+
+@pytest.mark.parametrize("option", ["--save", "--screenshot"])
+def test_an_existing_file_is_replaced_with_force_only(viewer, tmp_path, option, capsys):
+    (tmp_path / "there").write_text("precious")
+    assert main(["view", "run.mcap", option, "there"]) == 2
+    assert "there: exists already" in capsys.readouterr().err and viewer == []
+    assert main(["view", "run.mcap", option, "there", "--force"]) == 0
+    assert len(viewer) == 1
+
+
+def test_a_run_is_shown_as_a_recording(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "bending", "--duration", "0.04", "--quiet", "--log", "run.mcap", "--rrd", "direct.rrd"]) == 0
+    assert main(["view", "run.mcap", "--save", "converted.rrd"]) == 0
+    assert capsys.readouterr().out == "recording  converted.rrd\n"
+    for name in ("direct.rrd", "converted.rrd"):
+        assert (tmp_path / name).read_bytes()[:4] == b"RRF2"
