@@ -66,16 +66,17 @@ def summary(run: RunData, scales: Scales) -> str:
     description = run.description
     nodes = sum(strand.nodes.stop - strand.nodes.start for strand in description.strands)
     settings = [f"{name} {text}" for name, text in description.settings.items() if name not in versions()]
-    return "\n".join(
-        [
-            f"**{description.scene_name}: {description.title}**",
-            "",
-            f"{len(description.strands)} strands, {nodes} nodes, {run.times[-1] - run.times[0]:.6g} s simulated.",
-            "",
-            f"- **Colour:** axial strain, from −{100 * scales.strain_limit:g} % (blue) over 0 (grey) to"
-            f" +{100 * scales.strain_limit:g} % (red).",
-            f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.",
-            f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.",
-            f"- **Computed with:** {', '.join(settings)}.",
-        ]
-    )
+    percent = 100 * scales.strain_limit
+    lines = [
+        f"**{description.scene_name}: {description.title}**",
+        "",
+        f"Strands: {len(description.strands)}, nodes: {nodes}, simulated: {run.times[-1] - run.times[0]:.6g} s.",
+        "",
+        f"- **Colour:** axial strain, from −{percent:g} % (blue) over 0 (grey) to +{percent:g} % (red).",
+    ]
+    if run.contact_forces.any():
+        lines.append(f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.")
+    if description.obstacles:
+        lines.append(f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.")
+    lines.append(f"- **Computed with:** {', '.join(settings)}.")
+    return "\n".join(lines)

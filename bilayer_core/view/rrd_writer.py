@@ -164,11 +164,10 @@ def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
             },
         },
         "energy": {name: 1e3 * values for name, values in run.energy.items() if np.any(values)},
-        "solver": {
-            "iterations per step": run.solver["iterations"] / np.maximum(run.solver["substeps"], 1),
-            "smallest gap [mm]": 1e3 * np.where(np.isfinite(run.solver["min_gap"]), run.solver["min_gap"], np.nan),
-        },
+        "solver": {"iterations per step": run.solver["iterations"] / np.maximum(run.solver["substeps"], 1)},
     }
+    if np.isfinite(run.solver["min_gap"]).all():  # infinite where nothing can touch
+        groups["solver"]["smallest gap [mm]"] = 1e3 * run.solver["min_gap"]
     for group, series in groups.items():
         for index, (name, values) in enumerate(series.items()):
             _send_curve(recording, f"plots/{group}", name, index, run.times, values)

@@ -8,7 +8,8 @@ from bilayer_core.integrate.frame import PlaneInfo
 from bilayer_core.record.colours import strain_colours
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.view import geometry
-from bilayer_core.view.scales import VIEW_ASPECT, VIEW_DIRECTION, place_eye, rounded_up
+from bilayer_core.view.layout import summary
+from bilayer_core.view.scales import VIEW_ASPECT, VIEW_DIRECTION, choose_scales, place_eye, rounded_up
 
 
 def closed_volume(vertices, triangles):
@@ -65,6 +66,17 @@ def test_everything_is_in_the_picture_and_fills_it():
     filled = max(np.abs(across).max() / (shown * VIEW_ASPECT), np.abs(up).max() / shown)
     assert 0.7 < filled < 0.95
     assert across.max() == pytest.approx(-across.min(), rel=0.1)
+
+
+def test_the_text_beside_the_picture_states_its_scales():
+    memory = MemoryRecorder()
+    synthetic_run.run(memory, np.array([0.0, 2.0]))
+    run = memory.run_data()
+    text = summary(run, choose_scales(run))
+    assert "from −6 % (blue) over 0 (grey) to +6 % (red)" in text
+    # Arrows of 21.5 mN become a quarter of the robot's 116 mm, up to rounding of the scale.
+    assert "8 mN for 10 mm" in text
+    assert "Squares on the ground:** 15 mm" in text
 
 
 @pytest.mark.parametrize(("value", "scale"), [(0.052, 0.06), (0.06, 0.06), (9.1e-5, 1e-4), (1.2, 1.5), (70.0, 70.0)])
