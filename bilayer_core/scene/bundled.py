@@ -19,8 +19,10 @@ _SHARED = Path("share") / bilayer_core.DISTRIBUTION / "config" / "scenes"
 def _candidates() -> Iterator[Path]:
     """Directories in which the scenes may be, the likeliest first."""
     # A checkout, an editable install, a colcon symlink install: the package is a link into the checkout.
-    yield Path(bilayer_core.__file__).resolve().parents[1] / "config" / "scenes"
-    for prefix in dict.fromkeys((sysconfig.get_path("data"), sys.prefix)):
+    beside = Path(bilayer_core.__file__).resolve().parents[1]
+    yield beside / "config" / "scenes"
+    # A wheel; with ``pip install --target`` it is beside the package.
+    for prefix in (sysconfig.get_path("data"), sys.prefix, beside):
         yield Path(prefix) / _SHARED
     yield from _recorded()
     for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):

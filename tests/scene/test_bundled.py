@@ -43,7 +43,7 @@ def test_scenes_are_found_through_a_link_to_the_package(nowhere, monkeypatch):
     assert scenes_directory() == directory
 
 
-@pytest.mark.parametrize("prefix", ["data", "prefix"])
+@pytest.mark.parametrize("prefix", ["data", "prefix", "site-packages"])
 def test_scenes_of_a_wheel_are_found_below_the_prefix(nowhere, prefix):
     directory = put_scene(nowhere / prefix / SHARED)
     assert scenes_directory() == directory
