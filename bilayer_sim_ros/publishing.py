@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import math
 
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -11,11 +10,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.topics import Rate, TopicSpec
+from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec
 
 CLOCK_TOPIC = "/clock"
-# Frames come at multiples of the time step, up to rounding; in periods.
-PERIOD_ROUNDING = 1e-6
 
 
 def message_class(ros_type: str) -> type:
@@ -46,8 +43,7 @@ class FramePublisher:
 
     def __init__(self, node: Node, description: Description, rate: float, marker_rate: float, clock: bool):
         self._encoder = FrameEncoder(description)
-        self._display_rate = min(rate, marker_rate)
-        self._display_period = -1
+        self._gate = DisplayGate(rate, marker_rate)
         self._topics: list[tuple[TopicSpec, Publisher]] = [
             (spec, node.create_publisher(message_class(spec.type), spec.full_name("~"), quality_of_service(spec)))
             for spec in self._encoder.topics
@@ -61,9 +57,7 @@ class FramePublisher:
 
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send `frame` on every topic that has a subscriber and is due, or on every one of them."""
-        period = math.floor(frame.time * self._display_rate + PERIOD_ROUNDING)
-        display = everything or period != self._display_period
-        self._display_period = period
+        display = self._gate.is_due(frame.time) or everything
         for spec, publisher in self._topics:
             if (display or spec.rate is not Rate.DISPLAY) and publisher.get_subscription_count() > 0:
                 publisher.publish(self._encoder.encode(spec.name, frame))

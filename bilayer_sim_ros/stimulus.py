@@ -65,7 +65,7 @@ class StimulusInputs:
         with self._lock:
             self._received: dict[str, float] = {}
         self._heard: dict[str, float] = {}
-        self._acting: dict[str, float] = {}
+        self._acting: dict[str, float | None] = {}
 
     def receive(self, name: str, value: float) -> None:
         """Take the value of one channel; InputError leaves the last good one in force."""
@@ -85,29 +85,34 @@ class StimulusInputs:
         with self._lock:
             self._received.update(values)
 
-    def changes(self, time: float) -> dict[str, float]:
-        """Values to set for the step that begins at `time` [s]: each channel that a message or the fallback changes."""
+    def changes(self, time: float) -> dict[str, float | None]:
+        """What to set for the step that begins at `time` [s]: channels that a message or the fallback changes.
+
+        None gives a channel back to the scene's schedule.
+        """
         with self._lock:
             received, self._received = self._received, {}
         self._heard.update(dict.fromkeys(received, time))
-        wanted = received | {
-            name: value
-            for name in self._channels
-            if name not in received and (value := self._fallback_value(name, time)) is not None
-        }
-        changes = {name: value for name, value in wanted.items() if name in received or value != self._acting.get(name)}
+        changes: dict[str, float | None] = dict(received)
+        for name, channel in self._channels.items():
+            if self._is_silent(name, time):
+                value = self._fallback_value(channel, self._acting.get(name))
+                if value != self._acting.get(name):
+                    changes[name] = value
         self._acting.update(changes)
         return changes
 
-    def _fallback_value(self, name: str, time: float) -> float | None:
-        """What the fallback asks for at `time`; None while what is in force goes on."""
-        channel, heard = self._channels[name], self._heard.get(name)
-        if heard is not None and (self._timeout == 0.0 or time - heard < self._timeout - TIME_ROUNDING):
-            return None
+    def _is_silent(self, name: str, time: float) -> bool:
+        """Whether the fallback acts: before the first message, and after the timeout."""
+        if name not in self._heard:
+            return True
+        return self._timeout > 0.0 and time - self._heard[name] >= self._timeout - TIME_ROUNDING
+
+    def _fallback_value(self, channel: Channel, acting: float | None) -> float | None:
         match self._fallback:
             case "zero":
                 return min(max(0.0, channel.minimum), channel.maximum)
             case "hold":
-                return channel.schedule.value(0.0) if heard is None else None
+                return channel.schedule.value(0.0) if acting is None else acting
             case _:
-                return channel.schedule.value(time) if heard is not None else None
+                return None

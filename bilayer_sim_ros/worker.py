@@ -11,16 +11,18 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol
 
-from bilayer_core.errors import BilayerError, InputError
+from bilayer_core.errors import InputError
 from bilayer_core.integrate.frame import Frame
-from bilayer_core.integrate.simulator import Simulator
+from bilayer_core.integrate.simulator import Simulator, Termination
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.stimulus import StimulusInputs
 
 # Shorter waits cost more than they are worth: the simulation may be this far ahead of the clock [s].
 SHORTEST_WAIT = 0.005
-# Real time between two status reports [s].
+# In a log, this stimulus says that the scene's schedule acts again.
+SCHEDULE = math.nan
+# Real time between two status reports, and between two showings of a paused frame [s].
 STATUS_PERIOD = 1.0
 # Output times are compared in output periods; step times are multiples of dt up to rounding.
 PERIOD_ROUNDING = 1e-6
@@ -120,6 +122,7 @@ class SimulationWorker:
         self._stopping = threading.Event()
         self._ended = threading.Event()
         self._requests: queue.SimpleQueue[tuple[Future, Callable[[], str]] | None] = queue.SimpleQueue()
+        self._frame_is_out = True
         self._thread = threading.Thread(target=self._work, name="simulation")
         self.error: Exception | None = None
 
@@ -169,7 +172,7 @@ class SimulationWorker:
     # The rest runs in the worker's thread.
 
     def _work(self) -> None:
-        complete, termination = False, "interrupted"
+        complete, termination = False, Termination.INTERRUPTED.value
         try:
             self._begin()
             while not self._stopping.is_set() and not self._is_over():
@@ -177,8 +180,9 @@ class SimulationWorker:
                 if not self._paused:
                     self._advance()
                 self._report_when_due()
+                self._show_again_when_due()
             if not self._stopping.is_set():
-                complete, termination = True, "duration reached"
+                complete, termination = True, Termination.COMPLETED.value
         except Exception as error:
             self.error, termination = error, str(error)
         finally:
@@ -186,13 +190,21 @@ class SimulationWorker:
 
     def _end(self, complete: bool, termination: str) -> None:
         try:
-            self._recording.close(complete, termination)
-        except BilayerError as error:
+            self._finish_recording(complete, termination)
+        except Exception as error:
             self.error = self.error or error
         finally:
             self._ended.set()
             self._refuse_requests()
             self._finished()
+
+    def _finish_recording(self, complete: bool, termination: str) -> None:
+        """Close the files with the last accepted step in them."""
+        try:
+            if not self._frame_is_out:
+                self._hand_out()
+        finally:
+            self._recording.close(complete, termination)
 
     def _begin(self) -> None:
         """Start a run at the simulator's present state, and hand out its first frame."""
@@ -225,7 +237,7 @@ class SimulationWorker:
 
     def _time_to_wait(self) -> float:
         if self._paused:
-            return max(self._status_since + STATUS_PERIOD - time.monotonic(), 0.0)
+            return max(min(self._status_since, self._shown_at) + STATUS_PERIOD - time.monotonic(), 0.0)
         delay = self._pacer.delay(self._simulator.time)
         return delay if delay >= SHORTEST_WAIT else 0.0
 
@@ -234,9 +246,10 @@ class SimulationWorker:
         start = self._simulator.time
         for channel, value in self._inputs.changes(start).items():
             self._simulator.set_stimulus(channel, value)
-            self._recording.log_stimulus(channel, value, start)
+            self._recording.log_stimulus(channel, SCHEDULE if value is None else value, start)
         report = self._simulator.step()
         self._steps += 1
+        self._frame_is_out = False
         status = self._status
         status.steps += 1
         status.substeps += report.substeps
@@ -252,11 +265,14 @@ class SimulationWorker:
         return math.floor(steps * self._simulator.dt * self._rate + PERIOD_ROUNDING)
 
     def _hand_out(self) -> None:
+        """Show the present frame to all who look."""
+        self._frame_is_out = True
+        self._shown_at = time.monotonic()
         publish = self._publisher.wanted
         if publish or self._recording.wanted:
             frame = self._simulator.frame()
             if publish:
-                self._publisher.publish(frame)
+                self._publisher.publish(frame, everything=self._paused)
             self._recording.observe(frame)
 
     def _report_when_due(self) -> None:
@@ -267,10 +283,15 @@ class SimulationWorker:
             status.real_time_factor = (self._simulator.time - status.time) / real
             status.time, status.paused = self._simulator.time, self._paused
             self._report(status)
-            if self._paused and self._publisher.wanted:
-                self._publisher.publish(self._simulator.frame(), everything=True)
             self._status = Status(self._simulator.time, self._paused)
             self._status_since = now
+
+    def _show_again_when_due(self) -> None:
+        """Send the present frame of a paused simulation to those who came late."""
+        if self._paused and time.monotonic() - self._shown_at >= STATUS_PERIOD:
+            self._shown_at = time.monotonic()
+            if self._publisher.wanted:
+                self._publisher.publish(self._simulator.frame(), everything=True)
 
     def _do_pause(self) -> str:
         self._paused = True
@@ -291,7 +312,7 @@ class SimulationWorker:
 
     def _do_reset(self) -> str:
         following = self._recording.of_next_run()
-        self._recording.close(False, "reset")
+        self._finish_recording(False, "reset")
         self._recording = following
         self._simulator.reset()
         self._inputs.reset()

@@ -29,6 +29,7 @@ class NodeProcess:
     """An executable of the package, running or ended, with everything that it printed."""
 
     def __init__(self, module, directory, domain, parameters=None, arguments=()):
+        self.domain = domain
         command = [sys.executable, "-m", f"bilayer_sim_ros.{module}", *arguments]
         if parameters:
             command += ["--ros-args"]
@@ -71,11 +72,12 @@ class NodeProcess:
 
 
 class Client:
-    """A node of the test's own that listens, sends and calls services."""
+    """A node of the test's own that listens to a process, sends to it and calls its services."""
 
-    def __init__(self, domain):
+    def __init__(self, process):
+        self._process = process
         self._context = rclpy.Context()
-        rclpy.init(context=self._context, domain_id=domain)
+        rclpy.init(context=self._context, domain_id=process.domain)
         self.node = Node("client", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
@@ -84,6 +86,7 @@ class Client:
         """Serve callbacks until `condition()` is true; its value."""
         deadline = time.monotonic() + limit
         while not (value := condition()):
+            assert self._process.running, f"the node ended while the test waited for {what}:\n{self._process.output}"
             assert time.monotonic() < deadline, f"waited {limit} s for {what}"
             self._executor.spin_once(timeout_sec=0.05)
         return value
@@ -132,11 +135,11 @@ def start(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def connect():
-    """Makes clients in a domain; they close with the module."""
+    """Makes clients of processes; they close with the module."""
     clients = []
 
-    def begin(domain):
-        clients.append(Client(domain))
+    def begin(process):
+        clients.append(Client(process))
         return clients[-1]
 
     yield begin
