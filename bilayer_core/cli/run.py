@@ -14,9 +14,7 @@ from bilayer_core.cli.watch import Interrupt, notice_of_compilation, progress_ba
 from bilayer_core.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
-    from bilayer_core.integrate.frame import Description, Frame
     from bilayer_core.integrate.simulator import Simulator
-    from bilayer_core.record.mcap_log import McapRecorder
     from bilayer_core.scene.config import SceneConfig
 
 SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
@@ -49,7 +47,7 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
         changes.append(f"output.rate={options['log_rate']}")
     config = load_scene(scene, changes)
     interrupt = Interrupt()
-    observers = _open_outputs(config, options, interrupt)
+    observers = _open_outputs(config, options)
     simulator = _make_simulator(config, options["from_state"], quiet)
     duration = _duration(simulator, duration)
     failure = _simulate(simulator, duration, observers, interrupt, quiet)
@@ -59,7 +57,7 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     return INTERRUPTED if interrupt.granted else 0
 
 
-def _open_outputs(config: SceneConfig, options: dict[str, Any], interrupt: Interrupt) -> list:
+def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     """The recorders; whatever cannot be written is refused here, before anything is computed."""
     from bilayer_core.record.mcap_log import McapRecorder
     from bilayer_core.record.paths import check_output_path
@@ -72,7 +70,7 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any], interrupt: Inter
             raise InputError(f"{path}: is named for two outputs; give each a file of its own")
     observers = []
     if options["log"]:
-        observers.append(_Log(McapRecorder(options["log"], output.rate, output.marker_rate, force), interrupt))
+        observers.append(McapRecorder(options["log"], output.rate, output.marker_rate, force))
     if options["rrd"]:
         from bilayer_core.view.rerun_view import RrdRecorder
 
@@ -146,25 +144,3 @@ def _finish(
     for key in OUTPUT_OPTIONS:
         if options[key]:
             click.echo(f"  {key.replace('_', ' '):22}{options[key]}")
-
-
-class _Log:
-    """The log as an observer; it also says why a run ended early."""
-
-    def __init__(self, recorder: McapRecorder, interrupt: Interrupt):
-        self.rate = recorder.rate
-        self._recorder = recorder
-        self._interrupt = interrupt
-
-    def start(self, description: Description) -> None:
-        """Begin the file."""
-        self._recorder.start(description)
-
-    def observe(self, frame: Frame) -> None:
-        """Hand on a frame."""
-        self._recorder.observe(frame)
-
-    def close(self, complete: bool) -> None:
-        """Finish the file."""
-        ending = "completed" if complete else "interrupted" if self._interrupt.wished else "failed"
-        self._recorder.close(complete, ending)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -36,8 +37,8 @@ class Observer(Protocol):
     def observe(self, frame: Frame) -> None:
         """Called with every frame that is due, the first and the last included."""
 
-    def close(self, complete: bool) -> None:
-        """Called once at the end; `complete` is false if the run was cut short."""
+    def close(self, complete: bool, termination: str = "") -> None:
+        """Called once at the end; `complete` is false if the run was cut short, `termination` says why it ended."""
 
 
 class Termination(Enum):
@@ -293,7 +294,7 @@ class Simulator:
         self.compile()
         steps = int(round(left / self.dt))
         begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
-        termination, complete = Termination.COMPLETED, False
+        termination = Termination.INTERRUPTED
         schedule = _Schedule(observers, self)
         try:
             schedule.start()
@@ -303,12 +304,15 @@ class Simulator:
                 if progress is not None:
                     progress(self.time)
                 if stop is not None and done < steps and stop():
-                    termination = Termination.INTERRUPTED
                     break
-            complete = termination is Termination.COMPLETED
+            else:
+                termination = Termination.COMPLETED
+        except SimulationError:
+            termination = Termination.FAILED
+            raise
         finally:
-            self.termination = termination.value if self.termination != Termination.FAILED.value else self.termination
-            schedule.finish(complete)
+            self.termination = termination.value
+            schedule.finish(termination)
         return RunResult(
             termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
         )
@@ -374,14 +378,14 @@ class _Schedule:
             self._observers[i].observe(frame)
             self._last_seen[i] = frame.step
 
-    def finish(self, complete: bool) -> None:
+    def finish(self, termination: Termination) -> None:
+        """Show the last frame to whom it is missing, and close all, whatever goes wrong with one of them."""
         if not self._observers:
             return
         step = round(self._simulator.time / self._simulator.dt)
-        try:
+        with ExitStack() as closing:
+            for observer in reversed(self._observers):
+                closing.callback(observer.close, termination is Termination.COMPLETED, termination.value)
             missing = [i for i, seen in enumerate(self._last_seen) if seen not in (-1, step)]
             if missing:
                 self._show(missing)
-        finally:
-            for observer in self._observers:
-                observer.close(complete)

@@ -29,7 +29,7 @@ class MemoryRecorder:
         """Keep `frame`."""
         self.frames.append(frame)
 
-    def close(self, complete: bool) -> None:
+    def close(self, complete: bool, termination: str = "") -> None:
         """Note whether the run reached its end."""
         self.complete = complete
 

@@ -53,9 +53,9 @@ class RrdRecorder(MemoryRecorder):
         _require_rerun()
         self.path = check_output_path(path, force)
 
-    def close(self, complete: bool) -> None:
+    def close(self, complete: bool, termination: str = "") -> None:
         """Write the recording, also of a run that ended early."""
-        super().close(complete)
+        super().close(complete, termination)
         if self.frames:
             write_rrd(self.run_data(), self.path)
 

@@ -25,8 +25,8 @@ class Recorder:
     def observe(self, frame):
         self.frames.append(frame)
 
-    def close(self, complete):
-        self.closed = complete
+    def close(self, complete, termination):
+        self.closed, self.termination = complete, termination
 
 
 @pytest.fixture
@@ -123,7 +123,7 @@ def test_an_interrupted_run_tells_its_observers(simulator):
     recorder = Recorder(100.0)
     result = simulator.run(0.05, observers=[recorder], stop=lambda: simulator.time > 0.0225)
     assert result.termination is Termination.INTERRUPTED
-    assert recorder.closed is False
+    assert (recorder.closed, recorder.termination) == (False, "interrupted")
     assert recorder.frames[-1].time == pytest.approx(0.023)
     assert simulator.summary()["termination"] == "interrupted"
 
@@ -139,7 +139,7 @@ def test_a_solver_that_cannot_go_on_says_what_and_when_and_keeps_the_last_state(
     ):
         simulator.run(0.05, observers=[recorder])
     assert np.array_equal(simulator.save_state(), before, equal_nan=True)
-    assert recorder.closed is False and recorder.frames[-1].time == 0.0
+    assert (recorder.closed, recorder.termination) == (False, "failed") and recorder.frames[-1].time == 0.0
     assert simulator.summary()["termination"] == "failed"
 
 

@@ -22,7 +22,7 @@ class Gaps:
         self.heights.append(frame.body_positions[self.ball, 2])
         self.smallest = min(self.smallest, frame.min_gap)
 
-    def close(self, complete):
+    def close(self, complete, termination):
         assert complete
 
 
