@@ -21,6 +21,7 @@ from bilayer_core.scene.units import (
     NonNegativeTime,
     Number,
     PlainNumber,
+    PositiveAngle,
     PositiveDensity,
     PositiveInertia,
     PositiveLength,
@@ -92,6 +93,29 @@ class StraightPath(_Part):
     length: PositiveLength
 
 
+class ArcPath(_Part):
+    """A part of a circle in the plane of its direction and the rod's normal."""
+
+    shape: Literal["arc"]
+    start: Point
+    direction: Direction
+    """Tangent at the start."""
+    radius: PositiveLength
+    angle: PositiveAngle
+    toward: Literal["normal", "opposite"] = "normal"
+    """Side on which the centre lies: that of the rod's normal at the start, or the other."""
+
+    @property
+    def length(self) -> float:
+        """Length of the arc [m]."""
+        return self.radius * self.angle
+
+    @property
+    def curvature(self) -> float:
+        """Towards the normal [1/m]."""
+        return (1.0 if self.toward == "normal" else -1.0) / self.radius
+
+
 class Pattern(_Part):
     """Copies of a rod, turned about an axis at equal angles; the first is the rod itself."""
 
@@ -118,8 +142,8 @@ class Layer(_Part):
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
     eigenstrain: Eigenstrain | None = None
-    natural_curvature: Curvature = 0.0
-    """Of the layer by itself, through the thickness: positive where it bends towards the normal."""
+    natural_curvature: Curvature | None = None
+    """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
     natural_twist: Twist = 0.0
     """Of the layer by itself, about the path."""
 
@@ -129,9 +153,9 @@ class Rod(_Part):
 
     name: Name
     width: PositiveLength
-    path: StraightPath
+    path: Annotated[StraightPath | ArcPath, Field(discriminator="shape")]
     normal: Direction
-    """Through the thickness, from the first layer (bottom) to the last (top)."""
+    """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path."""
     stations: whole(3)
     """Cross-sections along the path, both ends included."""
     layers: list[Layer] = Field(min_length=1, max_length=2)

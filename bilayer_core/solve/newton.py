@@ -16,7 +16,7 @@ from enum import Enum
 import numpy as np
 
 from ..contact.step_bound import step_bound
-from ..model.build import carrier_names
+from ..model.bodies import carrier_names
 from ..model.model import Model
 from .configuration import Configuration
 from .potential import IncrementalPotential, StepContext

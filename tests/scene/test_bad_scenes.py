@@ -74,7 +74,7 @@ def faults_of(content) -> list[str]:
         # choices and names
         ("schema", 2, "found 2; must be 1"),
         ("rods.arm.torsion", "layer", "found \"layer\"; must be 'laminate' or 'layers'"),
-        ("rods.arm.path.shape", "arc", "found \"arc\"; must be 'straight'"),
+        ("rods.arm.path", {"shape": "spiral"}, "found {\"shape\": \"spiral\"}; `shape` must be one of 'straight', 'arc'"),
         ("stimuli.humidity.schedule", {"value": 1}, "found {\"value\": 1}; the key 'type' is missing"),
         (
             "rods.arm.layers.active.material",

@@ -1,0 +1,261 @@
+"""Rods: from paths, layers and sections to nodes, edges, joints and bonds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..kinematics.path import circle, rest_strains, straight
+from ..kinematics.rotation import rotation_matrix
+from ..scene.config import ArcPath, Fluid, Layer, Rod, SceneConfig
+from .model import StrandArrays
+from .section import Bond, Section, bond, rectangle
+
+
+@dataclass
+class Collected:
+    """What grows while rods are added one after the other."""
+
+    strands: list[StrandArrays] = field(default_factory=list)
+    rods: list[list[tuple[int, int, int, int]]] = field(default_factory=list)
+    columns: dict[str, list] = field(default_factory=dict)
+    laws: list[tuple[int, float, float]] = field(default_factory=list)
+    node_count: int = 0
+    edge_count: int = 0
+
+    def add(self, **values) -> None:
+        for name, value in values.items():
+            self.columns.setdefault(name, []).append(np.atleast_1d(value))
+
+    def column(self, name: str, dtype=float, width: int | None = None) -> np.ndarray:
+        parts = self.columns.get(name)
+        if not parts:
+            array = np.zeros((0,) if width is None else (0, width), dtype)
+        else:
+            array = np.concatenate(parts).astype(dtype)
+        array = np.ascontiguousarray(array)
+        array.flags.writeable = False
+        return array
+
+
+Turn = Callable[..., np.ndarray]
+
+
+def turn_of_copy(rod: Rod, copy: int) -> Turn:
+    """Function that turns directions of a rod, or points with ``about=True``, to those of one of its copies."""
+    if rod.pattern is None:
+        return lambda vectors, about=False: vectors
+    turn = rotation_matrix(2.0 * np.pi * copy / rod.pattern.count * np.array(rod.pattern.axis))
+    turn[np.abs(turn) < 1e-15] = 0.0  # quarter turns are exact
+    center = np.array(rod.pattern.center)
+
+    def apply(vectors: np.ndarray, about: bool = False) -> np.ndarray:
+        return (vectors - center) @ turn.T + center if about else vectors @ turn.T
+
+    return apply
+
+
+def add_rod(found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Turn, body_index: dict[str, int]) -> None:
+    """Add one copy of a rod: its strands, their drag, and the bond between them."""
+    sections = [rectangle(scene.materials[layer.material], rod.width, layer.thickness) for layer in rod.layers]
+    heights = [0.0] if len(sections) == 1 else [-0.5 * sections[0].thickness, 0.5 * sections[1].thickness]
+    spans = []
+    for layer, section, height in zip(rod.layers, sections, heights, strict=True):
+        first, last = rod.covered_stations(layer)
+        shape = _strand_shape(rod, height, first, last, turn)
+        spans.append((first, last, found.node_count, found.edge_count))
+        strand = StrandArrays(
+            f"{name}/{layer.name}",
+            name,
+            layer.name,
+            found.node_count,
+            last - first + 1,
+            found.edge_count,
+            rod.width,
+            layer.thickness,
+        )
+        clamps = []
+        if rod.clamp_start is not None and first == 0:
+            clamps.append((body_index[rod.clamp_start], 0))
+        if rod.clamp_end is not None and last == rod.stations - 1:
+            clamps.append((body_index[rod.clamp_end], -1))
+        _add_strand(found, scene, layer, section, strand, shape, clamps)
+    found.rods.append(spans)
+    if scene.fluid is not None:
+        _add_drag(found, scene.fluid, rod, spans)
+    if len(spans) == 2:
+        _add_bond(found, bond(sections[0], sections[1], scene.coupling, rod.torsion), spans)
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A strand at the start: its nodes, the frames of its edges, and those of the path at its two ends."""
+
+    positions: np.ndarray
+    lengths: np.ndarray
+    tangents: np.ndarray
+    normals: np.ndarray
+    end_tangents: np.ndarray
+    end_normals: np.ndarray
+
+
+def _strand_shape(rod: Rod, height: float, first: int, last: int, turn: Turn) -> _Shape:
+    """Shape of the layer whose centreline lies `height` [m] from the path, between two stations."""
+    frame = (np.array(rod.path.start), np.array(rod.path.direction), np.array(rod.normal))
+
+    def along(stations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        arc = rod.edge_length * stations
+        if isinstance(rod.path, ArcPath):
+            return circle(*frame, rod.path.curvature, arc)
+        return straight(*frame, arc)
+
+    points, tangents, normals = along(np.arange(first, last + 1))
+    _, _, middle_normals = along(np.arange(first, last) + 0.5)
+    positions = turn(points + height * normals, about=True)
+    edges = np.diff(positions, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    ends = [0, -1]
+    return _Shape(
+        positions, lengths, edges / lengths[:, None], turn(middle_normals), turn(tangents[ends]), turn(normals[ends])
+    )
+
+
+def _add_strand(
+    found: Collected,
+    scene: SceneConfig,
+    layer: Layer,
+    section: Section,
+    strand: StrandArrays,
+    shape: _Shape,
+    clamps: list[tuple[int, int]],
+) -> None:
+    nodes, edges = strand.node_count, strand.node_count - 1
+    first_edge = strand.first_edge
+    rest = shape.lengths
+    voronoi = np.zeros(nodes)
+    voronoi[:-1] += 0.5 * rest
+    voronoi[1:] += 0.5 * rest
+    found.strands.append(strand)
+    found.add(
+        position=shape.positions,
+        tangent=shape.tangents,
+        director1=shape.normals,
+        node_mass=section.mass * voronoi,
+        node_weight=voronoi,
+        node_radius=np.full(nodes, 0.5 * section.thickness),
+        spin_inertia=section.spin_inertia * rest,
+        half_width=np.full(edges, 0.5 * section.width),
+        edge_node=strand.first_node + np.arange(edges),
+        rest_length=rest,
+        axial_stiffness=np.full(edges, section.axial_stiffness),
+        eigenstrain_law=np.full(edges, _law_of_layer(found, scene, layer)),
+    )
+    bend = np.array([*section.bending_stiffness, section.twisting_stiffness])
+    inner = voronoi[1:-1]
+    found.add(
+        joint_a=first_edge + np.arange(edges - 1),
+        joint_b=first_edge + np.arange(1, edges),
+        joint_stiffness=bend / inner[:, None],
+        joint_rest=_natural(
+            layer, inner, shape.tangents[:-1], shape.normals[:-1], shape.tangents[1:], shape.normals[1:]
+        ),
+        joint_node=strand.first_node + np.arange(1, nodes - 1),
+        voronoi_length=inner,
+    )
+    for body, end in clamps:
+        wall = -1 - sum(len(part) for part in found.columns.get("wall_tangent", []))
+        node = strand.first_node if end == 0 else strand.first_node + nodes - 1
+        edge = first_edge if end == 0 else first_edge + edges - 1
+        fixed = (shape.end_tangents[[end]], shape.end_normals[[end]])
+        moving = (shape.tangents[[end]], shape.normals[[end]])
+        from_start = (*fixed, *moving) if end == 0 else (*moving, *fixed)
+        found.add(
+            wall_tangent=fixed[0],
+            wall_director1=fixed[1],
+            attached_node=node,
+            attached_body=body,
+            attached_position=(shape.positions[end] - np.array(scene.bodies[body].position))[None],
+            joint_a=wall if end == 0 else edge,
+            joint_b=edge if end == 0 else wall,
+            joint_stiffness=(bend / voronoi[end])[None],
+            joint_rest=_natural(layer, voronoi[[end]], *from_start),
+            joint_node=node,
+            voronoi_length=voronoi[end],
+        )
+    found.node_count += nodes
+    found.edge_count += edges
+
+
+def _natural(layer: Layer, voronoi: np.ndarray, *frames: np.ndarray) -> np.ndarray:
+    """κ̄₁ κ̄₂ ψ̄ of elements [rad] with frames (t, m1) on either side:
+    the layer's natural shape, by default that at the start.
+    """
+    rest = rest_strains(*frames)
+    if layer.natural_curvature is not None:
+        rest[:, :2] = 0.0
+        rest[:, 0] = layer.natural_curvature * voronoi
+    rest[:, 2] += layer.natural_twist * voronoi
+    return rest
+
+
+def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, int, int, int]]) -> None:
+    """Drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts at
+    the middle.
+    """
+    length = np.full(rod.stations, rod.edge_length)
+    length[[0, -1]] *= 0.5
+    thickness = np.zeros(rod.stations)
+    for (first, last, _, _), layer in zip(spans, rod.layers, strict=True):
+        thickness[first : last + 1] += layer.thickness
+    along, across = fluid.drag_along * rod.width, fluid.drag_across * rod.width
+    whole = np.stack(
+        [np.full(rod.stations, along), np.full(rod.stations, across), fluid.drag_across * thickness], axis=1
+    )
+    for (first, last, first_node, first_edge), layer in zip(spans, rod.layers, strict=True):
+        station = np.arange(last - first + 1)
+        covered = slice(first, last + 1)
+        share = fluid.density * length[covered] * layer.thickness / thickness[covered]
+        edges = np.stack([np.maximum(station - 1, 0), np.minimum(station, last - first - 1)], axis=1)
+        found.add(
+            drag_node=first_node + station,
+            drag_edge=first_edge + edges,
+            drag_coefficient=share[:, None] * whole[covered],
+        )
+
+
+def _law_of_layer(found: Collected, scene: SceneConfig, layer: Layer) -> int:
+    """Index of the eigenstrain law of a layer, −1 if it has none; equal laws are one."""
+    if layer.eigenstrain is None:
+        return -1
+    channel = list(scene.stimuli).index(layer.eigenstrain.stimulus)
+    law = (channel, layer.eigenstrain.gain, layer.eigenstrain.time_constant)
+    if law not in found.laws:
+        found.laws.append(law)
+    return found.laws.index(law)
+
+
+def _add_bond(found: Collected, law: Bond, spans: list[tuple[int, int, int, int]]) -> None:
+    """Bonds of paired edges; the rest values are those of the initial shape."""
+    bottom, top = spans
+    first, last = max(bottom[0], top[0]), min(bottom[1], top[1])
+    position, tangent, m1 = (found.column(name, width=3) for name in ("position", "tangent", "director1"))
+    edges = [layer[3] + np.arange(first, last) - layer[0] for layer in (top, bottom)]
+    nodes = [layer[2] + np.arange(first, last) - layer[0] for layer in (top, bottom)]
+    middles = [0.5 * (position[start] + position[start + 1]) for start in nodes]
+    frames = [(tangent[edge], m1[edge]) for edge in edges]
+    between = middles[0] - middles[1]
+    mean = [0.5 * (frames[0][1] + frames[1][1]), 0.5 * (frames[0][0] + frames[1][0])]  # m1 and the tangent
+    across = 0.5 * (np.cross(*frames[0]) + np.cross(*frames[1]))
+    length = found.column("rest_length")
+    weight = 0.5 * (length[edges[0]] + length[edges[1]])
+    found.add(
+        bond_joint_a=edges[0],
+        bond_joint_b=edges[1],
+        bond_joint_stiffness=weight[:, None] * np.array([law.bending, law.tilt, law.twist]),
+        bond_joint_rest=rest_strains(*frames[0], *frames[1]),
+        bond_joint_node=np.full(last - first, -1),
+        pair_stiffness=weight * law.translation,
+        pair_rest=np.stack([np.einsum("ij,ij->i", between, m) for m in (mean[0], across, mean[1])], axis=1),
+    )
