@@ -116,11 +116,13 @@ def key_path(location: Location, data: Any) -> str:
         if part == "[key]":
             continue
         if isinstance(part, int):
+            if isinstance(here, dict):  # which stands for a list of one
+                continue
             item = here[part] if isinstance(here, list | tuple) and part < len(here) else None
             name = item.get("name") if isinstance(item, dict) else None
             path += f".{name}" if isinstance(name, str) else f"[{part}]"
             here = item
-        elif isinstance(here, dict) and part not in here and place < len(location) - 1:
+        elif isinstance(here, dict) and part not in here and place < len(location) - 1 and part in here.values():
             continue
         else:
             path += f".{part}"

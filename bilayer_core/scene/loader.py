@@ -24,7 +24,8 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     Parameters
     ----------
     scene : str, Path or mapping
-        Path of a YAML file, name of a bundled scene, or the content of a scene.
+        Path of a YAML file, name of a bundled scene, or the content of a scene. Files that a scene names are relative
+        to its own file, for a mapping to the working directory.
     overrides : sequence of str
         Values to change, ``PATH=VALUE`` each, such as ``rods.arm.stations=100``.
 
@@ -39,7 +40,7 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] =
         One line for each fault: file, key path, the value found, what is allowed.
     """
     if isinstance(scene, Mapping):
-        return _validated(dict(scene), "scene", overrides)
+        return _validated(dict(scene), "scene", overrides, Path())
     path = _find(scene)
     try:
         text = path.read_text(encoding="utf-8")
@@ -47,12 +48,14 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] =
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise SceneError(f"{path}: is not UTF-8 text: {error.reason} at byte {error.start}") from None
-    return parse_scene(text, str(path), overrides)
+    return parse_scene(text, str(path), overrides, path.parent)
 
 
-def parse_scene(text: str, source: str, overrides: Sequence[str] = ()) -> SceneConfig:
-    """Validate the text of a scene; `source` begins each line of an error. Otherwise as `load_scene`."""
-    return _validated(read_yaml(text, source), source, overrides)
+def parse_scene(text: str, source: str, overrides: Sequence[str] = (), directory: Path = Path()) -> SceneConfig:
+    """Validate the text of a scene; `source` begins each line of an error, and files that the scene names are
+    relative to `directory`. Otherwise as `load_scene`.
+    """
+    return _validated(read_yaml(text, source), source, overrides, directory)
 
 
 def scene_text(config: SceneConfig) -> str:
@@ -72,22 +75,22 @@ def _find(scene: str | Path) -> Path:
     return bundled_scene(scene)
 
 
-def _validated(data: Any, source: str, overrides: Sequence[str]) -> SceneConfig:
+def _validated(data: Any, source: str, overrides: Sequence[str], directory: Path) -> SceneConfig:
     if not isinstance(data, dict):
         raise SceneError(
             f"{source}: found {type(data).__name__}; must be a mapping of keys to values, see the bundled scenes"
         )
-    config = _validate(data, source)
+    config = _validate(data, source, directory)
     if not overrides:
         return config
     data = _content(config)
     for override in overrides:
         apply_override(data, override)
-    return _validate(data, f"{source} with {' '.join(overrides)}")
+    return _validate(data, f"{source} with {' '.join(overrides)}", directory)
 
 
-def _validate(data: dict[str, Any], source: str) -> SceneConfig:
+def _validate(data: dict[str, Any], source: str, directory: Path) -> SceneConfig:
     try:
-        return SceneConfig.model_validate(data)
+        return SceneConfig.model_validate(data, context={"directory": directory})
     except ValidationError as error:
         raise SceneError(tell(error, SceneConfig, data, source)) from None

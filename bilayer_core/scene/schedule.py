@@ -1,14 +1,16 @@
-"""Stimulus over time, as a scene prescribes it: linear between points, constant outside them."""
+"""Stimulus over time, as a scene prescribes it."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 from bilayer_core.scene.faults import Fault, refuse_all
-from bilayer_core.scene.units import NonNegativeTime, PlainNumber, Time
+from bilayer_core.scene.table_file import TableFile, read_table_file
+from bilayer_core.scene.units import NonNegativeTime, PlainNumber, PositiveTime, Time
+from bilayer_core.scene.waveform import ROUNDING, PulseTrain, Sine, Square
 
 
 class Hold(BaseModel):
@@ -58,7 +60,7 @@ class Ramp(BaseModel):
 
 
 class Table(BaseModel):
-    """Values at given times."""
+    """Values at given times, linear between them and constant outside."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -88,7 +90,63 @@ class Table(BaseModel):
         return {("values", index): value for index, value in enumerate(self.values)}
 
 
-Schedule = Annotated[Hold | Ramp | Table, Field(discriminator="type")]
+class Part(BaseModel):
+    """A part of a sequence."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    duration: PositiveTime
+    schedule: Schedule
+    """Its time begins with the part."""
+
+
+class Sequence(BaseModel):
+    """Schedules one after the other; after the last, its value at its end, or from the beginning again."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    type: Literal["sequence"]
+    parts: list[Part] = Field(min_length=1)
+    repeat: bool = False
+
+    def value(self, t: float) -> float:
+        """Value at time `t` [s], in the unit of the channel."""
+        total = sum(part.duration for part in self.parts)
+        elapsed = t + ROUNDING * total
+        if self.repeat:
+            elapsed %= total
+        for part in self.parts[:-1]:
+            if elapsed < part.duration:
+                break
+            elapsed -= part.duration
+        else:
+            part = self.parts[-1]
+        return part.schedule.value(min(max(elapsed - ROUNDING * total, 0.0), part.duration))
+
+    def points(self) -> dict[tuple[str | int, ...], float]:
+        """Values between which all others lie, by their keys."""
+        return {
+            ("parts", index, "schedule", *key): value
+            for index, part in enumerate(self.parts)
+            for key, value in part.schedule.points().items()
+        }
+
+
+def _as_table(schedule: BaseModel, info: ValidationInfo) -> BaseModel:
+    """The table that a csv file holds, any other schedule as it is: a validated scene needs no further file."""
+    if not isinstance(schedule, TableFile):
+        return schedule
+    times, values = read_table_file(schedule, (info.context or {}).get("directory", ""))
+    return Table(type="table", times=times, values=values)
+
+
+Schedule = Annotated[
+    Hold | Ramp | Table | Sine | Square | PulseTrain | Sequence | TableFile,
+    Field(discriminator="type"),
+    AfterValidator(_as_table),
+]
+Part.model_rebuild()
+Sequence.model_rebuild()
 
 
 def faults_of_times(times: list[float], key: tuple[str], values: list) -> list[Fault]:
