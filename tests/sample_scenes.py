@@ -82,13 +82,15 @@ def everything(stations=6):
         pattern={"count": 2},
     )
     point = {"position": [0, 0, -0.0005], "length": 0.01, "offset": 0.0005}
+    uneven = contact(coefficient=0.5, speed_threshold=1e-2)
+    uneven["friction"] |= {"forward": 0.3, "backward": 0.6, "sideways": 0.4}
     return scene(
         [arm],
         gravity=[0.3, 0.2, -10.0],
         stimuli={"humidity": {"schedule": {"type": "hold", "value": 0.5}}},
         bodies=[fixed("hub", (0, 0, 0.0425), contact_points=[point]), ball((0, 0, 0.0209), shell=True)],
         obstacles=[GROUND],
-        contact=contact(coefficient=0.5, speed_threshold=1e-2),
+        contact=uneven,
         damping={"mass": 2.0},
         fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05]},
     )

@@ -1,19 +1,22 @@
-"""Smoothed Coulomb friction, lagged once per step.
+"""Smoothed Coulomb friction, lagged once per step, that may differ with the direction of sliding.
 
 With normal force λ, normal n and contact points taken at the start of the step, the slip u of the contact points over
-the step of length h
-gives the dissipation potential (Li et al. 2020, eq. 14)
+the step of length h gives a dissipation potential (Li et al. 2020, eq. 14; paper, eqs. 21 and 22, f₁ and u_t put
+right). Let a be the forward direction in the tangent plane, s = n × a, and
 
-    D = μ λ h f₀(|u_t|/h),   u_t = (I − n nᵀ) u,   force −μ λ f₁(|u_t|/h) u_t/|u_t|        (paper, eqs. 21 and 22, f₁
-    and u_t put right)
+    ψ(u)² = (μ± u·a)² + (μ_s u·s)²,   μ± = μ₊ where u·a ≥ 0, μ₋ elsewhere,   μ = max(μ₊, μ₋, μ_s),   w = ψ/(μ h)
 
-    ∂D/∂u = μ λ f₁/|u_t| u_t =: G,    ∂²D/∂u² = μ λ [f₁/|u_t| (T − û ûᵀ) + f₁′/h û ûᵀ] =: F,   T = I − n nᵀ, û =
-    u_t/|u_t|
+    D = λ μ h f₀(w),   force −λ f₁(w) q/ψ,   q = μ±² (u·a) a + μ_s² (u·s) s
 
-The contact point of a ball moves with it: y = X + a, where the arm a turns with the ball, δa = δφ×a + ½ δφ×(δφ×a). So
-u depends on both
-carriers' positions and rotations, and the force on one is opposite to that on the other, moment included. F is
-positive semidefinite.
+A slip along +a meets λ μ₊, one along −a λ μ₋; with equal coefficients D = μ λ h f₀(|u_t|/h). D is convex, ψ² once
+continuously differentiable:
+
+    ∂D/∂u = λ κ q =: G,   κ = f₁/(w μ h)
+    ∂²D/∂u² = λ [κ (μ±² a aᵀ + μ_s² s sᵀ) + (f₁′ − f₁/w)/(w² (μ h)³) q qᵀ] =: F
+
+The contact point of a ball moves with it: y = X + r, where the arm r turns with the ball, δr = δφ×r + ½ δφ×(δφ×r). So u
+depends on both carriers' positions and rotations, and the force on one is opposite to that on the other, moment
+included. F is positive semidefinite.
 """
 
 from __future__ import annotations
@@ -31,7 +34,6 @@ from ..jit import kernel
 def lag_friction(
     d_hat,
     stiffness,
-    coefficient,
     weight,
     radius,
     position,
@@ -45,7 +47,7 @@ def lag_friction(
     load_out,
     normal_out,
 ):
-    """List the contacts at the start of a step: who, μλ [N] and outward normal; return how many.
+    """List the contacts at the start of a step: who, λ [N] and outward normal; return how many.
 
     Carrier and pair arrays are as in `forces.contact`. Outputs have room for every candidate: `first_out`,
     `second_out` (−1 for a plane),
@@ -62,7 +64,7 @@ def lag_friction(
                 first_out[count] = i
                 second_out[count] = -1
                 pair_out[count] = -1
-                load_out[count] = -coefficient * stiffness * weight[i] * barrier_gradient(d, d_hat)
+                load_out[count] = -stiffness * weight[i] * barrier_gradient(d, d_hat)
                 for j in range(3):
                     normal_out[count, j] = plane_normal[m, j]
                 count += 1
@@ -75,12 +77,47 @@ def lag_friction(
             first_out[count] = i
             second_out[count] = j
             pair_out[count] = k
-            load_out[count] = -coefficient * stiffness * weight[i] * barrier_gradient(d, d_hat)
+            load_out[count] = -stiffness * weight[i] * barrier_gradient(d, d_hat)
             normal_out[count, 0] = n0 / distance
             normal_out[count, 1] = n1 / distance
             normal_out[count, 2] = n2 / distance
             count += 1
     return count
+
+
+@kernel
+def lag_axes(count, first, normal, node_edges, node_axis, tangent, director1, axis_out):
+    """Forward direction of each contact in its tangent plane, unit, shape (·, 3).
+
+    That of the rod at a node (mean of its edges), any direction for a body. A rod whose direction is along the normal
+    has no forward direction there: what rounding leaves of the projection decides.
+    """
+    for k in range(count):
+        i = first[k]
+        x, y, z = 1.0, 0.0, 0.0
+        if i < node_axis.shape[0]:
+            p, q = node_edges[i, 0], node_edges[i, 1]
+            t0, t1, t2 = tangent[p, 0] + tangent[q, 0], tangent[p, 1] + tangent[q, 1], tangent[p, 2] + tangent[q, 2]
+            m0, m1, m2 = (
+                director1[p, 0] + director1[q, 0],
+                director1[p, 1] + director1[q, 1],
+                director1[p, 2] + director1[q, 2],
+            )
+            x, y, z = t0, t1, t2
+            if node_axis[i] == 1:
+                x, y, z = m0, m1, m2
+            elif node_axis[i] == 2:
+                x, y, z = t1 * m2 - t2 * m1, t2 * m0 - t0 * m2, t0 * m1 - t1 * m0
+        n0, n1, n2 = normal[k, 0], normal[k, 1], normal[k, 2]
+        for _ in range(2):
+            along = x * n0 + y * n1 + z * n2
+            x, y, z = x - along * n0, y - along * n1, z - along * n2
+            size = math.sqrt(x * x + y * y + z * z)
+            if size > 0.0:
+                x, y, z = x / size, y / size, z / size
+            else:
+                x, y, z = n1, n2, n0  # parallel to n only if its three components are equal
+        axis_out[k, 0], axis_out[k, 1], axis_out[k, 2] = x, y, z
 
 
 @kernel
@@ -102,6 +139,8 @@ def friction(
     pair,
     load,
     normal,
+    axis,
+    coefficient,
     step_length,
     threshold,
     radius,
@@ -121,8 +160,10 @@ def friction(
 
     Parameters
     ----------
-    count, first, second, pair, load, normal
-        From `lag_friction`.
+    count, first, second, pair, load, normal, axis
+        From `lag_friction` and `lag_axes`.
+    coefficient : Array
+        μ₊, μ₋, μ_s of each carrier, the first of a pair counts, shape (n_carrier, 3).
     step_length : float
         h [s].
     threshold : float
@@ -146,6 +187,8 @@ def friction(
     arm_j = np.empty(3)
     u = np.empty(3)
     g = np.empty(3)
+    q = np.empty(3)
+    across = np.empty(3)
     f = np.empty((3, 3))
     jacobian = np.empty((3, 12))  # of u with respect to x_i, φ_i, x_j, φ_j
     product = np.empty((3, 12))
@@ -165,17 +208,23 @@ def friction(
                 u[m] -= position[j, m] - start_position[j, m] + arm_j[m]
                 if bj >= 0:
                     u[m] += radius[j] * normal[k, m]
-        along = u[0] * normal[k, 0] + u[1] * normal[k, 1] + u[2] * normal[k, 2]
-        slip2 = 0.0
+        forward = u[0] * axis[k, 0] + u[1] * axis[k, 1] + u[2] * axis[k, 2]
+        across[0] = normal[k, 1] * axis[k, 2] - normal[k, 2] * axis[k, 1]
+        across[1] = normal[k, 2] * axis[k, 0] - normal[k, 0] * axis[k, 2]
+        across[2] = normal[k, 0] * axis[k, 1] - normal[k, 1] * axis[k, 0]
+        sideways = u[0] * across[0] + u[1] * across[1] + u[2] * across[2]
+        largest = max(coefficient[i, 0], coefficient[i, 1], coefficient[i, 2])
+        if largest == 0.0:
+            continue
+        ca = (coefficient[i, 0] if forward >= 0.0 else coefficient[i, 1]) ** 2
+        cs = coefficient[i, 2] ** 2
+        scale = largest * step_length
+        speed = math.sqrt(ca * forward * forward + cs * sideways * sideways) / scale
+        energy += load[k] * scale * friction_potential(speed, threshold)
+        ratio = load[k] * friction_over_speed(speed, threshold) / scale
         for m in range(3):
-            u[m] -= along * normal[k, m]
-            slip2 += u[m] * u[m]
-        slip = math.sqrt(slip2)
-        speed = slip / step_length
-        energy += load[k] * step_length * friction_potential(speed, threshold)
-        ratio = load[k] * friction_over_speed(speed, threshold) / step_length
-        for m in range(3):
-            g[m] = ratio * u[m]
+            q[m] = ca * forward * axis[k, m] + cs * sideways * across[m]
+            g[m] = ratio * q[m]
             gradient_out[i, m] += g[m]
             if j >= 0:
                 gradient_out[j, m] -= g[m]
@@ -190,12 +239,13 @@ def friction(
         if not with_hessian:
             continue
 
-        excess = load[k] * friction_slope(speed, threshold) / step_length - ratio
-        inverse2 = 1.0 / slip2 if slip2 > 0.0 else 0.0
+        excess = 0.0
+        if speed > 0.0:
+            bend = friction_slope(speed, threshold) - friction_over_speed(speed, threshold)
+            excess = load[k] * bend / (speed * speed * scale**3)
         for m in range(3):
             for n in range(3):
-                f[m, n] = excess * u[m] * u[n] * inverse2 - ratio * normal[k, m] * normal[k, n]
-            f[m, m] += ratio
+                f[m, n] = excess * q[m] * q[n] + ratio * (ca * axis[k, m] * axis[k, n] + cs * across[m] * across[n])
         if bi < 0 and bj < 0:
             for m in range(3):
                 for n in range(m, 3):

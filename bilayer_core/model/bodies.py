@@ -86,6 +86,9 @@ def build_carriers(scene: SceneConfig, found: Collected, bodies: Bodies) -> Carr
     return Carriers(
         weight=np.concatenate([found.column("node_weight"), [p.length for _, p in points], bodies.radius[spheres]]),
         radius=np.concatenate([found.column("node_radius"), [p.offset for _, p in points], bodies.radius[spheres]]),
+        node_edges=found.column("node_edges", np.int64, 2),
+        node_axis=found.column("node_axis", np.int64),
+        friction=_friction_of_carriers(scene, nodes, first_sphere + len(spheres)),
         point_body=np.array([index for index, _ in points], dtype=np.int64),
         point_position=np.array([point.position for _, point in points], dtype=float).reshape(-1, 3),
         sphere_body=np.array(spheres, dtype=np.int64),
@@ -95,6 +98,14 @@ def build_carriers(scene: SceneConfig, found: Collected, bodies: Bodies) -> Carr
         plane_point=np.array([plane.point for plane in scene.obstacles], dtype=float).reshape(-1, 3),
         plane_normal=np.array([plane.normal for plane in scene.obstacles], dtype=float).reshape(-1, 3),
     )
+
+
+def _friction_of_carriers(scene: SceneConfig, nodes: int, carriers: int) -> np.ndarray:
+    """Friction coefficients forward, backward and sideways of each carrier, shape (n_carrier, 3)."""
+    law = scene.contact.friction if scene.contact else None
+    coefficients = np.full((carriers, 3), law.coefficient if law else 0.0)
+    coefficients[:nodes] = law.of_rods if law else 0.0
+    return coefficients
 
 
 def carrier_names(model: Model) -> list[str]:

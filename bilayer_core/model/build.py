@@ -35,6 +35,7 @@ def build_model(scene: SceneConfig) -> Model:
         array.flags.writeable = False
         return array
 
+    laws = np.array(found.laws, dtype=float).reshape(-1, 6)
     model = Model(
         scene=scene,
         strands=tuple(found.strands),
@@ -62,10 +63,14 @@ def build_model(scene: SceneConfig) -> Model:
         edge_node=found.column("edge_node", np.int64),
         rest_length=found.column("rest_length"),
         axial_stiffness=found.column("axial_stiffness"),
-        eigenstrain_law=found.column("eigenstrain_law", np.int64),
-        law_channel=np.array([law[0] for law in found.laws], dtype=np.int64),
-        law_gain=np.array([law[1] for law in found.laws]),
-        law_time_constant=np.array([law[2] for law in found.laws]),
+        driven_edge=found.column("driven_edge", np.int64),
+        driven_law=found.column("driven_law", np.int64),
+        law_channel=laws[:, 0].astype(np.int64),
+        law_rising=laws[:, 1],
+        law_falling=laws[:, 2],
+        law_gain=laws[:, 3],
+        law_reference=laws[:, 4],
+        law_saturation=laws[:, 5],
         joint_a=np.concatenate([wall_a, found.column("bond_joint_a", np.int64)]),
         joint_b=np.concatenate([wall_b, found.column("bond_joint_b", np.int64)]),
         joint_stiffness=joined("joint_stiffness", width=3),

@@ -55,6 +55,9 @@ class Carriers:
 
     weight: Array  # Δl of the barrier [m], shape (n_carrier,)
     radius: Array  # half thickness, offset, or radius [m], shape (n_carrier,)
+    node_edges: Array  # edges before and after each node, the same at an end, shape (n_node, 2)
+    node_axis: Array  # which direction counts as forward: 0 t, 1 m1, 2 m2, shape (n_node,)
+    friction: Array  # coefficients forward, backward and sideways, shape (n_carrier, 3)
     point_body: Array  # body of each contact point, shape (n_point,)
     point_position: Array  # in the body's frame [m], shape (n_point, 3)
     sphere_body: Array  # body of each sphere, shape (n_sphere,)
@@ -105,10 +108,14 @@ class Model:
     edge_node: Array  # first node of each edge, shape (n_edge,)
     rest_length: Array  # [m], shape (n_edge,)
     axial_stiffness: Array  # EA [N], shape (n_edge,)
-    eigenstrain_law: Array  # index into the laws, −1 for a passive edge, shape (n_edge,)
+    driven_edge: Array  # edges that follow a law, once for each law, shape (n_driven,)
+    driven_law: Array  # the law that each of them follows, shape (n_driven,)
     law_channel: Array  # stimulus channel of each law, shape (n_law,)
-    law_gain: Array  # eigenstrain per unit of stimulus, shape (n_law,)
-    law_time_constant: Array  # [s], shape (n_law,)
+    law_rising: Array  # time constant for a rising stimulus [s], shape (n_law,)
+    law_falling: Array  # and for a falling one
+    law_gain: Array  # eigenstrain per unit of stimulus near the reference, shape (n_law,)
+    law_reference: Array  # stimulus without eigenstrain, in its unit, shape (n_law,)
+    law_saturation: Array  # largest magnitude of the eigenstrain, or infinite, shape (n_law,)
 
     joint_a: Array  # first edge of each joint, shape (n_joint,)
     joint_b: Array  # second edge

@@ -99,7 +99,7 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
         "bodies": state(free, "no free body"),
         "barrier": state(bool(pairs), "no surfaces that can meet"),
         "friction": state(
-            bool(pairs) and friction is not None and friction.coefficient > 0.0,
+            bool(pairs) and friction is not None and friction.acts,
             "no surfaces that can meet" if not pairs else "no friction coefficient above zero",
         ),
     }

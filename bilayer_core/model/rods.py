@@ -21,7 +21,8 @@ class Collected:
     strands: list[StrandArrays] = field(default_factory=list)
     rods: list[list[tuple[int, int, int, int]]] = field(default_factory=list)
     columns: dict[str, list] = field(default_factory=dict)
-    laws: list[tuple[int, float, float]] = field(default_factory=list)
+    laws: list[tuple[float, ...]] = field(default_factory=list)
+    """Channel, time constants rising and falling, gain, reference, saturation of each eigenstrain law."""
     node_count: int = 0
     edge_count: int = 0
 
@@ -81,7 +82,8 @@ def add_rod(found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Tur
             clamps.append((body_index[rod.clamp_start], 0))
         if rod.clamp_end is not None and last == rod.stations - 1:
             clamps.append((body_index[rod.clamp_end], -1))
-        _add_strand(found, scene, layer, section, strand, shape, clamps)
+        _add_eigenstrain(found, scene, rod, layer, strand)
+        _add_strand(found, scene, rod, layer, section, strand, shape, clamps)
     found.rods.append(spans)
     if scene.fluid is not None:
         _add_drag(found, scene.fluid, rod, spans)
@@ -125,6 +127,7 @@ def _strand_shape(rod: Rod, height: float, first: int, last: int, turn: Turn) ->
 def _add_strand(
     found: Collected,
     scene: SceneConfig,
+    rod: Rod,
     layer: Layer,
     section: Section,
     strand: StrandArrays,
@@ -137,6 +140,7 @@ def _add_strand(
     voronoi = np.zeros(nodes)
     voronoi[:-1] += 0.5 * rest
     voronoi[1:] += 0.5 * rest
+    index = np.arange(nodes)
     found.strands.append(strand)
     found.add(
         position=shape.positions,
@@ -145,12 +149,13 @@ def _add_strand(
         node_mass=section.mass * voronoi,
         node_weight=voronoi,
         node_radius=np.full(nodes, 0.5 * section.thickness),
+        node_edges=first_edge + np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1),
+        node_axis=np.full(nodes, ["path", "normal", "across"].index(rod.friction_axis)),
         spin_inertia=section.spin_inertia * rest,
         half_width=np.full(edges, 0.5 * section.width),
         edge_node=strand.first_node + np.arange(edges),
         rest_length=rest,
         axial_stiffness=np.full(edges, section.axial_stiffness),
-        eigenstrain_law=np.full(edges, _law_of_layer(found, scene, layer)),
     )
     bend = np.array([*section.bending_stiffness, section.twisting_stiffness])
     inner = voronoi[1:-1]
@@ -225,15 +230,16 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, i
         )
 
 
-def _law_of_layer(found: Collected, scene: SceneConfig, layer: Layer) -> int:
-    """Index of the eigenstrain law of a layer, −1 if it has none; equal laws are one."""
-    if layer.eigenstrain is None:
-        return -1
-    channel = list(scene.stimuli).index(layer.eigenstrain.stimulus)
-    law = (channel, layer.eigenstrain.gain, layer.eigenstrain.time_constant)
-    if law not in found.laws:
-        found.laws.append(law)
-    return found.laws.index(law)
+def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, layer: Layer, strand: StrandArrays) -> None:
+    """The edges of a layer that follow its laws; equal laws are one."""
+    first, _ = rod.covered_stations(layer)
+    for law in layer.eigenstrain:
+        channel = list(scene.stimuli).index(law.stimulus)
+        numbers = (channel, *law.lags, law.gain, law.reference, law.limit)
+        if numbers not in found.laws:
+            found.laws.append(numbers)
+        edges = strand.first_edge - first + np.array(rod.driven_edges(layer, law))
+        found.add(driven_edge=edges, driven_law=np.full(len(edges), found.laws.index(numbers)))
 
 
 def _add_bond(found: Collected, law: Bond, spans: list[tuple[int, int, int, int]]) -> None:

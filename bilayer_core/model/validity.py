@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from ..scene.config import Layer, Rod, SceneConfig
+from ..scene.transduction import free_strain
 
 LARGE_STRAIN = 0.1  # linear elasticity and the rectangular section lose meaning
 SLENDER = 5.0  # least length over width
@@ -21,7 +24,7 @@ def validity_warnings(scene: SceneConfig) -> Iterator[str]:
                 f"rods.{rod.name}: length/width is {rod.path.length / rod.width:.2g}; "
                 f"below {SLENDER:g} it is a plate more than a rod"
             )
-        strain = max((_largest_eigenstrain(scene, layer) for layer in rod.layers), default=0.0)
+        strain = max((_largest_eigenstrain(scene, rod, layer) for layer in rod.layers), default=0.0)
         if strain > LARGE_STRAIN:
             yield (
                 f"rods.{rod.name}: eigenstrain up to {100 * strain:.3g} %; "
@@ -55,12 +58,16 @@ def validity_warnings(scene: SceneConfig) -> Iterator[str]:
                 )
 
 
-def _largest_eigenstrain(scene: SceneConfig, layer: Layer) -> float:
-    """Largest magnitude of a layer's eigenstrain over its channel's range."""
-    if layer.eigenstrain is None:
-        return 0.0
-    channel = scene.stimuli[layer.eigenstrain.stimulus]
-    return abs(layer.eigenstrain.gain) * max(abs(channel.minimum), abs(channel.maximum))
+def _largest_eigenstrain(scene: SceneConfig, rod: Rod, layer: Layer) -> float:
+    """Largest magnitude of a layer's eigenstrain over its channels' ranges."""
+    largest = np.zeros(rod.stations - 1)
+    for law in layer.eigenstrain:
+        channel = scene.stimuli[law.stimulus]
+        ends = np.array([channel.minimum, channel.maximum])
+        largest[rod.driven_edges(layer, law)] += np.abs(
+            free_strain(ends, law.gain, law.reference, np.full(2, law.limit))
+        ).max()
+    return float(largest.max())
 
 
 def _free_curvature(scene: SceneConfig, rod: Rod) -> float:
@@ -70,6 +77,6 @@ def _free_curvature(scene: SceneConfig, rod: Rod) -> float:
     bottom, top = rod.layers
     m = scene.materials[bottom.material].youngs_modulus / scene.materials[top.material].youngs_modulus
     n = bottom.thickness / top.thickness
-    mismatch = sum(_largest_eigenstrain(scene, layer) for layer in rod.layers)
+    mismatch = sum(_largest_eigenstrain(scene, rod, layer) for layer in rod.layers)
     shape = 6.0 * (1.0 + n) ** 2 / (3.0 * (1.0 + n) ** 2 + (1.0 + m * n) * (n**2 + 1.0 / (m * n)))
     return shape * mismatch / (bottom.thickness + top.thickness)

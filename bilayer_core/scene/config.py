@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    field_serializer,
+    model_validator,
+)
 
 from bilayer_core.scene import checks
+from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import refuse, refuse_all
 from bilayer_core.scene.schedule import Schedule, faults_of_times
 from bilayer_core.scene.units import (
@@ -55,6 +64,13 @@ Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$")]
 Point = tuple[Length, Length, Length]
 Direction = Annotated[tuple[Number, Number, Number], AfterValidator(_unit_vector)]
 """Unit vector; a file may give any length."""
+Eigenstrains = Annotated[
+    list[Eigenstrain],
+    BeforeValidator(
+        lambda laws: [] if laws is None else [laws] if isinstance(laws, dict) else laws,
+        json_schema_input_type=Eigenstrain | list[Eigenstrain] | None,
+    ),
+]
 PoissonRatio = real("Poisson's ratio", "1", "0.5", above=-1.0, at_most=0.5)
 
 
@@ -124,15 +140,6 @@ class Pattern(_Part):
     count: whole(1)
 
 
-class Eigenstrain(_Part):
-    """Free strain of a layer: gain times the stimulus, which the material follows with a first-order lag."""
-
-    stimulus: Name
-    gain: Number
-    """Eigenstrain per unit of the stimulus."""
-    time_constant: NonNegativeTime = 0.0
-
-
 class Layer(_Part):
     """One layer of a rod. It covers the whole path, or the stations nearest to `interval`."""
 
@@ -141,11 +148,17 @@ class Layer(_Part):
     thickness: PositiveLength
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
-    eigenstrain: Eigenstrain | None = None
+    eigenstrain: Eigenstrains = []
+    """One law or several, which add up."""
     natural_curvature: Curvature | None = None
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
     natural_twist: Twist = 0.0
     """Of the layer by itself, about the path."""
+
+    @field_serializer("eigenstrain")
+    def _as_written(self, laws: list[Eigenstrain]) -> Any:
+        """A single law without its list, as scenes state it, so that overrides find its keys."""
+        return laws if len(laws) > 1 else laws[0] if laws else None
 
 
 class Rod(_Part):
@@ -161,6 +174,8 @@ class Rod(_Part):
     layers: list[Layer] = Field(min_length=1, max_length=2)
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
+    friction_axis: Literal["path", "normal", "across"] = "path"
+    """Direction of the rod that counts as forward for friction: along its path, its normal, or path × normal."""
     pattern: Pattern | None = None
     clamp_start: Name | None = None
     clamp_end: Name | None = None
@@ -181,6 +196,16 @@ class Rod(_Part):
             return 0, self.stations - 1
         first, last = (math.floor(length / self.edge_length + 0.5) for length in layer.interval)
         return first, last
+
+    def driven_edges(self, layer: Layer, law: Eigenstrain) -> range:
+        """Edges of the path that a law of `layer` drives: those of the layer whose middle lies in its interval, the end
+        excluded, so that adjoining intervals share none.
+        """
+        first, last = self.covered_stations(layer)
+        if law.interval is None:
+            return range(first, last)
+        begin, end = (math.ceil(length / self.edge_length - 0.5) for length in law.interval)
+        return range(max(first, begin), min(last, end))
 
     @model_validator(mode="after")
     def _check(self) -> Rod:
@@ -271,10 +296,29 @@ class Plane(_Part):
 
 
 class Friction(_Part):
-    """Coulomb friction, smoothed below a speed."""
+    """Coulomb friction, smoothed below a speed.
+
+    Rods may slide more easily one way than the other along their axis (`Rod.friction_axis`), and sideways; bodies feel
+    `coefficient`.
+    """
 
     coefficient: NonNegativeNumber
     speed_threshold: PositiveSpeed
+    forward: NonNegativeNumber | None = None
+    """Of rods sliding along + of their axis; like the next two, `coefficient` by default."""
+    backward: NonNegativeNumber | None = None
+    sideways: NonNegativeNumber | None = None
+
+    @property
+    def of_rods(self) -> tuple[float, float, float]:
+        """Coefficients of rods: forward, backward, sideways."""
+        given = (self.forward, self.backward, self.sideways)
+        return tuple(self.coefficient if value is None else value for value in given)
+
+    @property
+    def acts(self) -> bool:
+        """Whether there is any friction."""
+        return self.coefficient > 0.0 or max(self.of_rods) > 0.0
 
 
 class Contact(_Part):

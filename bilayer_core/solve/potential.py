@@ -14,7 +14,7 @@ from ..forces.body import body_gravity, body_spring
 from ..forces.contact import pair_contact, plane_contact
 from ..forces.coupling import bond_translation
 from ..forces.drag import drag, lag_directions
-from ..forces.friction import friction, lag_friction
+from ..forces.friction import friction, lag_axes, lag_friction
 from ..forces.quadratic import angle_spring, gravity, node_spring
 from ..forces.stretch import stretch
 from ..model.model import Model
@@ -78,7 +78,7 @@ class IncrementalPotential:
         self.has_balls = scene.contact is not None and len(carriers.pair_first) > 0
         self.has_contact = self.has_planes or self.has_balls
         law = scene.contact.friction if scene.contact else None
-        self.has_friction = self.has_contact and law is not None and law.coefficient > 0.0
+        self.has_friction = self.has_contact and law is not None and law.acts
         self.has_drag = len(model.drag_node) > 0
         self.has_bodies = model.free_count > 0
 
@@ -102,6 +102,7 @@ class IncrementalPotential:
         self._contact_pair = np.zeros(room, dtype=np.int64)
         self._contact_load = np.zeros(room)
         self._contact_normal = np.zeros((room, 3))
+        self._contact_axis = np.zeros((room, 3))
         self._contact_count = 0
         self._drag_direction = np.zeros((len(model.drag_node), 3, 3))
         self._flow = np.array(scene.fluid.velocity if scene.fluid else (0.0, 0.0, 0.0))
@@ -121,7 +122,6 @@ class IncrementalPotential:
             self._contact_count = lag_friction(
                 contact.barrier_distance,
                 contact.stiffness,
-                contact.friction.coefficient,
                 carriers.weight,
                 carriers.radius,
                 context.start.carrier,
@@ -134,6 +134,16 @@ class IncrementalPotential:
                 self._contact_pair,
                 self._contact_load,
                 self._contact_normal,
+            )
+            lag_axes(
+                self._contact_count,
+                self._contact_first,
+                self._contact_normal,
+                carriers.node_edges,
+                carriers.node_axis,
+                context.start.tangent,
+                context.start.director1,
+                self._contact_axis,
             )
 
     def evaluate(self, at: Configuration, with_hessian: bool) -> float:
@@ -281,6 +291,8 @@ class IncrementalPotential:
                 self._contact_pair,
                 self._contact_load,
                 self._contact_normal,
+                self._contact_axis,
+                carriers.friction,
                 self.context.length,
                 contact.friction.speed_threshold,
                 carriers.radius,

@@ -176,3 +176,39 @@ def test_a_fluid_at_rest_slows_a_strip_as_the_quadratic_law_says():
     simulator.run(0.02)
     rate = 0.5 * 1000.0 * 0.01 * 1.0 / (1000.0 * 0.01 * 1e-3)  # ½ ρ_f w C/(ρ w h)
     assert simulator.velocities[:, 2] == pytest.approx(np.full(5, 2.0 / (1.0 + 2.0 * rate * 0.02)), rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("gravity", "coefficient"),
+    [([4.0, 0, -9.81], 0.1), ([-4.0, 0, -9.81], 0.3), ([0, 4.0, -9.81], 0.2), ([0, -4.0, -9.81], 0.2)],
+    ids=["forward", "backward", "left", "right"],
+)
+def test_a_strip_slides_against_the_coefficient_of_its_direction(gravity, coefficient):
+    friction = {**contact(coefficient=0.5)["friction"], "forward": 0.1, "backward": 0.3, "sideways": 0.2}
+    strip = rod([layer(thickness=2e-3)], length=0.02, stations=5, start=(0, 0, 1.99e-3))
+    sliding = scene([strip], gravity=gravity, obstacles=[slope(0.0)], contact={**contact(), "friction": friction})
+    simulator = Simulator(load_scene(sliding))
+    simulator.run(0.05)
+    start = simulator.velocities.mean(axis=0)
+    simulator.run(0.2)
+    acceleration = (simulator.velocities.mean(axis=0) - start) / 0.2
+    direction = np.sign(np.array(gravity)) * [1, 1, 0]
+    assert acceleration == pytest.approx((4.0 - coefficient * 9.81) * direction, abs=0.02)
+
+
+def test_a_strip_slides_obliquely_along_the_direction_of_greatest_dissipation():
+    friction = {**contact(coefficient=0.5)["friction"], "forward": 0.1, "sideways": 0.4}
+    strip = rod([layer(thickness=2e-3)], length=0.02, stations=5, start=(0, 0, 1.99e-3))
+    pushed = scene(
+        [strip], gravity=[1.5, 6.0, -9.81], obstacles=[slope(0.0)], contact={**contact(), "friction": friction}
+    )
+    simulator = Simulator(load_scene(pushed))
+    simulator.run(0.3)
+    v = simulator.velocities.mean(axis=0)
+    # along x and y the law slows by μ_i² v_i/√(Σ μ² v²) g: integrate it by itself
+    reference, dt = np.zeros(2), 1e-5
+    for _ in range(30000):
+        weighted = np.array([0.1, 0.4]) ** 2 * reference
+        size = math.sqrt((np.array([0.1, 0.4]) ** 2) @ reference**2)
+        reference += dt * (np.array([1.5, 6.0]) - 9.81 * weighted / max(size, 1e-6))
+    assert v[:2] == pytest.approx(reference, rel=0.01)
