@@ -41,9 +41,9 @@ class Outcome:
     Attributes
     ----------
     first_contact : float
-        When the first node of the robot touched it [s].
+        When the first node of the arms touched it, to the nearest frame of shapes [s].
     contact_nodes : int
-        Nodes that touch it at the end.
+        Nodes of the arms that touch it at the end.
     lift : float
         Height at the end above that at the start [m].
     real_time_factor : float
@@ -59,7 +59,8 @@ class Outcome:
 def outcome(run: RunData) -> Outcome:
     """Read off a run what happened to the ball."""
     ball = [body.name for body in run.description.bodies].index(BALL)
-    touching = np.any(run.contact_forces != 0.0, axis=2).sum(axis=1)
+    arms = slice(0, max(strand.nodes.stop for strand in run.description.strands))
+    touching = np.any(run.contact_forces[:, arms] != 0.0, axis=2).sum(axis=1)
     if not touching.any():
         raise SimulationError("the gripper never touched the ball", float(run.times[-1]))
     heights = run.body_positions[:, ball, 2]
@@ -139,7 +140,8 @@ def demonstrate(directory: Path) -> None:
         path.unlink(missing_ok=True)
     console.print(
         f"The scene '{SCENE}', simulated by one ROS 2 node; another one ramps its stimulus '{CHANNEL}'.\n"
-        "The first start on a machine compiles for up to a minute."
+        "The first start on a machine compiles for up to a minute.",
+        soft_wrap=True,
     )
     start = time.monotonic()
     simulate(log, load_scene(SCENE).duration, console)
@@ -150,8 +152,8 @@ def demonstrate(directory: Path) -> None:
     convert_log(log, recording)
     screenshot(recording, picture)
     console.print(
-        f"\nfirst contact      {result.first_contact:.2f} s after the start\n"
-        f"contact nodes      {result.contact_nodes} at the end\n"
+        f"\nfirst contact      {result.first_contact:.1f} s after the start\n"
+        f"contact nodes      {result.contact_nodes} of the arms at the end\n"
         f"ball lifted by     {1e3 * result.lift:.1f} mm\n"
         f"simulated          {run.times[-1]:.2f} s in {wall:.0f} s, real-time factor {result.real_time_factor:.2f}\n"
         f"\nlog                {log}\nrerun recording    {recording}    (look at it: bilayer view {recording})\n"

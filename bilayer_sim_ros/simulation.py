@@ -72,7 +72,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         worker.stop()
     if worker.error is not None:
         raise worker.error
-    node.get_logger().info(f"ended at t = {simulator.time:.6g} s")
+    node.get_logger().info(f"ended at t = {simulator.time:.6g} s; CPU time of the steps: {simulator.cpu_time:.3f} s")
 
 
 def _diagnostics(node: Node, real_time_factor: float) -> Callable[[Status], None]:

@@ -19,7 +19,7 @@ from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.stimulus import StimulusInputs
 
 # Shorter waits cost more than they are worth: the simulation may be this far ahead of the clock [s].
-SHORTEST_WAIT = 0.005
+SHORTEST_WAIT = 0.01
 # In a log, this stimulus says that the scene's schedule acts again.
 SCHEDULE = math.nan
 # Real time between two status reports, and between two showings of a paused frame [s].
