@@ -1,0 +1,62 @@
+"""What the inchworm does, from its scene file alone."""
+
+import numpy as np
+import pytest
+
+from bilayer_core import Simulator, load_scene
+
+pytestmark = pytest.mark.slow
+PERIOD = 2.4
+
+
+def strides(cycles, *changes):
+    """Displacement of the mass centre along x in each cycle [m], and the simulator."""
+    simulator = Simulator(load_scene("crawling_inchworm", changes))
+    found = [simulator.com[0]]
+    for _ in range(cycles):
+        simulator.run(PERIOD)
+        found.append(simulator.com[0])
+    return np.diff(found), simulator
+
+
+@pytest.fixture(scope="module")
+def forward():
+    return strides(4)
+
+
+def test_the_inchworm_has_the_papers_parameters(forward):
+    _, simulator = forward
+    passive, active = simulator.model.strands
+    assert (passive.node_count, active.node_count, simulator.dt) == (80, 50, 1e-3)
+    assert simulator.scene.contact.friction.of_rods[:2] == (0.3, 0.6)
+
+
+def test_every_cycle_moves_it_forward_and_by_the_same_from_the_second_on(forward):
+    moved, simulator = forward
+    assert moved[1] > 3e-3
+    assert moved[1:] == pytest.approx(np.full(3, moved[1]), rel=0.02)
+    assert abs(simulator.com[1]) < 1e-9
+    assert simulator.summary()["converged"] is True
+
+
+def test_it_goes_the_other_way_when_its_friction_is_turned_round(forward):
+    moved, _ = strides(2, "contact.friction.forward=0.6", "contact.friction.backward=0.3")
+    assert moved == pytest.approx(-forward[0][:2], rel=1e-3)
+
+
+def test_it_stays_where_it_is_when_friction_is_the_same_both_ways(forward):
+    moved, _ = strides(2, "contact.friction.forward=0.6")
+    assert abs(moved[1]) < 0.02 * forward[0][1]
+
+
+def test_it_does_not_drift_at_rest():
+    simulator = Simulator(
+        load_scene(
+            "crawling_inchworm",
+            ["stimuli.humidity.schedule.amplitude=0", "stimuli.humidity.schedule.mean=0.6"],
+        )
+    )
+    simulator.run(1.0)
+    start = simulator.com[0]
+    simulator.run(1.0)
+    assert abs(simulator.com[0] - start) < 1e-5  # 0.01 mm/s
