@@ -71,7 +71,7 @@ setup(
         "numba>=0.60",
         "numpy>=1.26",
         "pint>=0.24",
-        "pydantic>=2.7,<3",
+        "pydantic>=2.9,<3",
         "pyyaml>=6.0",
         "rich>=13",
         "scipy>=1.12",

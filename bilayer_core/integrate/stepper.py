@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import SimulationError
 from ..model.model import Model, body_displacement
 from ..model.state import State
-from ..scene.transduction import follow
+from ..scene.transduction import follow, free_strain
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonSolver
 from ..solve.potential import IncrementalPotential
@@ -64,7 +64,6 @@ class Stepper:
         self.end = Configuration(model)
         self._trial = Configuration(model)
         self._channels = list(model.scene.stimuli.values())
-        self._law_of_active = np.flatnonzero(model.eigenstrain_law >= 0)
         self.stimulus = np.zeros(len(self._channels))
         self.eigenstrain = np.zeros(model.edge_count)
 
@@ -86,10 +85,8 @@ class Stepper:
     def eigenstrain_of(self, transduction: Array) -> Array:
         """Eigenstrain of each edge from the filtered stimuli, shape (n_edge,)."""
         model = self.model
-        eigenstrain = np.zeros(model.edge_count)
-        laws = model.eigenstrain_law[self._law_of_active]
-        eigenstrain[self._law_of_active] = (model.law_gain * transduction)[laws]
-        return eigenstrain
+        strain = free_strain(transduction, model.law_gain, model.law_reference, model.law_saturation)
+        return np.bincount(model.driven_edge, strain[model.driven_law], model.edge_count)
 
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
@@ -149,7 +146,7 @@ class Stepper:
         transduction = state.transduction
         if len(transduction):
             target = stimulus[self.model.law_channel]
-            transduction = follow(transduction, target, self.model.law_time_constant, h)
+            transduction = follow(transduction, target, self.model.law_rising, self.model.law_falling, h)
         eigenstrain = self.eigenstrain_of(transduction)
         self._start.take_state(state, state.body_position)
         context = implicit_euler.predict(self.model, state, self._start, h, eigenstrain)

@@ -36,14 +36,24 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         faults.append((("normal",), rod.normal, f"must be perpendicular to the path, is {tilt:.3g} deg off"))
     names = [(("layers", index, "name"), layer.name) for index, layer in enumerate(rod.layers)]
     faults += _repeated(names, "layers of a rod")
+    ordered = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
+
+    def is_ordered(interval: tuple[float, float]) -> bool:
+        return interval[0] < interval[1] <= rod.path.length * (1.0 + ROUNDING)
+
     for index, layer in enumerate(rod.layers):
+        for number, law in enumerate(layer.eigenstrain):
+            where: Location = ("layers", index, "eigenstrain", number, "interval")
+            if law.interval is not None and not is_ordered(law.interval):
+                faults.append((where, law.interval, ordered))
+            elif not rod.driven_edges(layer, law):
+                demand = f"must hold the middle of an edge of the layer; an edge is {rod.edge_length:g} m long"
+                faults.append((where, law.interval, demand))
         if layer.interval is None:
             continue
         first, last = rod.covered_stations(layer)
-        begin, end = layer.interval
-        if begin >= end or end > rod.path.length * (1.0 + ROUNDING):
-            demand = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
-            faults.append((("layers", index, "interval"), layer.interval, demand))
+        if not is_ordered(layer.interval):
+            faults.append((("layers", index, "interval"), layer.interval, ordered))
         elif last - first < 2:
             demand = f"must span two edges or more; an edge is {rod.edge_length:g} m long"
             faults.append((("layers", index, "interval"), layer.interval, demand))
@@ -92,10 +102,10 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
             where: Location = ("rods", number, "layers", index)
             if layer.material not in scene.materials:
                 yield (*where, "material"), layer.material, one_of("materials", layer.material, scene.materials)
-            eigenstrain = layer.eigenstrain
-            if eigenstrain and eigenstrain.stimulus not in scene.stimuli:
-                demand = one_of("stimuli", eigenstrain.stimulus, scene.stimuli)
-                yield (*where, "eigenstrain", "stimulus"), eigenstrain.stimulus, demand
+            for place, law in enumerate(layer.eigenstrain):
+                if law.stimulus not in scene.stimuli:
+                    demand = one_of("stimuli", law.stimulus, scene.stimuli)
+                    yield (*where, "eigenstrain", place, "stimulus"), law.stimulus, demand
 
 
 def _clamps(scene: SceneConfig) -> Iterator[Fault]:

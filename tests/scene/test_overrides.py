@@ -14,7 +14,7 @@ def test_an_override_changes_its_value_and_no_other():
 @pytest.mark.parametrize(
     ("override", "read", "value"),
     [
-        ("rods.arm.layers.active.eigenstrain.gain=5 %", lambda s: s.rods[0].layers[1].eigenstrain.gain, 0.05),
+        ("rods.arm.layers.active.eigenstrain.gain=5 %", lambda s: s.rods[0].layers[1].eigenstrain[0].gain, 0.05),
         ("rods.0.layers.1.thickness=2 mm", lambda s: s.rods[0].layers[1].thickness, 2e-3),
         ("gravity.2=-1 m/s^2", lambda s: s.gravity[2], -1.0),
         ("bodies.ball.position=[0, 0, 30 mm]", lambda s: s.bodies[1].position, (0.0, 0.0, 0.03)),

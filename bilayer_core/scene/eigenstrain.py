@@ -1,0 +1,112 @@
+"""Eigenstrain laws of a layer as a scene states them, and ready-made ones for four stimuli."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from bilayer_core.scene.faults import one_of, refuse_all
+from bilayer_core.scene.units import (
+    NonNegativeLength,
+    NonNegativeTime,
+    Number,
+    PlainNumber,
+    PositiveLength,
+    PositiveNumber,
+)
+
+# Orders of magnitude for strips of about a millimetre; docs/stimuli.md says what is published and what is assumed.
+LAWS: dict[str, dict[str, float]] = {
+    # Stimulus: relative humidity, 0 to 1. Swelling by up to 4 % below 40 % humidity, responses within seconds:
+    # poly(N-vinylcaprolactam) films, "Applicability of Vapor-Deposited Thermoresponsive Hydrogel Thin Films in
+    # Ultrafast Humidity Sensors/Actuators" (American Chemical Society, figshare 11604297). The rest is assumed.
+    "humidity_hydrogel": {
+        "gain": 0.1,
+        "time_constant_rising": 2.0,
+        "time_constant_falling": 4.0,
+        "saturation": 0.1,
+    },
+    # Stimulus: temperature in degrees Celsius. Linear thermal expansion of silicone elastomers, rounded;
+    # h²/(π² a) for h = 1 mm and a diffusivity of a = 1e-7 m²/s, assumed.
+    "temperature_elastomer": {
+        "gain": 3e-4,
+        "reference": 20.0,
+        "time_constant_rising": 1.0,
+        "time_constant_falling": 1.0,
+    },
+    # Stimulus: light, 1 for about 0.5 W/cm². Response in 1 s and relaxation in 3 s: "Graphene-polydimethylsiloxane/
+    # chromium bilayer-based flexible, reversible, and large bendable photomechanical actuators" (550 mW/cm², infrared).
+    # The gain is assumed: the expansion above at 60 K.
+    "light_photothermal": {"gain": 0.018, "time_constant_rising": 1.0, "time_constant_falling": 3.0},
+    # Stimulus: heating current, 1 for full drive. Nickel-titanium contracts by up to 8 % (ASME IMECE2002, p. 277);
+    # half of it as gain, and the time constants, are assumed.
+    "current_sma": {
+        "gain": -0.04,
+        "time_constant_rising": 0.3,
+        "time_constant_falling": 1.5,
+        "saturation": 0.08,
+    },
+}
+"""Keys of an eigenstrain that a law stands for, each of which a scene may state otherwise."""
+
+
+class Eigenstrain(BaseModel):
+    """Free strain of a layer: gain times the stimulus, which the material follows with a first-order lag."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    stimulus: str
+    law: Literal[*LAWS] | None = Field(None, exclude=True)
+    """Where numbers not given come from; None in a validated scene, which states the numbers."""
+    gain: Number
+    """Eigenstrain per unit of the stimulus, near `reference`."""
+    reference: PlainNumber = 0.0
+    """Stimulus without eigenstrain, in the unit of the channel."""
+    time_constant: NonNegativeTime | None = None
+    """Both ways; without any the material follows at once."""
+    time_constant_rising: NonNegativeTime | None = None
+    """While the stimulus is above what the material has reached."""
+    time_constant_falling: NonNegativeTime | None = None
+    """While it is below."""
+    saturation: PositiveNumber | None = None
+    """Magnitude that the eigenstrain tends to but does not exceed."""
+    interval: tuple[NonNegativeLength, PositiveLength] | None = None
+    """From and to, as lengths along the path [m]: edges whose middle lies between; default: the whole layer."""
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _resolve_law(cls, data: Any, handler: Callable[[Any], Eigenstrain]) -> Eigenstrain:
+        """Put the numbers of a law in place of its name."""
+        law = data.get("law") if isinstance(data, dict) else None
+        if law is None:
+            return handler(data)
+        if law not in LAWS:
+            refuse_all("Eigenstrain", [(("law",), law, one_of("laws", law, LAWS))])
+        numbers = LAWS[law]
+        if "time_constant" in data:
+            numbers = {key: number for key, number in numbers.items() if not key.startswith("time_constant")}
+        return handler({**numbers, **data, "law": None})
+
+    @model_validator(mode="after")
+    def _check(self) -> Eigenstrain:
+        directions = ("time_constant_rising", "time_constant_falling")
+        given = [key for key in directions if getattr(self, key) is not None]
+        if self.time_constant is not None and given:
+            demand = f"must be left out where `{given[0]}` is given"
+            refuse_all("Eigenstrain", [(("time_constant",), self.time_constant, demand)])
+        return self
+
+    @property
+    def lags(self) -> tuple[float, float]:
+        """Time constants for a rising and a falling stimulus [s]."""
+        both = self.time_constant or 0.0
+        rising, falling = self.time_constant_rising, self.time_constant_falling
+        return both if rising is None else rising, both if falling is None else falling
+
+    @property
+    def limit(self) -> float:
+        """Saturation, infinite without one."""
+        return math.inf if self.saturation is None else self.saturation
