@@ -18,31 +18,25 @@ from bilayer_core.scene.units import (
     PositiveNumber,
 )
 
-# Orders of magnitude for strips of about a millimetre; docs/stimuli.md says what is published and what is assumed.
+# Orders of magnitude. docs/stimuli.md names their sources, and says what is published and what is assumed.
 LAWS: dict[str, dict[str, float]] = {
-    # Stimulus: relative humidity, 0 to 1. Swelling by up to 4 % below 40 % humidity, responses within seconds:
-    # poly(N-vinylcaprolactam) films, "Applicability of Vapor-Deposited Thermoresponsive Hydrogel Thin Films in
-    # Ultrafast Humidity Sensors/Actuators" (American Chemical Society, figshare 11604297). The rest is assumed.
+    # of the relative humidity, 0 to 1
     "humidity_hydrogel": {
         "gain": 0.1,
         "time_constant_rising": 2.0,
         "time_constant_falling": 4.0,
         "saturation": 0.1,
     },
-    # Stimulus: temperature in degrees Celsius. Linear thermal expansion of silicone elastomers, rounded;
-    # h²/(π² a) for h = 1 mm and a diffusivity of a = 1e-7 m²/s, assumed.
+    # of the temperature in degrees Celsius
     "temperature_elastomer": {
         "gain": 3e-4,
         "reference": 20.0,
         "time_constant_rising": 1.0,
         "time_constant_falling": 1.0,
     },
-    # Stimulus: light, 1 for about 0.5 W/cm². Response in 1 s and relaxation in 3 s: "Graphene-polydimethylsiloxane/
-    # chromium bilayer-based flexible, reversible, and large bendable photomechanical actuators" (550 mW/cm², infrared).
-    # The gain is assumed: the expansion above at 60 K.
+    # of light, 1 for about 0.5 W/cm²
     "light_photothermal": {"gain": 0.018, "time_constant_rising": 1.0, "time_constant_falling": 3.0},
-    # Stimulus: heating current, 1 for full drive. Nickel-titanium contracts by up to 8 % (ASME IMECE2002, p. 277);
-    # half of it as gain, and the time constants, are assumed.
+    # of a heating current, 1 for full drive
     "current_sma": {
         "gain": -0.04,
         "time_constant_rising": 0.3,
