@@ -74,3 +74,19 @@ def test_no_surface_is_ever_crossed_and_every_step_converges(gripped):
     simulator, gaps = gripped
     assert 0.0 < simulator.statistics.min_gap <= gaps.smallest < 1e-3
     assert simulator.summary()["converged"] is True
+
+
+@pytest.mark.parametrize(("coefficient", "held"), [(0.5, True), (0.0, False)])
+def test_short_arms_hold_the_ball_by_friction_alone(coefficient, held):
+    simulator = Simulator(load_scene("gripping_friction", [f"contact.friction.coefficient={coefficient}"]))
+    simulator.run(13.5)
+    assert simulator.statistics.bodies["ball"].first_contact < 13.30
+    ball, hub = simulator.bodies["ball"].position[2], simulator.bodies["hub"].position[2]
+    simulator.run(4.0)
+    lift = simulator.bodies["ball"].position[2] - ball
+    raised = simulator.bodies["hub"].position[2] - hub
+    assert raised == pytest.approx(0.1, abs=1e-12)
+    if held:
+        assert raised - lift < 1e-3  # slip
+    else:
+        assert abs(lift) < 1e-4
