@@ -61,7 +61,7 @@ $(STAMP): setup.py pyproject.toml
 
 # Pictures are drawn by the viewer on Mesa's software Vulkan.
 vulkan:
-	@ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json >/dev/null 2>&1 && ldconfig -p | grep -q libvulkan.so.1 || { \
+	@ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json 2>/dev/null | grep -q . && ldconfig -p | grep -q libvulkan.so.1 || { \
 	    $(call debian_packages,mesa-vulkan-drivers libvulkan1,A Vulkan driver (for pictures)); }
 
 .PHONY: help demo test lint install clean vulkan
