@@ -25,7 +25,7 @@ help:  ## Show what can be made.
 demo: $(STAMP) vulkan  ## Run the gripper: simulation node, controller, log, picture.
 	$(BIN)/python -m bilayer_sim_ros.demo
 
-test: $(STAMP)  ## Run every test, the slow ones as well.
+test: $(STAMP) vulkan  ## Run every test, the slow ones as well.
 	$(BIN)/python -m pytest -m "" -n $(JOBS)
 
 lint: $(STAMP)  ## Check the code's style.

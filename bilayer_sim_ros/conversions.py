@@ -41,7 +41,7 @@ def to_diagnostics(status: Status, name: str, real_time_factor: float) -> Diagno
     if status.paused:
         message = "paused"
     elif late:
-        message = f"slower than asked for: {status.real_time_factor:.3g} instead of {real_time_factor:g}"
+        message = f"slower than asked for: {status.real_time_factor:.3g} not {real_time_factor:g}"
     else:
         message = "running"
     per_step = status.iterations / status.steps if status.steps else math.nan

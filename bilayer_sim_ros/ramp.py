@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from bilayer_core.errors import InputError
 from bilayer_sim_ros.parameters import Value
 
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 POLL_PERIOD = 0.05
 """Real time between two looks at whether something is connected [s]."""
 FINAL_MESSAGES = 5
@@ -32,16 +37,22 @@ def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) 
     topic = f"{target}/stimulus/{channel}"
     publisher = node.create_publisher(Float64, topic, 10)
     limit = parameters["connection_timeout"]
+    node.get_logger().info(f"waiting for a subscriber of {topic}")
     if not _wait(lambda: publisher.get_subscription_count() > 0, stop, limit, f"nobody subscribes to {topic}"):
         return
+    clock = node.get_clock()
     if node.count_publishers("/clock") > 0:
         node.set_parameters([Parameter("use_sim_time", value=True)])
-    if parameters["resume"] and not _resume(node, f"{target}/resume", stop, limit):
-        return
-    clock = node.get_clock()
-    if not _wait(lambda: clock.now().nanoseconds > 0, stop, limit, "/clock is silent"):
-        return
-    start, final = clock.now(), 0
+    if node.get_parameter("use_sim_time").value:
+        heard: deque[Clock] = deque(maxlen=1)
+        node.create_subscription(Clock, "/clock", lambda message: heard.append(message), BEST_EFFORT)
+        # A paused simulation repeats its time once a second.
+        if not _wait(lambda: heard, stop, limit, "/clock is silent"):
+            return
+        start = Time.from_msg(heard[-1].clock, clock_type=clock.clock_type)
+    else:
+        start = clock.now()
+    final = 0
 
     def send() -> None:
         nonlocal final
@@ -53,7 +64,10 @@ def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) 
             stop.set()
 
     node.get_logger().info(f"ramping {topic}")
+    send()
     node.create_timer(1.0 / parameters["rate"], send)
+    if parameters["resume"] and not _resume(node, f"{target}/resume", stop, limit):
+        return
     stop.wait()
     node.get_logger().info("done")
 

@@ -2,9 +2,12 @@
 
 import itertools
 import os
+import random
+import socket
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import pytest
 import rclpy
@@ -16,13 +19,24 @@ NODE = "/bilayer_sim"
 # Longest wait for anything that needs discovery or a first compilation [s].
 LIMIT = 120.0
 
+# A test holds the TCP port of its domain's number above this one.
+FIRST_LOCK_PORT = 21000
+
 _numbers = itertools.count()
 
 
-def new_domain() -> int:
-    """A ROS domain that no other test of this run uses at the same time."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    return 1 + (worker * 25 + next(_numbers) % 25) % 100
+@contextmanager
+def claimed_domain():
+    """A ROS domain that no other test of this machine uses, those of other test runs included."""
+    for domain in random.sample(range(1, 101), 100):
+        with socket.socket() as lock:
+            try:
+                lock.bind(("127.0.0.1", FIRST_LOCK_PORT + domain))
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RuntimeError("all ROS domains are in use by tests")
 
 
 class NodeProcess:
@@ -55,6 +69,13 @@ class NodeProcess:
 
     def send(self, number):
         self._process.send_signal(number)
+
+    def wait_for(self, text):
+        """Return once the output has `text`."""
+        deadline = time.monotonic() + LIMIT
+        while text not in self.output:
+            assert self.running and time.monotonic() < deadline, f"no {text!r} in:\n{self.output}"
+            time.sleep(0.05)
 
     def wait(self, limit=LIMIT) -> int:
         """Exit code."""
@@ -149,4 +170,11 @@ def connect():
 
 @pytest.fixture
 def domain():
-    return new_domain()
+    with claimed_domain() as domain:
+        yield domain
+
+
+@pytest.fixture(scope="module")
+def domain_of_module():
+    with claimed_domain() as domain:
+        yield domain

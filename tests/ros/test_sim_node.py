@@ -15,7 +15,6 @@ from bilayer_core import Simulator, load_scene
 from bilayer_sim_ros.conversions import to_seconds
 
 SCENE = "bending"
-DOMAIN = 101
 PERIOD = 0.02
 
 
@@ -25,8 +24,9 @@ def scene():
 
 
 @pytest.fixture(scope="module")
-def process(start):
-    return start("sim_node", DOMAIN, {"scene": SCENE, "start_paused": True, "rate": 50, "real_time_factor": 0.0})
+def process(domain_of_module, start):
+    parameters = {"scene": SCENE, "start_paused": True, "rate": 50, "real_time_factor": 0}
+    return start("sim_node", domain_of_module, parameters)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,37 @@
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+
+from bilayer_sim_ros.conversions import to_diagnostics, to_seconds, to_time
+from bilayer_sim_ros.worker import Status
+
+
+@pytest.mark.parametrize(
+    ("seconds", "expected"), [(0.0, (0, 0)), (0.1, (0, 100_000_000)), (17.999999999, (17, 999_999_999)), (2.0, (2, 0))]
+)
+def test_simulated_time_becomes_a_stamp_to_the_nanosecond(seconds, expected):
+    stamp = to_time(seconds)
+    assert (stamp.sec, stamp.nanosec) == expected
+    assert to_seconds(stamp) == pytest.approx(seconds, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("status", "asked", "level", "message"),
+    [
+        (Status(1.0, False, real_time_factor=0.99), 1.0, DiagnosticStatus.OK, "running"),
+        (Status(1.0, False, real_time_factor=0.5), 1.0, DiagnosticStatus.WARN, "slower than asked for: 0.5 not 1"),
+        (Status(1.0, False, real_time_factor=0.01), 0.0, DiagnosticStatus.OK, "running"),
+        (Status(1.0, True), 1.0, DiagnosticStatus.OK, "paused"),
+    ],
+)
+def test_diagnostics_warn_when_the_simulation_is_slower_than_asked_for(status, asked, level, message):
+    report = to_diagnostics(status, "/bilayer_sim", asked).status[0]
+    assert (report.level, report.message) == (level, message)
+
+
+def test_diagnostics_give_means_over_the_steps_since_the_last_ones():
+    status = Status(1.5, False, real_time_factor=1.0, steps=4, substeps=5, iterations=10, residual=2e-7)
+    array = to_diagnostics(status, "/bilayer_sim", 1.0)
+    values = {value.key: value.value for value in array.status[0].values}
+    assert values["Newton iterations per step"] == "2.5"
+    assert values["largest residual [m/s]"] == "2e-07"
+    assert to_seconds(array.header.stamp) == 1.5

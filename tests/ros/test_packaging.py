@@ -1,0 +1,63 @@
+"""What an installation contains, tried in a directory of its own."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = pytest.mark.slow
+
+
+NOT_SOURCES = shutil.ignore_patterns(".*", "__pycache__", "build", "runs", "*.egg-info")
+
+
+@pytest.fixture(scope="module")
+def prefix(root, tmp_path_factory):
+    """Where a plain installation went, without its dependencies, which are those of the environment."""
+    directory = tmp_path_factory.mktemp("installation")
+    shutil.copytree(root, directory / "sources", ignore=NOT_SOURCES)
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--ignore-installed"]
+    subprocess.run([*pip, "--prefix", directory / "prefix", directory / "sources"], check=True)
+    return directory / "prefix"
+
+
+@pytest.fixture
+def run(prefix, tmp_path):
+    """Runs a command with the installation before everything else, away from the checkout."""
+    (packages,) = prefix.glob("lib/python3*/site-packages")
+    environment = os.environ | {"PYTHONPATH": str(packages)}
+
+    def finished(*command):
+        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+
+    return finished
+
+
+def test_the_bundled_scenes_are_found(prefix, run):
+    listing = run(sys.executable, "-m", "bilayer_core", "scenes")
+    assert listing.returncode == 0, listing.stderr
+    assert "gripping" in listing.stdout
+    assert str(prefix) in run(sys.executable, "-c", "import bilayer_core; print(bilayer_core.__file__)").stdout
+
+
+def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
+    assert (prefix / "share/ament_index/resource_index/packages/bilayer_sim_ros").is_file()
+    for name in ("package.xml", "config/sim_node.yaml", "config/scenes/gripping.yaml", "launch/simulation.launch.py"):
+        assert (prefix / "share/bilayer_sim_ros" / name).is_file()
+
+
+@pytest.mark.parametrize("name", ["sim_node", "ramp_controller"])
+def test_executables_are_where_ros2_run_looks_for_them(prefix, run, name):
+    shown = run(prefix / "lib/bilayer_sim_ros" / name, "--help")
+    assert shown.returncode == 0, shown.stderr
+    assert f"usage: {name}" in shown.stdout
+
+
+def test_the_core_needs_nothing_of_ros(run):
+    program = "import sys; sys.modules['rclpy'] = None\nfrom bilayer_sim_ros.sim_node import main\nsys.exit(main())"
+    node = run(sys.executable, "-c", program)
+    assert node.returncode == 2
+    assert "pip install 'bilayer_sim_ros[ros]'" in node.stderr
+    assert "Traceback" not in node.stderr

@@ -1,0 +1,84 @@
+"""The controller beside a simulation node: two processes, connected by topics alone."""
+
+import signal
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from bilayer_core.record.log_reader import read_log
+from bilayer_sim_ros.ramp import ramp
+
+DURATION = 1.0
+
+
+@pytest.mark.parametrize(("elapsed", "value"), [(-1.0, 2.0), (0.0, 2.0), (2.5, 5.0), (10.0, 14.0), (99.0, 14.0)])
+def test_a_ramp_is_linear_and_constant_before_and_after(elapsed, value):
+    assert ramp(elapsed, 10.0, 2.0, 14.0) == value
+
+
+@pytest.fixture(scope="module")
+def log(domain_of_module, start, tmp_path_factory):
+    """The log of a run whose controller took the stimulus from 0.25 to 0.75."""
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    simulation = start(
+        "sim_node",
+        domain_of_module,
+        {"scene": "bending", "log": path, "start_paused": True, "duration": 1.5 * DURATION},
+    )
+    controller = start(
+        "ramp_controller",
+        domain_of_module,
+        {"channel": "swelling", "start_value": 0.25, "end_value": 0.75, "duration": DURATION, "resume": True},
+    )
+    assert controller.wait() == 0, controller.output
+    assert simulation.wait() == 0, simulation.output
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(log):
+    return read_log(log)
+
+
+def test_the_stimulus_follows_the_ramp_in_simulated_time(run):
+    expected = np.array([ramp(time, DURATION, 0.25, 0.75) for time in run.times])
+    # The controller hears of a time after it was simulated: the stimulus is late, and never early.
+    late = (expected - run.stimulus[:, 0])[run.times > 0.2]
+    assert late.min() > -1e-9
+    assert late.max() < 0.05
+
+
+def test_the_end_value_stays_after_the_controller_has_ended(run):
+    assert np.all(run.stimulus[run.times > 1.3 * DURATION, 0] == 0.75)
+
+
+def test_before_the_first_message_the_start_of_the_schedule_is_held(run):
+    assert run.stimulus[0, 0] == 0.0
+
+
+def test_each_stimulus_is_logged_at_the_time_from_which_it_acts(log, run):
+    with log.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        messages = [
+            (message.log_time * 1e-9, decoded.data)
+            for _, _, message, decoded in reader.iter_decoded_messages(topics=["/bilayer_sim/stimulus/swelling"])
+        ]
+    assert len({value for _, value in messages}) > 10
+    # A frame shows the stimulus of the step that ends with it.
+    for time, applied in zip(run.times[1:], run.stimulus[1:, 0], strict=True):
+        assert applied == [value for since, value in messages if since < time - 1e-9][-1]
+
+
+def test_a_controller_without_a_simulation_gives_up_with_exit_code_2(start, domain):
+    controller = start("ramp_controller", domain, {"connection_timeout": 0.5})
+    assert controller.wait() == 2
+    assert "nobody subscribes to /bilayer_sim/stimulus/humidity (waited 0.5 s)" in controller.output
+
+
+def test_a_waiting_controller_can_be_interrupted(start, domain):
+    controller = start("ramp_controller", domain, {"connection_timeout": 100})
+    controller.wait_for("waiting for a subscriber")
+    controller.send(signal.SIGINT)
+    assert controller.wait(10) == 130
