@@ -86,7 +86,8 @@ class Stepper:
         """Eigenstrain of each edge from the filtered stimuli, shape (n_edge,)."""
         model = self.model
         strain = free_strain(transduction, model.law_gain, model.law_reference, model.law_saturation)
-        return np.bincount(model.driven_edge, strain[model.driven_law], model.edge_count)
+        total = np.bincount(model.driven_edge, strain[model.driven_law], model.edge_count)
+        return total.astype(float, copy=False)  # whole numbers if nothing is driven
 
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
