@@ -13,14 +13,14 @@ PARTS = ("kinematics", "contact", "forces", "solve", "integrate")
 
 
 def kernels():
-    """All compiled functions of the core by name."""
+    """All kernels of the core by name, without the small functions that they inline (whose names begin with _)."""
     found = {}
     for part in PARTS:
         package = importlib.import_module(f"bilayer_core.{part}")
         for info in pkgutil.iter_modules(package.__path__):
             module = importlib.import_module(f"bilayer_core.{part}.{info.name}")
             for name, value in vars(module).items():
-                if isinstance(value, CPUDispatcher):
+                if isinstance(value, CPUDispatcher) and not name.startswith("_"):
                     found[f"{value.py_func.__module__}.{name}"] = value
     return found
 
