@@ -23,7 +23,11 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     size = f"{summary['nodes']} nodes, {summary['dof']} unknowns"
     yield f"  {'model':22}{summary['model']}, {summary['integrator']}, {size}"
     yield f"  {'CPU time':22}{summary['cpu_time']:.3g} s" + (f", real-time factor {factor:.3g}" if factor else "")
-    yield f"  {'Newton iterations':22}{summary['newton_iterations']}"
+    iterations = summary["newton_iterations"]
+    each = f", {1e3 * summary['cpu_time'] / iterations:.2g} ms each" if iterations else ""
+    yield f"  {'Newton iterations':22}{iterations}{each}"
+    refused = f", {summary['rejected_steps']} attempts refused" if summary["rejected_steps"] else ""
+    yield f"  {'steps':22}{summary['steps']}{refused}; correction left at most {summary['largest_residual']:.1g} m/s"
     yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m"
     if summary["min_gap"] is not None:
         yield f"  {'smallest gap':22}{1e3 * summary['min_gap']:.4g} mm"
