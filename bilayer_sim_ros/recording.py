@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 
+from bilayer_core.errors import InputError
 from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.record.mcap_log import McapRecorder
+
+RRD_ENDING = ".rrd"
 
 
 class Recording:
@@ -24,23 +28,29 @@ class Recording:
     Raises
     ------
     InputError
-        At once: a file exists already, or its directory cannot be written to.
+        At once: a file exists already or has another ending, or its directory cannot be written to.
     """
 
     def __init__(self, log_path: str, rrd_path: str, rate: float, marker_rate: float, run: int = 0):
         self._settings = (log_path, rrd_path, rate, marker_rate)
         self._run = run
-        self._log = McapRecorder(self._numbered(log_path), rate, marker_rate) if log_path else None
-        self._rrd = None
+        self._log = McapRecorder(self._new_file(log_path), rate, marker_rate) if log_path else None
+        rrd = None
         if rrd_path:
+            if not rrd_path.endswith(RRD_ENDING):
+                raise InputError(f"{rrd_path}: the name of a rerun recording ends in {RRD_ENDING}")
             from bilayer_core.view.rerun_view import RrdRecorder
 
-            self._rrd = RrdRecorder(self._numbered(rrd_path), rate)
-        self._recorders = [recorder for recorder in (self._log, self._rrd) if recorder]
+            rrd = RrdRecorder(self._new_file(rrd_path), rate)
+        self._recorders = [recorder for recorder in (self._log, rrd) if recorder]
 
-    def _numbered(self, name: str) -> Path:
+    def _new_file(self, name: str) -> Path:
         path = Path(name)
-        return path.with_stem(f"{path.stem}_{self._run}") if self._run else path
+        if self._run:
+            path = path.with_stem(f"{path.stem}_{self._run}")
+        if path.exists():
+            raise InputError(f"{path}: exists already; remove it, or choose another name")
+        return path
 
     def of_next_run(self) -> Recording:
         """The files of the run that begins with a reset."""
@@ -67,10 +77,7 @@ class Recording:
             self._log.log_stimulus(channel, value, time)
 
     def close(self, complete: bool, termination: str) -> None:
-        """Finish all files, the second one even if the first cannot be."""
-        try:
-            if self._log:
-                self._log.close(complete, termination)
-        finally:
-            if self._rrd:
-                self._rrd.close(complete)
+        """Finish all files, each even if another cannot be."""
+        with ExitStack() as stack:
+            for recorder in self._recorders:
+                stack.callback(recorder.close, complete, termination)

@@ -3,6 +3,7 @@
 import signal
 
 import pytest
+import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosgraph_msgs.msg import Clock
@@ -24,6 +25,7 @@ FAST = {"scene": "bending", "real_time_factor": 0}
         ({"scene": "griping"}, "gripping"),
         ({"model": "three_rod"}, "three_rod"),
         ({"log": "missing/run.mcap"}, "missing"),
+        ({"rerun": "serve"}, "serve: the name of a rerun recording ends in .rrd"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
 )
@@ -41,6 +43,30 @@ def test_an_existing_log_is_refused_before_the_simulation_starts(start, domain, 
     assert node.wait() == 2
     assert str(log) in node.output
     assert log.read_bytes() == b"dear to somebody"
+
+
+def test_a_rerun_recording_is_written_when_the_run_ends(start, domain, tmp_path):
+    recording = tmp_path / "run.rrd"
+    node = start("sim_node", domain, FAST | {"rerun": recording, "duration": 0.1})
+    assert node.wait() == 0, node.output
+    assert recording.stat().st_size > 10_000
+
+
+def test_a_simulation_that_cannot_go_on_ends_with_3_and_a_log_up_to_its_last_step(start, domain, root, tmp_path):
+    scene = yaml.safe_load((root / "config" / "scenes" / "bending.yaml").read_text())
+    scene["stimuli"]["swelling"]["schedule"] = {"type": "table", "times": [0.05, 0.051], "values": [0.0, 1.0]}
+    scene["solver"] = {"max_newton_iterations": 1, "max_halvings": 0}
+    path, log = tmp_path / "hopeless.yaml", tmp_path / "run.mcap"
+    path.write_text(yaml.safe_dump(scene))
+    parameters = FAST | {"scene": path, "log": log, "stimulus_fallback": "schedule", "rate": 10}
+    node = start("sim_node", domain, parameters)
+    assert node.wait() == 3, node.output
+    assert "sim_node: stopped at t = 0.05 s" in node.output
+    assert "Traceback" not in node.output
+    info = read_info(log)
+    assert not info.complete
+    assert "stopped at t = 0.05 s" in info.termination
+    assert info.last_time == pytest.approx(0.05)  # the last accepted step, between two frames of 10 Hz
 
 
 def test_an_argument_that_nobody_reads_is_refused(start, domain):
