@@ -1,6 +1,6 @@
 """Bending and twisting between two edges a and b.
 
-    B = ½ k₁ (κ₁ − κ̄₁)² + ½ k₂ (κ₂ − κ̄₂)² + ½ k₃ (ψ − ψ̄)²        (paper, eqs. 9 to 12)
+    B = ½ k₁ (κ₁ − κ̄₁)² + ½ k₂ (κ₂ − κ̄₂)² + ½ k₃ (ψ − ψ̄)²        (paper, eqs. 10 to 13)
 
 At an inner node k₁ = EI₁/Δl, k₂ = EI₂/Δl, k₃ = GJ/Δl and κ₁ = χ Δl, κ₂ = ξ Δl, ψ = τ Δl with the Voronoi length Δl.
 The same

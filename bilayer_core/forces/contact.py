@@ -1,6 +1,6 @@
 """Barrier contact of carriers with planes and with each other.
 
-    C = K_c b(d) Δl,   force −K_c b′(d) Δl n, repulsive along the outward normal n        (paper, eq. 20; bracket's
+    C = K_c b(d) Δl,   force −K_c b′(d) Δl n, repulsive along the outward normal n        (paper, eq. 24; bracket's
     sign put right)
 
 Plane: d = n·(x − p) − r. Two carriers: d = |x_i − x_j| − r_i − r_j, n = (x_i − x_j)/|x_i − x_j|. With b′, b″ at d, P

@@ -1,6 +1,6 @@
 """Bond between the paired edges of two layers: translation. (Rotation is `bend_twist` with other stiffnesses.)
 
-    C_T = ½ k_T l Σ_α (p·m̄_α − d_α)²,   m̄_α = ½ (m_α^t + m_α^b),   α = 1, 2, 3        (paper, eqs. 16 and 17)
+    C_T = ½ k_T l Σ_α (p·m̄_α − d_α)²,   m̄_α = ½ (m_α^t + m_α^b),   α = 1, 2, 3        (paper, eqs. 17 to 19)
 
 p joins the midpoints of the paired edges, bottom to top; m3 is the tangent; l is the rest length of the station, d_α
 the value in the

@@ -1,6 +1,6 @@
 """Quadratic drag of a fluid at rest or in uniform flow, once for the whole section of a rod.
 
-    F = −½ ρ_f Δl (w C∥ |v_t| v_t t + w C⊥ |v₁| v₁ m1 + h C⊥ |v₂| v₂ m2)        (paper, eq. 23)
+    F = −½ ρ_f Δl (w C∥ |v_t| v_t t + w C⊥ |v₁| v₁ m1 + h C⊥ |v₂| v₂ m2)        (paper, eq. 27)
 
 v is the velocity relative to the fluid, v_t, v₁, v₂ its components along the tangent, through the thickness and
 across the width; w is the

@@ -1,7 +1,7 @@
 """Smoothed Coulomb friction, lagged once per step, that may differ with the direction of sliding.
 
 With normal force λ, normal n and contact points taken at the start of the step, the slip u of the contact points over
-the step of length h gives a dissipation potential (Li et al. 2020, eq. 14; paper, eqs. 21 and 22, f₁ and u_t put
+the step of length h gives a dissipation potential (Li et al. 2020, eq. 14; paper, eqs. 25 and 26, f₁ and u_t put
 right). Let a be the forward direction in the tangent plane, s = n × a, and
 
     ψ(u)² = (μ± u·a)² + (μ_s u·s)²,   μ± = μ₊ where u·a ≥ 0, μ₋ elsewhere,   μ = max(μ₊, μ₋, μ_s),   w = ψ/(μ h)

@@ -2,7 +2,7 @@
 
 Over a step of length h from qₙ with velocity vₙ:
 
-    inertia (implicit Euler, paper eq. 25)   ½ M/h² |q − q̃|²,   q̃ = qₙ + h vₙ,   v = (q − qₙ)/h
+    inertia (implicit Euler, paper, eq. 29)   ½ M/h² |q − q̃|²,   q̃ = qₙ + h vₙ,   v = (q − qₙ)/h
     mass damping, force −α M v               ½ α M/h |q − qₙ|²
     gravity                                  −M g·x
 

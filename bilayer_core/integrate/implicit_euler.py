@@ -1,4 +1,4 @@
-"""Implicit Euler, the paper's integrator (eq. 25): order 1, strongly dissipative.
+"""Implicit Euler, the paper's integrator (eq. 29): order 1, strongly dissipative.
 
     q̃ = qₙ + h vₙ,   minimise ½ |q − q̃|²_M/h² + V(q),   v = (q − qₙ)/h
 

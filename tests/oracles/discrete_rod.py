@@ -14,7 +14,7 @@ def parallel_transport(vector, start, end):
 
 
 def curvatures(edge_a, edge_b, frame_a, frame_b):
-    """Integrated curvatures χΔl and ξΔl by the curvature binormal (paper, eqs. 9 and 10); frames are (m1, m2)."""
+    """Integrated curvatures χΔl and ξΔl by the curvature binormal (paper, eqs. 10 and 11); frames are (m1, m2)."""
     binormal = 2.0 * np.cross(edge_a, edge_b)
     binormal /= np.linalg.norm(edge_a) * np.linalg.norm(edge_b) + edge_a @ edge_b
     chi = 0.5 * (frame_a[1] + frame_b[1]) @ binormal
