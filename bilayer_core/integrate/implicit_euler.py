@@ -59,6 +59,8 @@ def accept(model: Model, state: State, context: StepContext, end: Configuration)
 
 def _torque_free_spin(model: Model, place: int, rotation: np.ndarray, spin: np.ndarray, h: float) -> np.ndarray:
     """Angular velocity [rad/s] after a step `h` [s] without torque, to first order; unchanged for a ball."""
+    if model.bodies.isotropic[place]:
+        return spin
     second = model.bodies.second_moment[place]
     inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
     return spin + h * np.linalg.solve(inertia, np.cross(inertia @ spin, spin))

@@ -34,6 +34,7 @@ def build_bodies(scene: SceneConfig, found: Collected) -> Bodies:
         reach.append(max([body.surface.radius if body.surface else 0.0, *lengths]))
     free_index = np.full(count, -1, dtype=np.int64)
     free_index[free] = np.arange(len(free))
+    moments = np.array([_second_moment(scene.bodies[index]) for index in free]).reshape(len(free), 3, 3)
     keyframes = [
         ([], []) if i in free else (b.motion.times, b.motion.displacements) for i, b in enumerate(scene.bodies)
     ]
@@ -45,7 +46,8 @@ def build_bodies(scene: SceneConfig, found: Collected) -> Bodies:
         start_velocity=velocity,
         start_angular_velocity=angular_velocity,
         mass=np.array([scene.bodies[index].motion.mass for index in free]),
-        second_moment=np.array([_second_moment(scene.bodies[index]) for index in free]).reshape(len(free), 3, 3),
+        isotropic=np.array([np.array_equal(j, j[0, 0] * np.eye(3)) for j in moments], dtype=bool),
+        second_moment=moments,
         freedom=np.concatenate(freedom, axis=1) if freedom else np.zeros((0, 0)),
         reach=np.array(reach),
         radius=np.array([body.surface.radius if body.surface else 0.0 for body in scene.bodies]),

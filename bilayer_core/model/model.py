@@ -39,6 +39,7 @@ class Bodies:
     start_velocity: Array  # [m/s], shape (n_body, 3)
     start_angular_velocity: Array  # [rad/s], shape (n_body, 3)
     mass: Array  # of free bodies [kg], shape (n_free,)
+    isotropic: Array  # whether all axes are principal: a ball needs no gyroscopic term, shape (n_free,)
     second_moment: Array  # ∫ r rᵀ dm of free bodies, body frame [kg m²], shape (n_free, 3, 3)
     freedom: (
         Array  # motions (X, φ) that free bodies are allowed, one a column, orthonormal, shape (6 n_free, n_freedom)

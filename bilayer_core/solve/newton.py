@@ -16,6 +16,7 @@ from enum import Enum
 import numpy as np
 
 from ..contact.step_bound import step_bound
+from ..jit import kernel
 from ..model.bodies import carrier_names
 from ..model.model import Model
 from .configuration import Configuration
@@ -27,6 +28,24 @@ KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
 BACKTRACKING = 0.5
 MAX_BACKTRACKS = 30
 ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the potential below it mean nothing
+
+
+@kernel
+def _largest_move(step, node_unknown, edge_unknown, half_width):
+    """Largest displacement of a node, or of an edge's border by its turn [m]; NaN if any is."""
+    largest = 0.0
+    for i in range(node_unknown.shape[0]):
+        d = node_unknown[i]
+        size = math.sqrt(step[d] ** 2 + step[d + 1] ** 2 + step[d + 2] ** 2)
+        if math.isnan(size):
+            return size
+        largest = max(largest, size)
+    for k in range(edge_unknown.shape[0]):
+        size = abs(step[edge_unknown[k]]) * half_width[k]
+        if math.isnan(size):
+            return size
+        largest = max(largest, size)
+    return largest
 
 
 class NewtonStatus(Enum):
@@ -88,8 +107,7 @@ class NewtonSolver:
     def speed(self, step: Array, body_step: Array) -> float:
         """Largest displacement of a material point in a step, over the length of the time step [m/s]."""
         model = self._model
-        largest = np.sqrt(np.square(step[self._node_step]).sum(axis=1).max())
-        largest = max(largest, np.abs(step[model.layout.edge] * model.half_width).max())
+        largest = _largest_move(step, model.layout.node, model.layout.edge, model.half_width)
         for b in range(model.free_count):
             turn = self._reach[b] * math.sqrt(body_step[b, 3:] @ body_step[b, 3:])
             largest = max(largest, math.sqrt(body_step[b, :3] @ body_step[b, :3]) + turn)

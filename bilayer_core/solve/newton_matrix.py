@@ -3,9 +3,8 @@
     [ A   U ] [ δ   ]     [ g   ]
     [ Uᵀ  D ] [ δ_b ] = − [ g_b ]
 
-A is factorised as L D Lᵀ in linear time, S = D − Uᵀ A⁻¹ U by Cholesky, after both are restricted to the motions that
-bodies are allowed.
-While no free body touches or holds a rod, U vanishes and is left out.
+A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the motions
+that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
 If a pivot is not positive the matrix is not convex there; multiples of the mass matrix are added until it is, so that
 the step is a descent direction.
 """
@@ -13,7 +12,6 @@ the step is a descent direction.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..kinematics.rotation import skew
 from ..model.model import Model
@@ -28,6 +26,16 @@ SHIFT_GROWTH = 10.0
 LARGEST_SHIFT = 1e8
 
 
+def zeros_in_one(shapes: dict[str, tuple[int, ...]]) -> tuple[Array, list[Array]]:
+    """A flat array of zeros and consecutive views of it with the given shapes: one call clears them all."""
+    sizes = [int(np.prod(shape)) for shape in shapes.values()]
+    flat = np.zeros(sum(sizes))
+    ends = np.cumsum(sizes)
+    return flat, [
+        flat[end - size : end].reshape(shape) for size, end, shape in zip(sizes, ends, shapes.values(), strict=True)
+    ]
+
+
 class NewtonMatrix:
     """Second derivatives in edge space, filled by the forces, and the factorised matrix of the unknowns."""
 
@@ -39,15 +47,21 @@ class NewtonMatrix:
         pairs, carriers = len(model.pair_top), model.carriers
         size, b = model.layout.size, model.layout.half_bandwidth
         balls = len(carriers.pair_first) if has_balls else 0
-        self.edge_hessian = np.zeros((edges, 4, 4))
-        self.cross_hessian = np.zeros((len(model.joint_a), 4, 4))
-        self.pair_hessian = np.zeros((pairs, 3, 3))
-        self.top_hessian = np.zeros((pairs, 3, 4))
-        self.bottom_hessian = np.zeros((pairs, 3, 4))
-        self.carrier_hessian = np.zeros((len(carriers.weight) if has_node_blocks else 0, 3, 3))
-        self.ball_hessian = np.zeros((balls, 3, 3))
-        self.ball_turn_hessian = np.zeros((balls, 3, 3))
-        self.body_hessian = np.zeros((6 * model.free_count, 6 * model.free_count))
+        carrier_blocks = len(carriers.weight) if has_node_blocks else 0
+        shapes = {
+            "edge_hessian": (edges, 4, 4),
+            "cross_hessian": (len(model.joint_a), 4, 4),
+            "pair_hessian": (pairs, 3, 3),
+            "top_hessian": (pairs, 3, 4),
+            "bottom_hessian": (pairs, 3, 4),
+            "carrier_hessian": (carrier_blocks, 3, 3),
+            "ball_hessian": (balls, 3, 3),
+            "ball_turn_hessian": (balls, 3, 3),
+            "body_hessian": (6 * model.free_count, 6 * model.free_count),
+        }
+        self._second_derivatives, parts = zeros_in_one(shapes)
+        self.edge_hessian, self.cross_hessian, self.pair_hessian, self.top_hessian, self.bottom_hessian = parts[:5]
+        self.carrier_hessian, self.ball_hessian, self.ball_turn_hessian, self.body_hessian = parts[5:]
         self._band = np.zeros((size + b, b + 1))
         self._factor, self._solve, self._solve_border = band_kernels(b)
         self._right = np.zeros(size + b)
@@ -63,23 +77,19 @@ class NewtonMatrix:
         self._schur = None
         self._coupled = False
         points = model.bodies.free_index[carriers.point_body]
-        self._carriers = [model.node_count + k for k in np.flatnonzero(points >= 0)]
-        self._carrier_body = [points[k - model.node_count] for k in self._carriers]
-        balls = np.flatnonzero(carriers.free_body >= 0)
-        self._carriers += balls.tolist()
-        self._carrier_body += carriers.free_body[balls].tolist()
+        self._points = [(model.node_count + k, points[k]) for k in np.flatnonzero(points >= 0)]
+        self._balls = [(k, carriers.free_body[k]) for k in np.flatnonzero(carriers.free_body >= 0)]
         self.shift = 0.0
 
     def clear(self) -> None:
         """Set all second derivatives to zero."""
-        for array in (self.edge_hessian, self.cross_hessian, self.pair_hessian, self.top_hessian, self.bottom_hessian):
-            array.fill(0.0)
-        for array in (self.carrier_hessian, self.ball_hessian, self.ball_turn_hessian, self.body_hessian):
-            array.fill(0.0)
+        self._second_derivatives.fill(0.0)
 
     def add_carriers_to_bodies(self, carrier_gradient: Array, at: Configuration, body_gradient: Array) -> None:
         """Hand the force on the centre of each ball and on each contact point to its free body."""
-        for carrier, free in zip(self._carriers, self._carrier_body, strict=True):
+        for carrier, free in self._balls:
+            body_gradient[free, :3] += carrier_gradient[carrier]
+        for carrier, free in self._points:
             body_gradient[free, :3] += carrier_gradient[carrier]
             arm = at.carrier[carrier] - at.body_position[free]
             body_gradient[free, 3:] += np.cross(arm, carrier_gradient[carrier])
@@ -158,17 +168,19 @@ class NewtonMatrix:
         model, carriers, corner = self._model, self._model.carriers, self._corner
         if not self._has_node_blocks:
             return
-        jacobian = {}
-        for carrier, free in zip(self._carriers, self._carrier_body, strict=True):
+        carried = {}
+        for carrier, free in self._balls:
             own = self.carrier_hessian[carrier]
+            corner[6 * free : 6 * free + 3, 6 * free : 6 * free + 3] += own + np.triu(own, 1).T
+            carried[carrier] = free, np.eye(3, 6)
+        for carrier, free in self._points:
+            own, force = self.carrier_hessian[carrier], self.carrier_gradient[carrier]
             arm = at.carrier[carrier] - at.body_position[free]
-            jacobian[carrier] = np.hstack([np.eye(3), -skew(arm)])
-            rows = slice(6 * free, 6 * free + 6)
-            corner[rows, rows] += jacobian[carrier].T @ (own + np.triu(own, 1).T) @ jacobian[carrier]
-            if arm.any():
-                force = self.carrier_gradient[carrier]
-                turning = 0.5 * (np.outer(arm, force) + np.outer(force, arm)) - (arm @ force) * np.eye(3)
-                corner[rows, rows][3:, 3:] += turning
+            jacobian = np.hstack([np.eye(3), -skew(arm)])
+            rows, turns = slice(6 * free, 6 * free + 6), slice(6 * free + 3, 6 * free + 6)
+            corner[rows, rows] += jacobian.T @ (own + np.triu(own, 1).T) @ jacobian
+            corner[turns, turns] += 0.5 * (np.outer(arm, force) + np.outer(force, arm)) - (arm @ force) * np.eye(3)
+            carried[carrier] = free, jacobian
         for k in np.flatnonzero(self.ball_hessian.any(axis=(1, 2))):
             i, j = carriers.pair_first[k], carriers.pair_second[k]
             ball = carriers.free_body[j]
@@ -178,11 +190,10 @@ class NewtonMatrix:
                     self._border[rows, 6 * ball : 6 * ball + 3] += self.ball_hessian[k]
                     self._border[rows, 6 * ball + 3 : 6 * ball + 6] += self.ball_turn_hessian[k]
                     self._coupled = True
-            elif i in jacobian and ball >= 0:
-                block = np.hstack([self.ball_hessian[k], self.ball_turn_hessian[k]])
-                first = self._carrier_body[self._carriers.index(i)]
+            elif i in carried and ball >= 0:
+                first, jacobian = carried[i]
                 rows, columns = slice(6 * first, 6 * first + 6), slice(6 * ball, 6 * ball + 6)
-                block = jacobian[i].T @ block
+                block = jacobian.T @ np.hstack([self.ball_hessian[k], self.ball_turn_hessian[k]])
                 corner[rows, columns] += block
                 corner[columns, rows] += block.T
 
@@ -246,9 +257,10 @@ class NewtonMatrix:
             self._solve_border(self._band, size, self._border_solution)
             schur -= self._border_free.T @ self._border_solution
         try:
-            self._schur = cho_factor(schur, check_finite=False)
-        except LinAlgError:
+            np.linalg.cholesky(schur)
+        except np.linalg.LinAlgError:
             return False
+        self._schur = schur
         return True
 
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
@@ -265,7 +277,7 @@ class NewtonMatrix:
         load = -freedom.T @ body_gradient.ravel()
         if self._coupled:
             load = load - self._border_free[:size].T @ step
-        body_step = cho_solve(self._schur, load, check_finite=False)
+        body_step = np.linalg.solve(self._schur, load)
         if self._coupled:
             step -= self._border_solution[:size] @ body_step
         return step, (freedom @ body_step).reshape(-1, 6)

@@ -21,7 +21,7 @@ from ..model.model import Model
 from .assembly import expand_gradient
 from .clamps import hand_gradient_to_bodies
 from .configuration import Configuration
-from .newton_matrix import NewtonMatrix
+from .newton_matrix import NewtonMatrix, zeros_in_one
 
 Array = np.ndarray
 
@@ -85,13 +85,12 @@ class IncrementalPotential:
         self.terms: dict[str, float] = {}
         self.min_gap = math.inf
         self.gradient = np.zeros(model.layout.size)
-        self.body_gradient = np.zeros((model.free_count, 6))
+        shapes = {"node": (model.node_count, 3), "edge": (edges, 4), "pair": (pairs, 3), "body": (model.free_count, 6)}
+        self._first_derivatives, parts = zeros_in_one(shapes)
+        self._node_gradient, self.edge_gradient, self._pair_gradient, self.body_gradient = parts
         self.carrier_gradient = np.zeros((len(carriers.weight), 3))
         self.body_contact_gradient = np.zeros((model.free_count, 6))
         self.pair_gap = np.full(len(carriers.pair_first), math.inf)
-        self.edge_gradient = np.zeros((edges, 4))
-        self._node_gradient = np.zeros((model.node_count, 3))
-        self._pair_gradient = np.zeros((pairs, 3))
         self.matrix = NewtonMatrix(model, self.has_contact or self.has_drag, self.has_balls, self.carrier_gradient)
         self.attached_gradient = np.zeros((len(model.attached_node), 3))
         self._attached_free, self._wall_free = model.attached_free, model.wall_free
@@ -151,8 +150,7 @@ class IncrementalPotential:
         request.
         """
         model, context, matrix = self.model, self.context, self.matrix
-        for array in (self._node_gradient, self.edge_gradient, self._pair_gradient, self.body_gradient):
-            array.fill(0.0)
+        self._first_derivatives.fill(0.0)
         if with_hessian:
             matrix.clear()
         terms = self.terms
