@@ -3,8 +3,8 @@
     [ A   U ] [ δ   ]     [ g   ]
     [ Uᵀ  D ] [ δ_b ] = − [ g_b ]
 
-A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the motions
-that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
+A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the
+motions that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
 If a pivot is not positive the matrix is not convex there; multiples of the mass matrix are added until it is, so that
 the step is a descent direction.
 """
