@@ -83,6 +83,7 @@ setup(
         "bench": ["matplotlib>=3.8", "mujoco>=3.3", "pyelastica>=0.3.2"],
         "test": [
             "hypothesis>=6.100",
+            "jsonschema>=4.20",
             "mcap-ros2-support>=0.5",
             "pillow>=10",
             "pytest>=8",

@@ -10,7 +10,7 @@ import click
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
 from bilayer_core.cli.run import run
-from bilayer_core.cli.scenes import check, scenes
+from bilayer_core.cli.scenes import check, scenes, schema
 from bilayer_core.errors import BilayerError
 
 INTERNAL_ERROR = 70
@@ -36,7 +36,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, check, run, info, view):
+for verb in (scenes, schema, check, run, info, view):
     program.add_command(verb)
 
 

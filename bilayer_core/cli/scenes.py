@@ -1,4 +1,4 @@
-"""The verbs about scenes: ``scenes`` and ``check``."""
+"""The verbs about scenes: ``scenes``, ``schema`` and ``check``."""
 
 from __future__ import annotations
 
@@ -21,6 +21,15 @@ def scenes() -> None:
     for name, path in found.items():
         title = read_yaml(path.read_text(encoding="utf-8"), str(path))["title"]
         click.echo(f"{name:{width}}  {title}")
+
+
+@click.command(cls=Verb)
+def schema() -> None:
+    """Print the JSON Schema of scene files; editors complete and check with it."""
+    from bilayer_core.scene.config import SceneConfig
+
+    text = {"$schema": "https://json-schema.org/draft/2020-12/schema", **SceneConfig.model_json_schema(by_alias=True)}
+    click.echo(json.dumps(text, indent=2, ensure_ascii=False))
 
 
 @click.command(cls=Verb)

@@ -14,7 +14,7 @@ from decimal import Decimal
 from functools import cache
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
+from pydantic import BeforeValidator, Field
 
 from bilayer_core.scene.faults import refuse
 
@@ -149,12 +149,17 @@ class Count:
 
 def real(*arguments: Any, **limits: float) -> Any:
     """Annotation of a real number; the arguments are those of `Quantity`."""
-    return Annotated[float, BeforeValidator(Quantity(*arguments, **limits))]
+    quantity = Quantity(*arguments, **limits)
+    written = float | str if quantity.unit else float
+    return Annotated[
+        float, BeforeValidator(quantity, json_schema_input_type=written), Field(description=quantity.describe())
+    ]
 
 
 def whole(at_least: int) -> Any:
     """Annotation of a whole number."""
-    return Annotated[int, BeforeValidator(Count(at_least))]
+    count = Count(at_least)
+    return Annotated[int, BeforeValidator(count, json_schema_input_type=int), Field(description=count.describe())]
 
 
 PlainNumber = real("a plain number", "")
