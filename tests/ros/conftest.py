@@ -112,6 +112,14 @@ class Client:
             self._executor.spin_once(timeout_sec=0.05)
         return value
 
+    def drain(self, quiet=0.1):
+        """Receive what is on its way, until nothing has come for `quiet` seconds; of a paused node that is soon."""
+        last = time.monotonic()
+        while (now := time.monotonic()) - last < quiet:
+            self._executor.spin_once(timeout_sec=quiet / 2)
+            if time.monotonic() - now < quiet / 4:
+                last = time.monotonic()
+
     def listen(self, message_type, topic) -> list:
         """A list that grows with every message; it has one already."""
         messages = []

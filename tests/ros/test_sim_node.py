@@ -55,6 +55,7 @@ def heard(client):
 
 def step(client, *topics):
     """The messages of some topics after one more output period."""
+    client.drain()
     counts = [len(messages) for messages in topics]
     assert client.call("step").success
 
