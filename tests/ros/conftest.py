@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 import rclpy
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
@@ -97,7 +98,7 @@ class Client:
 
     def __init__(self, process):
         self._process = process
-        self._context = rclpy.Context()
+        self._context = Context()
         rclpy.init(context=self._context, domain_id=process.domain)
         self.node = Node("client", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)

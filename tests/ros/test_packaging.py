@@ -1,6 +1,8 @@
 """What an installation contains, tried in a directory of its own."""
 
+import importlib.metadata
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -61,3 +63,9 @@ def test_the_core_needs_nothing_of_ros(run):
     assert node.returncode == 2
     assert "pip install 'bilayer_sim_ros[ros]'" in node.stderr
     assert "Traceback" not in node.stderr
+
+
+def test_every_ros_wheel_of_this_environment_is_pinned(root):
+    pinned = set(re.findall(r"(ros-[a-z0-9-]+)(?:\[\w+\])?==", (root / "setup.py").read_text()))
+    names = {distribution.metadata["Name"].lower() for distribution in importlib.metadata.distributions()}
+    assert {name for name in names if name.startswith("ros-")} <= pinned
