@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import PenetrationError
-from ..scene.config import Body, Free, Prescribed, SceneConfig
+from ..scene.body import Body, Free, Prescribed
+from ..scene.config import SceneConfig
 from .model import Bodies, Carriers, Model, body_displacement
 from .rods import Collected
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..errors import SceneError
-from ..scene.config import Prescribed, SceneConfig
+from ..scene.body import Prescribed
+from ..scene.config import SceneConfig
 from .validity import validity_warnings
 
 MODELS = ("two_rod",)

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..kinematics.path import circle, rest_strains, straight
 from ..kinematics.rotation import rotation_matrix
-from ..scene.config import ArcPath, Fluid, Layer, Rod, SceneConfig
+from ..scene.config import Fluid, SceneConfig
+from ..scene.rod import ArcPath, Layer, Rod
 from .model import StrandArrays
 from .section import Bond, Section, bond, rectangle
 

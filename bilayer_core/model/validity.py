@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..scene.config import Layer, Rod, SceneConfig
+from ..scene.config import SceneConfig
+from ..scene.rod import Layer, Rod
 from ..scene.transduction import free_strain
 
 LARGE_STRAIN = 0.1  # linear elasticity and the rectangular section lose meaning

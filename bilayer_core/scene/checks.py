@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 from bilayer_core.scene.faults import Fault, Location, one_of
 
 if TYPE_CHECKING:
-    from bilayer_core.scene.config import Free, Rod, SceneConfig, Stimulus
+    from bilayer_core.scene.body import Free
+    from bilayer_core.scene.config import SceneConfig, Stimulus
+    from bilayer_core.scene.rod import Rod
 
 ROUNDING = 1e-9
 """Relative difference of typed numbers that is not taken for a fault."""

@@ -1,0 +1,142 @@
+"""Rods of a scene: paths, layers, patterns."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, field_serializer, model_validator
+
+from bilayer_core.scene import checks
+from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.units import (
+    Curvature,
+    NonNegativeLength,
+    PositiveAngle,
+    PositiveLength,
+    Twist,
+    whole,
+)
+
+Eigenstrains = Annotated[
+    list[Eigenstrain],
+    BeforeValidator(
+        lambda laws: [] if laws is None else [laws] if isinstance(laws, dict) else laws,
+        json_schema_input_type=Eigenstrain | list[Eigenstrain] | None,
+    ),
+]
+
+
+class StraightPath(Part):
+    """A straight line of given length."""
+
+    shape: Literal["straight"]
+    start: Point
+    direction: Direction
+    length: PositiveLength
+
+
+class ArcPath(Part):
+    """A part of a circle in the plane of its direction and the rod's normal."""
+
+    shape: Literal["arc"]
+    start: Point
+    direction: Direction
+    """Tangent at the start."""
+    radius: PositiveLength
+    angle: PositiveAngle
+    toward: Literal["normal", "opposite"] = "normal"
+    """Side on which the centre lies: that of the rod's normal at the start, or the other."""
+
+    @property
+    def length(self) -> float:
+        """Length of the arc [m]."""
+        return self.radius * self.angle
+
+    @property
+    def curvature(self) -> float:
+        """Towards the normal [1/m]."""
+        return (1.0 if self.toward == "normal" else -1.0) / self.radius
+
+
+class Pattern(Part):
+    """Copies of a rod, turned about an axis at equal angles; the first is the rod itself."""
+
+    axis: Direction = (0.0, 0.0, 1.0)
+    center: Point = (0.0, 0.0, 0.0)
+    count: whole(1)
+
+
+class Layer(Part):
+    """One layer of a rod. It covers the whole path, or the stations nearest to `interval`."""
+
+    name: Name
+    material: Name
+    thickness: PositiveLength
+    interval: tuple[NonNegativeLength, PositiveLength] | None = None
+    """From and to, as lengths along the path [m]."""
+    eigenstrain: Eigenstrains = []
+    """One law or several, which add up."""
+    natural_curvature: Curvature | None = None
+    """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
+    natural_twist: Twist = 0.0
+    """Of the layer by itself, about the path."""
+
+    @field_serializer("eigenstrain")
+    def _as_written(self, laws: list[Eigenstrain]) -> Any:
+        """A single law without its list, as scenes state it, so that overrides find its keys."""
+        return laws if len(laws) > 1 else laws[0] if laws else None
+
+
+class Rod(Part):
+    """One or two layers along a path, or several equal ones about an axis."""
+
+    name: Name
+    width: PositiveLength
+    path: Annotated[StraightPath | ArcPath, Field(discriminator="shape")]
+    normal: Direction
+    """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path."""
+    stations: whole(3)
+    """Cross-sections along the path, both ends included."""
+    layers: list[Layer] = Field(min_length=1, max_length=2)
+    torsion: Literal["laminate", "layers"] = "laminate"
+    """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
+    friction_axis: Literal["path", "normal", "across"] = "path"
+    """Direction of the rod that counts as forward for friction: along its path, its normal, or path × normal."""
+    pattern: Pattern | None = None
+    clamp_start: Name | None = None
+    clamp_end: Name | None = None
+
+    @property
+    def edge_length(self) -> float:
+        """Distance of two stations [m]."""
+        return self.path.length / (self.stations - 1)
+
+    @property
+    def copies(self) -> list[str]:
+        """Names of the rods that this one stands for: its own, or numbered ones if it has a pattern."""
+        return [f"{self.name}_{index}" for index in range(self.pattern.count)] if self.pattern else [self.name]
+
+    def covered_stations(self, layer: Layer) -> tuple[int, int]:
+        """First and last station of `layer`, those nearest to its interval."""
+        if layer.interval is None:
+            return 0, self.stations - 1
+        first, last = (math.floor(length / self.edge_length + 0.5) for length in layer.interval)
+        return first, last
+
+    def driven_edges(self, layer: Layer, law: Eigenstrain) -> range:
+        """Edges of the path that a law of `layer` drives: those of the layer whose middle lies in its interval, the end
+        excluded, so that adjoining intervals share none.
+        """
+        first, last = self.covered_stations(layer)
+        if law.interval is None:
+            return range(first, last)
+        begin, end = (math.ceil(length / self.edge_length - 0.5) for length in law.interval)
+        return range(max(first, begin), min(last, end))
+
+    @model_validator(mode="after")
+    def _check(self) -> Rod:
+        refuse_all("Rod", checks.faults_of_rod(self))
+        return self
