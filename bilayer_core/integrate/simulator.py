@@ -291,8 +291,10 @@ class Simulator:
         left = self.scene.duration - self.time if duration is None else duration
         if not (math.isfinite(left) and left >= 0.0):
             raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
-        self.compile()
         steps = int(round(left / self.dt))
+        if left > 0.0 and steps == 0:
+            raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
+        self.compile()
         begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
         termination = Termination.INTERRUPTED
         schedule = _Schedule(observers, self)

@@ -105,8 +105,10 @@ class NewtonSolver:
         self._moving = _Moving(model)
 
     def speed(self, step: Array, body_step: Array) -> float:
-        """Largest displacement of a material point in a step, over the length of the time step [m/s]."""
+        """Largest displacement of a material point in a step, over the length of the time step [m/s]; NaN if any is."""
         model = self._model
+        if not np.isfinite(body_step).all():
+            return math.nan
         largest = _largest_move(step, model.layout.node, model.layout.edge, model.half_width)
         for b in range(model.free_count):
             turn = self._reach[b] * math.sqrt(body_step[b, 3:] @ body_step[b, 3:])
@@ -229,6 +231,7 @@ class NewtonSolver:
         noise = ROUNDING * sum(abs(value) for value in potential.terms.values())
         self._carrier_step[: model.node_count] = step[self._node_step]
         self._moving.add_bodies(body_step[:, :3], self._carrier_step)
+        self._moving.add_turns(body_step[:, 3:], at, self._carrier_step)
         alpha, _ = self.bound(at, self._carrier_step)
         bounded = alpha < 1.0
         for halvings in range(MAX_BACKTRACKS):
@@ -243,9 +246,8 @@ class NewtonSolver:
 class _Moving:
     """Which carriers move freely, and which of them a free body carries.
 
-    Contact points and nodes on a turning body move on arcs. The bound follows straight lines, so a turn is added to
-    the motion as what it is to first order by the
-    line search itself: a trial behind a surface has an infinite potential and is halved.
+    What a turning body carries moves on an arc, which the bound follows along its tangent at the start of the iterate.
+    Where the arc ends behind a surface the potential is infinite, and the line search turns less.
     """
 
     def __init__(self, model: Model):
@@ -257,6 +259,8 @@ class _Moving:
         body[balls] = carriers.free_body[balls]
         self._carried = np.flatnonzero(body >= 0)
         self._body = body[self._carried]
+        self._turned = np.flatnonzero((body >= 0) & ~balls)
+        self._body_of_turned = body[self._turned]
         self.free = np.zeros(len(carriers.weight), dtype=bool)
         self.free[: model.node_count] = True
         self.free[model.attached_node] = False
@@ -265,3 +269,9 @@ class _Moving:
     def add_bodies(self, displacement: Array, carrier_step: Array) -> None:
         """Write the displacement of free bodies [m], shape (n_free, 3), into the steps of what they carry."""
         carrier_step[self._carried] = displacement[self._body]
+
+    def add_turns(self, turn: Array, at: Configuration, carrier_step: Array) -> None:
+        """Add what rotation vectors of free bodies [rad], shape (n_free, 3), do to nodes and points off their centres."""
+        if len(self._turned):
+            arms = at.carrier[self._turned] - at.body_position[self._body_of_turned]
+            carrier_step[self._turned] += np.cross(turn[self._body_of_turned], arms)

@@ -113,3 +113,17 @@ def test_a_free_body_with_feet_stands_on_the_ground():
     weight = 9.81 * (0.01 + simulator.model.node_mass.sum())
     assert simulator.contact_forces[-4:, 2] == pytest.approx(np.full(4, weight / 4), rel=1e-3)
     assert simulator.frame().body_wrenches[0] == pytest.approx([0, 0, weight, 0, 0, 0], abs=1e-3 * weight)
+
+
+def test_a_tumbling_body_does_not_cross_the_ground_with_its_feet_or_its_mast():
+    feet = [{"position": [x, 0, -0.01], "length": 5e-3, "offset": 0} for x in (-0.03, 0.03)]
+    table = free("table", (0, 0, 0.06), mass=0.01, inertia=1e-5, contact_points=feet)
+    table["motion"] |= {"angular_velocity": [0, 300.0, 0], "velocity": [0, 0, -2.0]}
+    mast = rod([layer()], length=0.02, stations=6, start=(0, 0, 0.07), clamp_start="table")
+    mast["path"]["direction"], mast["normal"] = [0, 0, 1], [1, 0, 0]
+    simulator = Simulator(
+        load_scene(scene([mast], bodies=[table], gravity=[0, 0, -9.81], obstacles=[GROUND], contact=contact()))
+    )
+    simulator.run(0.2)
+    assert 0.0 < simulator.statistics.min_gap < 1e-3
+    assert simulator.summary()["converged"] is True

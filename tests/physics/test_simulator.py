@@ -143,6 +143,30 @@ def test_a_solver_that_cannot_go_on_says_what_and_when_and_keeps_the_last_state(
     assert simulator.summary()["termination"] == "failed"
 
 
+def test_prescribed_motion_through_a_surface_stops_the_run_and_nothing_has_crossed():
+    pushed = everything()
+    pushed["bodies"] = pushed["bodies"][:1]
+    pushed["bodies"][0]["motion"] |= {"times": [0.0, 0.05], "displacements": [[0, 0, 0], [0, 0, -0.06]]}
+    simulator = Simulator(load_scene(pushed))
+    with pytest.raises(SimulationError, match=r"prescribed motion .* (node|contact point) .* would reach a surface"):
+        simulator.run(0.05)
+    assert simulator.time > 0.02
+    assert simulator.statistics.min_gap > 0.0
+
+
+def test_a_duration_in_which_nothing_would_happen_is_refused(simulator):
+    with pytest.raises(InputError, match="less than half a step"):
+        simulator.run(1e-4)
+    assert simulator.run(0.0).steps == 0
+
+
+def test_a_correction_that_is_not_finite_is_never_small(simulator):
+    simulator.step()
+    solver, size = simulator._stepper.solver, simulator.model.layout.size
+    for rods, body in ((np.nan, 0.0), (0.0, np.nan), (0.0, np.inf)):
+        assert not solver.speed(np.full(size, rods), np.full((1, 6), body)) <= 1.0
+
+
 def test_a_step_that_does_not_converge_is_halved_and_the_steps_grow_again():
     rough = everything()
     rough["solver"] = {"dt": 0.01, "max_newton_iterations": 6}
