@@ -1,4 +1,4 @@
-"""Inertia, damping and gravity of free rigid bodies.
+"""Inertia and damping of free rigid bodies.
 
 A body is the continuum of its mass points y = X + R r. Their squared distance from where inertia alone would take
 them is
@@ -77,16 +77,4 @@ def body_spring(
                 body_hessian_out[base + 3 + i, base + 3 + i] += factor * trace
                 for j in range(3):
                     body_hessian_out[base + 3 + i, base + 3 + j] -= 0.5 * factor * (a[i, j] + a[j, i])
-    return energy
-
-
-@kernel
-def body_gravity(mass, acceleration, position, body_gradient_out):
-    """Add −Σ m g·X of free bodies and return it [J]; `acceleration` is g [m/s²], shape (3,)."""
-    energy = 0.0
-    for b in range(mass.shape[0]):
-        for i in range(3):
-            weight = mass[b] * acceleration[i]
-            body_gradient_out[b, i] -= weight
-            energy -= weight * position[b, i]
     return energy

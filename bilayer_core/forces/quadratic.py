@@ -46,7 +46,7 @@ def angle_spring(inertia, factor, angle, speed, edge_gradient_out):
 
 @kernel
 def gravity(mass, acceleration, position, node_gradient_out):
-    """Add −Σ m g·x and return it [J]; `acceleration` is g [m/s²], shape (3,)."""
+    """Add −Σ m g·x of nodes or of bodies and return it [J]; `acceleration` is g [m/s²], shape (3,)."""
     energy = 0.0
     for i in range(mass.shape[0]):
         for j in range(3):

@@ -31,9 +31,7 @@ def build_model(scene: SceneConfig) -> Model:
     wall_b = _resolve_walls(found.column("joint_b", np.int64), edge_count)
 
     def joined(name: str, dtype=float, width: int | None = None) -> np.ndarray:
-        array = np.concatenate([found.column(name, dtype, width), found.column(bond_joints + name, dtype, width)])
-        array.flags.writeable = False
-        return array
+        return np.concatenate([found.column(name, dtype, width), found.column(bond_joints + name, dtype, width)])
 
     laws = np.array(found.laws, dtype=float).reshape(-1, 6)
     model = Model(

@@ -17,8 +17,18 @@ HALF_BANDWIDTH = {
 }  # by number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
 
 
+class ReadOnlyArrays:
+    """Base of frozen dataclasses whose arrays nobody writes to, either."""
+
+    def __post_init__(self):
+        for value in vars(self).values():
+            for array in value if isinstance(value, tuple) else (value,):
+                if isinstance(array, np.ndarray):
+                    array.flags.writeable = False
+
+
 @dataclass(frozen=True)
-class Layout:
+class Layout(ReadOnlyArrays):
     """Numbers of unknowns.
 
     Attributes

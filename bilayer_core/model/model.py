@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene.config import SceneConfig
-from .layout import Layout
+from .layout import Layout, ReadOnlyArrays
 
 Array = np.ndarray
 
@@ -27,7 +27,7 @@ class StrandArrays:
 
 
 @dataclass(frozen=True)
-class Bodies:
+class Bodies(ReadOnlyArrays):
     """Rigid bodies, in the scene's order. *Free* bodies, guided ones among them, have unknowns, in the order in which
     they occur.
     """
@@ -51,7 +51,7 @@ class Bodies:
 
 
 @dataclass(frozen=True)
-class Carriers:
+class Carriers(ReadOnlyArrays):
     """Points with a radius that feel surfaces: all nodes, then contact points of bodies, then spheres."""
 
     weight: Array  # Δl of the barrier [m], shape (n_carrier,)
@@ -70,7 +70,7 @@ class Carriers:
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(ReadOnlyArrays):
     """Flat arrays of a scene; indices run over strands in order, and along each strand.
 
     Edges n_edge … n_edge + n_wall − 1 are the fixed directions of clamps ("walls"). *Joints* are pairs of edges with

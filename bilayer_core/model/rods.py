@@ -37,9 +37,7 @@ class Collected:
             array = np.zeros((0,) if width is None else (0, width), dtype)
         else:
             array = np.concatenate(parts).astype(dtype)
-        array = np.ascontiguousarray(array)
-        array.flags.writeable = False
-        return array
+        return np.ascontiguousarray(array)
 
 
 Turn = Callable[..., np.ndarray]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..forces.bend_twist import bend_twist
-from ..forces.body import body_gravity, body_spring
+from ..forces.body import body_spring
 from ..forces.contact import pair_contact, plane_contact
 from ..forces.coupling import bond_translation
 from ..forces.drag import drag, lag_directions
@@ -254,7 +254,7 @@ class IncrementalPotential:
         if self.has_gravity:
             terms["gravity"] = gravity(model.node_mass, self._gravity, at.position, node_out)
             if self.has_bodies:
-                terms["gravity"] += body_gravity(bodies.mass, self._gravity, at.body_position, self.body_gradient)
+                terms["gravity"] += gravity(bodies.mass, self._gravity, at.body_position, self.body_gradient)
 
     def _add_contact(self, at: Configuration, with_hessian: bool) -> None:
         carriers, contact, matrix = self.model.carriers, self.model.scene.contact, self.matrix
