@@ -271,7 +271,7 @@ class _Moving:
         carrier_step[self._carried] = displacement[self._body]
 
     def add_turns(self, turn: Array, at: Configuration, carrier_step: Array) -> None:
-        """Add what rotation vectors of free bodies [rad], shape (n_free, 3), do to nodes and points off their centres."""
+        """Add what rotation vectors of free bodies [rad], shape (n_free, 3), do to nodes and points off centre."""
         if len(self._turned):
             arms = at.carrier[self._turned] - at.body_position[self._body_of_turned]
             carrier_step[self._turned] += np.cross(turn[self._body_of_turned], arms)
