@@ -17,7 +17,7 @@ from ..kinematics.rotation import rotation_matrix, rotation_vector
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
-from ..solve.potential import StepContext
+from ..solve.terms.term import StepContext
 
 NAME = "implicit_euler"
 ORDER = 1

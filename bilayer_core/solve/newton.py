@@ -20,7 +20,8 @@ from ..jit import kernel
 from ..model.bodies import carrier_names
 from ..model.model import Model
 from .configuration import Configuration
-from .potential import IncrementalPotential, StepContext
+from .potential import IncrementalPotential
+from .terms.term import StepContext
 
 Array = np.ndarray
 ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 2006, ch. 3)

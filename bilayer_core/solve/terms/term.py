@@ -1,0 +1,107 @@
+"""What all terms have in common, the data that a step freezes for them, and the arrays to which they add."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.model import Model
+from ..configuration import Configuration
+from ..newton_matrix import NewtonMatrix, zeros_in_one
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class StepContext:
+    """What is frozen over a step.
+
+    Attributes
+    ----------
+    length : float
+        h [s].
+    start : Configuration
+        At the start of the step.
+    predicted_position : Array
+        x̃ of nodes [m], shape (n_node, 3).
+    predicted_turn : Array
+        Turn of edges that inertia prefers [rad], shape (n_edge,).
+    predicted_body_position, predicted_body_rotation : Array
+        X̃ [m] and R̃ of free bodies, shapes (n_free, 3), (n_free, 3, 3).
+    eigenstrain : Array
+        η of each edge at the end of the step, shape (n_edge,).
+    """
+
+    length: float
+    start: Configuration
+    predicted_position: Array
+    predicted_turn: Array
+    predicted_body_position: Array
+    predicted_body_rotation: Array
+    eigenstrain: Array
+
+
+class Accumulators:
+    """First and second derivatives to which terms add, and their energies.
+
+    Attributes
+    ----------
+    energy : dict of str to float
+        Of each term [J], in the order of the register.
+    node, edge, pair, body, carrier : Array
+        ∂/∂x of nodes [N], shape (n_node, 3); ∂/∂(e, θ) of edges and walls, shape (n_edge + n_wall, 4); ∂/∂p of paired
+        edges, shape (n_pair, 3); ∂/∂(X, φ) of free bodies, shape (n_free, 6); ∂/∂x of carriers, (n_carrier, 3).
+    matrix : NewtonMatrix
+        Second derivatives.
+    """
+
+    def __init__(self, model: Model, has_node_blocks: bool, has_balls: bool):
+        edges = model.edge_count + model.wall_count
+        shapes = {
+            "node": (model.node_count, 3),
+            "edge": (edges, 4),
+            "pair": (len(model.pair_top), 3),
+            "body": (model.free_count, 6),
+        }
+        self._all_but_carriers, parts = zeros_in_one(shapes)
+        self.node, self.edge, self.pair, self.body = parts
+        self.carrier = np.zeros((len(model.carriers.weight), 3))
+        self.energy: dict[str, float] = {}
+        self.matrix = NewtonMatrix(model, has_node_blocks, has_balls, self.carrier)
+
+    def clear(self, with_hessian: bool) -> None:
+        """Forget energies and first derivatives, those of carriers apart, and second ones on request."""
+        self.energy.clear()
+        self._all_but_carriers.fill(0.0)
+        if with_hessian:
+            self.matrix.clear()
+
+
+class Term:
+    """One line of the register: a summand of the potential, or several that a kernel computes together.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Under which its energies are known.
+    """
+
+    names: tuple[str, ...] = ()
+
+    def __init__(self, model: Model, out: Accumulators):
+        self.model = model
+        self.out = out
+        self.context: StepContext | None = None
+
+    def start_step(self, context: StepContext) -> None:
+        """Freeze what a step depends on."""
+        self.context = context
+
+    def add(self, at: Configuration, with_hessian: bool) -> None:
+        """Add the derivatives at a configuration to `out`, and write the energy [J] there under each of `names`."""
+        raise NotImplementedError
+
+    def parts(self) -> tuple[Term, ...]:
+        """Terms of one name each that have this one as their sum."""
+        return (self,)
