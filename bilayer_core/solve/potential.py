@@ -17,7 +17,7 @@ from .terms.contact import Barrier, Friction
 from .terms.elastic import BendingAndTwisting, Bond, Stretching
 from .terms.fluid import Drag
 from .terms.inertial import Damping, Gravity, Inertia
-from .terms.term import Accumulators, StepContext, Term
+from .terms.term import Accumulators, Kind, StepContext, Term
 
 Array = np.ndarray
 
@@ -105,24 +105,31 @@ class IncrementalPotential:
         self._expand(at)
         return sum(self.terms.values())
 
-    def one_by_one(self, at: Configuration) -> Iterator[tuple[str, float]]:
-        """Evaluate the terms at a configuration each by itself, without inertia.
+    def one_by_one(self, at: Configuration, context: StepContext) -> Iterator[tuple[Term, str, float]]:
+        """Evaluate the terms at a configuration each by itself, those of inertia left out.
+
+        Parameters
+        ----------
+        at : Configuration
+        context : StepContext
+            From which velocities are taken. What `start_step` froze stays as it is.
 
         Yields
         ------
-        name, energy : str, float
+        term, name, energy : Term, str, float
             [J]; meanwhile `accumulators` holds the first derivatives of this term alone, nothing of it handed on to
             unknowns or bodies.
         """
         out = self.accumulators
         for term in (*self._of_rods_and_bodies, *self._of_carriers):
-            if isinstance(term, Inertia):
+            if term.kind is Kind.INERTIAL:
                 continue
+            term.context = context
             for part in term.parts():
                 out.clear(False)
                 out.carrier.fill(0.0)
                 part.add(at, False)
-                yield part.names[0], float(self.terms[part.names[0]])
+                yield part, part.names[0], float(self.terms[part.names[0]])
 
     def _expand(self, at: Configuration) -> None:
         """From nodes, edges, pairs and bodies to the unknowns."""

@@ -10,7 +10,7 @@ from ...forces.contact import pair_contact, plane_contact
 from ...forces.friction import friction, lag_axes, lag_friction
 from ...model.model import Model
 from ..configuration import Configuration
-from .term import Accumulators, StepContext, Term
+from .term import Accumulators, Kind, StepContext, Term
 
 
 class Barrier(Term):
@@ -61,6 +61,7 @@ class Friction(Term):
     """Friction of the contacts at the start of the step."""
 
     names = ("friction",)
+    kind = Kind.DISSIPATIVE
 
     def __init__(self, model: Model, out: Accumulators):
         super().__init__(model, out)

@@ -7,13 +7,14 @@ import numpy as np
 from ...forces.drag import drag, lag_directions
 from ...model.model import Model
 from ..configuration import Configuration
-from .term import Accumulators, StepContext, Term
+from .term import Accumulators, Kind, StepContext, Term
 
 
 class Drag(Term):
     """Quadratic drag along directions frozen at the start of the step."""
 
     names = ("drag",)
+    kind = Kind.DISSIPATIVE
 
     def __init__(self, model: Model, out: Accumulators):
         super().__init__(model, out)

@@ -8,13 +8,14 @@ from ...forces.body import body_spring
 from ...forces.quadratic import angle_spring, gravity, node_spring
 from ...model.model import Model
 from ..configuration import Configuration
-from .term import Accumulators, Term
+from .term import Accumulators, Kind, Term
 
 
 class Inertia(Term):
     """Half the squared distance from the predictions, in the norm of mass over h²."""
 
     names = ("inertia",)
+    kind = Kind.INERTIAL
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
         model, context, out, bodies = self.model, self.context, self.out, self.model.bodies
@@ -41,6 +42,7 @@ class Damping(Term):
     """Mass damping of rods."""
 
     names = ("damping",)
+    kind = Kind.DISSIPATIVE
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
         model, start = self.model, self.context.start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
@@ -78,6 +79,15 @@ class Accumulators:
             self.matrix.clear()
 
 
+class Kind(Enum):
+    """What a term's energy means, and on which side of the budget its work stands."""
+
+    CONSERVATIVE = "energy of the configuration"
+    DISSIPATIVE = "potential of the velocity; its work is lost"
+    INERTIAL = "distance from the motion without forces; its work is kinetic energy"
+    EXTERNAL = "work of a load over the step; supplied from outside"
+
+
 class Term:
     """One line of the register: a summand of the potential, or several that a kernel computes together.
 
@@ -85,9 +95,11 @@ class Term:
     ----------
     names : tuple of str
         Under which its energies are known.
+    kind : Kind
     """
 
     names: tuple[str, ...] = ()
+    kind = Kind.CONSERVATIVE
 
     def __init__(self, model: Model, out: Accumulators):
         self.model = model
