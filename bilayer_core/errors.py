@@ -41,3 +41,7 @@ class SimulationError(BilayerError):
         super().__init__(f"stopped at t = {time:.6g} s: {reason}")
         self.reason = reason
         self.time = time
+
+    def __reduce__(self) -> tuple:
+        """For its way between processes."""
+        return type(self), (self.reason, self.time)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import click
 
+from bilayer_core.cli.converge import converge
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
 from bilayer_core.cli.run import run
@@ -36,7 +37,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, schema, check, run, info, view):
+for verb in (scenes, schema, check, run, converge, info, view):
     program.add_command(verb)
 
 

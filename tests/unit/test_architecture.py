@@ -26,7 +26,8 @@ ALLOWED = {
     "integrate": MECHANICS | {"solve"},
     "record": NUMERICS,
     "view": NUMERICS | {"record"},
-    "cli": NUMERICS | {"record", "view"},
+    "converge": NUMERICS,
+    "cli": NUMERICS | {"record", "view", "converge"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
 FACES = {"__init__": NUMERICS, "__main__": {"cli"}}

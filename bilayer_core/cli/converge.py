@@ -1,0 +1,107 @@
+"""The verb ``converge``."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import click
+
+from bilayer_core.cli.options import Duration, Verb, scene_argument, set_option
+from bilayer_core.cli.watch import notice_of_compilation
+from bilayer_core.errors import InputError
+
+
+@click.command(cls=Verb)
+@scene_argument
+@click.option("--duration", type=Duration(), help="Simulated time of each run; default: to the end of the scene.")
+@click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="A figure to judge, such as com.x.")
+@set_option
+@click.option("--workers", type=click.IntRange(1), help="Runs side by side; default: one a core.")
+@click.option("--json", "json_file", metavar="FILE.json", help="Write all values.")
+@click.option("--quiet", is_flag=True, help="No progress.")
+def converge(
+    scene: str,
+    duration: float | None,
+    quantities: tuple[str, ...],
+    overrides: tuple[str, ...],
+    workers: int | None,
+    json_file: str | None,
+    quiet: bool,
+) -> None:
+    """Run SCENE at twice and half its time step, with half and twice its edges: observed orders and error bars."""
+    from bilayer_core.converge import study
+    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.scene.loader import load_scene
+
+    config = load_scene(scene, overrides)
+    if json_file:
+        check_output_path(json_file, force=True)
+    runs = len(study.planned_runs(config))
+    done = 0
+
+    def tell(name: str) -> None:
+        nonlocal done
+        done += 1
+        if not quiet:
+            click.echo(f"  run {done} of {runs} done: {name}", err=True)
+
+    with notice_of_compilation(quiet):
+        found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
+    click.echo(f"{config.name}: {found.integrator}, step {1e3 * config.solver.dt:g} ms")
+    _print_table(found.rows)
+    for name, reason in found.missing.items():
+        click.echo(f"  {name}: {reason}")
+    if json_file:
+        try:
+            Path(json_file).write_text(json.dumps(_content(config.name, found), indent=2) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"{json_file}: cannot be written: {error.strerror or error}") from error
+
+
+def _print_table(rows: list) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from bilayer_core.converge.quantities import unit_of
+    from bilayer_core.converge.study import BASE
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for title in ("figure", "value", "error bar", "half the step", "order", "twice the edges", "order"):
+        table.add_column(title, justify="left" if title == "figure" else "right")
+    for row in rows:
+        unit, factor = unit_of(row.name)
+        table.add_row(
+            row.name,
+            f"{factor * row.values[BASE]:.6g} {unit}",
+            f"± {factor * row.bar:.2g}",
+            f"{100 * row.time.change:+.2g} %",
+            _order(row.time.order),
+            f"{100 * row.mesh.change:+.2g} %",
+            _order(row.mesh.order),
+        )
+    Console(width=120).print(table)
+
+
+def _order(order: float | None) -> str:
+    return "none seen" if order is None else f"{order:.2f}"
+
+
+def _content(name: str, found: Any) -> dict[str, Any]:
+    return {
+        "scene": name,
+        "integrator": found.integrator,
+        "quantities": [
+            {
+                "name": row.name,
+                "values": row.values,
+                "error_bar": row.bar,
+                "time": {"change": row.time.change, "order": row.time.order, "bar": row.time.bar},
+                "mesh": {"change": row.mesh.change, "order": row.mesh.order, "bar": row.mesh.bar},
+            }
+            for row in found.rows
+        ],
+        "missing": found.missing,
+    }

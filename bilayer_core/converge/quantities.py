@@ -1,0 +1,135 @@
+"""The figures of a run by which its convergence is judged.
+
+| name | what |
+| --- | --- |
+| ``com.x``, ``com.y``, ``com.z`` | displacement of the rods' mass centre over the run [m] |
+| ``com.rise``, ``com.rise_time`` | how far it rose above its start at most [m], and when [s] |
+| ``take_off`` | when nodes lost their last contact, if they end the run without any [s] |
+| ``body.<name>.x``, ``.y``, ``.z`` | displacement of a body [m] |
+| ``body.<name>.first_contact`` | when a node first touched it [s] |
+| ``mean_curvature``, ``max_curvature`` | size of the curvature through the thickness at the end [1/m] |
+| ``tip.<rod>/<layer>.x``, ``.y``, ``.z`` | displacement of the last node of a layer [m] |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from bilayer_core.errors import InputError
+from bilayer_core.integrate.simulator import Simulator
+from bilayer_core.scene.faults import suggestion
+
+AXES = "xyz"
+NEGLIGIBLE = 1e-3
+"""Displacements below this part of the largest one are not among the headline numbers."""
+
+
+def measure(simulator: Simulator, duration: float, progress: Callable[[float], None] | None = None) -> dict[str, float]:
+    """Run a scene from its start and return every quantity that it has.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        At its start; is run.
+    duration : float
+        Simulated time [s].
+    progress : callable, optional
+        Called after every step with the simulated time [s].
+
+    Raises
+    ------
+    SimulationError
+        If a step cannot be made.
+    """
+    tips = _tips(simulator)
+    com, tip_start = simulator.com, simulator.positions[list(tips.values())]
+    heights, touched, take_off = [com[2]], False, None
+    times = [simulator.time]
+    for _ in range(max(1, round(duration / simulator.dt))):
+        simulator.step()
+        times.append(simulator.time)
+        heights.append(simulator.com[2])
+        touches = bool(simulator.contact_forces.any())
+        if touched and not touches:
+            take_off = simulator.time
+        touched = touches
+        if progress is not None:
+            progress(simulator.time)
+    summary = simulator.summary()
+    found = _by_axis("com", simulator.com - com)
+    rise, when = _peak(np.array(times), np.array(heights))
+    if rise > 0.0:
+        found |= {"com.rise": rise, "com.rise_time": when}
+    if take_off is not None and not touched:
+        found["take_off"] = take_off
+    for name, body in summary["bodies"].items():
+        found |= _by_axis(f"body.{name}", np.subtract(body["end"], body["start"]))
+        if body["first_contact"] is not None:
+            found[f"body.{name}.first_contact"] = body["first_contact"]
+    found |= {key: summary[key] for key in ("mean_curvature", "max_curvature")}
+    for name, moved in zip(tips, simulator.positions[list(tips.values())] - tip_start, strict=True):
+        found |= _by_axis(f"tip.{name}", moved)
+    return found
+
+
+def headline(found: dict[str, float], prescribed: Sequence[str]) -> list[str]:
+    """Names of the quantities that say what a robot did: no tips, no prescribed motion, no negligible displacement."""
+    chosen = [
+        name
+        for name in found
+        if not name.startswith("tip.") and name.rpartition(".")[0] not in {f"body.{body}" for body in prescribed}
+    ]
+    moves = [name for name in chosen if name.rpartition(".")[2] in AXES]
+    largest = max((abs(found[name]) for name in moves), default=0.0)
+    return [name for name in chosen if name not in moves or abs(found[name]) > NEGLIGIBLE * largest]
+
+
+def check_names(simulator: Simulator, asked: Sequence[str]) -> None:
+    """Refuse quantities that no run of this scene can have.
+
+    Raises
+    ------
+    InputError
+        Names the quantity, and lists those that there are.
+    """
+    bodies = simulator.model.bodies.names
+    points = ["com", *(f"body.{body}" for body in bodies), *(f"tip.{tip}" for tip in _tips(simulator))]
+    known = [f"{point}.{axis}" for point in points for axis in AXES]
+    known += ["com.rise", "com.rise_time", "take_off", "mean_curvature", "max_curvature"]
+    known += [f"body.{body}.first_contact" for body in bodies]
+    for name in asked:
+        if name not in known:
+            raise InputError(
+                f"--quantity {name}: no such figure{suggestion(name, known)}; there are {', '.join(known)}"
+            )
+
+
+def unit_of(name: str) -> tuple[str, float]:
+    """Unit in which a quantity is shown, and the factor from SI to it."""
+    if name.endswith(("take_off", "time", "first_contact")):
+        return "s", 1.0
+    if name.endswith("curvature"):
+        return "1/m", 1.0
+    return "mm", 1e3
+
+
+def _by_axis(name: str, vector: np.ndarray) -> dict[str, float]:
+    return {f"{name}.{axis}": float(value) for axis, value in zip(AXES, vector, strict=True)}
+
+
+def _tips(simulator: Simulator) -> dict[str, int]:
+    return {s.name: s.first_node + s.node_count - 1 for s in simulator.model.strands}
+
+
+def _peak(times: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
+    """Rise of the highest point over the first [m] and its time [s], from the parabola through its neighbours."""
+    top = int(heights.argmax())
+    rise, when = heights[top] - heights[0], times[top]
+    if 0 < top < len(heights) - 1:
+        before, after = heights[top - 1] - heights[top], heights[top + 1] - heights[top]
+        offset = 0.5 * (before - after) / (before + after) if before + after < 0.0 else 0.0
+        rise -= 0.25 * (before - after) * offset
+        when += offset * (times[top + 1] - times[top])
+    return float(rise), float(when)

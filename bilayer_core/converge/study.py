@@ -1,0 +1,165 @@
+"""The runs of a convergence study: a scene as it is, at twice and half its time step, with half and twice its edges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+
+from bilayer_core.converge.order import Estimate, estimate
+from bilayer_core.converge.quantities import check_names, headline, measure
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.integrate.simulator import Simulator
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.loader import load_scene, parse_scene, scene_text
+
+BASE = "the scene as it is"
+COARSER_STEP, FINER_STEP = "twice the step", "half the step"
+COARSER_MESH, FINER_MESH = "half the edges", "twice the edges"
+NEEDED = (BASE, FINER_STEP, FINER_MESH)
+LEAST_EDGES = 2
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a study: its name, its overrides, its step [s] and its edges relative to the scene's own."""
+
+    name: str
+    overrides: tuple[str, ...]
+    dt: float
+    edges: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """A quantity of a study.
+
+    Attributes
+    ----------
+    name : str
+    values : dict of str to float
+        By the name of the run.
+    time, mesh : Estimate
+        What the time step and the mesh do to the scene's own run.
+    """
+
+    name: str
+    values: dict[str, float]
+    time: Estimate
+    mesh: Estimate
+
+    @property
+    def bar(self) -> float:
+        """Half width of the error bar of the scene's own run: time step and mesh together."""
+        return self.time.bar + self.mesh.bar
+
+
+@dataclass(frozen=True)
+class Study:
+    """A finished study: its integrator, its rows, and why a coarser run is missing, by its name."""
+
+    integrator: str
+    rows: list[Row]
+    missing: dict[str, str]
+
+
+def planned_runs(scene: SceneConfig) -> list[Run]:
+    """The five runs; the edges of every rod are halved or doubled."""
+    dt, edges = scene.solver.dt, {rod.name: rod.stations - 1 for rod in scene.rods}
+    halved = {name: max(LEAST_EDGES, round(count / 2)) for name, count in edges.items()}
+    doubled = {name: 2 * count for name, count in edges.items()}
+    total = sum(edges.values())
+    runs = [Run(BASE, (), dt, 1.0)]
+    runs += [
+        Run(name, (f"solver.dt={size!r}",), size, 1.0) for name, size in ((COARSER_STEP, 2 * dt), (FINER_STEP, dt / 2))
+    ]
+    for name, counts in ((COARSER_MESH, halved), (FINER_MESH, doubled)):
+        overrides = tuple(f"rods.{rod}.stations={count + 1}" for rod, count in counts.items())
+        runs.append(Run(name, overrides, dt, sum(counts.values()) / total))
+    return runs
+
+
+def converge(
+    scene: SceneConfig,
+    duration: float | None = None,
+    quantities: Sequence[str] = (),
+    workers: int = 1,
+    progress: Callable[[str], None] | None = None,
+) -> Study:
+    """Run a study.
+
+    Parameters
+    ----------
+    scene : SceneConfig
+    duration : float, optional
+        Simulated time of every run [s]; default: the scene's.
+    quantities : sequence of str
+        Names from `bilayer_core.converge.quantities`; default: the headline numbers of the scene.
+    workers : int
+        Processes that run side by side.
+    progress : callable, optional
+        Called with the name of every run that is done.
+
+    Raises
+    ------
+    SimulationError
+        If the scene's own run or a finer one cannot go on.
+    InputError
+        If a quantity does not exist, or the run has none: nothing took off, a body was not touched.
+    """
+    time = scene.duration if duration is None else duration
+    runs = planned_runs(scene)
+    simulator = Simulator(scene)
+    check_names(simulator, quantities)
+    simulator.compile()  # once, before several processes would
+    text = scene_text(scene)
+    found, missing = {}, {}
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        jobs = {pool.submit(_run, text, run.overrides, time): run for run in runs}
+        try:
+            for job in as_completed(jobs):
+                name = jobs[job].name
+                try:
+                    found[name] = job.result()
+                except SimulationError as error:
+                    if name in NEEDED:
+                        raise SimulationError(f"{name}: {error.reason}", error.time) from error
+                    missing[name] = str(error)
+                if progress is not None:
+                    progress(name)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    prescribed = [body.name for body in scene.bodies if body.motion.type == "prescribed"]
+    names = list(quantities) or headline(found[BASE], prescribed)
+    for name in quantities:
+        absent = [run for run in NEEDED if name not in found[run]]
+        if absent:
+            raise InputError(f"--quantity {name}: did not happen in one of the runs: {absent[0]}")
+    names = [name for name in names if all(name in found[run] for run in NEEDED)]
+    by_name = {run.name: run for run in runs}
+    return Study(simulator.plan.integrator, [_row(name, found, by_name) for name in names], missing)
+
+
+def _run(text: str, overrides: Sequence[str], duration: float) -> dict[str, float]:
+    """In a process of its own."""
+    base = parse_scene(text, "scene")
+    scene = load_scene(base.model_dump(mode="json", by_alias=True), overrides) if overrides else base
+    return measure(Simulator(scene), duration)
+
+
+def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run]) -> Row:
+    values = {run: figures[name] for run, figures in found.items() if name in figures}
+
+    def judge(coarser: str, finer: str, size: Callable[[Run], float]) -> Estimate:
+        three = (coarser, BASE, finer)
+        sizes = tuple(size(runs[run]) if run in values else None for run in three)
+        return estimate(sizes, tuple(values.get(run) for run in three))
+
+    return Row(
+        name,
+        values,
+        judge(COARSER_STEP, FINER_STEP, lambda run: run.dt),
+        judge(COARSER_MESH, FINER_MESH, lambda run: 1.0 / run.edges),
+    )
