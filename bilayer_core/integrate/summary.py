@@ -47,7 +47,7 @@ def summarise(simulator: Simulator) -> dict:
         "com_end": simulator.com.tolist(),
         "com_max_height": statistics.com_max_height,
         "max_curvature": float(curvature.max()),
-        "mean_curvature": float(curvature.mean()),
+        "mean_curvature": float(np.average(curvature, weights=model.carriers.weight[: model.node_count])),
         "tip_positions": {s.name: positions[s.first_node + s.node_count - 1].tolist() for s in model.strands},
         "min_gap": min_gap if np.isfinite(min_gap) else None,
         "max_contact_force": statistics.max_contact_force,
