@@ -83,6 +83,13 @@ def everything(stations=6):
     )
     point = {"position": [0, 0, -0.0005], "length": 0.01, "offset": 0.0005}
     uneven = contact(coefficient=0.5, speed_threshold=1e-2)
+    loads = [
+        {"name": "tug", "rod": "arm_1", "position": 3.5 * spacing, "force": [2e-3, -1e-3, 3e-3]},
+        {"name": "jet", "rod": "arm", "position": spacing, "force": [1e-3, 2e-3, -1e-3], "frame": "material"},
+        {"name": "crank", "body": "ball", "force": [0, 1e-3, 0], "moment": [2e-5, -1e-5, 3e-5]},
+        {"name": "rotor", "body": "ball", "force": [1e-3, 0, 0], "moment": [0, 1e-5, 0], "frame": "material"},
+    ]
+    loads[0]["schedule"] = loads[3]["schedule"] = {"type": "sine", "mean": 1, "amplitude": 0.5, "period": 0.1}
     uneven["friction"] |= {"forward": 0.3, "backward": 0.6, "sideways": 0.4}
     return scene(
         [arm],
@@ -93,4 +100,6 @@ def everything(stations=6):
         contact=uneven,
         damping={"mass": 2.0},
         fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05]},
+        masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
+        loads=loads,
     )

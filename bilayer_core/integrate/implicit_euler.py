@@ -23,7 +23,9 @@ NAME = "implicit_euler"
 ORDER = 1
 
 
-def predict(model: Model, state: State, start: Configuration, h: float, eigenstrain: np.ndarray) -> StepContext:
+def predict(
+    model: Model, state: State, start: Configuration, h: float, eigenstrain: np.ndarray, load_factor: np.ndarray
+) -> StepContext:
     """Frozen data of a step of length `h` [s] from `state`."""
     free = model.bodies.body_of_free
     rotation = np.empty((len(free), 3, 3))
@@ -38,6 +40,7 @@ def predict(model: Model, state: State, start: Configuration, h: float, eigenstr
         predicted_body_position=start.body_position + h * state.body_velocity[free],
         predicted_body_rotation=rotation,
         eigenstrain=eigenstrain,
+        load_factor=load_factor,
     )
 
 

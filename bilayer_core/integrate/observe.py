@@ -139,11 +139,8 @@ def node_curvature(model: Model, stepper: Stepper) -> Array:
 
 
 def energies(stepper: Stepper, state: State) -> dict[str, float]:
-    """Energy of each term of the last accepted configuration [J]; dissipation potentials are none and are left out."""
-    model, terms = stepper.model, stepper.potential.terms
-    found = {
-        name: float(value) for name, value in terms.items() if name not in ("inertia", "damping", "drag", "friction")
-    }
+    """Kinetic energy, and that of each conservative term, of the last accepted configuration [J]."""
+    model = stepper.model
     kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
     kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
     for place, body in enumerate(model.bodies.body_of_free):
@@ -151,7 +148,7 @@ def energies(stepper: Stepper, state: State) -> dict[str, float]:
         rotation, second = state.body_rotation[body], model.bodies.second_moment[place]
         inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
         kinetic += 0.5 * float(model.bodies.mass[place] * velocity @ velocity + spin @ inertia @ spin)
-    return {"kinetic": kinetic, **found}
+    return {"kinetic": kinetic, **stepper.potential.energies}
 
 
 def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:

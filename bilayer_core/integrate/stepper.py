@@ -89,6 +89,10 @@ class Stepper:
         total = np.bincount(model.driven_edge, strain[model.driven_law], model.edge_count)
         return total.astype(float, copy=False)  # whole numbers if nothing is driven
 
+    def load_factor(self, time: float) -> Array:
+        """Factor of each load at `time`, shape (n_load,)."""
+        return np.array([load.factor(time) for load in self.model.scene.loads], dtype=float)
+
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
         time = float(state.step[0]) * self.dt
@@ -97,7 +101,9 @@ class Stepper:
         self.stimulus = self.stimulus_at(state, time)
         self.eigenstrain = self.eigenstrain_of(state.transduction)
         still = State(**{**vars(state), "velocity": np.zeros_like(state.velocity), "spin": np.zeros_like(state.spin)})
-        self.potential.start_step(implicit_euler.predict(self.model, still, self._start, self.dt, self.eigenstrain))
+        self.potential.start_step(
+            implicit_euler.predict(self.model, still, self._start, self.dt, self.eigenstrain, self.load_factor(time))
+        )
         self.potential.evaluate(self.end, False)
 
     def advance(self, state: State) -> StepReport:
@@ -150,7 +156,7 @@ class Stepper:
             transduction = follow(transduction, target, self.model.law_rising, self.model.law_falling, h)
         eigenstrain = self.eigenstrain_of(transduction)
         self._start.take_state(state, state.body_position)
-        context = implicit_euler.predict(self.model, state, self._start, h, eigenstrain)
+        context = implicit_euler.predict(self.model, state, self._start, h, eigenstrain, self.load_factor(time))
         self.potential.start_step(context)
         body_position = self.body_positions(state, time)
         self._target.place_prescribed(body_position)

@@ -32,7 +32,8 @@ def build_bodies(scene: SceneConfig, found: Collected) -> Bodies:
             [point.position for point in body.contact_points],
         ]
         lengths = [np.linalg.norm(arm) for part in own for arm in part]
-        reach.append(max([body.surface.radius if body.surface else 0.0, *lengths]))
+        gyration = np.sqrt(np.trace(_second_moment(body)) / motion.mass)
+        reach.append(max([body.surface.radius if body.surface else gyration, *lengths]))
     free_index = np.full(count, -1, dtype=np.int64)
     free_index[free] = np.arange(len(free))
     moments = np.array([_second_moment(scene.bodies[index]) for index in free]).reshape(len(free), 3, 3)

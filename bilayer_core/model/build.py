@@ -8,6 +8,7 @@ from ..scene.config import SceneConfig
 from .bodies import build_bodies, build_carriers, refuse_penetration
 from .layout import number_unknowns
 from .model import Model
+from .points import add_point_masses, build_loads
 from .rods import Collected, add_rod, turn_of_copy
 
 
@@ -24,6 +25,7 @@ def build_model(scene: SceneConfig) -> Model:
     for rod in scene.rods:
         for copy, name in enumerate(rod.copies):
             add_rod(found, scene, rod, name, turn_of_copy(rod, copy), body_index)
+    add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found)
     walls = found.column("wall_tangent", width=3)
@@ -40,6 +42,8 @@ def build_model(scene: SceneConfig) -> Model:
         layout=number_unknowns(found.rods, found.node_count, edge_count, found.column("attached_node", np.int64)),
         bodies=bodies,
         carriers=build_carriers(scene, found, bodies),
+        dead_loads=build_loads(scene, found, bodies, "world"),
+        follower_loads=build_loads(scene, found, bodies, "material"),
         node_count=found.node_count,
         edge_count=edge_count,
         wall_count=len(walls),

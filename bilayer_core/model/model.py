@@ -44,7 +44,7 @@ class Bodies(ReadOnlyArrays):
     freedom: (
         Array  # motions (X, φ) that free bodies are allowed, one a column, orthonormal, shape (6 n_free, n_freedom)
     )
-    reach: Array  # largest distance of a point of a free body from its position [m], shape (n_free,)
+    reach: Array  # of a free body: largest distance of its points, or its radius of gyration [m], shape (n_free,)
     radius: Array  # of the sphere, 0 without one [m], shape (n_body,)
     times: tuple[Array, ...]  # keyframes of each prescribed body [s]
     displacements: tuple[Array, ...]  # and its displacements there [m], shape (n_keyframe, 3)
@@ -70,6 +70,33 @@ class Carriers(ReadOnlyArrays):
 
 
 @dataclass(frozen=True)
+class LoadShares(ReadOnlyArrays):
+    """Parts of loads, each on one node or on one free body."""
+
+    target: Array  # node or free body, shape (n_share,)
+    load: Array  # place of the load in the scene, shape (n_share,)
+    vector: Array  # force [N] or moment [N m] at factor 1, shape (n_share, 3)
+
+    def scaled(self, factor: Array) -> Array:
+        """Vectors at the present factors of the loads, shape (n_load,)."""
+        return factor[self.load, None] * self.vector
+
+
+@dataclass(frozen=True)
+class PointLoads:
+    """Loads from outside, either all of fixed direction, in the world's axes, or all in those of what they act on."""
+
+    nodes: LoadShares
+    bodies: LoadShares
+    moments: LoadShares  # on free bodies
+
+    @property
+    def forces(self) -> int:
+        """Number of shares of forces."""
+        return len(self.nodes.target) + len(self.bodies.target)
+
+
+@dataclass(frozen=True)
 class Model(ReadOnlyArrays):
     """Flat arrays of a scene; indices run over strands in order, and along each strand.
 
@@ -83,6 +110,8 @@ class Model(ReadOnlyArrays):
     layout: Layout
     bodies: Bodies
     carriers: Carriers
+    dead_loads: PointLoads  # of fixed direction
+    follower_loads: PointLoads  # along path, normal and path × normal of a rod, or in the axes of a body
 
     node_count: int
     edge_count: int
@@ -102,7 +131,7 @@ class Model(ReadOnlyArrays):
     drag_edge: Array  # edges before and after each, shape (n_drag, 2)
     drag_coefficient: Array  # ρ_f A C along t, m1, m2 [kg/m], shape (n_drag, 3)
 
-    node_mass: Array  # [kg], shape (n_node,)
+    node_mass: Array  # with point masses [kg], shape (n_node,)
     spin_inertia: Array  # of edges about their tangent [kg m²], shape (n_edge,)
     half_width: Array  # of each edge [m], shape (n_edge,)
 
@@ -139,6 +168,11 @@ class Model(ReadOnlyArrays):
     def free_count(self) -> int:
         """Number of free bodies."""
         return len(self.bodies.mass)
+
+    @property
+    def has_moments(self) -> bool:
+        """Whether a moment acts on a body."""
+        return len(self.dead_loads.moments.target) + len(self.follower_loads.moments.target) > 0
 
     @property
     def unknowns(self) -> int:

@@ -86,6 +86,8 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
     pairs = _contact_pairs(scene)
     friction = scene.contact.friction if scene.contact else None
     free = any(not isinstance(body.motion, Prescribed) for body in scene.bodies)
+    dead = [load for load in scene.loads if load.frame == "world"]
+    turning = [load for load in scene.loads if load.frame == "material"]
     driven = any(layer.eigenstrain for rod in scene.rods for layer in rod.layers)
     return {
         "stretching": "active",
@@ -95,6 +97,9 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
         "eigenstrain": state(driven, "no layer follows a stimulus"),
         "inertia": "active",
         "gravity": state(any(scene.gravity), "gravity is zero"),
+        "loads": state(any(any(load.force) for load in dead), "no force of fixed direction"),
+        "followers": state(any(any(load.force) for load in turning), "no load in a material frame"),
+        "moments": state(any(any(load.moment) for load in scene.loads), "no moment on a body"),
         "drag": state(scene.fluid is not None, "no fluid"),
         "damping": state(scene.damping.mass > 0.0, "damping.mass is zero"),
         "bodies": state(free, "no free body"),

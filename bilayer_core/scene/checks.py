@@ -11,6 +11,7 @@ from bilayer_core.scene.faults import Fault, Location, one_of
 if TYPE_CHECKING:
     from bilayer_core.scene.body import Free
     from bilayer_core.scene.config import SceneConfig, Stimulus
+    from bilayer_core.scene.load import Load, PointMass
     from bilayer_core.scene.rod import Rod
 
 ROUNDING = 1e-9
@@ -76,9 +77,26 @@ def faults_of_inertia(motion: Free) -> list[Fault]:
     return []
 
 
+def faults_of_load(load: Load) -> list[Fault]:
+    """Whether it acts on one thing, at one place, and what acts there."""
+    if (load.rod is None) == (load.body is None):
+        found = None if load.rod is None else f"{load.rod}, beside the body {load.body}"
+        return [(("rod",), found, "must be given, or `body` instead of it: a load acts on one of the two")]
+    faults: list[Fault] = []
+    if load.rod is not None and load.position is None:
+        faults.append((("position",), None, "must be given for a load on a rod: a length along its path"))
+    if load.body is not None and load.position is not None:
+        faults.append((("position",), load.position, "must be left out: a force on a body acts at its mass centre"))
+    if load.rod is not None and any(load.moment):
+        faults.append((("moment",), load.moment, "must be left out: only bodies take moments"))
+    if not any(load.force) and not any(load.moment):
+        faults.append((("force",), load.force, "must not be zero" + (" where `moment` is" if load.body else "")))
+    return faults
+
+
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
     """Names that refer to other parts, names that occur twice, and parts that need another."""
-    return [*_names(scene), *_references(scene), *_clamps(scene), *_surfaces(scene)]
+    return [*_names(scene), *_references(scene), *_clamps(scene), *_surfaces(scene), *_points(scene)]
 
 
 def _names(scene: SceneConfig) -> Iterator[Fault]:
@@ -88,6 +106,8 @@ def _names(scene: SceneConfig) -> Iterator[Fault]:
         *((("obstacles", index, "name"), plane.name) for index, plane in enumerate(scene.obstacles)),
     ]
     yield from _repeated(named, "rods, bodies and obstacles")
+    for key in ("masses", "loads"):
+        yield from _repeated([((key, i, "name"), part.name) for i, part in enumerate(getattr(scene, key))], key)
 
 
 def _repeated(named: list[tuple[Location, str]], among: str) -> Iterator[Fault]:
@@ -133,3 +153,33 @@ def _surfaces(scene: SceneConfig) -> Iterator[Fault]:
             None,
             f"must be given (barrier_distance, stiffness): there is something to touch, {surfaces}",
         )
+
+
+def _points(scene: SceneConfig) -> Iterator[Fault]:
+    """Point masses and loads: what they are on, and where."""
+    for key, parts in (("masses", scene.masses), ("loads", scene.loads)):
+        for index, part in enumerate(parts):
+            if part.rod is not None:
+                yield from _place_on_rod(scene, (key, index), part)
+    names = [body.name for body in scene.bodies]
+    for index, load in enumerate(scene.loads):
+        if load.body is None:
+            continue
+        if load.body not in names:
+            yield ("loads", index, "body"), load.body, one_of("bodies", load.body, names)
+            continue
+        motion = scene.bodies[names.index(load.body)].motion.type
+        if motion == "prescribed":
+            yield ("loads", index, "body"), load.body, "must be a free or a guided body; the path of this one is given"
+        elif motion == "guided" and any(load.moment):
+            yield ("loads", index, "moment"), load.moment, "must be left out: a guided body does not turn"
+
+
+def _place_on_rod(scene: SceneConfig, where: Location, part: PointMass | Load) -> Iterator[Fault]:
+    rods = {name: rod for rod in scene.rods for name in (rod.name, *rod.copies)}
+    if part.rod not in rods:
+        yield (*where, "rod"), part.rod, one_of("rods or their copies", part.rod, rods)
+        return
+    length = rods[part.rod].path.length
+    if part.position is not None and part.position > length * (1.0 + ROUNDING):
+        yield (*where, "position"), part.position, f"must be a length [m] along the path, from 0 to {length:g}"

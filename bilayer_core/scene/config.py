@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
 from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.rod import Rod
 from bilayer_core.scene.schedule import Schedule
@@ -158,6 +159,8 @@ class SceneConfig(Part):
     stimuli: dict[Name, Stimulus] = {}
     rods: list[Rod] = Field(min_length=1)
     bodies: list[Body] = []
+    masses: list[PointMass] = []
+    loads: list[Load] = []
     obstacles: list[Plane] = []
     contact: Contact | None = None
     fluid: Fluid | None = None

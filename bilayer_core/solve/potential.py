@@ -17,6 +17,7 @@ from .terms.contact import Barrier, Friction
 from .terms.elastic import BendingAndTwisting, Bond, Stretching
 from .terms.fluid import Drag
 from .terms.inertial import Damping, Gravity, Inertia
+from .terms.loads import Followers, Loads, Moments
 from .terms.term import Accumulators, Kind, StepContext, Term
 
 Array = np.ndarray
@@ -62,6 +63,9 @@ class IncrementalPotential:
             (Inertia, True),
             (Damping, model.scene.damping.mass > 0.0),
             (Gravity, any(model.scene.gravity)),
+            (Loads, model.dead_loads.forces > 0),
+            (Followers, model.follower_loads.forces > 0),
+            (Moments, model.has_moments),
             (Drag, has_drag),
         )
         self._of_carriers = [self._barrier] if self.has_contact else []
@@ -79,6 +83,13 @@ class IncrementalPotential:
     def pair_gap(self) -> Array:
         """Gap of each pair of carriers there [m], shape (n_pair,)."""
         return self._barrier.pair_gap
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """Energies of the configuration last evaluated [J], by term; what is lost or supplied over a step is none."""
+        terms = (*self._of_rods_and_bodies, *self._of_carriers)
+        names = [name for term in terms if term.kind is Kind.CONSERVATIVE for name in term.names]
+        return {name: float(self.terms[name]) for name in names}
 
     def start_step(self, context: StepContext) -> None:
         """Freeze what a step depends on: friction's contacts and drag's directions among it."""

@@ -49,6 +49,7 @@ FORCES = {
     "twisting": lambda m: bends(m, (2,)),
     "bond translation": lambda m: only(m, pair_stiffness=m.pair_stiffness),
     "bond rotation": bonds,
+    "loads": only,
     OTHERS: only,
     "everything": lambda m: m,
 }
@@ -70,10 +71,16 @@ class Problem:
         scene = everything()
         scene["bodies"][0]["motion"] = HUBS[hub]
         h = STEP
-        if force not in (OTHERS, "everything"):  # elasticity by itself
+        if force not in (OTHERS, "everything"):  # elasticity, or loads, by themselves
             h = LONG_STEP
             scene |= {"gravity": [0, 0, 0], "damping": {}, "fluid": None, "obstacles": [], "contact": None}
-            scene["bodies"] = [{**scene["bodies"][0], "contact_points": []}]
+            if force == "loads":
+                scene["bodies"][0]["contact_points"] = []
+                del scene["bodies"][1]["surface"]
+                scene["bodies"][1]["motion"] = {**HUBS["free hub"]}
+            else:
+                scene["bodies"] = [{**scene["bodies"][0], "contact_points": []}]
+                scene["loads"] = []
         model = FORCES[force](build_model(load_scene(scene)))
         stepper = Stepper(model, h, 1e-6, 50, 0)
         state = initial_state(model)
@@ -93,7 +100,8 @@ class Problem:
             state.body_angular_velocity[body] = rng.standard_normal(3)
         start = Configuration(model)
         start.take_state(state, state.body_position)
-        context = implicit_euler.predict(model, state, start, h, stepper.eigenstrain_of(np.array([0.7])))
+        drive = stepper.eigenstrain_of(np.array([0.7])), stepper.load_factor(0.03)
+        context = implicit_euler.predict(model, state, start, h, *drive)
         self.potential = stepper.potential
         self.potential.start_step(context)
         size = model.layout.size
@@ -161,6 +169,8 @@ def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
     if force in (OTHERS, "everything"):
         assert all(problem.potential.terms[term] > 0.0 for term in ("barrier", "friction", "drag", "damping"))
         assert problem.coupling > 0.0
+    if force == "loads":
+        assert {"loads", "followers", "moments"} <= problem.potential.terms.keys()
     gradient_errors, hessian_errors = [], []
     for h in (3e-8, 1e-7, 3e-7, 1e-6):
         by_energy, by_gradient = problem.differences(h)

@@ -28,7 +28,8 @@ def at_rest(scene_dict):
     state = initial_state(model)
     start = Configuration(model)
     start.take_state(state, state.body_position)
-    stepper.potential.start_step(implicit_euler.predict(model, state, start, 1e3, np.zeros(model.edge_count)))
+    undriven = np.zeros(model.edge_count), np.zeros(0)
+    stepper.potential.start_step(implicit_euler.predict(model, state, start, 1e3, *undriven))
     return model, stepper.potential, start
 
 

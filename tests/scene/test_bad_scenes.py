@@ -104,6 +104,23 @@ def faults_of(content) -> list[str]:
             [0.001, 0.0022],
             "found [0.001, 0.0022]; must span two edges or more; an edge",
         ),
+        # masses and loads
+        ("masses.cargo.mass", 0, "found 0; must be a mass [kg] above 0, such as 2.7 g"),
+        ("masses.cargo.rod", "arms", 'found "arms"; must be one of the rods or their copies (arm, arm_0, arm_1), did'),
+        ("masses.cargo.position", 0.1, "found 0.1; must be a length [m] along the path, from 0 to 0.0055"),
+        ("masses.cargo.position", "-1 mm", 'found "-1 mm"; must be a length [m] at least 0, such as 1 mm'),
+        ("loads.tug.rod", "arm_2", 'found "arm_2"; must be one of the rods or their copies (arm, arm_0, arm_1), did'),
+        ("loads.tug.position", "6 mm", "found 0.006; must be a length [m] along the path, from 0 to 0.0055"),
+        ("loads.tug.position", DELETE, "found null; must be given for a load on a rod: a length along its path"),
+        ("loads.tug.force[0]", "1 N*m", 'found "1 N*m", a quantity in kg * m ** 2 / s ** 2; must be a force [N], such'),
+        ("loads.tug.force", [0, 0, 0], "found [0.0, 0.0, 0.0]; must not be zero"),
+        ("loads.tug.moment", [0, 0, 1], "found [0.0, 0.0, 1.0]; must be left out: only bodies take moments"),
+        ("loads.tug.frame", "body", "found \"body\"; must be 'world' or 'material'"),
+        ("loads.crank.moment[2]", "1 N", 'found "1 N", a quantity in kg * m / s ** 2; must be a moment [N*m], such as'),
+        ("loads.crank.body", "bal", 'found "bal"; must be one of the bodies (hub, ball), did you mean ball?'),
+        ("loads.crank.body", "hub", 'found "hub"; must be a free or a guided body; the path of this one is given'),
+        ("loads.crank.position", 0, "found 0.0; must be left out: a force on a body acts at its mass centre"),
+        ("loads.crank.rod", "arm", 'found "arm, beside the body ball"; must be given, or `body` instead of it'),
         # parts that need another
         (
             "contact",
@@ -162,6 +179,14 @@ def test_a_fault_is_told_with_its_place_the_value_found_and_what_is_allowed(path
             None,
             "ball.motion.inertia: found null; must be given for a free body that is no sphere",
         ),
+        ("loads.crank.name", "tug", 'loads.tug.name: found "tug"; must be a name of its own among the loads'),
+        ("loads.crank.body", DELETE, "loads.crank.rod: found null; must be given, or `body` instead of it: a"),
+        (
+            "bodies.ball.motion",
+            {"type": "guided", "axis": [0, 0, 1], "mass": 1},
+            "loads.crank.moment: found [2e-05, -1e-05, 3e-05]; must be left out: a guided body does not turn",
+        ),
+        ("loads.tug.schedule.period", 0, "loads.tug.schedule.period: found 0; must be a time [s] above 0, such as"),
         ("stimuli.humidity.maximum", -1, "stimuli.humidity.maximum: found -1.0; must be above `minimum` (0)"),
         (
             "rods.arm.layers.active.eigenstrain.stimulus",

@@ -32,6 +32,8 @@ class StepContext:
         X̃ [m] and R̃ of free bodies, shapes (n_free, 3), (n_free, 3, 3).
     eigenstrain : Array
         η of each edge at the end of the step, shape (n_edge,).
+    load_factor : Array
+        Factor of each load of the scene there, shape (n_load,).
     """
 
     length: float
@@ -41,6 +43,7 @@ class StepContext:
     predicted_body_position: Array
     predicted_body_rotation: Array
     eigenstrain: Array
+    load_factor: Array
 
 
 class Accumulators:

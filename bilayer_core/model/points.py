@@ -1,0 +1,78 @@
+"""Point masses and loads: on which nodes and bodies they act."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..scene.config import SceneConfig
+from ..scene.rod import Rod
+from .model import Bodies, LoadShares, PointLoads
+from .rods import Collected
+
+
+def add_point_masses(scene: SceneConfig, found: Collected) -> None:
+    """Add point masses to the masses of nodes [kg]."""
+    node_mass = found.column("node_mass")
+    for point in scene.masses:
+        for rod, spans in _copies(scene, found, point.rod):
+            nodes, shares = _shares(rod, spans, point.position)
+            np.add.at(node_mass, nodes, point.mass * shares)
+    found.columns["node_mass"] = [node_mass]
+
+
+def build_loads(scene: SceneConfig, found: Collected, bodies: Bodies, frame: str) -> PointLoads:
+    """Arrays of the loads whose components are in one of the two frames."""
+    nodes, forces, moments = [], [], []  # target, load, vector
+    for index, load in enumerate(scene.loads):
+        if load.frame != frame:
+            continue
+        if load.body is not None:
+            free = bodies.free_index[bodies.names.index(load.body)]
+            forces += [(free, index, load.force)] if any(load.force) else []
+            moments += [(free, index, load.moment)] if any(load.moment) else []
+            continue
+        for rod, spans in _copies(scene, found, load.rod):
+            parts = zip(*_shares(rod, spans, load.position), strict=True)
+            nodes += [(node, index, share * np.array(load.force)) for node, share in parts]
+    return PointLoads(*(_load_shares(parts) for parts in (nodes, forces, moments)))
+
+
+def _load_shares(parts: list[tuple[int, int, np.ndarray]]) -> LoadShares:
+    target, load, vector = zip(*parts, strict=True) if parts else ((), (), ())
+    return LoadShares(
+        np.array(target, dtype=np.int64), np.array(load, dtype=np.int64), np.array(vector, dtype=float).reshape(-1, 3)
+    )
+
+
+def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[Rod, list[tuple[int, int, int, int]]]]:
+    """Rods of a name, or the copies of a pattern, each with its layers (first and last station, first node, edge)."""
+    spans = iter(found.rods)
+    for rod in scene.rods:
+        for copy in rod.copies:
+            own = next(spans)
+            if name in (copy, rod.name):
+                yield rod, own
+
+
+def _shares(rod: Rod, spans: list[tuple[int, int, int, int]], position: float) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes next to a place on the path, and the part of a force or of a mass that each takes.
+
+    Between stations the parts are linear in the position; where two layers cover a station, the path is their
+    interface, and each takes a part in proportion to the other's thickness. Force, moment and mass centre are thus
+    those of a point on the path.
+    """
+    along = min(position / rod.edge_length, rod.stations - 1.0)
+    before = min(int(along), rod.stations - 2)
+    nodes, shares = [], []
+    for station, part in ((before, before + 1.0 - along), (before + 1, along - before)):
+        if part == 0.0:
+            continue
+        layers = [k for k, (first, last, _, _) in enumerate(spans) if first <= station <= last]
+        thickness = [rod.layers[k].thickness for k in layers]
+        for k, own in zip(layers, thickness, strict=True):
+            first, _, first_node, _ = spans[k]
+            nodes.append(first_node + station - first)
+            shares.append(part * (1.0 if len(layers) == 1 else 1.0 - own / sum(thickness)))
+    return np.array(nodes, dtype=np.int64), np.array(shares)

@@ -1,0 +1,52 @@
+"""Point masses on rods, and forces and moments that act from outside."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from bilayer_core.scene import checks
+from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.part import Name, Part
+from bilayer_core.scene.schedule import Schedule
+from bilayer_core.scene.units import Force, Moment, NonNegativeLength, PositiveMass
+
+
+class PointMass(Part):
+    """A mass fixed to the path of a rod; it has weight and inertia, and no size."""
+
+    name: Name
+    rod: Name
+    """A copy such as `arm_0`, or all copies of a pattern: each has the mass."""
+    position: NonNegativeLength
+    """Along the path."""
+    mass: PositiveMass
+
+
+class Load(Part):
+    """A force on a rod or on a body, or a moment on a body."""
+
+    name: Name
+    rod: Name | None = None
+    """A copy such as `arm_0`, or all copies of a pattern: each has the force."""
+    position: NonNegativeLength | None = None
+    """Along the path of the rod."""
+    body: Name | None = None
+    """Instead of a rod; the force acts at its mass centre."""
+    force: tuple[Force, Force, Force] = (0.0, 0.0, 0.0)
+    moment: tuple[Moment, Moment, Moment] = (0.0, 0.0, 0.0)
+    frame: Literal["world", "material"] = "world"
+    """Axes of the components: the world's, or those of what it acts on, with which the load turns: the axes of a body,
+    or path, normal and path × normal of a rod."""
+    schedule: Schedule | None = None
+    """Factor over time; without it 1."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Load:
+        refuse_all("Load", checks.faults_of_load(self))
+        return self
+
+    def factor(self, t: float) -> float:
+        """What force and moment are multiplied with at time `t` [s]."""
+        return 1.0 if self.schedule is None else self.schedule.value(t)

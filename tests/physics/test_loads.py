@@ -1,0 +1,254 @@
+"""Point masses, forces and moments from outside, against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from sample_scenes import fixed, layer, rod, scene
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.kinematics.rotation import matrix_from_quaternion
+
+STILL = {"dt": 1.0, "tolerance": 1e-11}  # a second is long compared with all that moves here
+LENGTH, MODULUS = 0.1, 1e6
+SOFT = {"gel": {"youngs_modulus": MODULUS, "poisson_ratio": 0.5, "density": 1000.0}}
+EI = MODULUS * 0.01 * 2e-3**3 / 12
+FAR = rod([layer()], length=0.02, stations=3, start=(0, 0, 5), name="far", clamp_start="wall")
+"""A scene has a rod; this one is out of the way."""
+
+
+def strip(layers=None, stations=41, **more):
+    return rod(layers or [layer(thickness=2e-3)], length=LENGTH, stations=stations, clamp_start="wall", **more)
+
+
+def force_on_rod(force, position=LENGTH, **more):
+    return {"name": "pull", "rod": "rod", "position": position, "force": list(force), **more}
+
+
+def cantilever(load, layers=None, stations=41, **more):
+    return scene([strip(layers, stations)], bodies=[fixed()], materials=SOFT, loads=[load], solver=STILL, **more)
+
+
+def settled(description, time=40.0):
+    simulator = Simulator(load_scene(description))
+    simulator.run(time)
+    return simulator
+
+
+def elastica_tip(load, follower=False):
+    """Tip of an inextensible cantilever along x under a force at its end: along z, or along its normal there.
+
+    Seen from the tip, EI θ'' = −F cos(θ − θ_F) with θ' = 0 there, and θ = 0 at the wall.
+    """
+
+    def from_tip(angle, of_force):
+        def change(s, y):
+            return [y[1], -load / EI * np.cos(y[0] - of_force), np.cos(y[0]), np.sin(y[0])]
+
+        return solve_ivp(change, (0.0, LENGTH), [angle, 0.0, 0.0, 0.0], rtol=1e-10, atol=1e-12).y[:, -1]
+
+    if follower:  # turned as a whole: the angle at the tip is minus that found at the wall
+        angle = -from_tip(0.0, 0.0)[0]
+        return from_tip(angle, angle)[2:]
+    angle = brentq(lambda tip: from_tip(tip, 0.0)[0], 0.0, 1.5)
+    return from_tip(angle, 0.0)[2:]
+
+
+@pytest.mark.parametrize("layers", [None, [layer("bottom"), layer("top")]], ids=["one layer", "two layers"])
+def test_a_small_force_at_the_tip_bends_a_cantilever_by_the_cube_of_its_length(layers):
+    force = 1e-4 * 3 * EI / LENGTH**2
+    simulator = settled(cantilever(force_on_rod([0, 0, force]), layers))
+    moved = simulator.positions[:, 2] - simulator.model.start_position[:, 2]
+    assert moved[-1] == pytest.approx(force * LENGTH**3 / (3 * EI), rel=1e-3)
+
+
+def test_a_small_force_between_two_stations_bends_as_one_there():
+    force, place = 1e-4 * 3 * EI / LENGTH**2, 0.6135 * LENGTH
+    simulator = settled(cantilever(force_on_rod([0, 0, force], place), stations=81))
+    expected = force * place**2 / (6 * EI) * (3 * LENGTH - place)
+    assert simulator.positions[-1, 2] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize("follower", [False, True], ids=["of fixed direction", "that follows the normal"])
+def test_a_large_force_at_the_tip_bends_a_cantilever_to_the_elastica(follower):
+    load = 2.0 * EI / LENGTH**2
+    force = {"force": [0, load, 0], "frame": "material"} if follower else {"force": [0, 0, load]}
+    simulator = settled(cantilever({**force_on_rod([0, 0, 0]), **force}, stations=81))
+    expected = elastica_tip(load, follower)
+    assert expected[1] > 0.4 * LENGTH
+    assert simulator.positions[-1, [0, 2]] == pytest.approx(expected, abs=2e-4 * LENGTH)
+
+
+def test_a_force_on_the_path_between_two_layers_does_not_turn_them():
+    thick = [layer("bottom", thickness=1e-3), layer("top", thickness=3e-3)]
+    pulled = scene([rod(thick, stations=41)], loads=[force_on_rod([0.2, 0, 0], 0.05)], materials=SOFT)
+    simulator = Simulator(load_scene(pulled))
+    model, shares = simulator.model, simulator.model.dead_loads.nodes
+    moment = np.cross(model.start_position[shares.target] - [0.05, 0, 0], shares.vector).sum(axis=0)
+    assert shares.vector.sum(axis=0) == pytest.approx([0.2, 0, 0])
+    assert np.abs(moment).max() < 1e-18
+    simulator.run(0.1)
+    momentum = model.node_mass @ simulator.velocities
+    assert momentum == pytest.approx([0.02, 0, 0], abs=1e-12)
+
+
+def test_a_mass_at_the_tip_slows_the_vibration_of_a_strip_as_the_formula_says():
+    tip = 20e-3  # of the strip's own 2 g
+    stiffness = 3 * 1e8 * 0.01 * 2e-3**3 / 12 / LENGTH**3
+    released = force_on_rod([0, 0, 0.02 * LENGTH * stiffness])
+    released["schedule"] = {"type": "table", "times": [0.0, 4.9999, 5.0], "values": [1, 1, 0]}
+    swinging = scene(
+        [strip(stations=21)],
+        bodies=[fixed()],
+        loads=[released],
+        masses=[{"name": "tip", "rod": "rod", "position": LENGTH, "mass": tip}],
+        solver={"dt": 2e-3, "tolerance": 1e-9},
+        damping={"mass": 3.0},
+    )
+    simulator = Simulator(load_scene(swinging))
+    simulator.run(5.0)
+    crossings, before = [], simulator.positions[-1, 2]
+    for _ in range(1500):
+        simulator.step()
+        height = simulator.positions[-1, 2]
+        if before > 0.0 >= height:
+            crossings.append(simulator.time - 2e-3 * height / (height - before))
+        before = height
+    own = 1000.0 * 0.01 * 2e-3 * LENGTH
+    natural = math.sqrt(stiffness / (tip + 33 / 140 * own))  # Rayleigh's share of the strip
+    period = np.diff(crossings).mean()
+    assert len(crossings) > 4
+    assert 2 * math.pi / period == pytest.approx(math.sqrt(natural**2 - 1.5**2), rel=5e-3)
+
+
+def test_point_masses_weigh_as_much_as_they_are_heavy():
+    masses = [
+        {"name": "near", "rod": "rod", "position": 0.0333, "mass": 1e-3},
+        {"name": "far", "rod": "rod", "position": LENGTH, "mass": 5e-3},
+    ]
+    layers = [layer("bottom"), layer("top", thickness=2e-3, interval=[0.02, 0.08])]
+    plain = Simulator(load_scene(scene([rod(layers)])))
+    simulator = Simulator(load_scene(scene([rod(layers)], masses=masses)))
+    own = plain.model.node_mass.sum()
+    assert simulator.model.node_mass.sum() == pytest.approx(own + 6e-3)
+    expected = (own * plain.com + np.array([1e-3 * 0.0333 + 5e-3 * LENGTH, 0, 0])) / (own + 6e-3)
+    expected[2] -= 5e-3 * 0.5e-3 / (own + 6e-3)  # the tip is of the bottom layer alone
+    assert simulator.com == pytest.approx(expected, abs=1e-15)
+    assert simulator.frame().com == pytest.approx(expected, abs=1e-15)
+
+
+def test_a_pattern_takes_a_load_on_all_copies_or_on_the_one_that_is_named():
+    star = rod([layer()], length=0.02, stations=5, start=(0.005, 0, 0), name="arm", pattern={"count": 3})
+    both = [
+        {"name": "each", "rod": "arm", "position": 0.02, "force": [0, 0, 1.0]},
+        {"name": "one", "rod": "arm_2", "position": 0.0, "force": [0, 0, 2.0]},
+    ]
+    masses = [{"name": "one", "rod": "arm_1", "position": 0.01, "mass": 1.0}]
+    model = Simulator(load_scene(scene([star], loads=both, masses=masses))).model
+    assert model.dead_loads.nodes.target.tolist() == [4, 9, 14, 10]
+    assert model.dead_loads.nodes.vector[:, 2].tolist() == [1.0, 1.0, 1.0, 2.0]
+    assert np.flatnonzero(model.node_mass > 0.5).tolist() == [7]
+
+
+def flyer(inertia=(3e-5, 3e-5, 3e-5), **motion):
+    """A free body without a surface."""
+    return {
+        "name": "ball",
+        "position": [0, 0, 0],
+        "motion": {"type": "free", "mass": 0.2, "inertia": list(inertia), **motion},
+    }
+
+
+def in_space(body=None, dt=1e-3, **load):
+    """A body without weight, and a load on it."""
+    load = {"name": "push", "body": "ball", **load}
+    solver = {"dt": dt, "tolerance": 1e-10}
+    return scene([FAR], bodies=[fixed(position=(0, 0, 5)), body or flyer()], loads=[load], solver=solver)
+
+
+def test_a_force_accelerates_a_free_body_by_its_mass():
+    simulator = Simulator(load_scene(in_space(force=[0.1, -0.2, 0.3])))
+    simulator.run(0.5)
+    frame = simulator.frame()
+    assert frame.body_velocities[1] == pytest.approx(0.5 * np.array([0.1, -0.2, 0.3]) / 0.2, rel=1e-9)
+    assert np.abs(frame.body_angular_velocities[1]).max() == 0.0
+
+
+@pytest.mark.parametrize("frame", ["world", "material"])
+def test_a_moment_turns_a_free_body_by_its_inertia(frame):
+    moment = np.array([2e-4, -1e-4, 1e-4])
+    simulator = Simulator(load_scene(in_space(moment=list(moment), frame=frame)))
+    simulator.run(1.0)
+    expected = 1.0 * moment / 3e-5
+    assert simulator.frame().body_angular_velocities[1] == pytest.approx(expected, rel=1e-6)
+    assert np.linalg.norm(expected) * 1.0 / 2 > 0.5 * math.pi  # it has turned by more than a small angle
+
+
+def test_a_moment_across_the_spin_bends_the_angular_momentum_towards_itself():
+    inertia = (3e-5, 4e-5, 5e-5)  # of no ball: a wrong order of rotations would show
+    errors = []
+    for dt in (2e-3, 1e-3):
+        body = flyer(inertia, angular_velocity=[20.0, 0, 0])
+        simulator = Simulator(load_scene(in_space(body, dt, moment=[0, 3e-4, 0])))
+        simulator.run(0.2)
+        frame = simulator.frame()
+        rotation = matrix_from_quaternion(frame.body_quaternions[1])
+        momentum = rotation @ np.diag(inertia) @ rotation.T @ frame.body_angular_velocities[1]
+        errors.append(np.abs(momentum - [6e-4, 0.2 * 3e-4, 0]).max() / 6e-4)
+    assert errors[1] < 0.02
+    assert errors[1] < 0.6 * errors[0]  # of first order, as the integrator
+
+
+def test_a_follower_force_on_a_spinning_body_goes_in_circles():
+    spin = 10.0
+    body = flyer(angular_velocity=[0, 0, spin])
+    simulator = Simulator(load_scene(in_space(body, force=[0.4, 0, 0], frame="material")))
+    simulator.run(0.4)
+    expected = 0.4 / 0.2 / spin * np.array([math.sin(spin * 0.4), 1 - math.cos(spin * 0.4), 0])
+    assert simulator.frame().body_velocities[1] == pytest.approx(expected, abs=0.01 * 0.4 / 0.2 / spin)
+
+
+def test_a_guided_body_feels_the_force_along_its_rail():
+    hub = {"name": "ball", "position": [0, 0, 0], "motion": {"type": "guided", "axis": [0.6, 0, 0.8], "mass": 0.5}}
+    push = {"name": "push", "body": "ball", "force": [1.0, 2.0, 3.0]}
+    simulator = Simulator(load_scene(scene([FAR], bodies=[fixed(position=(0, 0, 5)), hub], loads=[push])))
+    simulator.run(0.1)
+    expected = 0.1 * (0.6 + 2.4) / 0.5 * np.array([0.6, 0, 0.8])
+    assert simulator.frame().body_velocities[1] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_scheduled_force_gives_its_impulse_whatever_the_step():
+    pulses = {"type": "pulse_train", "low": 0, "high": 1, "period": 0.1, "width": 0.05, "count": 2, "start": 0.02}
+    found = []
+    for dt in (2e-3, 1e-3):
+        simulator = Simulator(load_scene(in_space(force=[0.1, 0, 0], schedule=pulses)), dt=dt)
+        simulator.run(0.3)
+        found.append(simulator.frame().body_velocities[1, 0])
+    assert found == pytest.approx([0.1 * 2 * 0.05 / 0.2] * 2, rel=1e-9)
+
+
+def test_the_work_of_loads_is_supplied_from_outside_and_no_energy_of_the_robot():
+    simulator = Simulator(load_scene(in_space(force=[0.1, 0, 0], moment=[0, 0, 1e-4])))
+    simulator.run(0.1)
+    energy, work = simulator.energy(), 0.1 * simulator.bodies["ball"].position[0] + 1e-4 * 0.5 * 1e-4 / 3e-5 * 0.1**2
+    assert "loads" not in energy and "moments" not in energy
+    assert energy["kinetic"] == pytest.approx(work, rel=0.02)  # the integrator's loss is of first order
+    assert {k: v for k, v in simulator.plan.terms.items() if k in ("loads", "followers", "moments")} == {
+        "loads": "active",
+        "followers": "skipped: no load in a material frame",
+        "moments": "active",
+    }
+
+
+def test_a_state_restores_a_run_under_scheduled_loads_bit_for_bit():
+    load = force_on_rod([0, 0, 0.01], schedule={"type": "sine", "mean": 0, "amplitude": 1, "period": 0.02})
+    simulator = Simulator(load_scene(cantilever(load, stations=11) | {"solver": {"dt": 1e-3}}))
+    simulator.run(0.01)
+    snapshot = simulator.save_state()
+    simulator.run(0.01)
+    expected = simulator.positions
+    simulator.load_state(snapshot)
+    simulator.run(0.01)
+    assert np.array_equal(simulator.positions, expected)
