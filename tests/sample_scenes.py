@@ -99,7 +99,7 @@ def everything(stations=6):
         obstacles=[GROUND],
         contact=uneven,
         damping={"mass": 2.0},
-        fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05]},
+        fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05], "added_mass": True},
         masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
         loads=loads,
     )

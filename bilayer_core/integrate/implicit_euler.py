@@ -17,6 +17,7 @@ from ..kinematics.rotation import rotation_matrix, rotation_vector
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
+from ..solve.terms.fluid import momentum_of_fluid
 from ..solve.terms.term import StepContext
 
 NAME = "implicit_euler"
@@ -39,6 +40,7 @@ def predict(
         predicted_turn=h * state.spin,
         predicted_body_position=start.body_position + h * state.body_velocity[free],
         predicted_body_rotation=rotation,
+        fluid_momentum=momentum_of_fluid(model, start, state.velocity),
         eigenstrain=eigenstrain,
         load_factor=load_factor,
     )

@@ -9,6 +9,7 @@ import numpy as np
 from ..kinematics.rotation import quaternion_from_matrix
 from ..model.model import Model
 from ..model.state import State
+from ..solve.terms.fluid import energy_of_fluid
 from .frame import BodyInfo, Description, Frame, PlaneInfo, Strand
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper
@@ -148,6 +149,9 @@ def energies(stepper: Stepper, state: State) -> dict[str, float]:
         rotation, second = state.body_rotation[body], model.bodies.second_moment[place]
         inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
         kinetic += 0.5 * float(model.bodies.mass[place] * velocity @ velocity + spin @ inertia @ spin)
+    if len(model.fluid_mass):
+        fluid = energy_of_fluid(model, stepper.end, state.velocity, state.spin)
+        return {"kinetic": kinetic, "fluid": fluid, **stepper.potential.energies}
     return {"kinetic": kinetic, **stepper.potential.energies}
 
 

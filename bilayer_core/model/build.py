@@ -59,6 +59,7 @@ def build_model(scene: SceneConfig) -> Model:
         drag_node=found.column("drag_node", np.int64),
         drag_edge=found.column("drag_edge", np.int64, 2),
         drag_coefficient=found.column("drag_coefficient", width=3),
+        fluid_mass=found.column("fluid_mass", width=3),
         node_mass=found.column("node_mass"),
         spin_inertia=found.column("spin_inertia"),
         half_width=found.column("half_width"),

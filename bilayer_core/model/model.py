@@ -131,6 +131,8 @@ class Model(ReadOnlyArrays):
     drag_edge: Array  # edges before and after each, shape (n_drag, 2)
     drag_coefficient: Array  # ρ_f A C along t, m1, m2 [kg/m], shape (n_drag, 3)
 
+    fluid_mass: Array  # added along m1, m2 [kg] and against spin [kg m²], shape (n_edge, 3); (0, 3) without
+
     node_mass: Array  # with point masses [kg], shape (n_node,)
     spin_inertia: Array  # of edges about their tangent [kg m²], shape (n_edge,)
     half_width: Array  # of each edge [m], shape (n_edge,)

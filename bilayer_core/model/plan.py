@@ -101,6 +101,10 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
         "followers": state(any(any(load.force) for load in turning), "no load in a material frame"),
         "moments": state(any(any(load.moment) for load in scene.loads), "no moment on a body"),
         "drag": state(scene.fluid is not None, "no fluid"),
+        "added mass": state(
+            scene.fluid is not None and scene.fluid.added_mass is not None,
+            "no fluid" if scene.fluid is None else "fluid.added_mass is false",
+        ),
         "damping": state(scene.damping.mass > 0.0, "damping.mass is zero"),
         "bodies": state(free, "no free body"),
         "barrier": state(bool(pairs), "no surfaces that can meet"),

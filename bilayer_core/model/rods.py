@@ -86,6 +86,8 @@ def add_rod(found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Tur
     found.rods.append(spans)
     if scene.fluid is not None:
         _add_drag(found, scene.fluid, rod, spans)
+        if scene.fluid.added_mass is not None:
+            _add_added_mass(found, scene.fluid, rod, spans)
     if len(spans) == 2:
         _add_bond(found, bond(sections[0], sections[1], scene.coupling, rod.torsion), spans)
 
@@ -227,6 +229,19 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, i
             drag_edge=first_edge + edges,
             drag_coefficient=share[:, None] * whole[covered],
         )
+
+
+def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, int, int, int]]) -> None:
+    """Added mass of the whole section along each edge, shared by its layers in proportion to their thickness."""
+    thickness = np.zeros(rod.stations - 1)
+    for (first, last, _, _), layer in zip(spans, rod.layers, strict=True):
+        thickness[first:last] += layer.thickness
+    per_area, law = 0.25 * np.pi * fluid.density * rod.edge_length, fluid.added_mass
+    through = np.full(rod.stations - 1, law.through * rod.width**2)
+    turning = law.turning * (rod.width**2 - thickness**2) ** 2 / 32.0
+    whole = per_area * np.stack([through, law.sideways * thickness**2, turning], axis=1)
+    for (first, last, _, _), layer in zip(spans, rod.layers, strict=True):
+        found.add(fluid_mass=layer.thickness / thickness[first:last, None] * whole[first:last])
 
 
 def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, layer: Layer, strand: StrandArrays) -> None:

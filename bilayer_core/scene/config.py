@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
-from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.faults import refuse, refuse_all
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.rod import Rod
@@ -99,8 +99,28 @@ class Contact(Part):
     friction: Friction | None = None
 
 
+class AddedMass(Part):
+    """Fluid that moves with a ribbon, as multiples of what an ellipse of its width and thickness takes along."""
+
+    through: NonNegativeNumber = 1.0
+    """Mass through the thickness, of π/4 × density × width² per length."""
+    sideways: NonNegativeNumber = 1.0
+    """Mass across the width, of π/4 × density × thickness² per length."""
+    turning: NonNegativeNumber = 1.0
+    """Moment of inertia about the path, of π/128 × density × (width² − thickness²)² per length."""
+
+
+def _with_or_without(value: Any) -> Any:
+    """`true` stands for the multiples by default, `false` for no added mass."""
+    if isinstance(value, bool):
+        return {} if value else None
+    if value is None or isinstance(value, dict | AddedMass):
+        return value
+    raise refuse("must be true, false, or a mapping of `through`, `sideways`, `turning`")
+
+
 class Fluid(Part):
-    """A fluid around the rods, and its quadratic drag on them."""
+    """A fluid around the rods: its quadratic drag on them and, on request, its inertia."""
 
     density: PositiveDensity = 1000.0
     velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
@@ -109,6 +129,10 @@ class Fluid(Part):
     """Coefficient for motion along the tangent, with the width as area per length."""
     drag_across: NonNegativeNumber
     """Coefficient for motion across: with the width through the thickness, with the thickness sideways."""
+    added_mass: Annotated[
+        AddedMass | None, BeforeValidator(_with_or_without, json_schema_input_type=AddedMass | bool | None)
+    ] = None
+    """Inertia of the fluid that the rods push aside; none by default, `true` for all multiples 1."""
 
 
 class Damping(Part):

@@ -5,6 +5,7 @@ times the one before;
 a new correction of the gradient at hand costs a fraction of a new factorisation. The last of them, not taken, is the
 measure of convergence:
 what Newton would still change, as the speed of the fastest material point [m/s].
+What the potential takes at the configuration (`IncrementalPotential.follow`) moves along with every correction.
 """
 
 from __future__ import annotations
@@ -180,6 +181,7 @@ class NewtonSolver:
         configuration.
         """
         potential = self._potential
+        potential.follow(at)
         energy = potential.evaluate(at, True)
         backtracks = 0
         fresh, previous = True, math.inf
@@ -223,6 +225,8 @@ class NewtonSolver:
             iterations += not fresh
             fresh, previous = False, (residual if halvings == 0 else 0.0)
             at, trial = trial, at
+            if potential.follow(at):
+                energy = potential.evaluate(at, False)
         return NewtonReport(status, iterations, factorisations, residual, backtracks), at
 
     def _search(self, at, trial, step: Array, body_step: Array, energy: float) -> tuple[float, int] | None:

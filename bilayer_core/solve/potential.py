@@ -15,7 +15,7 @@ from .clamps import hand_gradient_to_bodies
 from .configuration import Configuration
 from .terms.contact import Barrier, Friction
 from .terms.elastic import BendingAndTwisting, Bond, Stretching
-from .terms.fluid import Drag
+from .terms.fluid import AddedMass, Drag
 from .terms.inertial import Damping, Gravity, Inertia
 from .terms.loads import Followers, Loads, Moments
 from .terms.term import Accumulators, Kind, StepContext, Term
@@ -39,10 +39,11 @@ class IncrementalPotential:
         self.has_planes = contact is not None and len(carriers.plane_point) > 0
         self.has_balls = contact is not None and len(carriers.pair_first) > 0
         self.has_contact = self.has_planes or self.has_balls
-        has_drag = len(model.drag_node) > 0
+        has_drag, has_added_mass = len(model.drag_node) > 0, len(model.fluid_mass) > 0
+        has_node_blocks = self.has_contact or has_drag or has_added_mass
 
         self.gradient = np.zeros(model.layout.size)
-        self.accumulators = Accumulators(model, self.has_contact or has_drag, self.has_balls)
+        self.accumulators = Accumulators(model, has_node_blocks, self.has_balls)
         self.terms = self.accumulators.energy
         self.matrix = self.accumulators.matrix
         self.edge_gradient = self.accumulators.edge
@@ -67,6 +68,7 @@ class IncrementalPotential:
             (Followers, model.follower_loads.forces > 0),
             (Moments, model.has_moments),
             (Drag, has_drag),
+            (AddedMass, has_added_mass),
         )
         self._of_carriers = [self._barrier] if self.has_contact else []
         self._of_carriers += self._needed((Friction, self.has_contact and law is not None and law.acts))
@@ -96,6 +98,10 @@ class IncrementalPotential:
         self.context = context
         for term in (*self._of_rods_and_bodies, *self._of_carriers):
             term.start_step(context)
+
+    def follow(self, at: Configuration) -> bool:
+        """Let terms take from a configuration what they hold fixed between moves; false if none does so."""
+        return any([term.follow(at) for term in self._of_rods_and_bodies])
 
     def evaluate(self, at: Configuration, with_hessian: bool) -> float:
         """Potential at a configuration [J]; infinite behind a surface. Gradient always, second derivatives on

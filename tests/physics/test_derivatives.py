@@ -42,7 +42,7 @@ def bonds(model):
     return only(model, joint_stiffness=stiffness)
 
 
-OTHERS = "inertia gravity damping drag contact friction"
+OTHERS = "inertia gravity damping drag added mass contact friction"
 FORCES = {
     "stretching": lambda m: only(m, axial_stiffness=m.axial_stiffness),
     "bending": lambda m: bends(m, (0, 1)),
@@ -115,6 +115,8 @@ class Problem:
         self.at, self.trial = Configuration(model), Configuration(model)
         step = np.zeros(total)
         step[self.free] = 3e-5 * rng.standard_normal(len(self.free))
+        self._move(start, 0.5 * step, self.at)
+        self.potential.follow(self.at)
         self._move(start, step, self.at)
 
     def _move(self, base, vector, out):
@@ -168,6 +170,7 @@ def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
     gradient, hessian = problem.derivatives()
     if force in (OTHERS, "everything"):
         assert all(problem.potential.terms[term] > 0.0 for term in ("barrier", "friction", "drag", "damping"))
+        assert problem.potential.terms["added mass"] != 0.0
         assert problem.coupling > 0.0
     if force == "loads":
         assert {"loads", "followers", "moments"} <= problem.potential.terms.keys()

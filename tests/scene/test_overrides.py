@@ -21,6 +21,9 @@ def test_an_override_changes_its_value_and_no_other():
         ("contact.friction=null", lambda s: s.contact.friction, None),
         ("output.rate=1e2", lambda s: s.output.rate, 100.0),
         ("stimuli.humidity.schedule={type: hold, value: 1}", lambda s: s.stimuli["humidity"].schedule.value(0), 1.0),
+        ("fluid.added_mass=false", lambda s: s.fluid.added_mass, None),
+        ("fluid.added_mass={through: 2}", lambda s: s.fluid.added_mass.through, 2.0),
+        ("fluid.added_mass=true", lambda s: s.fluid.added_mass.sideways, 1.0),
         ("title=a = b", lambda s: s.title, "a = b"),
     ],
 )

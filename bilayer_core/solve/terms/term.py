@@ -30,6 +30,8 @@ class StepContext:
         Turn of edges that inertia prefers [rad], shape (n_edge,).
     predicted_body_position, predicted_body_rotation : Array
         X̃ [m] and R̃ of free bodies, shapes (n_free, 3), (n_free, 3, 3).
+    fluid_momentum : Array
+        P̄ of the fluid at nodes [N s], shape (n_node, 3); (0, 3) without added mass.
     eigenstrain : Array
         η of each edge at the end of the step, shape (n_edge,).
     load_factor : Array
@@ -42,6 +44,7 @@ class StepContext:
     predicted_turn: Array
     predicted_body_position: Array
     predicted_body_rotation: Array
+    fluid_momentum: Array
     eigenstrain: Array
     load_factor: Array
 
@@ -112,6 +115,10 @@ class Term:
     def start_step(self, context: StepContext) -> None:
         """Freeze what a step depends on."""
         self.context = context
+
+    def follow(self, at: Configuration) -> bool:
+        """Take from the configuration that Newton moved to what is held fixed until the next move; false if nothing."""
+        return False
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
         """Add the derivatives at a configuration to `out`, and write the energy [J] there under each of `names`."""

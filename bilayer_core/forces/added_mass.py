@@ -1,0 +1,184 @@
+"""Inertia of the fluid that a ribbon pushes aside: its added mass, once for the whole section of a rod.
+
+The fluid's kinetic energy per length of a slender body, relative to the flow U, is
+
+    T = ½ m₁ (u·m1)² + ½ m₂ (u·m2)² + ½ j ω²,    u = v − U,
+    m₁ = ρ_f π w²/4,    m₂ = ρ_f π h²/4,    j = ρ_f π (w² − h²)²/128,
+
+with ω the spin about the tangent, for an ellipse as wide and as thick as the section (Lamb 1932, art. 71): m₁ and, to
+(h/w)², j are those of a flat plate. Motion along the tangent takes no fluid along. With q the configuration, Lagrange's
+equations give the force that the fluid asks for,
+
+    R = d/dt ∂T/∂v − ∂T/∂q = dP/dt − ∂T/∂q,    P = m₁ (u·m1) m1 + m₂ (u·m2) m2,
+
+P being the fluid's momentum per length. The second part exists because m1 and m2 turn with the body. An increment
+(ε, θ) of an edge vector of length l and of its angle moves m to m − t (m·ε)/l + θ m′ (see `forces.bend_twist`), so
+
+    ∂T/∂ε = −[m₁ (u·m1) m1 + m₂ (u·m2) m2] (u·t)/l,    ∂T/∂θ = (m₁ − m₂) (u·m1)(u·m2).
+
+The first acts on the two ends of an edge as a couple: a plate with normal and tangential speeds u_n and u_t feels
+Munk's moment m₁ u_n u_t per length, which turns it broadside on. Along a curve it is the reactive force
+(∂_t − ∂_s u_t) (m₁ u_n m1) of Lighthill (1971), without the wake that he lets leave at the tail: T depends on
+differences of positions alone, so the momentum of rods and fluid together is conserved, to the tolerance of Newton's
+solution in each step.
+
+In space: T is summed over edges, half of an edge's mass at either end, T = Σ ½·½ m l̄ (u_i·m_edge)², l̄ the rest length;
+the layers of a section share it in proportion to their thickness. Error: second order in the edge length.
+
+In time: over a stage of length h from an origin where the fluid had the momentum P̄,
+
+    R = (P − P̄)/h − ∂T/∂q,    all at the end of the stage; for spins j (ω − ω̄)/h.
+
+That is the integrator's own rule, for momenta, and has its order: 1 for implicit Euler. R is no gradient: the part of
+its derivative that comes from ∂²T/∂v∂q is antisymmetric (gyroscopic). Therefore directions and ∂T/∂q are held at a
+configuration z, and R is the gradient at q = z of the convex potential
+
+    ½ Σ m (u·m_z)² − P̄·(x − x̄)/h − (∂T/∂q)_z·q + ½ j (ω − ω̄)²,
+
+whose Hessian is block-diagonal. z moves along with every correction of Newton, and the step ends where nothing changes
+any more. What is left out of the Hessian makes Newton linear instead of quadratic, by a factor of about
+h |u_t| k m₁/(m + m₁), k the largest wavenumber that bends in h; where that is not small, Newton fails and the step is
+halved.
+"""
+
+from __future__ import annotations
+
+from ..jit import kernel
+
+
+@kernel
+def fluid_momentum(
+    mass,
+    edge_node,
+    length,
+    tangent,
+    director1,
+    director2,
+    flow,
+    velocity,
+    spin,
+    momentum_out,
+    shape_gradient_out,
+):
+    """Momentum P of the fluid and ∂T/∂q at given velocities; return T [J].
+
+    Parameters
+    ----------
+    mass : Array
+        m₁ l̄ and m₂ l̄ [kg] and j l̄ [kg m²] of each edge, shape (n_edge, 3).
+    edge_node : Array
+        First node of each edge, shape (n_edge,).
+    length, tangent, director1, director2 : Array
+        Of edges [m, unit], shapes (≥ n_edge,), (≥ n_edge, 3).
+    flow : Array
+        U [m/s], shape (3,).
+    velocity : Array
+        Of nodes [m/s], shape (n_node, 3).
+    spin : Array
+        ω of edges [rad/s], shape (n_edge,).
+    momentum_out : Array
+        P of nodes [N s], shape (n_node, 3); written.
+    shape_gradient_out : Array
+        ∂T/∂(ε, θ) of edges [N, N m], shape (n_edge, 4); written.
+    """
+    energy = 0.0
+    momentum_out[:, :] = 0.0
+    for k in range(mass.shape[0]):
+        energy += 0.5 * mass[k, 2] * spin[k] ** 2
+        for c in range(4):
+            shape_gradient_out[k, c] = 0.0
+        for i in range(edge_node[k], edge_node[k] + 2):
+            along = through = across = 0.0
+            for c in range(3):
+                relative = velocity[i, c] - flow[c]
+                along += relative * tangent[k, c]
+                through += relative * director1[k, c]
+                across += relative * director2[k, c]
+            momentum1, momentum2 = 0.5 * mass[k, 0] * through, 0.5 * mass[k, 1] * across
+            energy += 0.5 * (momentum1 * through + momentum2 * across)
+            for c in range(3):
+                momentum = momentum1 * director1[k, c] + momentum2 * director2[k, c]
+                momentum_out[i, c] += momentum
+                shape_gradient_out[k, c] -= momentum * along / length[k]
+            shape_gradient_out[k, 3] += momentum1 * across - momentum2 * through
+    return energy
+
+
+@kernel
+def added_mass(
+    mass,
+    edge_node,
+    direction1,
+    direction2,
+    shape_gradient,
+    origin_momentum,
+    flow,
+    step_length,
+    position,
+    origin,
+    turn,
+    predicted_turn,
+    node_gradient_out,
+    node_hessian_out,
+    edge_gradient_out,
+    edge_hessian_out,
+    with_hessian,
+):
+    """Add the incremental potential of the fluid's inertia and return it [J].
+
+    Parameters
+    ----------
+    mass, edge_node, flow : Array
+        As for `fluid_momentum`.
+    direction1, direction2 : Array
+        m1 and m2 of edges at z, shape (≥ n_edge, 3).
+    shape_gradient : Array
+        (∂T/∂q)_z [N, N m], shape (n_edge, 4).
+    origin_momentum : Array
+        P̄ of nodes [N s], shape (n_node, 3).
+    step_length : float
+        h [s].
+    position, origin : Array
+        Of nodes, now and at the origin of the stage [m], shape (n_node, 3).
+    turn, predicted_turn : Array
+        Of edges since the start of the step, and with the spin ω̄ [rad], shape (n_edge,).
+    node_gradient_out, node_hessian_out : Array
+        Shapes (n_node, 3) and (n_node, 3, 3) (upper triangle); added to.
+    edge_gradient_out, edge_hessian_out : Array
+        Shapes (≥ n_edge, 4) and (≥ n_edge, 4, 4); added to.
+    with_hessian : bool
+    """
+    energy = 0.0
+    for i in range(origin_momentum.shape[0]):
+        for c in range(3):
+            force = origin_momentum[i, c] / step_length
+            node_gradient_out[i, c] -= force
+            energy -= force * (position[i, c] - origin[i, c])
+    for k in range(mass.shape[0]):
+        first = edge_node[k]
+        for i in range(first, first + 2):
+            through = across = 0.0
+            for c in range(3):
+                relative = (position[i, c] - origin[i, c]) / step_length - flow[c]
+                through += relative * direction1[k, c]
+                across += relative * direction2[k, c]
+            mass1, mass2 = 0.5 * mass[k, 0], 0.5 * mass[k, 1]
+            energy += 0.5 * (mass1 * through**2 + mass2 * across**2)
+            for m in range(3):
+                momentum = mass1 * through * direction1[k, m] + mass2 * across * direction2[k, m]
+                node_gradient_out[i, m] += momentum / step_length
+                if with_hessian:
+                    for n in range(m, 3):
+                        node_hessian_out[i, m, n] += (
+                            mass1 * direction1[k, m] * direction1[k, n] + mass2 * direction2[k, m] * direction2[k, n]
+                        ) / step_length**2
+        for c in range(3):
+            stretch = position[first + 1, c] - origin[first + 1, c] - position[first, c] + origin[first, c]
+            energy -= shape_gradient[k, c] * stretch
+            edge_gradient_out[k, c] -= shape_gradient[k, c]
+        inertia, ahead = mass[k, 2] / step_length**2, turn[k] - predicted_turn[k]
+        energy += 0.5 * inertia * ahead**2 - shape_gradient[k, 3] * turn[k]
+        edge_gradient_out[k, 3] += inertia * ahead - shape_gradient[k, 3]
+        if with_hessian:
+            edge_hessian_out[k, 3, 3] += inertia
+    return energy

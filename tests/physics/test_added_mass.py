@@ -1,0 +1,296 @@
+"""Inertia of the fluid against closed forms, Kirchhoff's equations of a rigid plate, and what it must conserve."""
+
+import math
+
+import numpy as np
+import pytest
+from sample_scenes import fixed, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.build import build_model
+from bilayer_core.model.section import rectangle
+from bilayer_core.model.state import initial_state
+from bilayer_core.solve.configuration import Configuration
+from bilayer_core.solve.terms.fluid import energy_of_fluid, momentum_of_fluid
+
+WIDTH, THICKNESS = 0.01, 2e-3
+OWN = 1000.0 * WIDTH * THICKNESS  # [kg/m]
+ADDED = 0.25 * math.pi * 1000.0 * WIDTH**2
+TURNING = math.pi / 128 * 1000.0 * (WIDTH**2 - THICKNESS**2) ** 2
+SIDEWAYS = 0.25 * math.pi * 1000.0 * THICKNESS**2
+WHOLE, HALVES = [layer(thickness=THICKNESS)], [layer("bottom"), layer("top")]
+
+
+def water(**more):
+    """A fluid without drag."""
+    return {"drag_along": 0.0, "drag_across": 0.0, "added_mass": True, **more}
+
+
+STIFF = {"youngs_modulus": 1e10, "poisson_ratio": 0.5, "density": 1000.0}
+
+
+def thrown(motion, spin, dt, duration, **fluid):
+    """A free strip with the velocity of a rigid motion about its middle, before and after `duration`."""
+    strip = rod(WHOLE, length=0.05, stations=11)
+    content = scene([strip], materials={"gel": STIFF}, fluid=water(**fluid), solver={"tolerance": 1e-9})
+    simulator = Simulator(load_scene(content), dt=dt)
+    state = simulator._state
+    state.velocity[:] = np.array(motion) + np.cross(spin, state.position - state.position.mean(axis=0))
+    state.spin[:] = spin[0]
+    simulator.compile()
+    before = momentum(simulator), sum(simulator.energy().values())
+    simulator.run(duration)
+    return simulator, before
+
+
+def momentum(simulator):
+    """Of rods and fluid together [N s]."""
+    model, state = simulator.model, simulator._state
+    fluid = momentum_of_fluid(model, simulator._stepper.end, state.velocity)
+    return model.node_mass @ state.velocity + fluid.sum(axis=0)
+
+
+def random_problem(seed=0):
+    """A bent bilayer, its configuration, and random velocities of its nodes and edges."""
+    rng = np.random.default_rng(seed)
+    content = scene([rod(HALVES, length=0.02, stations=7)], fluid=water(velocity=[0.1, -0.2, 0.05]))
+    model = build_model(load_scene(content))
+    state = initial_state(model)
+    start, bent = Configuration(model), Configuration(model)
+    start.take_state(state, state.body_position)
+    bent.position[:] = start.position + 4e-4 * rng.standard_normal((model.node_count, 3))
+    bent.carry_frames(start, 0.3 * rng.standard_normal(model.edge_count))
+    return model, bent, rng.standard_normal((model.node_count, 3)), rng.standard_normal(model.edge_count)
+
+
+def shape_gradient_of(model, at, velocity):
+    gradient, ignored = np.empty((model.edge_count, 4)), np.zeros((model.node_count, 3))
+    frames = (at.length, at.tangent, at.director1, at.director2)
+    motion = (np.array(model.scene.fluid.velocity), velocity, np.zeros(model.edge_count))
+    fluid_momentum(model.fluid_mass, model.edge_node, *frames, *motion, ignored, gradient)
+    return gradient
+
+
+def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
+    model, at, velocity, spin = random_problem()
+    moved, h = Configuration(model), 1e-6
+    by_velocity = np.zeros_like(velocity)
+    for entry in np.ndindex(velocity.shape):
+        unit = np.zeros_like(velocity)
+        unit[entry] = h
+        energies = [energy_of_fluid(model, at, velocity + sign * unit, spin) for sign in (1, -1)]
+        by_velocity[entry] = (energies[0] - energies[1]) / (2 * h)
+    found = momentum_of_fluid(model, at, velocity)
+    assert found == pytest.approx(by_velocity, abs=1e-7 * np.abs(found).max())
+
+    def displaced(position, angle):
+        moved.position[:] = at.position + position
+        moved.carry_frames(at, angle)
+        return energy_of_fluid(model, moved, velocity, spin)
+
+    gradient = shape_gradient_of(model, at, velocity)
+    on_nodes, h = np.zeros_like(velocity), 1e-9
+    np.add.at(on_nodes, model.edge_node, -gradient[:, :3])
+    np.add.at(on_nodes, model.edge_node + 1, gradient[:, :3])
+    for entry in np.ndindex(velocity.shape):
+        unit = np.zeros_like(velocity)
+        unit[entry] = h
+        still = np.zeros(model.edge_count)
+        difference = (displaced(unit, still) - displaced(-unit, still)) / (2 * h)
+        assert difference == pytest.approx(on_nodes[entry], abs=1e-6 * np.abs(on_nodes).max())
+    for edge in range(model.edge_count):
+        angle = np.zeros(model.edge_count)
+        angle[edge] = 1e-6
+        difference = (displaced(0.0, angle) - displaced(0.0, -angle)) / 2e-6
+        assert difference == pytest.approx(gradient[edge, 3], abs=1e-7 * np.abs(gradient[:, 3]).max())
+
+
+def test_a_turn_of_body_motion_and_flow_leaves_the_fluids_energy_unchanged():
+    model, at, velocity, spin = random_problem()
+    flow = np.array(model.scene.fluid.velocity)
+    turn, turned = rotation_matrix(np.array([0.4, -1.1, 2.0])), Configuration(model)
+    for name in ("tangent", "director1", "director2"):
+        getattr(turned, name)[:] = getattr(at, name) @ turn.T
+    turned.length[:] = at.length
+    relative = velocity - flow
+    energy = energy_of_fluid(model, at, velocity, spin)
+    assert energy_of_fluid(model, turned, relative @ turn.T + flow, spin) == pytest.approx(energy, rel=1e-12)
+    # the same for a small turn, in the forces: they make no moment
+    gradient, moments = shape_gradient_of(model, at, velocity), momentum_of_fluid(model, at, velocity)
+    edges = at.length[:, None] * at.tangent
+    moment = np.cross(edges, gradient[:, :3]).sum(axis=0) + gradient[:, 3] @ at.tangent
+    moment += np.cross(relative, moments).sum(axis=0)
+    assert np.abs(moment).max() < 1e-12 * np.abs(relative).max() * np.abs(moments).sum()
+
+
+@pytest.mark.parametrize("layers", [WHOLE, HALVES], ids=["one layer", "two layers"])
+@pytest.mark.parametrize(
+    ("direction", "added"),
+    [((0, 0, 1.0), ADDED), ((0, 1.0, 0), SIDEWAYS), ((1.0, 0, 0), 0.0)],
+    ids=["through", "sideways", "along"],
+)
+def test_a_straight_strip_accelerates_with_its_own_mass_and_that_of_the_fluid(layers, direction, added):
+    content = scene([rod(layers, length=0.05, stations=11)], gravity=list(direction), fluid=water())
+    simulator = Simulator(load_scene(content))
+    simulator.run(0.1)
+    expected = 0.1 * OWN / (OWN + added) * np.array(direction)
+    assert simulator.velocities == pytest.approx(np.tile(expected, (len(simulator.velocities), 1)), abs=1e-11)
+
+
+def test_multiples_of_the_flat_plates_mass_are_the_scenes():
+    content = scene([rod(WHOLE)], fluid=water(added_mass={"through": 0.5, "sideways": 3.0, "turning": 2.0}))
+    model = build_model(load_scene(content))
+    assert model.fluid_mass.sum(axis=0) == pytest.approx([0.05 * ADDED, 0.3 * SIDEWAYS, 0.2 * TURNING])
+
+
+def kirchhoff(velocity, spin, length, duration):
+    """Angle and velocity of a rigid plate in a perfect fluid at rest, in its plane of motion (Lamb 1932, ch. VI).
+
+    With m and n its own and its whole mass across, I its moment of inertia and that of its fluid:
+    m u̇ = n ω v,  n v̇ = −m ω u,  I ω̇ = −(n − m) u v,  θ̇ = ω; classical Runge–Kutta.
+    """
+    own, whole = OWN * length, (OWN + ADDED) * length
+    # masses at eleven nodes, halves at the ends
+    arms = np.linspace(-0.5, 0.5, 11) * length
+    weights = np.full(11, 0.1)
+    weights[[0, -1]] = 0.05
+    moment = whole * float(weights @ arms**2)
+
+    def rate(y):
+        u, v, omega, _ = y
+        return np.array([whole * omega * v / own, -own * omega * u / whole, -(whole - own) * u * v / moment, omega])
+
+    y, h = np.array([velocity[0], velocity[2], -spin[1], 0.0]), 1e-5
+    for _ in range(round(duration / h)):
+        a = rate(y)
+        b = rate(y + 0.5 * h * a)
+        c = rate(y + 0.5 * h * b)
+        y = y + h / 6.0 * (a + 2 * b + 2 * c + rate(y + h * c))
+    return y
+
+
+def angle_of(simulator):
+    chord = simulator.positions[-1] - simulator.positions[0]
+    return math.atan2(chord[2], chord[0])
+
+
+@pytest.mark.parametrize("velocity", [(0.3, 0.0, 0.2), (0.3, 0.0, -0.2)])
+def test_a_plate_that_moves_aslant_turns_broadside_on_as_munks_moment_says(velocity):
+    errors = []
+    for dt in (5e-4, 2.5e-4):
+        simulator, _ = thrown(velocity, (0, 0, 0), dt, 0.1)
+        errors.append(angle_of(simulator) - kirchhoff(velocity, (0, 0, 0), 0.05, 0.1)[3])
+    assert abs(angle_of(simulator)) > 0.5
+    assert angle_of(simulator) * velocity[2] < 0.0  # the normal turns towards the velocity
+    assert abs(errors[1]) < 0.01
+    assert abs(2 * errors[1] - errors[0]) < 1e-4  # what is left is of second order
+
+
+def test_momentum_of_rods_and_fluid_together_is_conserved():
+    bending = [layer("bottom"), layer("top", eigenstrain={"stimulus": "heat", "gain": 0.02})]
+    content = scene(
+        [rod(bending, length=0.06, stations=13)],
+        stimuli={"heat": {"schedule": {"type": "sine", "mean": 0.5, "amplitude": 0.5, "period": 0.1}}},
+        fluid=water(),
+        solver={"tolerance": 1e-10},
+    )
+    simulator = Simulator(load_scene(content))
+    simulator._state.velocity[:] = (0.2, 0.05, 0.1)
+    simulator.compile()
+    start, largest = momentum(simulator), 0.0
+    for _ in range(100):
+        before = momentum(simulator)
+        simulator.step()
+        largest = max(largest, np.abs(momentum(simulator) - before).max())
+    assert largest < 1e-9 * np.abs(start).max()
+    assert np.ptp(simulator.positions[:, 2]) > 5e-3  # it bends
+
+
+def test_a_strip_that_is_twisted_up_turns_back_and_forth_with_the_fluids_moment_of_inertia():
+    """Torsional vibration of a strip clamped at one end: ω = π/2 √(GJ/(I + j))/L."""
+    section = rectangle(load_scene(scene([rod(WHOLE)])).materials["gel"], WIDTH, THICKNESS)
+    periods = []
+    for fluid in (None, water()):
+        content = scene([rod(WHOLE, stations=21, clamp_start="wall")], bodies=[fixed()], fluid=fluid)
+        simulator = Simulator(load_scene(content), dt=2e-6)
+        middles = 0.5 * (simulator.positions[1:, 0] + simulator.positions[:-1, 0])
+        simulator._state.spin[:] = 1.0 * np.sin(0.5 * math.pi * middles / 0.1)
+        simulator.compile()
+        before = 1.0
+        while True:
+            simulator.step()
+            now = simulator._state.spin[-1]
+            if now < 0.0:
+                break
+            before = now
+        periods.append(4.0 * (simulator.time - simulator.dt * (0.5 + now / (now - before))))
+        inertia = section.spin_inertia + (TURNING if fluid else 0.0)
+        expected = 4.0 * 0.1 * math.sqrt(inertia / section.twisting_stiffness)
+        assert periods[-1] == pytest.approx(expected, rel=0.01)
+    assert periods[1] / periods[0] == pytest.approx(math.sqrt(1.0 + TURNING / section.spin_inertia), rel=0.002)
+
+
+@pytest.mark.parametrize(
+    ("motion", "spin"),
+    [((0.2, 0.0, 0.1), (0.0, 8.0, 0.0)), ((0.2, 0.05, 0.1), (3.0, 8.0, 1.0))],
+    ids=["in a plane", "in space"],
+)
+def test_energy_of_a_tumbling_plate_and_its_fluid_is_lost_at_the_integrators_order_only(motion, spin):
+    losses = []
+    for dt in (5e-4, 2.5e-4, 1.25e-4):
+        simulator, (_, energy) = thrown(motion, spin, dt, 0.1)
+        losses.append(1.0 - sum(simulator.energy().values()) / energy)
+    order = math.log2((losses[0] - losses[1]) / (losses[1] - losses[2]))
+    assert order == pytest.approx(1.0, abs=0.15)
+    assert 0.0 < losses[2] < 0.02
+
+
+def test_a_uniform_flow_acts_as_motion_through_fluid_at_rest():
+    still, _ = thrown((0.3, 0.1, 0.2), (0, 4.0, 0), 1e-3, 0.05)
+    flow = np.array([-0.2, 0.4, 0.1])
+    carried, _ = thrown(np.array([0.3, 0.1, 0.2]) + flow, (0, 4.0, 0), 1e-3, 0.05, velocity=flow.tolist())
+    assert carried.velocities - flow == pytest.approx(still.velocities, abs=1e-7)
+    assert carried.positions - 0.05 * flow == pytest.approx(still.positions, abs=1e-9)
+
+
+def test_a_clamped_strip_swings_more_slowly_by_the_root_of_its_whole_mass():
+    beta, length = 1.875104, 0.1
+    material = {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0}
+    periods = []
+    for fluid in (None, water()):
+        content = scene(
+            [rod(WHOLE, length=length, stations=41, clamp_start="wall")],
+            bodies=[fixed()],
+            materials={"gel": material},
+            fluid=fluid,
+            solver={"tolerance": 1e-9},
+        )
+        simulator = Simulator(load_scene(content), dt=2e-3)
+        s = beta * simulator.positions[:, 0] / length
+        ratio = (math.sinh(beta) - math.sin(beta)) / (math.cosh(beta) + math.cos(beta))
+        simulator._state.velocity[:, 2] = 2e-3 * (np.cosh(s) - np.cos(s) - ratio * (np.sinh(s) - np.sin(s)))
+        simulator.compile()
+        crossings, before = [], 0.0
+        while len(crossings) < 2:
+            simulator.step()
+            now = simulator.positions[-1, 2]
+            if before * now < 0.0:
+                crossings.append(simulator.time - simulator.dt * now / (now - before))
+            before = now
+        periods.append(2.0 * (crossings[1] - crossings[0]))
+    own = 2.0 * math.pi / (beta**2 * math.sqrt(1e6 * WIDTH * THICKNESS**3 / 12.0 / (OWN * length**4)))
+    assert periods[0] == pytest.approx(own, rel=0.005)
+    assert periods[1] / periods[0] == pytest.approx(math.sqrt(1.0 + ADDED / OWN), rel=0.005)
+
+
+def test_without_added_mass_there_is_nothing_to_compute():
+    for fluid in (None, water(added_mass=False)):
+        simulator = Simulator(load_scene(scene([rod(WHOLE)], fluid=fluid)))
+        assert simulator.model.fluid_mass.shape == (0, 3)
+        simulator.run(0.002)
+        assert "added mass" not in simulator._stepper.potential.terms
+        assert "fluid" not in simulator.energy()
+        assert simulator.plan.terms["added mass"].startswith("skipped")
+    assert Simulator(load_scene(scene([rod(WHOLE)], fluid=water()))).plan.terms["added mass"] == "active"
