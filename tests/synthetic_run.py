@@ -34,8 +34,8 @@ def description() -> Description:
                     layer=name,
                     nodes=slice(index * NODES, (index + 1) * NODES),
                     edges=slice(index * (NODES - 1), (index + 1) * (NODES - 1)),
-                    width=WIDTH,
-                    thickness=THICKNESS,
+                    width=np.full(NODES, WIDTH),
+                    thickness=np.full(NODES, THICKNESS),
                 )
             )
     node_count = len(strands) * NODES + 1

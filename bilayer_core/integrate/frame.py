@@ -19,8 +19,8 @@ class Strand:
         Names of the rod (copies of a pattern are numbered) and of the layer.
     nodes, edges : slice
         Where its nodes and edges stand in the arrays of a `Frame`; ``edges`` has one element less.
-    width, thickness : float
-        Of the cross-section [m].
+    width, thickness : ndarray
+        Of the cross-section at each node [m], shape (nodes,).
     """
 
     name: str
@@ -28,8 +28,8 @@ class Strand:
     layer: str
     nodes: slice
     edges: slice
-    width: float
-    thickness: float
+    width: np.ndarray
+    thickness: np.ndarray
 
 
 @dataclass(frozen=True)

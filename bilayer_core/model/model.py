@@ -13,7 +13,7 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class StrandArrays:
+class StrandArrays(ReadOnlyArrays):
     """One layer of one rod: where its nodes and edges stand."""
 
     name: str
@@ -22,8 +22,8 @@ class StrandArrays:
     first_node: int
     node_count: int
     first_edge: int
-    width: float
-    thickness: float
+    width: Array  # at its nodes [m], shape (node_count,)
+    thickness: Array  # likewise
 
 
 @dataclass(frozen=True)

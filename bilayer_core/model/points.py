@@ -10,6 +10,7 @@ from ..scene.config import SceneConfig
 from ..scene.rod import Rod
 from .model import Bodies, LoadShares, PointLoads
 from .rods import Collected
+from .section import outline
 
 
 def add_point_masses(scene: SceneConfig, found: Collected) -> None:
@@ -69,10 +70,10 @@ def _shares(rod: Rod, spans: list[tuple[int, int, int, int]], position: float) -
     for station, part in ((before, before + 1.0 - along), (before + 1, along - before)):
         if part == 0.0:
             continue
-        layers = [k for k, (first, last, _, _) in enumerate(spans) if first <= station <= last]
-        thickness = [rod.layers[k].thickness for k in layers]
-        for k, own in zip(layers, thickness, strict=True):
+        thickness = outline(rod, np.array([station]))[1][:, 0]
+        covering = np.flatnonzero(thickness)
+        for k in covering:
             first, _, first_node, _ = spans[k]
             nodes.append(first_node + station - first)
-            shares.append(part * (1.0 if len(layers) == 1 else 1.0 - own / sum(thickness)))
+            shares.append(part * (1.0 if len(covering) == 1 else 1.0 - thickness[k] / thickness.sum()))
     return np.array(nodes, dtype=np.int64), np.array(shares)

@@ -10,9 +10,10 @@ import numpy as np
 from ..kinematics.path import circle, rest_strains, straight
 from ..kinematics.rotation import rotation_matrix
 from ..scene.config import Fluid, SceneConfig
+from ..scene.profile import values_at
 from ..scene.rod import ArcPath, Layer, Rod
 from .model import StrandArrays
-from .section import Bond, Section, bond, rectangle
+from .section import Section, bond, outline, sections
 
 
 @dataclass
@@ -59,12 +60,12 @@ def turn_of_copy(rod: Rod, copy: int) -> Turn:
 
 def add_rod(found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Turn, body_index: dict[str, int]) -> None:
     """Add one copy of a rod: its strands, their drag, and the bond between them."""
-    sections = [rectangle(scene.materials[layer.material], rod.width, layer.thickness) for layer in rod.layers]
-    heights = [0.0] if len(sections) == 1 else [-0.5 * sections[0].thickness, 0.5 * sections[1].thickness]
     spans = []
-    for layer, section, height in zip(rod.layers, sections, heights, strict=True):
+    for place, layer in enumerate(rod.layers):
         first, last = rod.covered_stations(layer)
-        shape = _strand_shape(rod, height, first, last, turn)
+        at_nodes, at_edges = _sections(scene, rod, layer, first, last)
+        side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[place]
+        shape = _strand_shape(rod, side * at_nodes.thickness, first, last, turn)
         spans.append((first, last, found.node_count, found.edge_count))
         strand = StrandArrays(
             f"{name}/{layer.name}",
@@ -73,8 +74,8 @@ def add_rod(found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Tur
             found.node_count,
             last - first + 1,
             found.edge_count,
-            rod.width,
-            layer.thickness,
+            at_nodes.width,
+            at_nodes.thickness,
         )
         clamps = []
         if rod.clamp_start is not None and first == 0:
@@ -82,14 +83,21 @@ def add_rod(found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Tur
         if rod.clamp_end is not None and last == rod.stations - 1:
             clamps.append((body_index[rod.clamp_end], -1))
         _add_eigenstrain(found, scene, rod, layer, strand)
-        _add_strand(found, scene, rod, layer, section, strand, shape, clamps)
+        _add_strand(found, scene, rod, layer, at_nodes, at_edges, strand, shape, clamps)
     found.rods.append(spans)
     if scene.fluid is not None:
         _add_drag(found, scene.fluid, rod, spans)
         if scene.fluid.added_mass is not None:
             _add_added_mass(found, scene.fluid, rod, spans)
     if len(spans) == 2:
-        _add_bond(found, bond(sections[0], sections[1], scene.coupling, rod.torsion), spans)
+        _add_bond(found, scene, rod, spans)
+
+
+def _sections(scene: SceneConfig, rod: Rod, layer: Layer, first: int, last: int) -> tuple[Section, Section]:
+    """Sections of a layer at the stations from first to last, and in the middle of the edges between them."""
+    material = scene.materials[layer.material]
+    stations = np.arange(first, last + 1)
+    return sections(rod, layer, material, stations), sections(rod, layer, material, stations[:-1] + 0.5)
 
 
 @dataclass(frozen=True)
@@ -104,8 +112,8 @@ class _Shape:
     end_normals: np.ndarray
 
 
-def _strand_shape(rod: Rod, height: float, first: int, last: int, turn: Turn) -> _Shape:
-    """Shape of the layer whose centreline lies `height` [m] from the path, between two stations."""
+def _strand_shape(rod: Rod, height: np.ndarray, first: int, last: int, turn: Turn) -> _Shape:
+    """Shape of the layer whose centreline lies `height` [m] from the path at the stations from first to last."""
     frame = (np.array(rod.path.start), np.array(rod.path.direction), np.array(rod.normal))
 
     def along(stations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -116,13 +124,28 @@ def _strand_shape(rod: Rod, height: float, first: int, last: int, turn: Turn) ->
 
     points, tangents, normals = along(np.arange(first, last + 1))
     _, _, middle_normals = along(np.arange(first, last) + 0.5)
-    positions = turn(points + height * normals, about=True)
+    positions = turn(points + height[:, None] * normals, about=True)
     edges = np.diff(positions, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
+    edge_tangents = edges / lengths[:, None]
     ends = [0, -1]
+    slopes = (height[[1, -1]] - height[[0, -2]]) / rod.edge_length  # of a layer whose thickness varies
+    end_tangents = tangents[ends] + slopes[:, None] * normals[ends]
+    end_tangents = turn(end_tangents / np.linalg.norm(end_tangents, axis=1, keepdims=True))
     return _Shape(
-        positions, lengths, edges / lengths[:, None], turn(middle_normals), turn(tangents[ends]), turn(normals[ends])
+        positions,
+        lengths,
+        edge_tangents,
+        _across(turn(middle_normals), edge_tangents),
+        end_tangents,
+        _across(turn(normals[ends]), end_tangents),
     )
+
+
+def _across(normals: np.ndarray, tangents: np.ndarray) -> np.ndarray:
+    """Normals made perpendicular to tangents, unit, shape (n, 3)."""
+    normals = normals - np.einsum("ij,ij->i", normals, tangents)[:, None] * tangents
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
 def _add_strand(
@@ -130,7 +153,8 @@ def _add_strand(
     scene: SceneConfig,
     rod: Rod,
     layer: Layer,
-    section: Section,
+    at_nodes: Section,
+    at_edges: Section,
     strand: StrandArrays,
     shape: _Shape,
     clamps: list[tuple[int, int]],
@@ -138,34 +162,33 @@ def _add_strand(
     nodes, edges = strand.node_count, strand.node_count - 1
     first_edge = strand.first_edge
     rest = shape.lengths
-    voronoi = np.zeros(nodes)
-    voronoi[:-1] += 0.5 * rest
-    voronoi[1:] += 0.5 * rest
+    voronoi = _halves_to_nodes(rest)
     index = np.arange(nodes)
     found.strands.append(strand)
     found.add(
         position=shape.positions,
         tangent=shape.tangents,
         director1=shape.normals,
-        node_mass=section.mass * voronoi,
+        node_mass=_halves_to_nodes(at_edges.mass * rest),
         node_weight=voronoi,
-        node_radius=np.full(nodes, 0.5 * section.thickness),
+        node_radius=0.5 * at_nodes.thickness,
         node_edges=first_edge + np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1),
         node_axis=np.full(nodes, ["path", "normal", "across"].index(rod.friction_axis)),
-        spin_inertia=section.spin_inertia * rest,
-        half_width=np.full(edges, 0.5 * section.width),
+        spin_inertia=at_edges.spin_inertia * rest,
+        half_width=0.5 * at_edges.width,
         edge_node=strand.first_node + np.arange(edges),
         rest_length=rest,
-        axial_stiffness=np.full(edges, section.axial_stiffness),
+        axial_stiffness=at_edges.axial_stiffness,
     )
-    bend = np.array([*section.bending_stiffness, section.twisting_stiffness])
+    bend = np.stack([*at_nodes.bending_stiffness, at_nodes.twisting_stiffness], axis=1)
+    natural = _natural_shape(rod, layer)
     inner = voronoi[1:-1]
     found.add(
         joint_a=first_edge + np.arange(edges - 1),
         joint_b=first_edge + np.arange(1, edges),
-        joint_stiffness=bend / inner[:, None],
-        joint_rest=_natural(
-            layer, inner, shape.tangents[:-1], shape.normals[:-1], shape.tangents[1:], shape.normals[1:]
+        joint_stiffness=bend[1:-1] / inner[:, None],
+        joint_rest=_rest(
+            natural[1:-1], inner, shape.tangents[:-1], shape.normals[:-1], shape.tangents[1:], shape.normals[1:]
         ),
         joint_node=strand.first_node + np.arange(1, nodes - 1),
         voronoi_length=inner,
@@ -185,8 +208,8 @@ def _add_strand(
             attached_position=(shape.positions[end] - np.array(scene.bodies[body].position))[None],
             joint_a=wall if end == 0 else edge,
             joint_b=edge if end == 0 else wall,
-            joint_stiffness=(bend / voronoi[end])[None],
-            joint_rest=_natural(layer, voronoi[[end]], *from_start),
+            joint_stiffness=(bend[end] / voronoi[end])[None],
+            joint_rest=_rest(natural[[end]], voronoi[[end]], *from_start),
             joint_node=node,
             voronoi_length=voronoi[end],
         )
@@ -194,15 +217,31 @@ def _add_strand(
     found.edge_count += edges
 
 
-def _natural(layer: Layer, voronoi: np.ndarray, *frames: np.ndarray) -> np.ndarray:
+def _halves_to_nodes(of_edges: np.ndarray) -> np.ndarray:
+    """What edges have, half of it at each of their nodes, shape (n_edge + 1,)."""
+    of_nodes = np.zeros(len(of_edges) + 1)
+    of_nodes[:-1] += 0.5 * of_edges
+    of_nodes[1:] += 0.5 * of_edges
+    return of_nodes
+
+
+def _natural_shape(rod: Rod, layer: Layer) -> np.ndarray:
+    """Natural curvature [1/m], NaN where it is the path's, and twist [rad/m] of a layer at its nodes, shape (n, 2)."""
+    first, last = rod.covered_stations(layer)
+    along = rod.edge_length * np.arange(first, last + 1)
+    curvature = np.nan if layer.natural_curvature is None else layer.natural_curvature
+    return np.stack([values_at(curvature, along), values_at(layer.natural_twist, along)], axis=1)
+
+
+def _rest(natural: np.ndarray, voronoi: np.ndarray, *frames: np.ndarray) -> np.ndarray:
     """κ̄₁ κ̄₂ ψ̄ of elements [rad] with frames (t, m1) on either side:
     the layer's natural shape, by default that at the start.
     """
     rest = rest_strains(*frames)
-    if layer.natural_curvature is not None:
+    if not np.isnan(natural[:, 0]).any():
         rest[:, :2] = 0.0
-        rest[:, 0] = layer.natural_curvature * voronoi
-    rest[:, 2] += layer.natural_twist * voronoi
+        rest[:, 0] = natural[:, 0] * voronoi
+    rest[:, 2] += natural[:, 1] * voronoi
     return rest
 
 
@@ -212,17 +251,13 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, i
     """
     length = np.full(rod.stations, rod.edge_length)
     length[[0, -1]] *= 0.5
-    thickness = np.zeros(rod.stations)
-    for (first, last, _, _), layer in zip(spans, rod.layers, strict=True):
-        thickness[first : last + 1] += layer.thickness
-    along, across = fluid.drag_along * rod.width, fluid.drag_across * rod.width
-    whole = np.stack(
-        [np.full(rod.stations, along), np.full(rod.stations, across), fluid.drag_across * thickness], axis=1
-    )
-    for (first, last, first_node, first_edge), layer in zip(spans, rod.layers, strict=True):
+    width, layers = outline(rod, np.arange(rod.stations))
+    thickness = layers.sum(axis=0)
+    whole = np.stack([fluid.drag_along * width, fluid.drag_across * width, fluid.drag_across * thickness], axis=1)
+    for (first, last, first_node, first_edge), own in zip(spans, layers, strict=True):
         station = np.arange(last - first + 1)
         covered = slice(first, last + 1)
-        share = fluid.density * length[covered] * layer.thickness / thickness[covered]
+        share = fluid.density * length[covered] * own[covered] / thickness[covered]
         edges = np.stack([np.maximum(station - 1, 0), np.minimum(station, last - first - 1)], axis=1)
         found.add(
             drag_node=first_node + station,
@@ -233,15 +268,14 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, i
 
 def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, spans: list[tuple[int, int, int, int]]) -> None:
     """Added mass of the whole section along each edge, shared by its layers in proportion to their thickness."""
-    thickness = np.zeros(rod.stations - 1)
-    for (first, last, _, _), layer in zip(spans, rod.layers, strict=True):
-        thickness[first:last] += layer.thickness
+    width, layers = outline(rod, np.arange(rod.stations - 1) + 0.5)
+    thickness = layers.sum(axis=0)
     per_area, law = 0.25 * np.pi * fluid.density * rod.edge_length, fluid.added_mass
-    through = np.full(rod.stations - 1, law.through * rod.width**2)
-    turning = law.turning * (rod.width**2 - thickness**2) ** 2 / 32.0
-    whole = per_area * np.stack([through, law.sideways * thickness**2, turning], axis=1)
-    for (first, last, _, _), layer in zip(spans, rod.layers, strict=True):
-        found.add(fluid_mass=layer.thickness / thickness[first:last, None] * whole[first:last])
+    through, sideways = law.through * width**2, law.sideways * thickness**2
+    turning = law.turning * (width**2 - thickness**2) ** 2 / 32.0
+    whole = per_area * np.stack([through, sideways, turning], axis=1)
+    for (first, last, _, _), own in zip(spans, layers, strict=True):
+        found.add(fluid_mass=((own / thickness)[:, None] * whole)[first:last])
 
 
 def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, layer: Layer, strand: StrandArrays) -> None:
@@ -256,10 +290,12 @@ def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, layer: Laye
         found.add(driven_edge=edges, driven_law=np.full(len(edges), found.laws.index(numbers)))
 
 
-def _add_bond(found: Collected, law: Bond, spans: list[tuple[int, int, int, int]]) -> None:
+def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, spans: list[tuple[int, int, int, int]]) -> None:
     """Bonds of paired edges; the rest values are those of the initial shape."""
     bottom, top = spans
     first, last = max(bottom[0], top[0]), min(bottom[1], top[1])
+    (_, below), (_, above) = (_sections(scene, rod, layer, first, last) for layer in rod.layers)
+    law = bond(below, above, scene.coupling, rod.torsion)
     position, tangent, m1 = (found.column(name, width=3) for name in ("position", "tangent", "director1"))
     edges = [layer[3] + np.arange(first, last) - layer[0] for layer in (top, bottom)]
     nodes = [layer[2] + np.arange(first, last) - layer[0] for layer in (top, bottom)]
@@ -273,7 +309,7 @@ def _add_bond(found: Collected, law: Bond, spans: list[tuple[int, int, int, int]
     found.add(
         bond_joint_a=edges[0],
         bond_joint_b=edges[1],
-        bond_joint_stiffness=weight[:, None] * np.array([law.bending, law.tilt, law.twist]),
+        bond_joint_stiffness=weight[:, None] * np.stack([law.bending, law.tilt, law.twist], axis=1),
         bond_joint_rest=rest_strains(*frames[0], *frames[1]),
         bond_joint_node=np.full(last - first, -1),
         pair_stiffness=weight * law.translation,

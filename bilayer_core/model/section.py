@@ -1,50 +1,82 @@
-"""Stiffness and inertia of rectangular sections, alone and bonded in pairs (thickness h through the layer, width w)."""
+"""Stiffness and inertia of rectangular sections, alone and bonded in pairs (thickness h through the layer, width w).
+
+All of them are given at some places along a path; arrays have shape (n_place,).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..scene.config import Coupling, Material
+from ..scene.profile import values_at
+from ..scene.rod import Layer, Rod
+
+Array = np.ndarray
 
 
 @dataclass(frozen=True)
 class Section:
-    """A layer's cross-section.
+    """A layer's cross-sections.
 
     Attributes
     ----------
-    axial_stiffness : float
+    axial_stiffness : Array
         EA = E w h [N].
-    bending_stiffness : tuple of float
+    bending_stiffness : tuple of Array
         EI1 = E w h³/12 (curvature through the thickness) and EI2 = E h w³/12 (across the width) [N m²].
-    twisting_stiffness : float
+    twisting_stiffness : Array
         GJ = G w h³/3 (1 − 0.63 h/w) for h ≤ w, and with h and w exchanged otherwise [N m²].
-    shear_thickness : float
+    shear_thickness : Array
         G h, what the section contributes to the bond's shear [N/m].
-    mass : float
+    mass : Array
         ρ w h per length [kg/m].
-    spin_inertia : float
+    spin_inertia : Array
         ρ w h (w² + h²)/12 per length, about the tangent [kg m].
-    width, thickness : float
+    width, thickness : Array
         [m]
     """
 
-    axial_stiffness: float
-    bending_stiffness: tuple[float, float]
-    twisting_stiffness: float
-    shear_thickness: float
-    mass: float
-    spin_inertia: float
-    width: float
-    thickness: float
+    axial_stiffness: Array
+    bending_stiffness: tuple[Array, Array]
+    twisting_stiffness: Array
+    shear_thickness: Array
+    mass: Array
+    spin_inertia: Array
+    width: Array
+    thickness: Array
 
 
-def rectangle(material: Material, width: float, thickness: float) -> Section:
-    """Section of a layer `width` × `thickness` [m] of `material`."""
-    e = material.youngs_modulus
+def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Section:
+    """Sections of a layer at stations of its rod, which may be whole numbers or lie between."""
+    along = rod.edge_length * stations
+    return rectangle(
+        material,
+        values_at(rod.width, along),
+        values_at(layer.thickness, along),
+        values_at(layer.stiffness, along),
+    )
+
+
+def outline(rod: Rod, stations: Array) -> tuple[Array, Array]:
+    """Width of a rod and thickness of its layers [m] at stations, which may be whole numbers or lie between; shapes
+    (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not.
+    """
+    along = rod.edge_length * stations
+    thickness = np.zeros((len(rod.layers), len(stations)))
+    for own, layer in zip(thickness, rod.layers, strict=True):
+        first, last = rod.covered_stations(layer)
+        own[:] = values_at(layer.thickness, along) * ((first <= stations) & (stations <= last))
+    return values_at(rod.width, along), thickness
+
+
+def rectangle(material: Material, width: Array, thickness: Array, stiffness: Array | float = 1.0) -> Section:
+    """Sections `width` × `thickness` [m] of `material`, whose moduli are multiplied with `stiffness`."""
+    e = stiffness * material.youngs_modulus
     g = e / (2.0 * (1.0 + material.poisson_ratio))
     area = width * thickness
-    small, large = sorted((width, thickness))
+    small, large = np.minimum(width, thickness), np.maximum(width, thickness)
     return Section(
         axial_stiffness=e * area,
         bending_stiffness=(e * width * thickness**3 / 12.0, e * thickness * width**3 / 12.0),
@@ -63,16 +95,16 @@ class Bond:
 
     Attributes
     ----------
-    translation : float
+    translation : Array
         k_T [N/m²].
-    bending, tilt, twist : float
+    bending, tilt, twist : Array
         k_b about m2, k_φ about m1, k_τ about the tangent [N].
     """
 
-    translation: float
-    bending: float
-    tilt: float
-    twist: float
+    translation: Array
+    bending: Array
+    tilt: Array
+    twist: Array
 
 
 def bond(bottom: Section, top: Section, multiples: Coupling, torsion: str) -> Bond:
@@ -90,6 +122,6 @@ def bond(bottom: Section, top: Section, multiples: Coupling, torsion: str) -> Bo
     return Bond(
         translation=multiples.translation * reduced / distance2,
         bending=multiples.bending * reduced,
-        tilt=4.0 * bottom.width * shear if torsion == "laminate" else 0.0,
-        twist=multiples.twist * min(bottom.twisting_stiffness, top.twisting_stiffness) / distance2,
+        tilt=4.0 * bottom.width * shear * (torsion == "laminate"),
+        twist=multiples.twist * np.minimum(bottom.twisting_stiffness, top.twisting_stiffness) / distance2,
     )

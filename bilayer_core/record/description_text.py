@@ -29,7 +29,11 @@ def from_text(attributes: dict[str, str], scene_text: str) -> Description:
     names = [item.name for item in fields(Description) if item.name != "scene_text"]
     values = {name: json.loads(attributes[name]) for name in names}
     values["strands"] = tuple(
-        Strand(**{**strand, "nodes": slice(*strand["nodes"]), "edges": slice(*strand["edges"])})
+        Strand(
+            **{name: strand[name] for name in ("name", "rod", "layer")},
+            **{name: slice(*strand[name]) for name in ("nodes", "edges")},
+            **{name: np.array(strand[name]) for name in ("width", "thickness")},
+        )
         for strand in values["strands"]
     )
     values["bodies"] = tuple(BodyInfo(**body) for body in values["bodies"])

@@ -98,7 +98,7 @@ class MarkerEncoder:
             template.put("<u4", count)
             template.array(f"colours{index}", "<f4", (count, 4))
             _tail(template)
-        hub = max(strand.width for strand in description.strands)
+        hub = max(strand.width.max() for strand in description.strands)
         for index, body in enumerate(description.bodies):
             shape, size = (SPHERE, 2 * body.radius) if body.radius else (CUBE, hub)
             _head(template, f"bodies/{body.name}", shape, BODY_COLOUR, (size,) * 3, pose_field=f"pose{index}")
@@ -126,12 +126,7 @@ class MarkerEncoder:
         self._colours = [views[f"colours{i}"].reshape(-1, 2, 4) for i in strands]
         self._spacings = [views[f"spacing{i}"] for i in strands]
         self._body_poses = [views[f"pose{i}"] for i in range(len(description.bodies))]
-        self._half_width = np.concatenate(
-            [
-                np.full((ranges.stop - ranges.start, 1), 0.5 * strand.width)
-                for strand, ranges in zip(description.strands, node_frames.ranges, strict=True)
-            ]
-        )
+        self._half_width = 0.5 * np.concatenate([strand.width for strand in description.strands])[:, None]
         self._bars = np.empty((len(node_frames.order), 2, 3))
 
     def encode(self, frame: Frame) -> bytes:

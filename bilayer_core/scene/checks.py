@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from bilayer_core.scene.faults import Fault, Location, one_of
+from bilayer_core.scene.profile import Profile
 
 if TYPE_CHECKING:
     from bilayer_core.scene.body import Free
     from bilayer_core.scene.config import SceneConfig, Stimulus
     from bilayer_core.scene.load import Load, PointMass
-    from bilayer_core.scene.rod import Rod
+    from bilayer_core.scene.rod import Layer, Rod
 
 ROUNDING = 1e-9
 """Relative difference of typed numbers that is not taken for a fault."""
@@ -44,7 +45,10 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     def is_ordered(interval: tuple[float, float]) -> bool:
         return interval[0] < interval[1] <= rod.path.length * (1.0 + ROUNDING)
 
+    faults += _profiles(rod, (), ("width",), rod.path.length)
     for index, layer in enumerate(rod.layers):
+        varying = ("thickness", "stiffness", "natural_curvature", "natural_twist")
+        faults += _profiles(layer, ("layers", index), varying, rod.path.length)
         for number, law in enumerate(layer.eigenstrain):
             where: Location = ("layers", index, "eigenstrain", number, "interval")
             if law.interval is not None and not is_ordered(law.interval):
@@ -63,6 +67,15 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     if not faults and not any(rod.covered_stations(layer) == (0, rod.stations - 1) for layer in rod.layers):
         faults.append((("layers",), [layer.interval for layer in rod.layers], "one layer must cover the whole path"))
     return faults
+
+
+def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:
+    """Whether profiles along a path of given length [m] stay on it."""
+    for key in keys:
+        profile = getattr(part, key)
+        for index, place in enumerate(profile.at if isinstance(profile, Profile) else ()):
+            if place > length * (1.0 + ROUNDING):
+                yield (*where, key, "at", index), place, f"must be a length [m] along the path, from 0 to {length:g}"
 
 
 def faults_of_inertia(motion: Free) -> list[Fault]:

@@ -161,10 +161,11 @@ def _field(model: type[BaseModel], key: str | int) -> Any:
 def _annotation_at(schema: Any, location: Location) -> Any:
     for part in location:
         bare = _bare(schema)
-        if isinstance(bare, type) and issubclass(bare, BaseModel):
+        if _is_model(bare):
             schema = _field(bare, part)
         elif get_origin(bare) in (Union, types.UnionType):
-            schema = next((member for member in get_args(bare) if part in _tags(member)), Any)
+            tagged = [member for member in get_args(bare) if part in _tags(member)]
+            schema = tagged[0] if tagged else _field(_only_model(bare), part)
         elif get_origin(bare) is dict:
             schema = get_args(bare)[1]
         elif get_origin(bare) in (list, tuple):
@@ -174,12 +175,23 @@ def _annotation_at(schema: Any, location: Location) -> Any:
 
 def _tags(member: Any) -> tuple[Any, ...]:
     """Values by which a member of a discriminated union is chosen."""
+    if not _is_model(member):
+        return ()
     choices = [field.annotation for field in member.model_fields.values() if get_origin(field.annotation) is Literal]
     return tuple(tag for choice in choices for tag in get_args(choice))
 
 
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _only_model(annotation: Any) -> Any:
+    """The class of which a value is, or may be beside a plain one."""
+    return annotation if _is_model(annotation) else next(filter(_is_model, get_args(annotation)), BaseModel)
+
+
 def _keys(annotation: Any) -> list[str]:
-    model = _bare(annotation)
+    model = _only_model(_bare(annotation))
     return [field.alias or name for name, field in model.model_fields.items()]
 
 

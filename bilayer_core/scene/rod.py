@@ -11,11 +11,13 @@ from bilayer_core.scene import checks
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import refuse_all
 from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.profile import varying
 from bilayer_core.scene.units import (
     Curvature,
     NonNegativeLength,
     PositiveAngle,
     PositiveLength,
+    PositiveNumber,
     Twist,
     whole,
 )
@@ -74,14 +76,16 @@ class Layer(Part):
 
     name: Name
     material: Name
-    thickness: PositiveLength
+    thickness: varying(PositiveLength)
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
     eigenstrain: Eigenstrains = []
     """One law or several, which add up."""
-    natural_curvature: Curvature | None = None
+    stiffness: varying(PositiveNumber) = 1.0
+    """Multiple of the material's elastic moduli."""
+    natural_curvature: varying(Curvature) | None = None
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
-    natural_twist: Twist = 0.0
+    natural_twist: varying(Twist) = 0.0
     """Of the layer by itself, about the path."""
 
     @field_serializer("eigenstrain")
@@ -94,7 +98,7 @@ class Rod(Part):
     """One or two layers along a path, or several equal ones about an axis."""
 
     name: Name
-    width: PositiveLength
+    width: varying(PositiveLength)
     path: Annotated[StraightPath | ArcPath, Field(discriminator="shape")]
     normal: Direction
     """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path."""

@@ -40,8 +40,8 @@ def ribbon_vertices(strand: Strand, positions: np.ndarray, material_frames: np.n
     ndarray
         [m], shape (times, nodes, CORNERS, 3), float32.
     """
-    thickness = 0.5 * strand.thickness * rotated(material_frames, 0)
-    width = 0.5 * strand.width * rotated(material_frames, 1)
+    thickness = 0.5 * strand.thickness[:, None] * rotated(material_frames, 0)
+    width = 0.5 * strand.width[:, None] * rotated(material_frames, 1)
     corners = np.einsum("c,tni->tnci", _CORNERS[:, 0], thickness) + np.einsum("c,tni->tnci", _CORNERS[:, 1], width)
     return (positions[:, :, None] + corners).astype(np.float32)
 

@@ -106,8 +106,8 @@ def _send_strands(recording: rr.RecordingStream, run: RunData, scales: Scales) -
 
 
 def _send_bodies(recording: rr.RecordingStream, run: RunData) -> None:
-    width = max(strand.width for strand in run.description.strands)
-    thickness = max(strand.thickness for strand in run.description.strands)
+    width = max(strand.width.max() for strand in run.description.strands)
+    thickness = max(strand.thickness.max() for strand in run.description.strands)
     for index, body in enumerate(run.description.bodies):
         path = f"world/bodies/{body.name}"
         if body.radius:

@@ -1,6 +1,7 @@
 """Messages from templates, held against two independent implementations: rosbags and ROS 2 itself."""
 
 import time
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -41,6 +42,16 @@ def assert_same(found, expected):
             assert_same(one, other)
     else:
         assert found == expected
+
+
+def test_markers_show_the_width_at_each_node(typestore):
+    widths = np.linspace(12e-3, 3e-3, synthetic_run.NODES)
+    strands = tuple(replace(strand, width=widths) for strand in DESCRIPTION.strands)
+    data = FrameEncoder(replace(DESCRIPTION, strands=strands)).encode("markers", synthetic_run.frame(1.0))
+    markers = {m.ns: m for m in typestore.deserialize_cdr(data, TOPICS["markers"].type).markers}
+    points = [(p.x, p.y, p.z) for p in markers[f"strands/{strands[-1].name}"].points]
+    bars = np.array(points).reshape(-1, 2, 3)
+    assert np.linalg.norm(bars[:, 1] - bars[:, 0], axis=1) == pytest.approx(widths)
 
 
 @pytest.mark.parametrize("name", TOPICS)

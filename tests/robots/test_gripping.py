@@ -41,7 +41,7 @@ def test_the_gripper_has_the_papers_parameters():
     passive = sum(s.node_count for s in strands if s.layer == "passive") + simulator.model.point_count  # with the hub
     active = sum(s.node_count for s in strands if s.layer == "active")
     assert (passive, active, simulator.dt) == (201, 192, 1e-3)
-    assert {s.width for s in strands} == {0.01} and {s.thickness for s in strands} == {1e-3}
+    assert all((s.width == 0.01).all() and (s.thickness == 1e-3).all() for s in strands)
     scene = simulator.scene
     assert scene.gravity == (0.0, 0.0, -10.0)
     assert {(m.youngs_modulus, m.density) for m in scene.materials.values()} == {(1e8, 1000.0)}

@@ -48,7 +48,7 @@ def faults_of(content) -> list[str]:
         ("schema", DELETE, "is missing; must be 1"),
         ("title", DELETE, "is missing; must be text"),
         ("rods.arm.path", DELETE, "is missing; must be a mapping of keys to values"),
-        ("rods.arm.width", DELETE, "is missing; must be a length [m] above 0, such as 1 mm"),
+        ("rods.arm.width", DELETE, "is missing; must be a length [m] above 0, such as 1 mm, or a profile {at: [...], "),
         ("rods.arm.stations", DELETE, "is missing; must be a whole number of at least 3"),
         ("bodies.ball.motion.mass", DELETE, "is missing; must be a mass [kg] above 0, such as 2.7 g"),
         ("contact.friction.speed_threshold", DELETE, "is missing; must be a speed [m/s] above 0, such as 0.1 mm/s"),
@@ -105,6 +105,16 @@ def faults_of(content) -> list[str]:
             [0.001, 0.0022],
             "found [0.001, 0.0022]; must span two edges or more; an edge",
         ),
+        # profiles along the path
+        ("rods.arm.width", "1 kg", 'found "1 kg", a quantity in kg; must be a length [m] above 0, such as 1 mm'),
+        ("rods.arm.width", {"at": [0]}, "value: is missing; must be a list"),
+        ("rods.arm.width", {"at": [0], "valu": [1]}, "valu: unknown key, did you mean value?; allowed are at, value"),
+        ("rods.arm.width", {"at": [0], "value": [-1]}, "value[0]: found -1; must be a length [m] above 0, such as"),
+        ("rods.arm.width", {"at": [0, 0], "value": [1, 1]}, "at[1]: found 0.0; must be further than the place before"),
+        ("rods.arm.width", {"at": [0], "value": [1, 1]}, 'value: found "2 entries"; must be as many as `at`, 1'),
+        ("rods.arm.width", {"at": [0, "6 mm"], "value": [1, 1]}, "at[1]: found 0.006; must be a length [m] along the"),
+        ("rods.arm.layers.active.natural_twist", {"at": [1], "value": [0]}, "at[0]: found 1.0; must be a length [m]"),
+        ("rods.arm.layers.active.stiffness", 0, "found 0; must be a number above 0, such as 10"),
         # masses and loads
         ("masses.cargo.mass", 0, "found 0; must be a mass [kg] above 0, such as 2.7 g"),
         ("masses.cargo.rod", "arms", 'found "arms"; must be one of the rods or their copies (arm, arm_0, arm_1), did'),
@@ -132,7 +142,7 @@ def faults_of(content) -> list[str]:
 )
 def test_a_fault_is_told_with_its_place_the_value_found_and_what_is_allowed(path, value, fault):
     lines = faults_of(changed(path, value))
-    assert any(line.startswith(f"scene: {path}: {fault}") for line in lines), lines
+    assert any(line.startswith((f"scene: {path}: {fault}", f"scene: {path}.{fault}")) for line in lines), lines
 
 
 @pytest.mark.parametrize(

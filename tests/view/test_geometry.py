@@ -1,5 +1,7 @@
 """Surfaces and scales of pictures."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import synthetic_run
@@ -25,11 +27,24 @@ def test_the_surface_of_a_ribbon_is_closed_and_holds_its_volume():
     strand = run.description.strands[3]
     vertices = geometry.ribbon_vertices(strand, run.positions[:, strand.nodes], run.material_frames[:, strand.nodes])
     triangles = geometry.ribbon_triangles(synthetic_run.NODES)
-    area = strand.width * strand.thickness
+    area = synthetic_run.WIDTH * synthetic_run.THICKNESS
     flat, curled = (closed_volume(part.reshape(-1, 3), triangles) for part in vertices)
     assert flat == pytest.approx(area * synthetic_run.LENGTH, rel=1e-3)
     # The centreline of the upper layer is longer by the curvature times its distance from the interface.
     assert curled == pytest.approx(area * synthetic_run.LENGTH * (1 + 42.0 * 0.0005), rel=2e-3)
+
+
+def test_a_tapered_ribbon_is_drawn_with_its_taper():
+    nodes = synthetic_run.NODES
+    strand = replace(synthetic_run.description().strands[0], width=np.linspace(10e-3, 2e-3, nodes))
+    line = np.zeros((1, nodes, 3))
+    line[0, :, 2] = np.linspace(0, 0.06, nodes)
+    frames = np.tile([0.0, 0.0, 0.0, 1.0], (1, nodes, 1))  # m1 along x, m2 along y, the ribbon along z
+    vertices = geometry.ribbon_vertices(strand, line, frames)[0]
+    span = vertices[:, :, 1].max(axis=1) - vertices[:, :, 1].min(axis=1)
+    assert span == pytest.approx(strand.width, rel=1e-6)
+    volume = closed_volume(vertices.reshape(-1, 3), geometry.ribbon_triangles(nodes))
+    assert volume == pytest.approx(6e-3 * synthetic_run.THICKNESS * 0.06, rel=1e-6)
 
 
 def test_the_surface_of_a_ball_holds_its_volume_and_has_segments_of_both_colours():

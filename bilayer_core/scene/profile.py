@@ -1,0 +1,80 @@
+"""Values that may vary along the path of a rod: a number, or points between which they are linear."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Generic, TypeVar
+
+import numpy as np
+from pydantic import BeforeValidator, Field, TypeAdapter, model_validator
+
+from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.part import Part
+from bilayer_core.scene.units import NonNegativeLength, Quantity
+
+Value = TypeVar("Value")
+
+
+class Profile(Part, Generic[Value]):
+    """Values at lengths along the path, linear between them and constant outside."""
+
+    at: list[NonNegativeLength] = Field(min_length=1)
+    """Along the path, increasing."""
+    value: list[Value] = Field(min_length=1)
+
+    @classmethod
+    def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
+        """Title in the JSON Schema."""
+        return f"Profile of {_quantity(params[0]).what}"
+
+    @model_validator(mode="after")
+    def _check(self) -> Profile:
+        faults: list[Fault] = [
+            (("at", index), after, f"must be further than the place before it ({before:g} m)")
+            for index, (before, after) in enumerate(zip(self.at, self.at[1:], strict=False), start=1)
+            if after <= before
+        ]
+        if len(self.at) != len(self.value):
+            faults.append((("value",), f"{len(self.value)} entries", f"must be as many as `at`, {len(self.at)}"))
+        refuse_all("Profile", faults)
+        return self
+
+
+def _quantity(annotation: Any) -> Quantity:
+    """The validator in an annotation from `scene.units`."""
+    return annotation.__metadata__[0].func
+
+
+class _Varying:
+    """Validator of a number or a profile; a profile's faults stand at its own keys."""
+
+    def __init__(self, quantity: Any):
+        self._number = TypeAdapter(quantity)
+        self._profile = TypeAdapter(Profile[quantity])
+        self._quantity = _quantity(quantity)
+
+    def describe(self) -> str:
+        """What is allowed."""
+        return f"{self._quantity.describe()}, or a profile {{at: [...], value: [...]}} along the path"
+
+    def __call__(self, value: Any) -> Any:
+        """The number or the profile, in SI."""
+        return (self._profile if isinstance(value, dict | Profile) else self._number).validate_python(value)
+
+
+def varying(quantity: Any) -> Any:
+    """Annotation of a quantity, itself an annotation from `scene.units`, that may vary along the path."""
+    either = quantity | Profile[quantity]
+    return Annotated[float | Profile[quantity], BeforeValidator(_Varying(quantity), json_schema_input_type=either)]
+
+
+def values_at(number_or_profile: float | Profile, along: np.ndarray) -> np.ndarray:
+    """Values at lengths `along` the path [m], of the same shape."""
+    if isinstance(number_or_profile, Profile):
+        return np.interp(along, number_or_profile.at, number_or_profile.value)
+    return np.full(np.shape(along), number_or_profile)
+
+
+def extremes(number_or_profile: float | Profile) -> tuple[float, float]:
+    """Smallest and largest value."""
+    values = number_or_profile.value if isinstance(number_or_profile, Profile) else [number_or_profile]
+    return min(values), max(values)

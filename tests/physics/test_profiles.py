@@ -1,0 +1,180 @@
+"""Sections, natural shapes and moduli that vary along the path."""
+
+import numpy as np
+import pytest
+from sample_scenes import GEL, fixed, layer, rod, scene
+from scipy.integrate import quad
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.model.build import build_model
+from bilayer_core.model.validity import validity_warnings
+
+STILL = {"dt": 1.0, "tolerance": 1e-11}  # a second is long compared with all that moves here
+LENGTH, MODULUS = 0.1, 1e8
+
+
+def linear(first, last):
+    """A profile from one end of the path to the other."""
+    return {"at": [0, LENGTH], "value": [first, last]}
+
+
+def between(first, last, s):
+    return first + (last - first) * s / LENGTH
+
+
+def settled(layers, stations=81, time=30.0, **more):
+    strip = rod(layers, length=LENGTH, stations=stations, clamp_start="wall", **more.pop("rod", {}))
+    simulator = Simulator(load_scene(scene([strip], bodies=[fixed()], solver=STILL, **more)))
+    simulator.run(time)
+    return simulator
+
+
+TAPERS = {
+    "width": ({"width": linear(10e-3, 2e-3)}, {}, lambda s: between(10e-3, 2e-3, s) * 2e-3**3),
+    "thickness": ({}, {"thickness": linear(2e-3, 1e-3)}, lambda s: 10e-3 * between(2e-3, 1e-3, s) ** 3),
+    "stiffness": ({}, {"stiffness": linear(1.0, 0.2)}, lambda s: between(1.0, 0.2, s) * 10e-3 * 2e-3**3),
+}
+
+
+@pytest.mark.parametrize("taper", TAPERS)
+def test_a_tapered_cantilever_bends_under_a_tip_load_by_the_integral_of_its_flexibility(taper):
+    of_rod, of_layer, cube = TAPERS[taper]
+    force = 1e-4
+    pull = [{"name": "pull", "rod": "rod", "position": LENGTH, "force": [0, 0, force]}]
+    simulator = settled([layer(**{"thickness": 2e-3, **of_layer})], rod=of_rod, loads=pull)
+    expected = quad(lambda s: force * (LENGTH - s) ** 2 / (MODULUS * cube(s) / 12), 0, LENGTH)[0]
+    assert simulator.positions[-1, 2] == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_linearly_varying_natural_curvature_gives_an_euler_spiral():
+    def angle(s):
+        return 5.0 * s + 0.5 * 40.0 / LENGTH * s**2
+
+    tip = [quad(lambda s, f=f: f(angle(s)), 0, LENGTH)[0] for f in (np.cos, np.sin)]
+    errors = []
+    for stations in (41, 81):
+        simulator = settled([layer(natural_curvature=linear(5.0, 45.0))], stations)
+        errors.append(np.abs(simulator.positions[-1, [0, 2]] - tip).max() / LENGTH)
+    assert errors[1] < 2e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)  # of second order
+
+
+def test_a_varying_natural_twist_turns_the_end_by_its_integral():
+    simulator = settled([layer(natural_twist={"at": [0.02, 0.06], "value": [0.0, 30.0]})])
+    turn = 0.5 * 0.04 * 30.0 + 0.04 * 30.0 - 30.0 * LENGTH / 80 / 2  # a free end has no element: half an edge
+    m1 = simulator.frame().directors[-1]
+    assert simulator.positions[-1] == pytest.approx([LENGTH, 0, 0], abs=1e-9)
+    assert np.arctan2(-m1[1], m1[2]) == pytest.approx(turn, rel=2e-3)
+
+
+def timoshenko(m, n):
+    """κH/η of a bilayer whose top layer grows, m = E2/E1, n = h2/h1 (bottom over top)."""
+    return 6 * (1 + n) ** 2 / (3 * (1 + n) ** 2 + (1 + m * n) * (n**2 + 1 / (m * n)))
+
+
+@pytest.mark.parametrize(
+    ("moduli", "thicknesses"),
+    [((0.2, 5.0), (1e-3, 1e-3)), ((1.0, 1.0), (0.5e-3, 1.5e-3)), ((4.0, 1.0), (1.5e-3, 0.8e-3))],
+    ids=["stiffness", "thickness", "both"],
+)
+def test_a_bilayer_bends_everywhere_as_timoshenko_says_of_the_section_there(moduli, thicknesses):
+    layers = [
+        layer("bottom", thickness=linear(*thicknesses), stiffness=linear(*moduli)),
+        layer("top", eigenstrain={"stimulus": "heat", "gain": 0.01}),
+    ]
+    heat = {"heat": {"schedule": {"type": "ramp", "start": 0, "end": 5, "from": 0, "to": 1}}}
+    simulator = settled(layers, stimuli=heat)
+    inner = np.arange(8, 73)
+    along = inner * LENGTH / 80
+    bottom = between(*thicknesses, along)
+    expected = -timoshenko(between(*moduli, along), bottom / 1e-3) * 0.01 / (bottom + 1e-3)
+    assert np.ptp(expected) > 0.1 * np.abs(expected).max()
+    assert simulator.curvatures[inner] == pytest.approx(expected, rel=0.01)
+
+
+def test_a_bilayer_of_varying_thickness_starts_without_stress_and_stays():
+    layers = [layer("bottom", thickness=linear(1e-3, 2e-3)), layer("top", thickness=linear(2e-3, 0.5e-3))]
+    strip = rod(layers, length=LENGTH, clamp_start="wall", clamp_end="other", width=linear(10e-3, 5e-3))
+    walls = [fixed(), fixed("other", (LENGTH, 0, 0))]
+    simulator = Simulator(load_scene(scene([strip], bodies=walls)))
+    start = simulator.positions.copy()
+    assert start[:21, 2] == pytest.approx(-0.5 * np.linspace(1e-3, 2e-3, 21))
+    assert start[21:, 2] == pytest.approx(0.5 * np.linspace(2e-3, 0.5e-3, 21))
+    assert simulator.energy()["bending"] < 1e-20
+    simulator.run(0.02)
+    assert np.abs(simulator.positions - start).max() < 1e-12
+
+
+def test_the_mass_is_the_integral_of_the_section():
+    width = {"at": [0.02, 0.05, 0.08], "value": [4e-3, 10e-3, 6e-3]}
+    thickness = linear(1e-3, 3e-3)
+    model = build_model(load_scene(scene([rod([layer(thickness=thickness)], length=LENGTH, width=width)])))
+
+    def section(s):
+        return np.interp(s, width["at"], width["value"]) * between(1e-3, 3e-3, s)
+
+    mass = 1000.0 * quad(section, 0, LENGTH, points=width["at"])[0]
+    center = 1000.0 * quad(lambda s: s * section(s), 0, LENGTH, points=width["at"])[0] / mass
+    assert model.node_mass.sum() == pytest.approx(mass, rel=1e-3)
+    assert model.node_mass @ model.start_position[:, 0] / model.node_mass.sum() == pytest.approx(center, rel=1e-3)
+    flat = build_model(load_scene(scene([rod([layer()], length=LENGTH, width=width)])))
+    exact = 1000.0 * 1e-3 * (0.02 * 4e-3 + 0.03 * 7e-3 + 0.03 * 8e-3 + 0.02 * 6e-3)
+    assert flat.node_mass.sum() == pytest.approx(exact, rel=1e-12)
+
+
+def test_a_tapered_strip_sinks_as_fast_as_a_uniform_one_and_does_not_turn():
+    sinking = scene(
+        [rod([layer(thickness=2e-3)], length=LENGTH, width=linear(12e-3, 4e-3))],
+        gravity=[0, 0, 5.0],
+        fluid={"density": 800.0, "drag_along": 0.4, "drag_across": 1.2},
+    )
+    simulator = Simulator(load_scene(sinking), dt=5e-3)
+    simulator.run(2.0)
+    speed = np.sqrt(5.0 * 1000.0 * 2e-3 / (0.5 * 800.0 * 1.2))
+    assert simulator.velocities[:, 2] == pytest.approx(np.full(21, speed), rel=1e-2)
+
+
+def test_the_fluid_that_goes_along_is_the_integral_of_the_width_squared():
+    fluid = {"density": 800.0, "drag_along": 0.0, "drag_across": 0.0, "added_mass": {}}
+    layers = [layer("bottom"), layer("top", thickness=linear(1e-3, 2e-3))]
+    model = build_model(load_scene(scene([rod(layers, length=LENGTH, width=linear(12e-3, 4e-3))], fluid=fluid)))
+    expected = 0.25 * np.pi * 800.0 * quad(lambda s: between(12e-3, 4e-3, s) ** 2, 0, LENGTH)[0]
+    assert model.fluid_mass[:, 0].sum() == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_constant_profile_is_the_number_and_stiffness_multiplies_the_moduli():
+    constant = {"at": [0.03], "value": [10e-3]}
+    strip = rod([layer("bottom"), layer("top", stiffness=3.0, natural_curvature=4.0)], length=LENGTH)
+    same = rod(
+        [
+            layer("bottom", thickness={"at": [0], "value": [1e-3]}),
+            layer("top", natural_curvature=linear(4.0, 4.0), material="stiff"),
+        ],
+        length=LENGTH,
+        width=constant,
+    )
+    materials = {"gel": GEL, "stiff": {**GEL, "youngs_modulus": 3e8}}
+    one, other = (build_model(load_scene(scene([r], materials=materials))) for r in (strip, same))
+    for name in ("axial_stiffness", "joint_stiffness", "joint_rest", "pair_stiffness", "node_mass", "spin_inertia"):
+        assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-14, abs=1e-18), name
+
+
+def test_the_section_is_drawn_and_touches_as_it_is():
+    strip = rod([layer(thickness=linear(1e-3, 3e-3))], length=LENGTH, width=linear(10e-3, 2e-3))
+    simulator = Simulator(load_scene(scene([strip])))
+    (drawn,) = simulator.description.strands
+    assert drawn.width == pytest.approx(np.linspace(10e-3, 2e-3, 21))
+    assert drawn.thickness == pytest.approx(np.linspace(1e-3, 3e-3, 21))
+    assert simulator.model.carriers.radius == pytest.approx(0.5 * drawn.thickness)
+
+
+def test_the_warnings_are_about_the_worst_section():
+    heat = {"heat": {"schedule": {"type": "hold", "value": 1}}}
+    layers = [layer("bottom"), layer("top", eigenstrain={"stimulus": "heat", "gain": 0.05})]
+
+    def warned(**more):
+        return " ".join(validity_warnings(load_scene(scene([rod(layers, length=LENGTH, **more)], stimuli=heat))))
+
+    assert "between beam and plate" in warned(width=linear(1e-3, 10e-3))
+    assert "between beam and plate" not in warned(width=linear(1e-3, 2e-3))
+    assert "a plate more than a rod" in warned(width={"at": [0.05, 0.06], "value": [1e-3, 30e-3]})
