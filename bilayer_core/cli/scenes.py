@@ -24,12 +24,17 @@ def scenes() -> None:
 
 
 @click.command(cls=Verb)
-def schema() -> None:
-    """Print the JSON Schema of scene files; editors complete and check with it."""
-    from bilayer_core.scene.config import SceneConfig
+@click.option("--markdown", is_flag=True, help="As a page of tables.")
+def schema(markdown: bool) -> None:
+    """Print every key of scene files: as JSON Schema, with which editors complete and check, or as a page to read."""
+    if markdown:
+        from bilayer_core.scene.key_tables import page
 
-    text = {"$schema": "https://json-schema.org/draft/2020-12/schema", **SceneConfig.model_json_schema(by_alias=True)}
-    click.echo(json.dumps(text, indent=2, ensure_ascii=False))
+        click.echo(page(), nl=False)
+        return
+    from bilayer_core.scene.key_notes import json_schema
+
+    click.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))
 
 
 @click.command(cls=Verb)

@@ -26,11 +26,15 @@ class Free(Part):
 
     type: Literal["free"]
     mass: PositiveMass
+    """Its own, without that of the rods it holds."""
     inertia: tuple[PositiveInertia, PositiveInertia, PositiveInertia] | None = None
     """Principal moments of inertia; without them those of a solid ball, or of a hollow one if `shell` is true."""
     shell: bool = False
+    """Whether a ball is hollow: moment of inertia 2/3 m r² instead of 2/5 m r²."""
     velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
+    """At the start."""
     angular_velocity: tuple[AngularSpeed, AngularSpeed, AngularSpeed] = (0.0, 0.0, 0.0)
+    """At the start, about the axes of the world."""
 
     @model_validator(mode="after")
     def _check(self) -> Free:
@@ -43,7 +47,9 @@ class Guided(Part):
 
     type: Literal["guided"]
     axis: Direction
+    """Of the rail."""
     mass: PositiveMass
+    """Its own, without that of the rods it holds."""
     speed: Speed = 0.0
     """At the start, along the axis."""
 
@@ -53,6 +59,7 @@ class Prescribed(Part):
 
     type: Literal["prescribed"]
     times: list[NonNegativeTime] = []
+    """Increasing; without any the body stays where it is."""
     displacements: list[Point] = []
     """From the body's position, at each of the times; the first is zero."""
 
@@ -71,6 +78,7 @@ class Sphere(Part):
 
     shape: Literal["sphere"]
     radius: PositiveLength
+    """About the mass centre."""
 
 
 class ContactPoint(Part):
@@ -88,7 +96,12 @@ class Body(Part):
     """A rigid body."""
 
     name: Name
+    """By which rods are clamped to it; part of the names of its topics."""
     position: Point
+    """Of the mass centre at the start."""
     motion: Annotated[Free | Guided | Prescribed, Field(discriminator="type")]
+    """What moves it."""
     surface: Sphere | None = None
+    """What others touch; without one nothing does."""
     contact_points: list[ContactPoint] = []
+    """Points by which the body itself touches surfaces."""

@@ -37,17 +37,24 @@ class Material(Part):
     """A linearly elastic, isotropic material."""
 
     youngs_modulus: PositivePressure
+    """Stiffness E in tension and bending."""
     poisson_ratio: PoissonRatio
+    """ν, from which the shear modulus E/(2(1 + ν)) of torsion follows."""
     density: PositiveDensity
+    """Mass per volume."""
 
 
 class Stimulus(Part):
     """A stimulus channel: its unit, its range, and how the scene itself drives it."""
 
     unit: str = "1"
+    """For people to read; values are never converted."""
     minimum: PlainNumber = 0.0
+    """Smallest value that a schedule, a topic or `set_stimulus` may give."""
     maximum: PlainNumber = 1.0
+    """Largest value."""
     schedule: Schedule
+    """Value over time, as long as no topic and no `set_stimulus` overrides it."""
 
     @model_validator(mode="after")
     def _check(self) -> Stimulus:
@@ -59,9 +66,12 @@ class Plane(Part):
     """A fixed plane; rods and bodies stay on the side to which the normal points."""
 
     name: Name
+    """Unique among rods, bodies and obstacles."""
     type: Literal["plane"]
     point: Point
+    """Any point of the plane."""
     normal: Direction
+    """Out of the obstacle, towards the robot."""
 
 
 class Friction(Part):
@@ -72,11 +82,15 @@ class Friction(Part):
     """
 
     coefficient: NonNegativeNumber
+    """μ, of bodies and, where the next keys do not say otherwise, of rods."""
     speed_threshold: PositiveSpeed
+    """Sliding speed ε_v from which the full friction acts; what sticks creeps more slowly than that."""
     forward: NonNegativeNumber | None = None
     """Of rods sliding along + of their axis; like the next two, `coefficient` by default."""
     backward: NonNegativeNumber | None = None
+    """Of rods sliding along − of their axis."""
     sideways: NonNegativeNumber | None = None
+    """Of rods sliding across their axis."""
 
     @property
     def of_rods(self) -> tuple[float, float, float]:
@@ -96,7 +110,9 @@ class Contact(Part):
     barrier_distance: PositiveLength
     """Distance at which the barrier begins to act."""
     stiffness: PositivePressure
+    """Of the barrier, per length of rod; a larger one leaves the gap nearer to `barrier_distance`."""
     friction: Friction | None = None
+    """Of all surfaces; without it they are smooth."""
 
 
 class AddedMass(Part):
@@ -123,6 +139,7 @@ class Fluid(Part):
     """A fluid around the rods: its quadratic drag on them and, on request, its inertia."""
 
     density: PositiveDensity = 1000.0
+    """Mass per volume of the fluid. There is no buoyancy: take it off `gravity`."""
     velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
     """Of a uniform flow."""
     drag_along: NonNegativeNumber
@@ -146,52 +163,82 @@ class Coupling(Part):
     """Stiffness of the bond between two layers, as multiples of the section's own."""
 
     translation: PositiveNumber = 10.0
+    """Against one layer's sliding on the other and lifting off."""
     bending: PositiveNumber = 10.0
+    """Against a zigzag of one layer against the other."""
     twist: PositiveNumber = 10.0
+    """Against one layer's twisting on the other."""
 
 
 class Solver(Part):
     """How the equations are solved."""
 
     model: Literal["auto", "two_rod"] = "auto"
+    """`two_rod`: each layer a rod of its own, bonded to the other."""
     dimension: Literal["auto", 3] = "auto"
+    """Of space."""
     integrator: Literal["auto", "implicit_euler"] = "auto"
+    """How a step is taken in time; `auto` is the recommended one."""
     dt: PositiveTime = 1e-3
+    """Time step."""
     tolerance: PositiveSpeed = 1e-6
     """Largest velocity correction that Newton may leave."""
     max_newton_iterations: whole(1) = 50
+    """After which a step counts as failed and is halved."""
     max_halvings: whole(0) = 10
+    """Of a step that fails; when the smallest one fails as well, the run stops and says why."""
 
 
 class Output(Part):
     """How often a run is recorded, in simulated time."""
 
     rate: PositiveRate = 50.0
+    """Of poses, forces, energies and the state."""
     marker_rate: PositiveRate = 20.0
+    """Of the large messages, nodes, points and markers; not above `rate`."""
 
 
 class SceneConfig(Part):
     """A scene: a robot, its surroundings, what drives it, and how it is solved."""
 
     schema_version: Literal[1] = Field(alias="schema")
+    """Version of this format."""
     name: Name
+    """For logs and summaries."""
     title: str
+    """One line that says what happens."""
     description: str = ""
+    """Anything more that a reader should know."""
     duration: PositiveTime
+    """Simulated time of a run."""
     gravity: tuple[Acceleration, Acceleration, Acceleration] = (0.0, 0.0, -9.81)
+    """Along x, y and z; z is up."""
     materials: dict[Name, Material]
+    """By the names that layers call them by."""
     stimuli: dict[Name, Stimulus] = {}
+    """Channels that drive the active layers, by the names of their topics."""
     rods: list[Rod] = Field(min_length=1)
+    """The ribbons of the robot."""
     bodies: list[Body] = []
+    """Rigid parts: hubs, walls, junctions, things to grasp."""
     masses: list[PointMass] = []
+    """Masses fixed to rods."""
     loads: list[Load] = []
+    """Forces and moments from outside."""
     obstacles: list[Plane] = []
+    """Surfaces fixed in the world."""
     contact: Contact | None = None
+    """Must be given where there is something to touch."""
     fluid: Fluid | None = None
+    """Around the rods; none by default."""
     damping: Damping = Damping()
+    """None by default."""
     coupling: Coupling = Coupling()
+    """Of the two layers of a rod; rarely needs to be changed."""
     solver: Solver = Solver()
+    """Model, time step and accuracy."""
     output: Output = Output()
+    """What logs and topics hold how often."""
 
     @model_validator(mode="after")
     def _check(self) -> SceneConfig:

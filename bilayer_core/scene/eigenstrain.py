@@ -53,10 +53,11 @@ class Eigenstrain(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     stimulus: str
+    """One of the channels in `stimuli`."""
     law: Literal[*LAWS] | None = Field(None, exclude=True)
-    """Where numbers not given come from; None in a validated scene, which states the numbers."""
+    """Ready-made numbers for keys that are not given; see docs/stimuli.md."""
     gain: Number
-    """Eigenstrain per unit of the stimulus, near `reference`."""
+    """Eigenstrain per unit of the stimulus, near `reference`; may be left out where `law` is given."""
     reference: PlainNumber = 0.0
     """Stimulus without eigenstrain, in the unit of the channel."""
     time_constant: NonNegativeTime | None = None

@@ -17,17 +17,20 @@ class PointMass(Part):
     """A mass fixed to the path of a rod; it has weight and inertia, and no size."""
 
     name: Name
+    """Unique among the masses."""
     rod: Name
     """A copy such as `arm_0`, or all copies of a pattern: each has the mass."""
     position: NonNegativeLength
     """Along the path."""
     mass: PositiveMass
+    """Of each."""
 
 
 class Load(Part):
     """A force on a rod or on a body, or a moment on a body."""
 
     name: Name
+    """Unique among the loads."""
     rod: Name | None = None
     """A copy such as `arm_0`, or all copies of a pattern: each has the force."""
     position: NonNegativeLength | None = None
@@ -35,7 +38,9 @@ class Load(Part):
     body: Name | None = None
     """Instead of a rod; the force acts at its mass centre."""
     force: tuple[Force, Force, Force] = (0.0, 0.0, 0.0)
+    """Multiplied with the schedule's value."""
     moment: tuple[Moment, Moment, Moment] = (0.0, 0.0, 0.0)
+    """Of bodies only; multiplied with the schedule's value."""
     frame: Literal["world", "material"] = "world"
     """Axes of the components: the world's, or those of what it acts on, with which the load turns: the axes of a body,
     or path, normal and path × normal of a rod."""

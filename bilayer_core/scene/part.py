@@ -17,7 +17,8 @@ UNIT_LENGTH_TOLERANCE = 1e-14
 """A direction this near to length 1 is kept as it is, so that a dumped scene is read back bit for bit."""
 
 
-def _unit_vector(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+def unit_vector(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    """The vector at length 1, or a fault if it has none."""
     length = math.hypot(*vector)
     if length == 0.0:
         raise refuse("must be a direction, with a length above 0")
@@ -29,7 +30,7 @@ def _unit_vector(vector: tuple[float, float, float]) -> tuple[float, float, floa
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$")]
 """Fit for key paths, for ROS topics and for file names."""
 Point = tuple[Length, Length, Length]
-Direction = Annotated[tuple[Number, Number, Number], AfterValidator(_unit_vector)]
+Direction = Annotated[tuple[Number, Number, Number], AfterValidator(unit_vector)]
 """Unit vector; a file may give any length."""
 
 

@@ -20,6 +20,7 @@ class Profile(Part, Generic[Value]):
     at: list[NonNegativeLength] = Field(min_length=1)
     """Along the path, increasing."""
     value: list[Value] = Field(min_length=1)
+    """As many as there are places."""
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:

@@ -36,8 +36,11 @@ class StraightPath(Part):
 
     shape: Literal["straight"]
     start: Point
+    """Of the interface of two layers, or of the middle of one."""
     direction: Direction
+    """From the start to the end."""
     length: PositiveLength
+    """Of the line."""
 
 
 class ArcPath(Part):
@@ -45,10 +48,13 @@ class ArcPath(Part):
 
     shape: Literal["arc"]
     start: Point
+    """Of the interface of two layers, or of the middle of one."""
     direction: Direction
     """Tangent at the start."""
     radius: PositiveLength
+    """Of the circle."""
     angle: PositiveAngle
+    """How far round; the length is radius times angle."""
     toward: Literal["normal", "opposite"] = "normal"
     """Side on which the centre lies: that of the rod's normal at the start, or the other."""
 
@@ -67,16 +73,22 @@ class Pattern(Part):
     """Copies of a rod, turned about an axis at equal angles; the first is the rod itself."""
 
     axis: Direction = (0.0, 0.0, 1.0)
+    """About which copies are turned."""
     center: Point = (0.0, 0.0, 0.0)
+    """A point of the axis."""
     count: whole(1)
+    """Rods in all, at equal angles over a full turn; they are called `NAME_0`, `NAME_1` and so on."""
 
 
 class Layer(Part):
     """One layer of a rod. It covers the whole path, or the stations nearest to `interval`."""
 
     name: Name
+    """Unique in its rod."""
     material: Name
+    """One of `materials`."""
     thickness: varying(PositiveLength)
+    """Through the bond."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
     eigenstrain: Eigenstrains = []
@@ -98,20 +110,27 @@ class Rod(Part):
     """One or two layers along a path, or several equal ones about an axis."""
 
     name: Name
+    """Unique among rods, bodies and obstacles."""
     width: varying(PositiveLength)
+    """Of its rectangular section, across path and normal."""
     path: Annotated[StraightPath | ArcPath, Field(discriminator="shape")]
+    """Where the rod lies at the start, free of stress."""
     normal: Direction
     """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path."""
     stations: whole(3)
     """Cross-sections along the path, both ends included."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
+    """Bottom first."""
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
     friction_axis: Literal["path", "normal", "across"] = "path"
     """Direction of the rod that counts as forward for friction: along its path, its normal, or path × normal."""
     pattern: Pattern | None = None
+    """Equal rods round an axis; without it there is one."""
     clamp_start: Name | None = None
+    """Body that holds the start, position and direction; free by default."""
     clamp_end: Name | None = None
+    """Body that holds the end."""
 
     @property
     def edge_length(self) -> float:

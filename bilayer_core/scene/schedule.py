@@ -38,8 +38,11 @@ class Ramp(BaseModel):
 
     type: Literal["ramp"]
     start: Time
+    """Until then `from`."""
     end: Time
+    """From then on `to`."""
     from_value: PlainNumber = Field(alias="from")
+    """In the unit of the channel."""
     to_value: PlainNumber = Field(alias="to")
     """In the unit of the channel."""
 
@@ -66,8 +69,9 @@ class Table(BaseModel):
 
     type: Literal["table"]
     times: list[NonNegativeTime] = Field(min_length=1)
+    """Increasing."""
     values: list[PlainNumber] = Field(min_length=1)
-    """In the unit of the channel."""
+    """In the unit of the channel, as many as there are times."""
 
     @model_validator(mode="after")
     def _check(self) -> Table:
@@ -90,12 +94,13 @@ class Table(BaseModel):
         return {("values", index): value for index, value in enumerate(self.values)}
 
 
-class Part(BaseModel):
+class SequencePart(BaseModel):
     """A part of a sequence."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     duration: PositiveTime
+    """After which the next part follows."""
     schedule: Schedule
     """Its time begins with the part."""
 
@@ -106,8 +111,10 @@ class Sequence(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     type: Literal["sequence"]
-    parts: list[Part] = Field(min_length=1)
+    parts: list[SequencePart] = Field(min_length=1)
+    """In their order."""
     repeat: bool = False
+    """Whether it begins again after the last part."""
 
     def value(self, t: float) -> float:
         """Value at time `t` [s], in the unit of the channel."""
@@ -145,7 +152,7 @@ Schedule = Annotated[
     Field(discriminator="type"),
     AfterValidator(_as_table),
 ]
-Part.model_rebuild()
+SequencePart.model_rebuild()
 Sequence.model_rebuild()
 
 

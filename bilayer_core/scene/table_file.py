@@ -25,9 +25,9 @@ class TableFile(BaseModel):
     file: str
     """Relative to the scene file."""
     time_column: str = "time"
-    """In seconds."""
+    """Name of the column of times, in seconds."""
     value_column: str
-    """In the unit of the channel."""
+    """Name of the column of values, in the unit of the channel."""
 
 
 def read_table_file(source: TableFile, directory: str | Path) -> tuple[list[float], list[float]]:

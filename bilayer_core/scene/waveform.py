@@ -21,11 +21,15 @@ class Sine(BaseModel):
 
     type: Literal["sine"]
     mean: PlainNumber
+    """In the unit of the channel."""
     amplitude: PlainNumber
-    """In the unit of the channel, as `mean`."""
+    """In the unit of the channel."""
     period: PositiveTime
+    """Of one cycle."""
     phase: Angle = 0.0
+    """At the start; −90 deg begins at the lowest value."""
     start: Time = 0.0
+    """Until then the value at the start."""
 
     def value(self, t: float) -> float:
         """Value at time `t` [s], in the unit of the channel."""
@@ -46,11 +50,15 @@ class _Pulses(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     low: PlainNumber
+    """In the unit of the channel."""
     high: PlainNumber
-    """In the unit of the channel, as `low`."""
+    """In the unit of the channel."""
     period: PositiveTime
+    """From the beginning of one rise to that of the next."""
     start: Time = 0.0
+    """Of the first rise."""
     rise_time: NonNegativeTime = 0.0
+    """Of each flank, up and down; 0 switches at once."""
 
     def _value(self, t: float, width: float, last: float) -> float:
         """Value at time `t` of pulses that begin to fall after `width` [s]; they end after `last` periods."""
@@ -105,6 +113,7 @@ class PulseTrain(_Pulses):
     width: PositiveTime
     """From the beginning of the rise to the beginning of the fall."""
     count: whole(1)
+    """Of pulses."""
 
     @model_validator(mode="after")
     def _check(self) -> PulseTrain:

@@ -1,0 +1,58 @@
+"""The page of keys is that of the present classes, and says something about every key."""
+
+import re
+
+import pytest
+
+from bilayer_core.cli import main
+from bilayer_core.scene.key_notes import json_schema, notes, scene_models
+
+COMMAND = "python -m bilayer_core schema --markdown > docs/scene_keys.md"
+TAGS = {"type", "shape"}  # say which of several mappings stands there, and nothing else
+
+
+def written_page(root) -> str:
+    return (root / "docs/scene_keys.md").read_text(encoding="utf-8")
+
+
+def test_the_page_of_keys_is_that_of_the_classes(root, capsys):
+    assert main(["schema", "--markdown"]) == 0
+    present = capsys.readouterr().out
+    assert written_page(root) == present, f"keys have changed; make the page anew, in the checkout: {COMMAND}"
+
+
+@pytest.mark.parametrize("model", scene_models(), ids=lambda model: model.__name__)
+def test_every_key_has_a_description(model):
+    missing = model.model_fields.keys() - notes(model).keys() - TAGS
+    assert not missing, f"write a string below each of {sorted(missing)} in {model.__name__}, then: {COMMAND}"
+    assert all(text.endswith(".") for text in notes(model).values())
+
+
+def test_every_link_of_the_page_leads_to_a_section_of_it(root):
+    page = written_page(root)
+    sections = [title.lower() for title in re.findall(r"^## (\w+)$", page, re.M)]
+    assert len(sections) == len(set(sections))
+    assert set(re.findall(r"\]\(#(\w+)\)", page)) == set(sections)  # and each section is led to
+
+
+def test_the_page_says_unit_range_default_and_alternatives(root):
+    page = written_page(root)
+    for row in (
+        "| `radius` | number | m | **required** | > 0 |",
+        "| `thickness` | number or [Profile](#profile) | m | **required** | > 0 |",
+        "| `poisson_ratio` | number | 1 | **required** | > -1, ≤ 0.5 |",
+        "| `gravity` | list of 3 numbers | m/s^2 | `[0, 0, -9.81]` |",
+        "| [Free](#free) or [Guided](#guided) or [Prescribed](#prescribed) |  | **required** | chosen by `type` |",
+        "| `layers` | list of [Layer](#layer) |  | **required** | 1 to 2 items |",
+        "| `eigenstrain` | [Eigenstrain](#eigenstrain) or list of [Eigenstrain](#eigenstrain) |  | none |",
+        "| `torsion` | choice |  | `laminate` | `laminate`, `layers` |",
+        "Stands at `bodies.NAME.motion`, with `type: guided`.",
+    ):
+        assert row in page
+
+
+def test_the_json_schema_describes_keys_and_ranges():
+    path = json_schema()["$defs"]["StraightPath"]["properties"]
+    assert path["length"]["description"] == "Of the line. A length [m] above 0, such as 1 mm."
+    assert json_schema()["$defs"]["Layer"]["properties"]["thickness"]["description"] == "Through the bond."
+    assert json_schema()["properties"]["gravity"]["description"] == "Along x, y and z; z is up."
