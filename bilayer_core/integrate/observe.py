@@ -139,9 +139,8 @@ def node_curvature(model: Model, stepper: Stepper) -> Array:
     return curvature
 
 
-def energies(stepper: Stepper, state: State) -> dict[str, float]:
-    """Kinetic energy, and that of each conservative term, of the last accepted configuration [J]."""
-    model = stepper.model
+def kinetic_energy(model: Model, state: State) -> float:
+    """Of nodes, of edges about their tangents, and of free bodies [J]."""
     kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
     kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
     for place, body in enumerate(model.bodies.body_of_free):
@@ -149,10 +148,16 @@ def energies(stepper: Stepper, state: State) -> dict[str, float]:
         rotation, second = state.body_rotation[body], model.bodies.second_moment[place]
         inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
         kinetic += 0.5 * float(model.bodies.mass[place] * velocity @ velocity + spin @ inertia @ spin)
+    return kinetic
+
+
+def energies(stepper: Stepper, state: State) -> dict[str, float]:
+    """Kinetic energies, and that of each conservative term, of the last accepted configuration [J]."""
+    model = stepper.model
+    kinetic = {"kinetic": kinetic_energy(model, state)}
     if len(model.fluid_mass):
-        fluid = energy_of_fluid(model, stepper.end, state.velocity, state.spin)
-        return {"kinetic": kinetic, "fluid": fluid, **stepper.potential.energies}
-    return {"kinetic": kinetic, **stepper.potential.energies}
+        kinetic["fluid"] = energy_of_fluid(model, stepper.end, state.velocity, state.spin)
+    return {**kinetic, **stepper.potential.energies}
 
 
 def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:

@@ -20,6 +20,7 @@ from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observe
 from .frame import Description, Frame
+from .ledger import EnergyLedger
 from .statistics import RunStatistics, center_of_mass, largest_row
 from .stepper import Stepper, StepReport
 
@@ -93,6 +94,8 @@ class Simulator:
         Override the scene's; ``"auto"`` keeps them.
     dt : float, optional
         Overrides the scene's step [s].
+    budget : bool
+        Keep the energy budget of the run (`budget`); it takes another two evaluations of all forces a step.
 
     Raises
     ------
@@ -103,7 +106,14 @@ class Simulator:
     """
 
     def __init__(
-        self, scene: SceneConfig, *, model="auto", dimension="auto", integrator="auto", dt: float | None = None
+        self,
+        scene: SceneConfig,
+        *,
+        model="auto",
+        dimension="auto",
+        integrator="auto",
+        dt: float | None = None,
+        budget: bool = False,
     ):
         if dt is not None and not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt: {dt} is not a time step; allowed is a positive number of seconds")
@@ -115,6 +125,7 @@ class Simulator:
         self._stepper = Stepper(
             self.model, self.dt, solver.tolerance, solver.max_newton_iterations, solver.max_halvings
         )
+        self._ledger = EnergyLedger(self.model) if budget else None
         self._state = initial_state(self.model)
         self._compile_time: float | None = None
         self._start_over()
@@ -124,6 +135,11 @@ class Simulator:
         self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
+
+    def _begin_budget(self) -> None:
+        if self._ledger is not None:
+            self._ledger.begin(self._state, self._stepper.eigenstrain, self._stepper.load_factor(self.time))
+            self._stepper.ledger = self._ledger
 
     # what the scene looks like now
 
@@ -178,6 +194,24 @@ class Simulator:
         """Energy of each term [J]."""
         self.compile()
         return observe.energies(self._stepper, self._state)
+
+    @property
+    def keeps_budget(self) -> bool:
+        """Whether `budget` has anything to say."""
+        return self._ledger is not None
+
+    def budget(self) -> dict:
+        """Where the energy went since the start, the last `reset` or `load_state` [J]; see `ledger.EnergyLedger`.
+
+        Raises
+        ------
+        InputError
+            If it is not kept.
+        """
+        if self._ledger is None:
+            raise InputError("budget: is not kept; make the simulator with budget=True")
+        self.compile()
+        return self._ledger.budget()
 
     @property
     def description(self) -> Description:
@@ -239,6 +273,7 @@ class Simulator:
                 pass  # the first step of the run meets it again and reports it
             largest_row(self._state.position)
             self._stepper.rest(self._state)
+            self._begin_budget()
             self._compile_time = clock.thread_time() - begin
         return self._compile_time
 
@@ -335,6 +370,7 @@ class Simulator:
         self.compile()
         self._stepper.rest(self._state)
         self._start_over()
+        self._begin_budget()
 
     def reset(self) -> None:
         """Go back to the start of the scene; stimuli set from outside are forgotten."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonSolver
 from ..solve.potential import IncrementalPotential
 from . import implicit_euler
+
+if TYPE_CHECKING:
+    from .ledger import EnergyLedger
 
 Array = np.ndarray
 
@@ -51,6 +55,8 @@ class Stepper:
         The last accepted configuration.
     stimulus : Array
         Value of each channel over the last step.
+    ledger : EnergyLedger or None
+        What keeps the energy budget, if anything does.
     """
 
     def __init__(self, model: Model, dt: float, tolerance: float, max_iterations: int, max_halvings: int):
@@ -66,6 +72,7 @@ class Stepper:
         self._channels = list(model.scene.stimuli.values())
         self.stimulus = np.zeros(len(self._channels))
         self.eigenstrain = np.zeros(model.edge_count)
+        self.ledger: EnergyLedger | None = None
 
     def body_positions(self, state: State, time: float) -> Array:
         """Positions of all bodies: prescribed ones at `time`, free ones as they are [m], shape (n_body, 3)."""
@@ -117,6 +124,8 @@ class Stepper:
             nothing is changed.
         """
         parts = 2**self.max_halvings
+        if self.ledger is not None:
+            self.ledger.mark()
         kept = State(**{name: array.copy() for name, array in vars(state).items()})
         level = int(state.halvings[0])
         done = substeps = rejected = iterations = factorisations = 0
@@ -139,6 +148,8 @@ class Stepper:
             if level == self.max_halvings:
                 for name, array in vars(kept).items():
                     getattr(state, name)[...] = array
+                if self.ledger is not None:
+                    self.ledger.roll_back()
                 raise SimulationError(
                     self._explain(report, time, self.dt * size / parts), float(kept.step[0]) * self.dt
                 )
@@ -175,6 +186,8 @@ class Stepper:
             state.body_velocity[prescribed] = (body_position - state.body_position)[prescribed] / h
             state.body_position[prescribed] = body_position[prescribed]
             self.stimulus, self.eigenstrain = stimulus, eigenstrain
+            if self.ledger is not None:
+                self.ledger.record(state, eigenstrain, context.load_factor, h)
         return report
 
     def _explain(self, report: NewtonReport, time: float, h: float) -> str:

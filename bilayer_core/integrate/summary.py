@@ -52,6 +52,7 @@ def summarise(simulator: Simulator) -> dict:
         "min_gap": min_gap if np.isfinite(min_gap) else None,
         "max_contact_force": statistics.max_contact_force,
         "energy": simulator.energy(),
+        **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
         "versions": observe.versions(),
     }

@@ -1,0 +1,194 @@
+"""The energy budget of a run: where the work of stimuli, loads and prescribed bodies goes.
+
+Between two accepted configurations, a step h apart, with g the gradient of one term and Δq the displacement, both in
+edge space (`motion`), and η the eigenstrain:
+
+    work of a conservative force   W = −½ (gₙ + gₙ₊₁)·Δq                      error O(h³) a step: −ΔE to second order
+    work of a dissipative force    W = ½ h (Pₙ + Pₙ₊₁),  P = −g·v             likewise, and never above zero
+    work of the stimulus           W = ½ (sₙ + sₙ₊₁)·Δη,  s = ∂E/∂η = −EA (ε − η) |ē|
+    work of prescribed bodies      what moves held nodes and surfaces against all these forces, and their kinetic energy
+
+Energies E and the kinetic energy T come from states alone, works from gradients alone, so that two sums measure
+something:
+
+    numerical  = Σ W of all forces and of prescribed bodies − ΔT
+    residual   = supplied − ΔT − ΔE − lost                     supplied: stimulus, prescribed bodies, loads
+                                                               lost: to dissipative forces, and numerical
+
+*Numerical* is what the theorem of work and kinetic energy lacks: the dissipation of the integrator, and its errors in
+forces (a lagged friction), at the integrator's order; implicit Euler takes h ∫ v̇·M v̇ dt. The *residual* is the failure
+of works to be the differences of energies: the error of the quadrature, of second order, and any error of a gradient.
+
+All is taken at the accepted ends of steps with the velocities there; stages of an integrator are not looked at. The
+powers of friction and drag are taken rather than force times displacement because each is of one sign however sharply
+the force depends on the velocity. Both ends have the loads and directions of their own, where a step of the
+integrator uses those of its start.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kinematics.rotation import rotation_matrix
+from ..model.model import Model
+from ..model.state import State
+from ..solve.configuration import Configuration
+from ..solve.potential import IncrementalPotential
+from ..solve.terms.term import Kind, StepContext
+from .motion import Gradient, Motion, displacement, of_prescribed, velocity
+from .observe import kinetic_energy
+
+Array = np.ndarray
+VELOCITY_STEP = 1e-6  # over which potentials see a velocity as a displacement [s]; rounding makes 1e-10 m/s of it
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """A state with its energies [J], forces and powers [W].
+
+    `power` has for every dissipative term that of all forces, and that of those on what prescribed bodies impose.
+    """
+
+    at: Configuration
+    kinetic: float
+    imposed_kinetic: float
+    eigenstrain: Array
+    stimulus: Array  # ∂E/∂η of each edge [J], shape (n_edge,)
+    energy: dict[str, float]
+    gradient: dict[str, Gradient]
+    power: dict[str, tuple[float, float]]
+
+
+class EnergyLedger:
+    """Sums works since `begin`, from `record` after every accepted part of a step.
+
+    `mark` and `roll_back` serve a nominal step that fails after some of its parts were accepted.
+    """
+
+    def __init__(self, model: Model):
+        self._model = model
+        self._potential = IncrementalPotential(model)  # the stepper's own keeps what it has
+        self._imposed_mass = np.zeros(model.node_count)
+        imposed = model.attached_node[model.attached_free < 0]
+        self._imposed_mass[imposed] = model.node_mass[imposed]
+        self._kinds: dict[str, Kind] = {}
+        self._first: _Instant | None = None
+
+    def begin(self, state: State, eigenstrain: Array, load_factor: Array) -> None:
+        """Start from zero at a state, with the eigenstrain and the factors of loads there."""
+        self._first = self._last = self._look(state, eigenstrain, load_factor)
+        self._work: dict[str, float] = defaultdict(float)  # of each force [J]
+        self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
+        self._stimulus = 0.0
+        self.mark()
+
+    def mark(self) -> None:
+        """Remember all sums."""
+        self._marked = (self._last, self._work.copy(), self._imposed.copy(), self._stimulus)
+
+    def roll_back(self) -> None:
+        """Go back to the sums that were marked last."""
+        self._last, work, imposed, self._stimulus = self._marked
+        self._work, self._imposed = work.copy(), imposed.copy()
+
+    def record(self, state: State, eigenstrain: Array, load_factor: Array, h: float) -> None:
+        """Add the works of a step of length `h` [s] that has just been accepted."""
+        before, after = self._last, self._look(state, eigenstrain, load_factor)
+        moved = displacement(self._model, before.at, after.at)
+        imposed = of_prescribed(self._model, moved)
+        for name, gradient in after.gradient.items():
+            for sums, motion in ((self._work, moved), (self._imposed, imposed)):
+                sums[name] += 0.5 * (motion.work(before.gradient[name]) + motion.work(gradient))
+        for name, power in after.power.items():
+            for sums, start, end in zip((self._work, self._imposed), before.power[name], power, strict=True):
+                sums[name] += 0.5 * h * (start + end)
+        rise = after.eigenstrain - before.eigenstrain
+        self._stimulus += 0.5 * float((before.stimulus + after.stimulus) @ rise)
+        self._last = after
+
+    def budget(self) -> dict:
+        """Rows since `begin` [J].
+
+        Returns
+        -------
+        dict
+            `supplied`, `stored` and `lost`, each a dictionary of rows; `work` of each force; `residual`, and
+            `relative_residual` to the largest row.
+        """
+        first, last, work = self._first, self._last, self._work
+        of_kind = {kind: [name for name, own in self._kinds.items() if own is kind] for kind in Kind}
+        imposed_kinetic = last.imposed_kinetic - first.imposed_kinetic
+        prescribed = imposed_kinetic - sum(self._imposed.values())
+        kinetic = last.kinetic - first.kinetic
+        supplied = {"stimulus": self._stimulus, "prescribed motion": prescribed}
+        supplied |= {name: work[name] for name in of_kind[Kind.EXTERNAL]}
+        stored = {"kinetic": kinetic}
+        stored |= {name: last.energy[name] - first.energy[name] for name in of_kind[Kind.CONSERVATIVE]}
+        lost = {name: -work[name] for name in of_kind[Kind.DISSIPATIVE]}
+        lost["numerical"] = sum(work.values()) + prescribed - kinetic
+        residual = sum(supplied.values()) - sum(stored.values()) - sum(lost.values())
+        largest = max(abs(value) for rows in (supplied, stored, lost) for value in rows.values())
+        return {
+            "supplied": supplied,
+            "stored": stored,
+            "lost": lost,
+            "work": {name: work[name] for name in self._kinds},
+            "residual": residual,
+            "relative_residual": residual / largest if largest > 0.0 else 0.0,
+        }
+
+    def _look(self, state: State, eigenstrain: Array, load_factor: Array) -> _Instant:
+        model, potential = self._model, self._potential
+        at = Configuration(model)
+        at.take_state(state, state.body_position)
+        moving = velocity(model, at, state)
+        imposed = of_prescribed(model, moving)
+        potential.start_step(_context(at, at, eigenstrain, load_factor))
+        step = _context(at, self._origin(at, state, moving), eigenstrain, load_factor)
+        energy, gradient, power = {}, {}, {}
+        for term, name, value in potential.one_by_one(at, step):
+            self._kinds[name] = term.kind
+            if term.kind is Kind.DISSIPATIVE:
+                power[name] = (moving.work(potential.accumulators), imposed.work(potential.accumulators))
+            else:
+                energy[name] = value
+                gradient[name] = Gradient.copy_of(potential.accumulators)
+        strain = at.length[: model.edge_count] / model.rest_length - 1.0 - eigenstrain
+        return _Instant(
+            at=at,
+            kinetic=kinetic_energy(model, state),
+            imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
+            eigenstrain=eigenstrain.copy(),
+            stimulus=-model.axial_stiffness * strain * model.rest_length,
+            energy=energy,
+            gradient=gradient,
+            power=power,
+        )
+
+    def _origin(self, at: Configuration, state: State, moving: Motion) -> Configuration:
+        """Where everything was `VELOCITY_STEP` ago, had it moved with the present velocities."""
+        origin = Configuration(self._model)
+        origin.take_state(state, state.body_position)
+        origin.carrier[:] = at.carrier - VELOCITY_STEP * moving.carrier
+        origin.turn[:] = -VELOCITY_STEP * state.spin
+        origin.body_position[:] = at.body_position - VELOCITY_STEP * moving.body[:, :3]
+        for b in range(self._model.free_count):
+            origin.body_rotation[b] = rotation_matrix(-VELOCITY_STEP * moving.body[b, 3:]) @ at.body_rotation[b]
+        return origin
+
+
+def _context(at: Configuration, origin: Configuration, eigenstrain: Array, load_factor: Array) -> StepContext:
+    """A step of `VELOCITY_STEP` from `origin`; inertia, whose predictions it lacks, is not evaluated in it."""
+    return StepContext(
+        length=VELOCITY_STEP,
+        start=origin,
+        predicted_position=at.position,
+        predicted_turn=at.turn,
+        predicted_body_position=at.body_position,
+        predicted_body_rotation=at.body_rotation,
+        eigenstrain=eigenstrain,
+        load_factor=load_factor,
+    )
