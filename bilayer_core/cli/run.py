@@ -36,6 +36,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--summary", metavar="FILE.json", help="Write all figures of the run.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
 @click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
+@click.option("--budget", is_flag=True, help="Keep the energy budget, and show where the energy went.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
 def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> int:
@@ -48,7 +49,7 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     config = load_scene(scene, changes)
     interrupt = Interrupt()
     observers = _open_outputs(config, options)
-    simulator = _make_simulator(config, options["from_state"], quiet)
+    simulator = _make_simulator(config, options["from_state"], options["budget"], quiet)
     duration = _duration(simulator, duration)
     failure = _simulate(simulator, duration, observers, interrupt, quiet)
     _finish(simulator, duration, failure, options, quiet)
@@ -78,11 +79,11 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     return observers
 
 
-def _make_simulator(config: SceneConfig, from_state: str | None, quiet: bool) -> Simulator:
+def _make_simulator(config: SceneConfig, from_state: str | None, budget: bool, quiet: bool) -> Simulator:
     """A simulator that is ready to step."""
     from bilayer_core.integrate.simulator import Simulator
 
-    simulator = Simulator(config)
+    simulator = Simulator(config, budget=budget)
     if from_state is not None:
         from bilayer_core.record.state_file import read_saved_state
 
@@ -144,3 +145,7 @@ def _finish(
     for key in OUTPUT_OPTIONS:
         if options[key]:
             click.echo(f"  {key.replace('_', ' '):22}{options[key]}")
+    if options["budget"]:
+        from bilayer_core.cli.budget_table import print_budget
+
+        print_budget(summary["budget"])
