@@ -36,7 +36,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--summary", metavar="FILE.json", help="Write all figures of the run.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
 @click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
-@click.option("--budget", is_flag=True, help="Keep the energy budget, and show where the energy went.")
+@click.option("--budget", is_flag=True, help="Show where the energy went (runs two to three times as long).")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
 def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> int:

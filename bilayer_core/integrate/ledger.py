@@ -37,12 +37,22 @@ from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.potential import IncrementalPotential
+from ..solve.terms.fluid import survey_fluid
 from ..solve.terms.term import Kind, StepContext
 from .motion import Gradient, Motion, displacement, of_prescribed, velocity
 from .observe import kinetic_energy
 
 Array = np.ndarray
 VELOCITY_STEP = 1e-6  # over which potentials see a velocity as a displacement [s]; rounding makes 1e-10 m/s of it
+
+
+@dataclass(frozen=True)
+class _Fluid:
+    """Inertia of the fluid: its kinetic energy in the world, over that of the undisturbed flow [J], and its forces."""
+
+    energy: float
+    momentum: Array  # P at nodes [N s], shape (n_node, 3)
+    shape_gradient: Array  # ∂T/∂(e, θ) of edges, shape (n_edge, 4)
 
 
 @dataclass(frozen=True)
@@ -55,6 +65,8 @@ class _Instant:
     at: Configuration
     kinetic: float
     imposed_kinetic: float
+    fluid: _Fluid | None
+    velocity: Array  # of nodes [m/s], shape (n_node, 3)
     eigenstrain: Array
     stimulus: Array  # ∂E/∂η of each edge [J], shape (n_edge,)
     energy: dict[str, float]
@@ -105,6 +117,8 @@ class EnergyLedger:
         for name, power in after.power.items():
             for sums, start, end in zip((self._work, self._imposed), before.power[name], power, strict=True):
                 sums[name] += 0.5 * h * (start + end)
+        if after.fluid is not None:
+            self._imposed["fluid"] += self._work_of_fluid(before, after, imposed)
         rise = after.eigenstrain - before.eigenstrain
         self._stimulus += 0.5 * float((before.stimulus + after.stimulus) @ rise)
         self._last = after
@@ -126,9 +140,11 @@ class EnergyLedger:
         supplied = {"stimulus": self._stimulus, "prescribed motion": prescribed}
         supplied |= {name: work[name] for name in of_kind[Kind.EXTERNAL]}
         stored = {"kinetic": kinetic}
+        if last.fluid is not None:
+            stored["fluid"] = last.fluid.energy - first.fluid.energy
         stored |= {name: last.energy[name] - first.energy[name] for name in of_kind[Kind.CONSERVATIVE]}
         lost = {name: -work[name] for name in of_kind[Kind.DISSIPATIVE]}
-        lost["numerical"] = sum(work.values()) + prescribed - kinetic
+        lost["numerical"] = sum(work.values()) + prescribed - kinetic - stored.get("fluid", 0.0)
         residual = sum(supplied.values()) - sum(stored.values()) - sum(lost.values())
         largest = max(abs(value) for rows in (supplied, stored, lost) for value in rows.values())
         return {
@@ -139,6 +155,23 @@ class EnergyLedger:
             "residual": residual,
             "relative_residual": residual / largest if largest > 0.0 else 0.0,
         }
+
+    def _work_of_fluid(self, before: _Instant, after: _Instant, imposed: Motion) -> float:
+        """Work [J] of the fluid's inertia, dP/dt − ∂T/∂q, on what prescribed bodies impose."""
+        held = self._imposed_mass > 0.0
+        pushed = after.fluid.momentum[held] - before.fluid.momentum[held]
+        turned = 0.5 * (before.fluid.shape_gradient + after.fluid.shape_gradient)
+        work = float(np.vdot(turned, imposed.edge[: self._model.edge_count]))
+        return work - 0.5 * float(np.vdot(pushed, before.velocity[held] + after.velocity[held]))
+
+    def _look_at_fluid(self, at: Configuration, state: State) -> _Fluid | None:
+        model = self._model
+        if not len(model.fluid_mass):
+            return None
+        momentum, shape_gradient = np.empty((model.node_count, 3)), np.empty((model.edge_count, 4))
+        relative = survey_fluid(model, at, state.velocity, state.spin, momentum, shape_gradient)
+        carried = float(momentum.sum(axis=0) @ np.array(model.scene.fluid.velocity))
+        return _Fluid(relative + carried, momentum, shape_gradient)
 
     def _look(self, state: State, eigenstrain: Array, load_factor: Array) -> _Instant:
         model, potential = self._model, self._potential
@@ -160,6 +193,8 @@ class EnergyLedger:
         return _Instant(
             at=at,
             kinetic=kinetic_energy(model, state),
+            fluid=self._look_at_fluid(at, state),
+            velocity=state.velocity.copy(),
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
             eigenstrain=eigenstrain.copy(),
             stimulus=-model.axial_stiffness * strain * model.rest_length,
@@ -191,4 +226,5 @@ def _context(at: Configuration, origin: Configuration, eigenstrain: Array, load_
         predicted_body_rotation=at.body_rotation,
         eigenstrain=eigenstrain,
         load_factor=load_factor,
+        fluid_momentum=np.zeros((0, 3)),
     )

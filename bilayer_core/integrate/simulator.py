@@ -95,7 +95,7 @@ class Simulator:
     dt : float, optional
         Overrides the scene's step [s].
     budget : bool
-        Keep the energy budget of the run (`budget`); it takes another two evaluations of all forces a step.
+        Keep the energy budget of the run (`budget`), in two to three times the time.
 
     Raises
     ------

@@ -45,6 +45,18 @@ def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
     assert "real-time factor" in told and "run.mcap" in told
 
 
+def test_a_run_shows_on_request_where_its_energy_went(here, capsys):
+    assert main(["run", "cantilever", "--duration", "50 ms", "--budget", "--summary", "run.json"]) == 0
+    budget = json.loads((here / "run.json").read_text())["budget"]
+    assert set(budget) == {"supplied", "stored", "lost", "work", "residual", "relative_residual"}
+    assert budget["stored"]["gravity"] < 0.0 < budget["stored"]["bending"]
+    table = capsys.readouterr().out
+    assert f"{budget['stored']['bending']:.4e}" in table and "numerical" in table and "twisting" not in table
+    assert main(["run", "cantilever", "--duration", "50 ms", "--summary", "run.json", "--force"]) == 0
+    assert "budget" not in json.loads((here / "run.json").read_text())
+    assert "numerical" not in capsys.readouterr().out
+
+
 def test_the_log_holds_the_scene_with_all_changes(here):
     options = ["--dt", "2 ms", "--set", "rods.strip.stations=21", "--log-rate", "10", "--quiet", "--log", "run.mcap"]
     assert main(["run", "cantilever", "--duration", "0.01", *options]) == 0

@@ -362,6 +362,16 @@ def test_the_first_cycle_of_the_inchworm_closes():
     assert lost[0] / lost[1] == pytest.approx(2.0, rel=0.1)
 
 
+def test_the_inertia_of_a_flowing_fluid_takes_part_in_the_budget_of_a_strip_on_a_moving_clamp():
+    fluid = {"drag_along": 0.3, "drag_across": 1.2, "added_mass": True, "velocity": [0.1, 0, 0.2]}
+    towed = driven(fluid=fluid, bodies=[moving("wall", (0, 0, 0), (0, 3e-3, 0.01), 0.1)])
+    budgets = [run(towed, 0.1, dt).budget() for dt in (5e-4, 2.5e-4)]
+    lost = [budget["lost"]["numerical"] for budget in budgets]
+    assert budgets[1]["stored"]["fluid"] > 10.0 * lost[1]
+    assert abs(budgets[1]["relative_residual"]) < 1e-5
+    assert math.log2(lost[0] / lost[1]) == pytest.approx(1.0, abs=0.1)
+
+
 # the keeping of it
 
 

@@ -14,7 +14,7 @@ from sample_scenes import everything, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 
 for description in (everything(), everything(stations=7), scene([rod([layer()])])):
-    simulator = Simulator(load_scene(description))
+    simulator = Simulator(load_scene(description), budget=True)
     simulator.run(0.005)
     simulator.frame()
 

@@ -67,7 +67,7 @@ class AddedMass(Term):
 
     def follow(self, at: Configuration) -> bool:
         velocity = (at.position - self.context.start.position) / self.context.length
-        _survey(self.model, at, velocity, self._still, self._momentum, self._shape_gradient)
+        survey_fluid(self.model, at, velocity, self._still, self._momentum, self._shape_gradient)
         self._direction1[:], self._direction2[:] = at.director1, at.director2
         return True
 
@@ -99,19 +99,19 @@ def momentum_of_fluid(model: Model, at: Configuration, velocity: Array) -> Array
     if not len(model.fluid_mass):
         return np.zeros((0, 3))
     momentum = np.empty((model.node_count, 3))
-    _survey(model, at, velocity, np.zeros(model.edge_count), momentum, np.empty((model.edge_count, 4)))
+    survey_fluid(model, at, velocity, np.zeros(model.edge_count), momentum, np.empty((model.edge_count, 4)))
     return momentum
 
 
 def energy_of_fluid(model: Model, at: Configuration, velocity: Array, spin: Array) -> float:
     """Kinetic energy of the fluid relative to its flow [J]."""
-    return _survey(model, at, velocity, spin, np.empty((model.node_count, 3)), np.empty((model.edge_count, 4)))
+    return survey_fluid(model, at, velocity, spin, np.empty((model.node_count, 3)), np.empty((model.edge_count, 4)))
 
 
-def _survey(
+def survey_fluid(
     model: Model, at: Configuration, velocity: Array, spin: Array, momentum: Array, shape_gradient: Array
 ) -> float:
-    """Write P and ∂T/∂q, return T; see `forces.added_mass.fluid_momentum`."""
+    """Write P and ∂T/∂q, return T [J]; see `forces.added_mass.fluid_momentum`."""
     frames = (at.length, at.tangent, at.director1, at.director2)
     flow = np.array(model.scene.fluid.velocity)
     return fluid_momentum(model.fluid_mass, model.edge_node, *frames, flow, velocity, spin, momentum, shape_gradient)
