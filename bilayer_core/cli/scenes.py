@@ -88,7 +88,7 @@ def _lines(report: dict[str, Any]):
     yield f"  {'time':12}{report['duration']:g} s in steps of {1e3 * report['dt']:g} ms"
     yield "forces"
     for name, state in report["terms"].items():
-        yield f"  {name:12}{state}"
+        yield f"  {name:14}{state}"
     yield "contact pairs"
     yield from (f"  {pair}" for pair in report["contact_pairs"] or ["none"])
     yield "output"

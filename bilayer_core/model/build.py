@@ -9,6 +9,7 @@ from .bodies import build_bodies, build_carriers, refuse_penetration
 from .layout import number_unknowns
 from .model import Model
 from .points import add_point_masses, build_loads
+from .rod_surfaces import build_rod_surfaces, refuse_meeting_rods
 from .rods import Collected, add_rod, turn_of_copy
 
 
@@ -44,6 +45,7 @@ def build_model(scene: SceneConfig) -> Model:
         carriers=build_carriers(scene, found, bodies),
         dead_loads=build_loads(scene, found, bodies, "world"),
         follower_loads=build_loads(scene, found, bodies, "material"),
+        rod_surfaces=build_rod_surfaces(scene, found),
         node_count=found.node_count,
         edge_count=edge_count,
         wall_count=len(walls),
@@ -86,6 +88,7 @@ def build_model(scene: SceneConfig) -> Model:
         pair_rest=found.column("pair_rest", width=3),
     )
     refuse_penetration(model)
+    refuse_meeting_rods(model)
     return model
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..scene.config import SceneConfig
 from .layout import Layout, ReadOnlyArrays
+from .rod_surfaces import RodSurfaces
 
 Array = np.ndarray
 
@@ -112,6 +113,7 @@ class Model(ReadOnlyArrays):
     carriers: Carriers
     dead_loads: PointLoads  # of fixed direction
     follower_loads: PointLoads  # along path, normal and path × normal of a rod, or in the axes of a body
+    rod_surfaces: RodSurfaces | None  # None where no rod can meet another or itself
 
     node_count: int
     edge_count: int

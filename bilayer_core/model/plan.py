@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ..errors import SceneError
 from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
+from .meeting import Meeting, meetings, passing_warnings
 from .validity import validity_warnings
 
 MODELS = ("two_rod",)
@@ -64,7 +65,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         reasons,
         _terms(scene),
         _contact_pairs(scene),
-        tuple(validity_warnings(scene)),
+        (*validity_warnings(scene), *passing_warnings(scene)),
     )
 
 
@@ -83,7 +84,9 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
     def state(needed: bool, reason: str) -> str:
         return "active" if needed else f"skipped: {reason}"
 
-    pairs = _contact_pairs(scene)
+    pairs = _surface_pairs(scene)
+    rods = meetings(scene)
+    touch, apart = any(meeting.active for meeting in rods), _why_apart(rods)
     friction = scene.contact.friction if scene.contact else None
     free = any(not isinstance(body.motion, Prescribed) for body in scene.bodies)
     dead = [load for load in scene.loads if load.frame == "world"]
@@ -112,10 +115,27 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
             bool(pairs) and friction is not None and friction.acts,
             "no surfaces that can meet" if not pairs else "no friction coefficient above zero",
         ),
+        "rod barrier": state(touch, apart),
+        "rod friction": state(
+            touch and friction is not None and friction.coefficient > 0.0,
+            "no friction coefficient above zero" if touch else apart,
+        ),
     }
 
 
+def _why_apart(found: tuple[Meeting, ...]) -> str:
+    """Why no rod can touch another or itself."""
+    reasons = {meeting.reason for meeting in found}
+    if len(reasons) == 1:
+        return reasons.pop()
+    return "; ".join(f"{meeting.what}: {meeting.reason}" for meeting in found)
+
+
 def _contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
+    return (*_surface_pairs(scene), *(meeting.what for meeting in meetings(scene) if meeting.active))
+
+
+def _surface_pairs(scene: SceneConfig) -> tuple[str, ...]:
     if scene.contact is None:
         return ()
     balls = [body for body in scene.bodies if body.surface is not None]

@@ -21,7 +21,7 @@ PLATE_RANGE = (0.5, 3.0)  # of w²κ/H: between beam and plate
 def validity_warnings(scene: SceneConfig) -> Iterator[str]:
     """Warnings, each with the figure and the limit."""
     for rod in scene.rods:
-        at_edges = _Edges(scene, rod)
+        at_edges = EdgeFigures(scene, rod)
         thickness, curvature, width = at_edges.thickness, at_edges.free_curvature(), at_edges.width
         if rod.path.length < SLENDER * width.max():
             yield (
@@ -63,7 +63,7 @@ def validity_warnings(scene: SceneConfig) -> Iterator[str]:
                 )
 
 
-class _Edges:
+class EdgeFigures:
     """Figures of a rod at the middle of each of its edges.
 
     Attributes

@@ -113,6 +113,8 @@ class Contact(Part):
     """Of the barrier, per length of rod; a larger one leaves the gap nearer to `barrier_distance`."""
     friction: Friction | None = None
     """Of all surfaces; without it they are smooth."""
+    rods: Literal["auto"] | bool = "auto"
+    """Whether rods touch each other and themselves; `auto`: where their lengths and free curvatures let them meet."""
 
 
 class AddedMass(Part):

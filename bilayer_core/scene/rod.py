@@ -42,6 +42,11 @@ class StraightPath(Part):
     length: PositiveLength
     """Of the line."""
 
+    @property
+    def turn(self) -> float:
+        """Angle between its tangents at the two ends [rad]."""
+        return 0.0
+
 
 class ArcPath(Part):
     """A part of a circle in the plane of its direction and the rod's normal."""
@@ -62,6 +67,11 @@ class ArcPath(Part):
     def length(self) -> float:
         """Length of the arc [m]."""
         return self.radius * self.angle
+
+    @property
+    def turn(self) -> float:
+        """Angle by which its tangent turns [rad]."""
+        return self.angle
 
     @property
     def curvature(self) -> float:

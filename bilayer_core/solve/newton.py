@@ -124,7 +124,7 @@ class NewtonSolver:
         carriers = self._model.carriers
         pairs = slice(None) if self._potential.has_balls else slice(0)
         planes = slice(None) if self._potential.has_planes else slice(0)
-        return step_bound(
+        alpha, blocking = step_bound(
             at.carrier,
             carrier_step,
             carriers.radius,
@@ -133,6 +133,11 @@ class NewtonSolver:
             carriers.pair_first[pairs],
             carriers.pair_second[pairs],
         )
+        rods, nodes = self._potential.matrix.rods, self._model.node_count
+        if rods is None:
+            return alpha, blocking
+        between, node = rods.step_bound(at.position, carrier_step[:nodes])
+        return (alpha, blocking) if alpha <= between else (between, node)
 
     def first_guess(self, context: StepContext, target: Configuration, guess: Configuration) -> NewtonReport | None:
         """Set `guess` to the start of the step moved by its velocity, prescribed nodes and points to their place.
@@ -162,7 +167,7 @@ class NewtonSolver:
             if alpha >= 1.0:
                 break
             if retry is None:
-                name = carrier_names(model)[blocking]
+                name = carrier_names(model)[blocking] if blocking >= 0 else "a rod"
                 return NewtonReport(NewtonStatus.BLOCKED, 0, 0, math.inf, detail=f"{name} would reach a surface")
             fraction *= retry * alpha
         guess.carrier[:] = start.carrier + move

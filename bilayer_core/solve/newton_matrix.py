@@ -5,8 +5,10 @@
 
 A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the
 motions that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
-If a pivot is not positive the matrix is not convex there; multiples of the mass matrix are added until it is, so that
-the step is a descent direction.
+Some nodes of rods that touch leave the band for the border, too (`solve.rod_border`).
+
+If a pivot is not positive the matrix is not convex there; what is negative in the contact of rods is left out, then
+multiples of the mass matrix are added until it is, so that the step is a descent direction.
 """
 
 from __future__ import annotations
@@ -19,6 +21,9 @@ from .assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
 from .band import band_kernels
 from .clamps import hand_nodes_to_bodies, hand_walls_to_bodies
 from .configuration import Configuration
+from .dense import eliminate, factor_dense, solve_dense
+from .rod_border import RodBorder
+from .rod_contact import RodContact
 
 Array = np.ndarray
 FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
@@ -41,6 +46,8 @@ class NewtonMatrix:
 
     def __init__(self, model: Model, has_node_blocks: bool, has_balls: bool, carrier_gradient: Array):
         self._model = model
+        self.rods = RodContact(model) if model.rod_surfaces is not None else None
+        self._rod_border = RodBorder(model) if self.rods else None
         self._has_node_blocks = has_node_blocks
         self.carrier_gradient = carrier_gradient
         edges = model.edge_count + model.wall_count
@@ -75,11 +82,13 @@ class NewtonMatrix:
             or [np.zeros(0)]
         )
         self._schur = None
+        self._nothing = self._leaving = np.zeros(0, dtype=np.int64)
+        self._wide, self._wide_solution = self._border_free, self._border_solution
         self._coupled = False
         points = model.bodies.free_index[carriers.point_body]
         self._points = [(model.node_count + k, points[k]) for k in np.flatnonzero(points >= 0)]
         self._balls = [(k, carriers.free_body[k]) for k in np.flatnonzero(carriers.free_body >= 0)]
-        self.shift = 0.0
+        self.shift, self.simplified = 0.0, 0
 
     def clear(self) -> None:
         """Set all second derivatives to zero."""
@@ -106,11 +115,14 @@ class NewtonMatrix:
         edge_gradient, attached_gradient : Array
             First derivatives there, of edges and of attached nodes before they were handed to bodies.
         """
-        self.shift = 0.0
+        self.shift, self.simplified = 0.0, 0
         while True:
             self.assemble(factor * (1.0 + self.shift), at, edge_gradient, attached_gradient)
             if self._factorise(factor):
                 return True
+            if self.rods and self.rods.contacts.count and self.simplified < 2:
+                self.simplified += 1
+                continue
             self.shift = max(FIRST_SHIFT, self.shift * SHIFT_GROWTH)
             if self.shift > LARGEST_SHIFT:
                 return False
@@ -123,6 +135,8 @@ class NewtonMatrix:
         """
         model, layout = self._model, self._model.layout
         self._assemble_band(factor)
+        if self.rods:
+            self._rod_border.add_to_band([self.rods.contacts, self.rods.sliding], self.simplified, self._band)
         self._border.fill(0.0)
         self._corner[:] = self.body_hessian
         self._coupled = False
@@ -201,6 +215,8 @@ class NewtonMatrix:
         """Rows of nodes attached to free bodies, from the band and the border, and clamps' elements: into U and D."""
         model, layout = self._model, self._model.layout
         self._coupled = True
+        if self.rods:
+            self._rod_border.add_to_bodies(at.arm, self._border, self._corner)
         for k in np.flatnonzero(model.attached_free >= 0):
             free, rows = model.attached_free[k], slice(layout.attached[k], layout.attached[k] + 3)
             block = np.hstack([np.eye(3), -skew(at.arm[k])]).T @ self._border[rows]
@@ -241,21 +257,35 @@ class NewtonMatrix:
 
     def _factorise(self, factor: float) -> bool:
         model, size = self._model, self._model.layout.size
-        if self._factor(self._band, size) >= 0:
-            return False
-        if not model.free_count:
-            return True
+        self._leaving = self._rod_border.rows if self.rods else self._nothing
+        if not model.free_count and not len(self._leaving):
+            return self._factor(self._band, size) < 0
         freedom = model.bodies.freedom
         schur = self._corner
         if self.shift:
             schur = schur + self.shift * factor * np.diag(self._body_masses)
         schur = freedom.T @ schur @ freedom
+        self._wide, self._wide_solution = self._border_free, self._border_solution
         if self._coupled:
             self._border[self._held_unknowns] = 0.0
             self._border_free[:] = self._border @ freedom
-            self._border_solution[:] = self._border_free
-            self._solve_border(self._band, size, self._border_solution)
-            schur -= self._border_free.T @ self._border_solution
+        elif len(self._leaving):
+            self._border_free.fill(0.0)
+        if len(self._leaving):
+            self._coupled = True
+            self._wide, schur = self._rod_border.widen(self._band, self._border_free, schur)
+            self._wide_solution = np.empty_like(self._wide)
+        if self._factor(self._band, size) >= 0:
+            return False
+        if self._coupled:
+            self._wide_solution[:] = self._wide
+            self._solve_border(self._band, size, self._wide_solution)
+        if len(self._leaving):
+            eliminate(self._wide, self._wide_solution, size, schur)
+            self._schur = schur
+            return factor_dense(schur)
+        if self._coupled:
+            schur -= self._wide.T @ self._wide_solution
         try:
             np.linalg.cholesky(schur)
         except np.linalg.LinAlgError:
@@ -266,18 +296,25 @@ class NewtonMatrix:
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
         """Minus the inverse matrix times the gradient: of rods, shape (size,), and of bodies, shape (n_free, 6)."""
         size = self._model.layout.size
-        right = self._right
+        right, leaving = self._right, self._leaving
         np.negative(gradient, out=right[:size])
         right[size:] = 0.0
+        right[leaving] = 0.0
         self._solve(self._band, size, right)
         step = right[:size].copy()
-        if not self._model.free_count:
+        if not self._model.free_count and not len(leaving):
             return step, np.zeros((0, 6))
         freedom = self._model.bodies.freedom
-        load = -freedom.T @ body_gradient.ravel()
+        load = np.concatenate([-freedom.T @ body_gradient.ravel(), -gradient[leaving]])
         if self._coupled:
-            load = load - self._border_free[:size].T @ step
-        body_step = np.linalg.solve(self._schur, load)
+            load = load - step @ self._wide[:size]
+        if len(leaving):
+            border_step = load
+            solve_dense(self._schur, border_step)
+        else:
+            border_step = np.linalg.solve(self._schur, load)
         if self._coupled:
-            step -= self._border_solution[:size] @ body_step
-        return step, (freedom @ body_step).reshape(-1, 6)
+            step -= self._wide_solution[:size] @ border_step
+        bodies = freedom.shape[1]
+        step[leaving] = border_step[bodies:]
+        return step, (freedom @ border_step[:bodies]).reshape(-1, 6)

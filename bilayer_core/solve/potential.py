@@ -18,6 +18,7 @@ from .terms.elastic import BendingAndTwisting, Bond, Stretching
 from .terms.fluid import AddedMass, Drag
 from .terms.inertial import Damping, Gravity, Inertia
 from .terms.loads import Followers, Loads, Moments
+from .terms.rod_contact import RodBarrier, RodFriction
 from .terms.term import Accumulators, Kind, StepContext, Term
 
 Array = np.ndarray
@@ -38,7 +39,9 @@ class IncrementalPotential:
         contact, carriers = model.scene.contact, model.carriers
         self.has_planes = contact is not None and len(carriers.plane_point) > 0
         self.has_balls = contact is not None and len(carriers.pair_first) > 0
-        self.has_contact = self.has_planes or self.has_balls
+        has_surfaces = self.has_planes or self.has_balls
+        has_rods = model.rod_surfaces is not None
+        self.has_contact = has_surfaces or has_rods
         has_drag, has_added_mass = len(model.drag_node) > 0, len(model.fluid_mass) > 0
         has_node_blocks = self.has_contact or has_drag or has_added_mass
 
@@ -56,7 +59,8 @@ class IncrementalPotential:
 
         # The register, in the order of the sum: what adds to nodes, edges, pairs and bodies; then to carriers.
         law = contact.friction if contact else None
-        self._barrier = Barrier(model, self.accumulators) if self.has_contact else None
+        slides = law is not None and law.acts
+        self._barrier = Barrier(model, self.accumulators) if has_surfaces else None
         self._of_rods_and_bodies = self._needed(
             (Stretching, True),
             (BendingAndTwisting, True),
@@ -70,16 +74,23 @@ class IncrementalPotential:
             (Drag, has_drag),
             (AddedMass, has_added_mass),
         )
-        self._of_carriers = [self._barrier] if self.has_contact else []
-        self._of_carriers += self._needed((Friction, self.has_contact and law is not None and law.acts))
+        self._of_carriers = [self._barrier] if has_surfaces else []
+        self._of_carriers += self._needed(
+            (Friction, has_surfaces and slides),
+            (RodBarrier, has_rods),
+            (RodFriction, has_rods and slides and law.coefficient > 0.0),
+        )
 
     def _needed(self, *register: tuple[type[Term], bool]) -> list[Term]:
         return [term(self.model, self.accumulators) for term, needed in register if needed]
 
     @property
     def min_gap(self) -> float:
-        """Smallest gap at the last evaluation [m]; infinite without contact."""
-        return self._barrier.min_gap if self._barrier else math.inf
+        """Smallest gap at the last evaluation [m]; infinite without contact. Between rods those below the barrier
+        distance count.
+        """
+        rods = self.matrix.rods.min_gap if self.matrix.rods else math.inf
+        return min(self._barrier.min_gap, rods) if self._barrier else rods
 
     @property
     def pair_gap(self) -> Array:

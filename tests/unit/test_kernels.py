@@ -10,10 +10,12 @@ from pathlib import Path
 SURVEY = """
 import importlib, json, pkgutil
 from numba.core.registry import CPUDispatcher
-from sample_scenes import everything, layer, rod, scene
+from sample_scenes import contact, everything, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 
-for description in (everything(), everything(stations=7), scene([rod([layer()])])):
+ribbons = [rod([layer()], name="a"), rod([layer(), layer("top")], name="b", start=(0, 0, 2.3e-3))]
+touching = scene(ribbons, contact=contact(coefficient=0.5), gravity=[0, 0, -10])
+for description in (everything(), everything(stations=7), scene([rod([layer()])]), touching):
     simulator = Simulator(load_scene(description), budget=True)
     simulator.run(0.005)
     simulator.frame()

@@ -1,0 +1,104 @@
+"""The largest fraction of a step over which points of rods stay clear of segments: conservative advancement.
+
+Along a straight step a point nears a segment no faster than it nears one of the segment's ends, v = max |δp − δx_j|,
+|δp − δx_{j+1}|, so the distance D falls by at most v β over the fraction β. The step is gone through in parts that use
+up no more than what is left of D above the distance to keep; these are long where the two do not meet head-on, and a
+few of them come as near as `TOUCH` of the gap.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import kernel
+from .step_bound import KEPT_FRACTION
+
+TOUCH = 0.05  # of the gap: nearer to the distance to keep than this, the search ends
+MAX_PARTS = 100
+
+
+@kernel
+def rod_step_bound(
+    position, step, limit, pair_count, pair_point, pair_edge, edge_node, edge_radius, point_edge, point_fraction
+):
+    """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
+
+    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3).
+
+    Returns
+    -------
+    alpha : float
+    blocking : int
+        Node that sets the bound, −1 if none.
+    """
+    alpha = limit
+    blocking = -1
+    for c in range(pair_count):
+        p, k = pair_point[c], pair_edge[c]
+        a = point_edge[p]
+        i, j, s = edge_node[a], edge_node[k], point_fraction[p]
+        left, right = 0.0, 0.0
+        for m in range(3):
+            own = (1.0 - s) * step[i, m] + s * step[i + 1, m]
+            left += (own - step[j, m]) ** 2
+            right += (own - step[j + 1, m]) ** 2
+        speed = math.sqrt(max(left, right))
+        radii = edge_radius[a] + edge_radius[k]
+        gone = 0.0
+        gap = _distance(position, step, 0.0, i, s, j) - radii
+        kept = radii + KEPT_FRACTION * gap
+        room = (1.0 - KEPT_FRACTION) * gap
+        part = 0
+        while gone < alpha and speed * (alpha - gone) > room:
+            if part > 0 and (room < TOUCH * gap or part == MAX_PARTS):
+                alpha = gone
+                blocking = i
+                break
+            gone += room / speed
+            if gone < alpha:
+                room = _distance(position, step, gone, i, s, j) - kept
+            part += 1
+    return alpha, blocking
+
+
+@kernel
+def _distance(position, step, fraction, i, s, j):
+    """Distance [m] of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step."""
+    p0 = (1.0 - s) * (position[i, 0] + fraction * step[i, 0]) + s * (position[i + 1, 0] + fraction * step[i + 1, 0])
+    p1 = (1.0 - s) * (position[i, 1] + fraction * step[i, 1]) + s * (position[i + 1, 1] + fraction * step[i + 1, 1])
+    p2 = (1.0 - s) * (position[i, 2] + fraction * step[i, 2]) + s * (position[i + 1, 2] + fraction * step[i + 1, 2])
+    x0, x1, x2 = (
+        position[j, 0] + fraction * step[j, 0],
+        position[j, 1] + fraction * step[j, 1],
+        position[j, 2] + fraction * step[j, 2],
+    )
+    e0 = position[j + 1, 0] + fraction * step[j + 1, 0] - x0
+    e1 = position[j + 1, 1] + fraction * step[j + 1, 1] - x1
+    e2 = position[j + 1, 2] + fraction * step[j + 1, 2] - x2
+    p0, p1, p2 = p0 - x0, p1 - x1, p2 - x2
+    t = min(max((p0 * e0 + p1 * e1 + p2 * e2) / (e0 * e0 + e1 * e1 + e2 * e2), 0.0), 1.0)
+    p0, p1, p2 = p0 - t * e0, p1 - t * e1, p2 - t * e2
+    return math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
+
+
+@kernel
+def largest_travel(position, step, base):
+    """Largest distance of x + step from `base`, the mean displacement taken off, and that of the step alone [m].
+
+    A translation common to all nodes brings none of them nearer to another.
+    """
+    count = position.shape[0]
+    t0, t1, t2, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(count):
+        m0, m1, m2 = m0 + step[i, 0] / count, m1 + step[i, 1] / count, m2 + step[i, 2] / count
+        t0 += (position[i, 0] - base[i, 0]) / count
+        t1 += (position[i, 1] - base[i, 1]) / count
+        t2 += (position[i, 2] - base[i, 2]) / count
+    travel, move = 0.0, 0.0
+    for i in range(count):
+        s0, s1, s2 = step[i, 0] - m0, step[i, 1] - m1, step[i, 2] - m2
+        d0, d1 = position[i, 0] - base[i, 0] - t0, position[i, 1] - base[i, 1] - t1
+        d2 = position[i, 2] - base[i, 2] - t2
+        travel = max(travel, (d0 + s0) ** 2 + (d1 + s1) ** 2 + (d2 + s2) ** 2)
+        move = max(move, s0 * s0 + s1 * s1 + s2 * s2)
+    return math.sqrt(travel), math.sqrt(move)

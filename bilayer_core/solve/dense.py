@@ -1,0 +1,55 @@
+"""Small dense systems of the border, in one thread: for a few dozen unknowns the threads of a BLAS cost far more than
+the sums.
+
+A = L Lᵀ is kept in the lower triangle.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import kernel
+
+
+@kernel
+def eliminate(border, solution, size, corner):
+    """D − Uᵀ (A⁻¹ U), in place of D; most entries of U, shape (≥ size, n), are zero."""
+    n = border.shape[1]
+    for k in range(size):
+        for i in range(n):
+            value = border[k, i]
+            if value != 0.0:
+                for j in range(n):
+                    corner[i, j] -= value * solution[k, j]
+
+
+@kernel
+def factor_dense(matrix):
+    """Factorise a symmetric matrix in place; false if it is not positive definite."""
+    for i in range(matrix.shape[0]):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            if j < i:
+                matrix[i, j] = total / matrix[j, j]
+            elif total > 0.0:
+                matrix[i, i] = math.sqrt(total)
+            else:
+                return False
+    return True
+
+
+@kernel
+def solve_dense(factor, right):
+    """Overwrite a vector with the solution of the factorised system."""
+    n = factor.shape[0]
+    for i in range(n):
+        total = right[i]
+        for k in range(i):
+            total -= factor[i, k] * right[k]
+        right[i] = total / factor[i, i]
+    for i in range(n - 1, -1, -1):
+        right[i] /= factor[i, i]
+        for k in range(i):
+            right[k] -= factor[i, k] * right[i]

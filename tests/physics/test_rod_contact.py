@@ -1,0 +1,438 @@
+"""Rods that touch each other and themselves: derivatives, sums of forces, gaps, and that nothing passes through."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.errors import PenetrationError
+from bilayer_core.integrate import implicit_euler
+from bilayer_core.integrate.stepper import Stepper
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.build import build_model
+from bilayer_core.model.rod_surfaces import NearPairs
+from bilayer_core.model.state import initial_state
+from bilayer_core.solve.configuration import Configuration
+from bilayer_core.solve.rod_contact import RodContact
+
+D_HAT = 1e-3
+
+
+def turned(rod_dict, direction, normal=(0, 0, 1)):
+    """The rod along another direction."""
+    rod_dict["path"]["direction"], rod_dict["normal"] = list(direction), list(normal)
+    return rod_dict
+
+
+def model_of(rods, **more):
+    return build_model(load_scene(scene(rods, contact={**contact(coefficient=0.4), "rods": True}, **more)))
+
+
+def parallel_rods(rng):
+    """Two rods side by side on different meshes, the second longer: insides, nodes and ends of segments face points."""
+    rods = [rod([layer()], length=0.02, stations=6, name="a"), rod([layer()], length=0.03, stations=14, name="b")]
+    model = model_of([rods[0], {**rods[1], "path": {**rods[1]["path"], "start": [-0.004, 0, 5e-3]}}])
+    position = model.start_position.copy()
+    position[6:, 2] = 1.7e-3
+    return model, position + 1e-4 * rng.standard_normal(position.shape)
+
+
+def crossed_rods(rng):
+    """Two rods that cross between their nodes."""
+    rods = [rod([layer()], length=0.02, stations=4, name="a"), rod([layer()], length=0.02, stations=4, name="b")]
+    rods[1]["path"]["start"] = [0.01, -0.01, 0.01]
+    model = model_of([rods[0], turned(rods[1], (0, 1, 0))])
+    position = model.start_position.copy()
+    position[4:, 2] = 1.6e-3
+    return model, position + 1e-4 * rng.standard_normal(position.shape)
+
+
+def folded_rod(rng):
+    """A bilayer folded onto itself, with kinks in the segments: points face corners from inside."""
+    stations = 31
+    model = model_of([rod([layer("bottom"), layer("top")], length=0.06, stations=stations)])
+    radius = 1.4e-3  # of the fold's path
+    arc = np.linspace(0.0, 0.06, stations) - 0.03
+    angle = np.clip(arc / radius, -0.5 * np.pi, 0.5 * np.pi)
+    straight = arc - radius * angle
+    x = radius * np.cos(angle) - np.abs(straight)
+    z = radius * np.sin(angle) + 2e-4 * np.cos(400.0 * arc)
+    position = model.start_position.copy()
+    for strand, height in zip(model.strands, (-0.5e-3, 0.5e-3), strict=True):
+        own = slice(strand.first_node, strand.first_node + stations)
+        position[own] = np.stack([x, np.zeros(stations), z], axis=1)
+        position[own] -= height * np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1)
+    return model, position + 5e-5 * rng.standard_normal(position.shape)
+
+
+CASES = {"parallel": parallel_rods, "crossed": crossed_rods, "folded": folded_rod}
+
+
+def dense(contacts, nodes):
+    """Second derivatives of all contacts, from what the kernels leave for the matrix."""
+    hessian = np.zeros((nodes, 3, nodes, 3))
+    for c in range(contacts.count):
+        i, j = contacts.node[c]
+        places = [i, i + 1, j, j + 1]
+        w, m, side, a = contacts.weight[c], contacts.matrix[c], contacts.side[c], contacts.turn[c]
+        for k, row in enumerate(places):
+            for n, column in enumerate(places):
+                hessian[row, :, column, :] += w[k] * w[n] * m - side * np.outer(a[k], a[n])
+    return hessian.reshape(3 * nodes, 3 * nodes)
+
+
+def differences(function, position, h):
+    """Fourth-order central differences of a function of node positions, by each of their components."""
+    rows = []
+    for index in range(position.size):
+        values = []
+        for step in (h, -h, 2 * h, -2 * h):
+            moved = position.copy()
+            moved.ravel()[index] += step
+            values.append(function(moved))
+        rows.append((8 * (values[0] - values[1]) - (values[2] - values[3])) / (12 * h))
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("term", ["barrier", "friction"])
+@pytest.mark.parametrize("case", CASES)
+def test_derivatives_of_rod_contact_agree_with_differences(case, term):
+    model, position = CASES[case](np.random.default_rng(3))
+    rods = RodContact(model)
+    origin = position + 2e-6 * np.random.default_rng(4).standard_normal(position.shape)
+    rods.start_step(position)
+
+    def evaluate(at):
+        gradient = np.zeros_like(at)
+        if term == "barrier":
+            return rods.barrier(at, gradient), gradient
+        return rods.friction(at, origin, 0.01, gradient), gradient
+
+    energy, gradient = evaluate(position)
+    found = rods.contacts if term == "barrier" else rods.sliding
+    hessian = dense(found, model.node_count)
+    assert energy > 0.0 and found.count >= 4
+    if term == "barrier":
+        times, inner = found.times[: found.count], found.inner[: found.count]
+        assert inner.any()
+        assert case != "folded" or times.min() < 0  # a corner seen from inside
+        assert case != "parallel" or not inner.all()
+    errors = []
+    for h in (1e-9, 3e-9, 1e-8, 3e-8):
+        by_energy = differences(lambda at: evaluate(at)[0], position, h)
+        by_gradient = differences(lambda at: evaluate(at)[1].ravel(), position, h)
+        errors.append(
+            (
+                np.abs(by_energy - gradient.ravel()).max() / np.abs(gradient).max(),
+                np.abs(by_gradient - hessian).max() / np.abs(hessian).max(),
+            )
+        )
+    best = np.min(errors, axis=0)
+    assert best[0] < 1e-7 and best[1] < 1e-6
+
+
+def moved_rigidly(position):
+    turn = rotation_matrix(np.array([0.7, -0.4, 1.9]))
+    return position @ turn.T + np.array([0.1, -2.0, 0.3])
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_barrier_between_rods_feels_no_rigid_motion_and_exerts_no_force_or_moment_in_all(case):
+    model, position = CASES[case](np.random.default_rng(5))
+    rods = RodContact(model)
+    gradient = np.zeros_like(position)
+    energy = rods.barrier(position, gradient)
+    assert rods.barrier(moved_rigidly(position), np.zeros_like(position)) == pytest.approx(energy, rel=1e-9)
+    assert energy > 0.0
+    scale = np.abs(gradient).sum()
+    center = position.mean(axis=0)
+    assert np.abs(gradient.sum(axis=0)).max() < 1e-13 * scale
+    assert np.abs(np.cross(position - center, gradient).sum(axis=0)).max() < 1e-13 * scale * np.ptp(position)
+
+
+def test_friction_between_rods_is_opposite_on_the_two_and_opposes_the_slip():
+    model, position = parallel_rods(np.random.default_rng(5))
+    rods = RodContact(model)
+    rods.start_step(position)
+    slipped = position.copy()
+    slipped[:6, 0] += 1e-4  # far above the threshold in 10 ms
+    gradient = np.zeros_like(position)
+    rods.friction(slipped, position, 0.01, gradient)
+    load = rods.sliding.load[: rods.sliding.count].sum()
+    first, second = -gradient[:6].sum(axis=0), -gradient[6:].sum(axis=0)
+    assert first == pytest.approx(-second, abs=1e-12 * load)
+    assert first[0] == pytest.approx(-0.4 * load, rel=0.05)  # normals lean by the noise of the shape
+
+
+MESHES = [(3, 3), (11, 12), (21, 38), (81, 55)]
+
+
+@pytest.mark.parametrize("stations", MESHES)
+def test_parallel_ribbons_press_on_each_other_with_the_same_force_on_any_meshes(stations):
+    lower, upper = (rod([layer()], stations=n, name=name) for n, name in zip(stations, "ab", strict=True))
+    model = model_of([lower, {**upper, "path": {**upper["path"], "start": [0, 0, 1.8e-3]}}])
+    gradient = np.zeros((model.node_count, 3))
+    RodContact(model).barrier(np.array(model.start_position), gradient)
+    gap = 0.8e-3
+    s = gap - D_HAT
+    force = 1e7 * (2.0 * s * np.log(gap / D_HAT) + s * s / gap) * 0.1
+    assert -gradient[stations[0] :].sum(axis=0) == pytest.approx([0, 0, force], rel=1e-12, abs=1e-9 * force)
+
+
+def stacked(lower_stations, upper_stations):
+    """A ribbon on another one of the same length on the ground; barriers soft enough for both to stay straight."""
+    lower = rod([layer(thickness=2e-3)], stations=lower_stations, start=(0, 0, 1.9e-3), name="lower")
+    upper = rod([layer()], stations=upper_stations, start=(0, 0, 4.3e-3), name="upper")
+    soft = contact(coefficient=0.5) | {"stiffness": 1e4}
+    return scene([lower, upper], gravity=[0, 0, -10.0], obstacles=[GROUND], contact=soft, damping={"mass": 60.0})
+
+
+@pytest.mark.parametrize("stations", MESHES[1:])
+def test_parallel_ribbons_rest_at_the_gap_that_the_barrier_demands_on_any_meshes(stations):
+    simulator = Simulator(load_scene(stacked(*stations)))
+    simulator.run(0.3)
+    upper = simulator.model.strands[1].first_node
+    heights, weights = simulator.positions[:, 2], simulator.model.carriers.weight
+    gap = np.average(heights[upper:], weights=weights[upper:])
+    gap -= np.average(heights[:upper], weights=weights[:upper]) + 1.5e-3
+    s = gap - D_HAT
+    weight = 0.1  # N/m
+    assert 1e4 * (2.0 * s * np.log(gap / D_HAT) + s * s / gap) == pytest.approx(weight, rel=1e-3)
+    total = simulator.contact_forces
+    assert total[upper:].sum(axis=0) == pytest.approx([0, 0, weight * 0.1], rel=1e-5, abs=1e-7)
+    assert total.sum(axis=0) == pytest.approx([0, 0, 3.0 * weight * 0.1], rel=1e-5, abs=1e-7)
+
+
+@pytest.mark.parametrize("speed", [0.5, 20.0])
+def test_a_ribbon_that_falls_across_the_middle_of_another_does_not_pass(speed):
+    lower = rod([layer()], stations=6, length=0.05, start=(-0.025, 0, 0), name="lower")
+    lower |= {"clamp_start": "left", "clamp_end": "right"}
+    upper = turned(rod([layer()], stations=6, length=0.05, start=(0, -0.025, 0.02), name="upper"), (0, 1, 0))
+    crossing = scene(
+        [lower, upper],
+        bodies=[fixed("left", (-0.025, 0, 0)), fixed("right", (0.025, 0, 0))],
+        contact=contact(coefficient=0.3),
+    )
+    simulator = Simulator(load_scene(crossing))
+    upper_nodes = slice(6, 12)
+    simulator._state.velocity[upper_nodes, 2] = -speed
+    lowest, smallest = np.inf, np.inf
+    for _ in range(round(0.05 / simulator.dt)):
+        simulator.step()
+        middle = simulator.positions[8:10, 2].mean() - simulator.positions[2:4, 2].mean()
+        lowest = min(lowest, middle)
+        smallest = min(smallest, simulator.frame().min_gap)
+    assert smallest < D_HAT  # they met
+    # points of a rod are half a thickness apart: centrelines of two crossing ones stay this far apart
+    assert lowest > np.sqrt(1e-3**2 - 0.25e-3**2)
+
+
+def curling(stations=46, **more):
+    """A bilayer with a straight tail that would curl up by more than a turn, in the air."""
+    active = layer("active", eigenstrain={"stimulus": "heat", "gain": 0.06, "interval": [0.04, 0.2]})
+    return scene(
+        [rod([layer("passive"), active], length=0.2, stations=stations)],
+        stimuli={"heat": {"schedule": {"type": "ramp", "start": 0, "end": 0.1, "from": 0, "to": 1}}},
+        damping={"mass": 100.0},
+        **more,
+    )
+
+
+def least_distance(simulator):
+    """Of points on one layer from others on it that are a quarter of the strip away or more."""
+    count = simulator.model.strands[0].node_count
+    nodes = simulator.positions[:count]
+    part = np.linspace(0, count - 1, 20 * count)
+    line = np.stack([np.interp(part, np.arange(count), nodes[:, c]) for c in range(3)], axis=1)
+    distance = np.linalg.norm(line[:, None] - line[None], axis=2)
+    return distance[np.abs(np.subtract.outer(part, part)) > 0.25 * count].min()
+
+
+def test_a_bilayer_that_curls_up_closes_on_itself_and_does_not_pass_through_itself():
+    closed = Simulator(load_scene(curling(contact=contact())))
+    free = Simulator(load_scene(curling(contact={**contact(), "rods": False})))
+    nearest = {True: np.inf, False: np.inf}
+    for _ in range(15):
+        for simulator in (closed, free):
+            simulator.run(0.01)
+            nearest[simulator is closed] = min(nearest[simulator is closed], least_distance(simulator))
+    assert closed.statistics.min_gap < D_HAT
+    assert closed.summary()["converged"] is True
+    assert nearest[False] < 0.1e-3  # passes through itself
+    assert nearest[True] > 1e-3
+
+
+def test_ribbons_that_collide_in_flight_keep_their_momentum_and_slow_down_by_friction():
+    lower = rod([layer("bottom"), layer("top")], stations=12, length=0.05, name="lower")
+    upper = rod([layer()], stations=9, length=0.04, start=(0.003, 0, 4e-3), name="upper")
+    flight = scene([lower, upper], contact=contact(coefficient=0.5, speed_threshold=1e-2), solver={"tolerance": 1e-10})
+    simulator = Simulator(load_scene(flight))
+    nodes = simulator.model.strands[-1].first_node
+    simulator._state.velocity[nodes:] = [0.3, 0.1, -0.5]
+    mass = simulator.model.node_mass
+    before = mass @ simulator.velocities
+    relative = simulator.velocities[nodes, 0]
+    simulator.run(0.05)
+    after = mass @ simulator.velocities
+    exchanged = np.abs(before).sum()
+    assert simulator.statistics.min_gap < D_HAT
+    assert np.abs(after - before).max() < 1e-9 * exchanged
+    parts = (slice(nodes), slice(nodes, None))
+    mean = [np.average(simulator.velocities[part, 0], weights=mass[part]) for part in parts]
+    assert abs(mean[1] - mean[0]) < 0.9 * relative
+
+
+def pressed(hub):
+    """Two bilayer arms of a hub, bent onto each other, and a third rod across them; held nodes take part in contact."""
+    arms = rod(
+        [layer("bottom"), layer("top")], length=0.02, stations=7, start=(0, 0, 0.5e-3), name="arm", clamp_start="hub"
+    )
+    under = {**rod([layer()], length=0.02, stations=8, start=(-0.004, 1e-4, -2.6e-3), name="under")}
+    held = {**rod([layer()], length=0.015, stations=5, start=(0, 0, -5.2e-3), name="held"), "clamp_start": "hub"}
+    motion = {"type": "prescribed"} if hub == "prescribed" else {"type": "free", "mass": 1e-3, "inertia": [2e-8] * 3}
+    bodies = [{"name": "hub", "position": [0, 0, 0], "motion": motion}]
+    law = {**contact(coefficient=0.4, speed_threshold=0.1), "rods": True}
+    return scene([arms, under, held], bodies=bodies, contact=law)
+
+
+@pytest.mark.parametrize("hub", ["prescribed", "free"])
+def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hub):
+    model = build_model(load_scene(pressed(hub)))
+    # without elasticity, whose gradient has symmetric differences only up to the holonomy of frames
+    stiff = ("axial_stiffness", "joint_stiffness", "pair_stiffness")
+    model = replace(model, **{name: 0.0 * getattr(model, name) for name in stiff})
+    stepper = Stepper(model, 1e-5, 1e-9, 50, 0)
+    state, rng = initial_state(model), np.random.default_rng(2)
+    start = Configuration(model)
+    free = np.setdiff1d(np.arange(model.node_count), model.attached_node)
+    state.position[free] += 5e-5 * rng.standard_normal((len(free), 3))
+    under = model.strands[2]
+    state.position[under.first_node : under.first_node + under.node_count, 2] += 0.9e-3 - 0.3e-3
+    start.take_state(state, state.body_position)
+    start.carry_frames(start, np.zeros(model.edge_count))
+    undriven = np.zeros(model.edge_count), np.zeros(0)
+    stepper.potential.start_step(implicit_euler.predict(model, state, start, 1e-5, *undriven))
+    potential, size = stepper.potential, model.layout.size
+    held = (model.layout.node[model.attached_node][:, None] + np.arange(3)).ravel()
+    bodies = 6 * model.free_count
+
+    def moved(base, vector):
+        at = Configuration(model)
+        at.set_moved(base, vector[:size], vector[size:].reshape(-1, 6), 1.0)
+        return at
+
+    scale = np.full(size + bodies, 1.0)
+    scale[model.layout.edge] = 200.0
+    scale[size:].reshape(-1, 6)[:, 3:] = 100.0
+    shift = 2e-6 * rng.standard_normal(size + bodies) * scale
+    shift[held] = 0.0
+    at = moved(start, shift)
+
+    def gradient(vector):
+        potential.evaluate(moved(at, vector), False)
+        body = potential.body_gradient.copy()  # in the chart of rotations at the moved place; wanted is that at `at`
+        body[:, 3:] -= 0.5 * np.cross(vector[size:].reshape(-1, 6)[:, 3:], body[:, 3:])
+        return np.concatenate([potential.gradient, body.ravel()])
+
+    potential.evaluate(at, True)
+    assert potential.factorise(at)
+    matrix = potential.matrix
+    assert (matrix.shift, matrix.simplified) == (0.0, 0)
+    assert potential.terms["rod barrier"] > 0.0 and potential.terms["rod friction"] > 0.0
+    touching = matrix.rods.contacts.node[: matrix.rods.contacts.count]
+    assert np.isin(touching, model.attached_node).any()
+    for _ in range(3):
+        load = rng.standard_normal(size + bodies) / scale
+        load[held] = 0.0
+        step = np.concatenate([part.ravel() for part in matrix.newton_step(load[:size], load[size:].reshape(-1, 6))])
+        step[held] = 0.0
+        errors = []
+        for h in (1e-8, 3e-8, 1e-7):
+            unit = step * h / np.abs(step / scale).max()
+            change = (8 * (gradient(unit) - gradient(-unit)) - (gradient(2 * unit) - gradient(-2 * unit))) / 12
+            change *= np.abs(step / scale).max() / h
+            errors.append(np.abs((change + load) * scale).max() / np.abs(load * scale).max())
+        assert min(errors) < 1e-6
+
+
+def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_length():
+    counts = []
+    for stations in (201, 401, 801):
+        length = 2e-3 * (stations - 1)
+        rods = [rod([layer()], length=length, stations=stations, name=name) for name in "ab"]
+        rods[1]["path"]["start"] = [0.7e-3, 0, 1.8e-3]
+        model = model_of(rods)
+        surfaces = model.rod_surfaces
+        pairs = NearPairs(surfaces, model.edge_node, model.start_position, D_HAT)
+        pairs.find(np.array(model.start_position), D_HAT)
+        counts.append(pairs.count)
+        if stations > 201:
+            continue
+        position = model.start_position + 2e-4 * np.sin(np.arange(3 * model.node_count)).reshape(-1, 3)
+        pairs.find(position, D_HAT)
+        first = model.edge_node[surfaces.point_edge]
+        s = surfaces.point_fraction[:, None]
+        points = (1 - s) * position[first] + s * position[first + 1]
+        expected = set()
+        for k, j in enumerate(model.edge_node):
+            e = position[j + 1] - position[j]
+            t = np.clip((points - position[j]) @ e / (e @ e), 0.0, 1.0)[:, None]
+            distance = np.linalg.norm(points - position[j] - t * e, axis=1)
+            other = surfaces.edge_rod[surfaces.point_edge] != surfaces.edge_rod[k]
+            expected |= {(int(p), k) for p in np.flatnonzero(other & (distance - 1e-3 < D_HAT))}
+        found = list(zip(pairs.point[: pairs.count].tolist(), pairs.edge[: pairs.count].tolist(), strict=True))
+        assert found == sorted(expected) and len(found) > 1000
+    assert counts[2] - counts[1] == 2 * (counts[1] - counts[0])
+
+
+def test_a_run_with_rods_in_contact_continues_bit_for_bit_from_a_saved_state():
+    description = curling(contact=contact(coefficient=0.5))
+    whole = Simulator(load_scene(description))
+    whole.run(0.12)
+    saved = whole.save_state()
+    whole.run(0.02)
+    assert whole.frame().min_gap < D_HAT
+    other = Simulator(load_scene(description))
+    other.load_state(saved)
+    other.run(0.02)
+    assert np.array_equal(other.save_state(), whole.save_state(), equal_nan=True)
+    assert np.array_equal(other.contact_forces, whole.contact_forces)
+    assert np.abs(whole.contact_forces).max() > 0.0
+    assert whole.energy()["rod barrier"] > 0.0
+
+
+def test_rods_that_start_in_each_other_are_refused_by_name():
+    rods = [rod([layer()], name="a"), rod([layer("skin")], name="b", start=(0.013, 0, 0.6e-3))]
+    with pytest.raises(PenetrationError, match=r"node \d+ of [ab]/\w+ is 0\.4 mm inside node \d+ of [ab]/\w+"):
+        model_of(rods)
+
+
+def test_contact_of_rods_is_left_out_where_geometry_excludes_it_and_the_plan_says_why():
+    def plan_of(rods, **more):
+        return Simulator(load_scene(scene(rods, **{"contact": contact(coefficient=0.3), **more}))).plan
+
+    short = plan_of([rod([layer()])])
+    assert short.terms["rod barrier"].startswith("skipped: turns by 0° at most")
+    walls = [fixed("left"), fixed("right", (0, 0, 1))]
+    apart = plan_of(
+        [rod([layer()], name="a", clamp_start="left"), rod([layer()], name="b", start=(0, 0, 1), clamp_start="right")],
+        bodies=walls,
+    )
+    assert "a – b: held 79" in apart.terms["rod friction"]
+    free = plan_of([rod([layer()], name="a"), rod([layer()], name="b", start=(0, 0, 1))])
+    assert free.terms["rod barrier"] == free.terms["rod friction"] == "active" and free.contact_pairs == ("a – b",)
+    off = plan_of([rod([layer()], name="a"), rod([layer()], name="b")], contact={**contact(), "rods": False})
+    assert off.terms["rod barrier"] == "skipped: contact.rods is false"
+    assert any("rods may pass through each other: a – b" in warning for warning in off.warnings)
+    none = plan_of([rod([layer()])], contact=None)
+    assert none.terms["rod barrier"] == "skipped: no contact settings" and none.warnings == ()
+
+
+def test_arms_that_a_hub_holds_side_by_side_do_not_feel_what_joins_them():
+    star = rod([layer()], length=0.03, stations=16, name="arm", clamp_start="hub", pattern={"count": 12})
+    simulator = Simulator(load_scene(scene([star], bodies=[fixed("hub")], contact=contact())))
+    assert simulator.plan.contact_pairs == ("arm – its copies",)
+    simulator.run(0.01)
+    assert np.abs(simulator.contact_forces).max() == 0.0
