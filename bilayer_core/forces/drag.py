@@ -7,13 +7,14 @@ across the width; w is the
 width, h the thickness of the section, Δl the Voronoi length; the layers of a section share its drag. (The paper has
 the width for the sideways part as well, a flat ribbon's broad face.)
 
-The directions are those at the start of the step. Then each component has a convex dissipation potential in the
-displacement u of the
-step, v = u/h_t − U (h_t the step, U the flow):
+With the directions held fixed each component has a convex dissipation potential in the displacement u over a stage of
+length h_t, v = u/h_t − U (U the flow):
 
     D = h_t ρ_f A C |v·n|³/6,    ∂D/∂u = ½ ρ_f A C |v·n| (v·n) n,    ∂²D/∂u² = ρ_f A C |v·n|/h_t n nᵀ
 
-The drag is implicit: it cannot overshoot, however long the step.
+The drag is implicit: it cannot overshoot, however long the step. The directions move along with Newton's corrections
+and end as those at the end of the stage, so that the drag has the integrator's order: held at the start of the step,
+they made the stroke of a swimmer 6 % wrong at 1 ms with any integrator.
 """
 
 from __future__ import annotations

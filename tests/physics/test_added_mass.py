@@ -294,3 +294,16 @@ def test_without_added_mass_there_is_nothing_to_compute():
         assert "fluid" not in simulator.energy()
         assert simulator.plan.terms["added mass"].startswith("skipped")
     assert Simulator(load_scene(scene([rod(WHOLE)], fluid=water()))).plan.terms["added mass"] == "active"
+
+
+@pytest.mark.parametrize("added", [False, True], ids=["drag alone", "with added mass"])
+def test_forces_of_the_fluid_act_along_the_directions_at_the_end_of_the_step(added):
+    fluid = {"drag_along": 0.1, "drag_across": 1.0, "added_mass": added}
+    simulator = Simulator(load_scene(scene([rod(HALVES, length=0.05, stations=11)], fluid=fluid)))
+    state, middle = simulator._state, simulator.positions.mean(axis=0)
+    state.velocity[:] = np.array([0.3, 0.0, 0.2]) + np.cross((0, 60.0, 0), state.position - middle)
+    simulator.step()  # turns by 3 degrees
+    potential, end = simulator._stepper.potential, simulator._stepper.end
+    potential.follow(end)
+    potential.evaluate(end, False)
+    assert simulator._stepper.solver.speed(*potential.newton_step()) < simulator.scene.solver.tolerance

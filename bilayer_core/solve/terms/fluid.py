@@ -14,7 +14,7 @@ Array = np.ndarray
 
 
 class Drag(Term):
-    """Quadratic drag along directions frozen at the start of the step."""
+    """Quadratic drag, along the directions of the configuration to which Newton moved last."""
 
     names = ("drag",)
     kind = Kind.DISSIPATIVE
@@ -26,9 +26,12 @@ class Drag(Term):
 
     def start_step(self, context: StepContext) -> None:
         super().start_step(context)
+        self.follow(context.start)
+
+    def follow(self, at: Configuration) -> bool:
         before, after = self.model.drag_edge.T
-        start = context.start
-        lag_directions(self.model.drag_node, before, after, start.tangent, start.director1, self._direction)
+        lag_directions(self.model.drag_node, before, after, at.tangent, at.director1, self._direction)
+        return True
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
         model, context = self.model, self.context
