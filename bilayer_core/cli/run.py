@@ -27,7 +27,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--dt", metavar="TIME", help="Time step.")
 @click.option("--model", metavar="NAME", help="auto or two_rod.")
 @click.option("--dimension", metavar="D", help="auto or 3.")
-@click.option("--integrator", metavar="NAME", help="auto or implicit_euler.")
+@click.option("--integrator", metavar="NAME", help="auto, implicit_euler, sdirk2 or implicit_midpoint.")
 @click.option("--tolerance", metavar="SPEED", help="Largest velocity correction that a step may leave.")
 @set_option
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")

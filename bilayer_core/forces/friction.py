@@ -145,9 +145,10 @@ def friction(
     threshold,
     radius,
     position,
-    start_position,
+    origin,
     carrier_body,
     turn,
+    origin_turn,
     gradient_out,
     body_gradient_out,
     hessian_out,
@@ -165,15 +166,15 @@ def friction(
     coefficient : Array
         μ₊, μ₋, μ_s of each carrier, the first of a pair counts, shape (n_carrier, 3).
     step_length : float
-        h [s].
+        h [s], from the origin.
     threshold : float
         Speed below which friction sticks softly, ε_v [m/s].
-    radius, position, start_position : Array
-        Of carriers now and at the start of the step [m].
+    radius, position, origin : Array
+        Of carriers; where they are, and were at the origin of the stage [m].
     carrier_body : Array
         Free body whose ball the carrier is, −1 if none, shape (n_carrier,).
-    turn : Array
-        Rotation of each free body since the start of the step, R Rₙᵀ, shape (n_free, 3, 3).
+    turn, origin_turn : Array
+        Rotation of each free body, now and at the origin, from its start of the step: R Rₙᵀ, R̄ Rₙᵀ, (n_free, 3, 3).
     gradient_out, hessian_out : Array
         Of carriers, shapes (n_carrier, 3), (n_carrier, 3, 3) (upper triangle); added to.
     body_gradient_out, body_hessian_out : Array
@@ -185,6 +186,7 @@ def friction(
     energy = 0.0
     arm_i = np.empty(3)
     arm_j = np.empty(3)
+    origin_arm = np.empty(3)
     u = np.empty(3)
     g = np.empty(3)
     q = np.empty(3)
@@ -198,16 +200,14 @@ def friction(
         bi = carrier_body[i]
         bj = carrier_body[j] if j >= 0 else -1
         _arm(i, bi, -1.0, radius, normal, k, turn, arm_i)
+        _arm(i, bi, -1.0, radius, normal, k, origin_turn, origin_arm)
         for m in range(3):
-            u[m] = position[i, m] - start_position[i, m] + arm_i[m]
-            if bi >= 0:
-                u[m] += radius[i] * normal[k, m]
+            u[m] = position[i, m] - origin[i, m] + (arm_i[m] - origin_arm[m])
         if j >= 0:
             _arm(j, bj, 1.0, radius, normal, k, turn, arm_j)
+            _arm(j, bj, 1.0, radius, normal, k, origin_turn, origin_arm)
             for m in range(3):
-                u[m] -= position[j, m] - start_position[j, m] + arm_j[m]
-                if bj >= 0:
-                    u[m] += radius[j] * normal[k, m]
+                u[m] -= position[j, m] - origin[j, m] + (arm_j[m] - origin_arm[m])
         forward = u[0] * axis[k, 0] + u[1] * axis[k, 1] + u[2] * axis[k, 2]
         across[0] = normal[k, 1] * axis[k, 2] - normal[k, 2] * axis[k, 1]
         across[1] = normal[k, 2] * axis[k, 0] - normal[k, 0] * axis[k, 2]

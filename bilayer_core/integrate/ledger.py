@@ -32,18 +32,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rotation import rotation_matrix
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.potential import IncrementalPotential
 from ..solve.terms.fluid import survey_fluid
-from ..solve.terms.term import Kind, StepContext
-from .motion import Gradient, Motion, displacement, of_prescribed, velocity
+from ..solve.terms.term import Kind
+from .motion import Gradient, Motion, displacement, momentary_context, of_prescribed, velocity
 from .observe import kinetic_energy
 
 Array = np.ndarray
-VELOCITY_STEP = 1e-6  # over which potentials see a velocity as a displacement [s]; rounding makes 1e-10 m/s of it
 
 
 @dataclass(frozen=True)
@@ -179,8 +177,8 @@ class EnergyLedger:
         at.take_state(state, state.body_position)
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
-        potential.start_step(_context(at, at, eigenstrain, load_factor))
-        step = _context(at, self._origin(at, state, moving), eigenstrain, load_factor)
+        step = momentary_context(model, at, state, eigenstrain, load_factor)
+        potential.start_step(step)
         energy, gradient, power = {}, {}, {}
         for term, name, value in potential.one_by_one(at, step):
             self._kinds[name] = term.kind
@@ -202,29 +200,3 @@ class EnergyLedger:
             gradient=gradient,
             power=power,
         )
-
-    def _origin(self, at: Configuration, state: State, moving: Motion) -> Configuration:
-        """Where everything was `VELOCITY_STEP` ago, had it moved with the present velocities."""
-        origin = Configuration(self._model)
-        origin.take_state(state, state.body_position)
-        origin.carrier[:] = at.carrier - VELOCITY_STEP * moving.carrier
-        origin.turn[:] = -VELOCITY_STEP * state.spin
-        origin.body_position[:] = at.body_position - VELOCITY_STEP * moving.body[:, :3]
-        for b in range(self._model.free_count):
-            origin.body_rotation[b] = rotation_matrix(-VELOCITY_STEP * moving.body[b, 3:]) @ at.body_rotation[b]
-        return origin
-
-
-def _context(at: Configuration, origin: Configuration, eigenstrain: Array, load_factor: Array) -> StepContext:
-    """A step of `VELOCITY_STEP` from `origin`; inertia, whose predictions it lacks, is not evaluated in it."""
-    return StepContext(
-        length=VELOCITY_STEP,
-        start=origin,
-        predicted_position=at.position,
-        predicted_turn=at.turn,
-        predicted_body_position=at.body_position,
-        predicted_body_rotation=at.body_rotation,
-        eigenstrain=eigenstrain,
-        load_factor=load_factor,
-        fluid_momentum=np.zeros((0, 3)),
-    )

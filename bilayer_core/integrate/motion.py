@@ -6,14 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rotation import rotation_vector
+from ..kinematics.rotation import rotation_matrix, rotation_vector
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
-from ..solve.terms.term import Accumulators
+from ..solve.terms.term import Accumulators, StepContext
 
 Array = np.ndarray
 PARTS = ("node", "edge", "pair", "body", "carrier")
+MOMENT = 1e-6
+"""Time over which potentials see a velocity as a displacement [s]; rounding makes 1e-10 m/s of it."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,34 @@ def velocity(model: Model, at: Configuration, state: State) -> Motion:
     spin = np.where((model.wall_free >= 0)[:, None], state.body_angular_velocity[model.wall_body], 0.0)
     wall = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
     return compose(model, carrier, state.spin, wall, body)
+
+
+def momentary_context(
+    model: Model, at: Configuration, state: State, eigenstrain: Array, load_factor: Array
+) -> StepContext:
+    """A step so short that nothing changes in it but what moves: forces at a state, with its velocities.
+
+    Inertia is at rest in it: it has nothing to ask for.
+    """
+    moving = velocity(model, at, state)
+    rotation = np.empty_like(at.body_rotation)
+    for b in range(model.free_count):
+        rotation[b] = rotation_matrix(-MOMENT * moving.body[b, 3:]) @ at.body_rotation[b]
+    return StepContext(
+        length=MOMENT,
+        start=at,
+        origin_carrier=at.carrier - MOMENT * moving.carrier,
+        origin_turn=at.turn - MOMENT * state.spin,
+        origin_body_position=at.body_position - MOMENT * moving.body[:, :3],
+        origin_body_rotation=rotation,
+        origin_fluid_momentum=np.zeros((model.node_count if len(model.fluid_mass) else 0, 3)),
+        predicted_position=at.position,
+        predicted_turn=at.turn,
+        predicted_body_position=at.body_position,
+        predicted_body_rotation=at.body_rotation,
+        eigenstrain=eigenstrain,
+        load_factor=load_factor,
+    )
 
 
 def of_prescribed(model: Model, motion: Motion) -> Motion:

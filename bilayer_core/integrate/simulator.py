@@ -20,6 +20,7 @@ from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observe
 from .frame import Description, Frame
+from .integrators import INTEGRATORS
 from .ledger import EnergyLedger
 from .statistics import RunStatistics, center_of_mass, largest_row
 from .stepper import Stepper, StepReport
@@ -123,7 +124,12 @@ class Simulator:
         self.model = build_model(scene)
         solver = scene.solver
         self._stepper = Stepper(
-            self.model, self.dt, solver.tolerance, solver.max_newton_iterations, solver.max_halvings
+            self.model,
+            INTEGRATORS[self.plan.integrator],
+            self.dt,
+            solver.tolerance,
+            solver.max_newton_iterations,
+            solver.max_halvings,
         )
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = initial_state(self.model)

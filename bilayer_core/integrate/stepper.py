@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +12,15 @@ import numpy as np
 from ..errors import SimulationError
 from ..model.model import Model, body_displacement
 from ..model.state import State
+from ..scene.schedule import value_before
 from ..scene.transduction import follow, free_strain
 from ..solve.configuration import Configuration
-from ..solve.newton import NewtonReport, NewtonSolver
+from ..solve.newton import NewtonReport, NewtonSolver, NewtonStatus
 from ..solve.potential import IncrementalPotential
-from . import implicit_euler
+from ..solve.terms.term import StepContext
+from .method import Method
+from .motion import momentary_context
+from .stages import Point, combine, end_point, predict, start_point, write_state
 
 if TYPE_CHECKING:
     from .ledger import EnergyLedger
@@ -46,6 +52,20 @@ class StepReport:
     residual: float
 
 
+@dataclass(frozen=True)
+class _Drive:
+    """Values of stimuli, what the laws made of them, eigenstrain of edges and factors of loads at one time."""
+
+    stimulus: Array
+    transduction: Array
+    eigenstrain: Array
+    load_factor: Array
+
+
+def _value(value: Callable[[float], float], time: float, ended: float) -> float:
+    return value_before(value, time, ended) if ended > 0.0 else value(time)
+
+
 class Stepper:
     """Advances a `State` by nominal steps dt, halving where Newton fails and doubling again where it succeeds.
 
@@ -59,8 +79,11 @@ class Stepper:
         What keeps the energy budget, if anything does.
     """
 
-    def __init__(self, model: Model, dt: float, tolerance: float, max_iterations: int, max_halvings: int):
+    def __init__(
+        self, model: Model, method: Method, dt: float, tolerance: float, max_iterations: int, max_halvings: int
+    ):
         self.model = model
+        self.method = method
         self.dt = dt
         self.max_halvings = max_halvings
         self.potential = IncrementalPotential(model)
@@ -84,10 +107,13 @@ class Stepper:
             )
         return position
 
-    def stimulus_at(self, state: State, time: float) -> Array:
-        """Value of each channel at `time`: that set from outside, or the schedule's, shape (n_channel,)."""
-        scheduled = np.array([channel.schedule.value(time) for channel in self._channels])
-        return np.where(np.isnan(state.override), scheduled, state.override)
+    def stimulus_at(self, state: State, time: float, ended: float = 0.0) -> Array:
+        """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's.
+
+        At the end of a step of length `ended` [s], a schedule that jumps there still has its value from before.
+        """
+        scheduled = [_value(channel.schedule.value, time, ended) for channel in self._channels]
+        return np.where(np.isnan(state.override), np.array(scheduled, dtype=float), state.override)
 
     def eigenstrain_of(self, transduction: Array) -> Array:
         """Eigenstrain of each edge from the filtered stimuli, shape (n_edge,)."""
@@ -96,21 +122,21 @@ class Stepper:
         total = np.bincount(model.driven_edge, strain[model.driven_law], model.edge_count)
         return total.astype(float, copy=False)  # whole numbers if nothing is driven
 
-    def load_factor(self, time: float) -> Array:
-        """Factor of each load at `time`, shape (n_load,)."""
-        return np.array([load.factor(time) for load in self.model.scene.loads], dtype=float)
+    def load_factor(self, time: float, ended: float = 0.0) -> Array:
+        """Factor of each load at `time`, at the end of a step of length `ended` [s], shape (n_load,)."""
+        return np.array([_value(load.factor, time, ended) for load in self.model.scene.loads], dtype=float)
 
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
         time = float(state.step[0]) * self.dt
-        self._start.take_state(state, state.body_position)
         self.end.take_state(state, state.body_position)
         self.stimulus = self.stimulus_at(state, time)
         self.eigenstrain = self.eigenstrain_of(state.transduction)
-        still = State(**{**vars(state), "velocity": np.zeros_like(state.velocity), "spin": np.zeros_like(state.spin)})
-        self.potential.start_step(
-            implicit_euler.predict(self.model, still, self._start, self.dt, self.eigenstrain, self.load_factor(time))
-        )
+        self._look_at(state, self.eigenstrain, self.load_factor(time))
+
+    def _look_at(self, state: State, eigenstrain: Array, load_factor: Array) -> None:
+        """Evaluate the potential at `end` with the velocities of the state."""
+        self.potential.start_step(momentary_context(self.model, self.end, state, eigenstrain, load_factor))
         self.potential.evaluate(self.end, False)
 
     def advance(self, state: State) -> StepReport:
@@ -160,35 +186,92 @@ class Stepper:
 
     def _attempt(self, state: State, h: float, time: float) -> NewtonReport:
         """Try one part of length `h` [s] that ends at `time` [s]; `state` changes only if it converged."""
-        stimulus = self.stimulus_at(state, time)
+        model, method = self.model, self.method
+        self._start.take_state(state, state.body_position)
+        first = start_point(model, state, self._start)
+        first_stimulus = self.stimulus_at(state, time - h)
+        turned, length = np.zeros(model.edge_count), method.diagonal * h
+        stages: list[tuple[Point, Point]] = []
+        iterations = factorisations = backtracks = 0
+        residual = 0.0
+        for node, couplings in zip(method.nodes, method.couplings, strict=True):
+            weights = [coupling / method.diagonal for coupling in couplings]
+            origin = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
+            drive = self._drive(state, first_stimulus, time - h, node * h)
+            context = predict(model, origin, self._start, turned, length, drive.eigenstrain, drive.load_factor)
+            body_position = self.body_positions(state, time - (1.0 - node) * h)
+            report = self._solve(context, body_position)
+            iterations += report.iterations
+            factorisations += report.factorisations
+            backtracks += report.backtracks
+            if not report.converged:
+                return replace(report, iterations=iterations, factorisations=factorisations, backtracks=backtracks)
+            residual = max(residual, report.residual)
+            stages.append((origin, end_point(model, context, origin, turned, self.end, body_position)))
+            turned = stages[-1][1].turn
+            if len(stages) < len(method.nodes):
+                self._start, self.end = self.end, self._start
+                self._start.turn[:] = 0.0
+        report = NewtonReport(NewtonStatus.CONVERGED, iterations, factorisations, residual, backtracks)
+        origin, last = stages[-1]
+        prescribed_velocity = (last.body_position - origin.body_position) / length
+        if method.weights is not None:
+            weights = [weight / method.diagonal for weight in method.weights]
+            last = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
+            drive = self._drive(state, first_stimulus, time - h, h)
+            prescribed = model.bodies.free_index < 0
+            last.body_position[prescribed] = self.body_positions(state, time)[prescribed]
+            if not self._go_beyond(last, turned):
+                return replace(report, status=NewtonStatus.BEYOND, residual=math.inf)
+        write_state(model, state, last, self.end, prescribed_velocity)
+        if method.weights is not None:
+            self._look_at(state, drive.eigenstrain, drive.load_factor)
+        state.transduction[:] = drive.transduction
+        self.stimulus, self.eigenstrain = drive.stimulus, drive.eigenstrain
+        if self.ledger is not None:
+            self.ledger.record(state, drive.eigenstrain, drive.load_factor, h)
+        return report
+
+    def _drive(self, state: State, first_stimulus: Array, begin: float, elapsed: float) -> _Drive:
+        """What acts from outside `elapsed` [s] after `begin` [s], the start of a step."""
+        model = self.model
+        stimulus = self.stimulus_at(state, begin + elapsed, elapsed)
         transduction = state.transduction
         if len(transduction):
-            target = stimulus[self.model.law_channel]
-            transduction = follow(transduction, target, self.model.law_rising, self.model.law_falling, h)
-        eigenstrain = self.eigenstrain_of(transduction)
-        self._start.take_state(state, state.body_position)
-        context = implicit_euler.predict(self.model, state, self._start, h, eigenstrain, self.load_factor(time))
+            ends = first_stimulus[model.law_channel], stimulus[model.law_channel]
+            transduction = follow(transduction, *ends, model.law_rising, model.law_falling, elapsed)
+        load_factor = self.load_factor(begin + elapsed, elapsed)
+        return _Drive(stimulus, transduction, self.eigenstrain_of(transduction), load_factor)
+
+    def _solve(self, context: StepContext, body_position: Array) -> NewtonReport:
+        """Solve a stage at whose end prescribed bodies are at `body_position` [m]; its result is `end`."""
+        model = self.model
         self.potential.start_step(context)
-        body_position = self.body_positions(state, time)
         self._target.place_prescribed(body_position)
-        held = self.model.attached_body
-        self._target.position[self.model.attached_node] = body_position[held] + self.model.attached_position
+        self._target.position[model.attached_node] = body_position[model.attached_body] + model.attached_position
         report = self.solver.first_guess(context, self._target, self.end)
         if report is not None:
             return report
         report, end = self.solver.minimise(self.end, self._trial)
         if end is not self.end:
             self.end, self._trial = end, self.end
-        if report.converged:
-            implicit_euler.accept(self.model, state, context, self.end)
-            state.transduction[:] = transduction
-            prescribed = self.model.bodies.free_index < 0
-            state.body_velocity[prescribed] = (body_position - state.body_position)[prescribed] / h
-            state.body_position[prescribed] = body_position[prescribed]
-            self.stimulus, self.eigenstrain = stimulus, eigenstrain
-            if self.ledger is not None:
-                self.ledger.record(state, eigenstrain, context.load_factor, h)
         return report
+
+    def _go_beyond(self, last: Point, turned: Array) -> bool:
+        """Move `end` from the last stage on to the end of the step; false if a surface is in the way."""
+        begin, end, free = self.end, self._trial, self.model.bodies.body_of_free
+        end.carrier[:] = last.carrier
+        end.body_position[:], end.body_rotation[:] = last.body_position[free], last.rotation
+        end.place_prescribed(last.body_position)
+        end.place_held()
+        end.carry_frames(begin, last.turn - turned)
+        end.joint_strain[:, 2] = begin.joint_strain[:, 2]
+        if self.solver.bound(begin, end.carrier - begin.carrier)[0] < 1.0:
+            return False
+        if not math.isfinite(self.potential.evaluate(end, False)):
+            return False
+        self.end, self._trial = end, begin
+        return True
 
     def _explain(self, report: NewtonReport, time: float, h: float) -> str:
         text = f"{report.status.value} in the step to t = {time:.6g} s, tried down to {h:.3g} s"

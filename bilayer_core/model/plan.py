@@ -12,7 +12,7 @@ from .validity import validity_warnings
 
 MODELS = ("two_rod",)
 DIMENSIONS = (3,)
-INTEGRATORS = ("implicit_euler",)
+INTEGRATORS = ("implicit_euler", "sdirk2", "implicit_midpoint")
 
 
 @dataclass(frozen=True)

@@ -22,9 +22,7 @@ _FLOAT32_FIELD = 7  # sensor_msgs/PointField.FLOAT32
 
 def state_labels(description: Description) -> list[tuple[str, int]]:
     """Labels ``name:shape`` of the parts of a state, for example ``positions:393x3``, with their sizes."""
-    return [
-        (f"{name}:{'x'.join(map(str, shape))}", int(np.prod(shape))) for name, shape in description.state_layout
-    ]
+    return [(f"{name}:{'x'.join(map(str, shape))}", int(np.prod(shape))) for name, shape in description.state_layout]
 
 
 def clock_template() -> Template:

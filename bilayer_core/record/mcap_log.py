@@ -180,9 +180,7 @@ class _LogFile:
                 if spec.type not in schemas:
                     text = schema_text(spec.type).encode()
                     schemas[spec.type] = self._writer.register_schema(spec.type, "ros2msg", text)
-                self._topics[spec.name] = self._writer.register_channel(
-                    spec.full_name(), "cdr", schemas[spec.type], {}
-                )
+                self._topics[spec.name] = self._writer.register_channel(spec.full_name(), "cdr", schemas[spec.type], {})
             self._writer.flush()
             self._sync()
         except BaseException:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
@@ -166,3 +167,20 @@ def faults_of_times(times: list[float], key: tuple[str], values: list) -> list[F
     if len(times) != len(values):
         faults.append((key, f"{len(values)} entries", f"must be as many as `times`, {len(times)}"))
     return faults
+
+
+NEARLY = 1e-3
+"""Part of a step by which a value is taken before its end to see a jump there; more than the early switch of waves."""
+JUMP = 1e3
+"""Ratio of two successive changes from which the second is a jump."""
+
+
+def value_before(value: Callable[[float], float], t: float, h: float) -> float:
+    """Value at the end `t` [s] of a step of length `h` [s]: the limit from within the step where it jumps at `t`.
+
+    A step that ends at a jump has its own value to its end; the next one begins with the new value.
+    """
+    here, before, earlier = value(t), value(t - NEARLY * h), value(t - 2.0 * NEARLY * h)
+    if abs(here - before) > JUMP * abs(before - earlier):
+        return 2.0 * before - earlier
+    return here

@@ -5,32 +5,37 @@ from __future__ import annotations
 import numpy as np
 
 
-def follow(filtered: np.ndarray, target: np.ndarray, rising: np.ndarray, falling: np.ndarray, dt: float) -> np.ndarray:
-    """First-order lag over one step, exact for a stimulus that is held over the step.
+def follow(
+    filtered: np.ndarray, first: np.ndarray, last: np.ndarray, rising: np.ndarray, falling: np.ndarray, dt: float
+) -> np.ndarray:
+    """First-order lag over a time, exact for a stimulus that is linear over it.
 
-    The solution of  T dy/dt = u - y  is  y(t + dt) = y + (1 - exp(-dt/T)) (u - y); it is stable for every dt
-    and tends to y = u for T = 0. It never crosses u, so T is one of the two throughout.
+    The solution of  T dy/dt = u - y  for u from u₀ to u₁ is, with x = dt/T and φ = (1 - exp(-x))/x,
+
+        y(t + dt) = y + (1 - exp(-x)) (u₀ - y) + (1 - φ) (u₁ - u₀)
+
+    It is stable for every dt and tends to u₁ for T = 0. T is one of the two time constants throughout.
 
     Parameters
     ----------
     filtered : ndarray
-        y at the start of the step, in the unit of the stimulus.
-    target : ndarray
-        u, the stimulus held over the step, of the same shape.
+        y at the start, in the unit of the stimulus.
+    first, last : ndarray
+        u₀ and u₁, at the start and the end, of the same shape.
     rising, falling : ndarray
-        T >= 0 [s] where u > y and elsewhere, of the same shape.
+        T >= 0 [s] where u₁ > y and elsewhere, of the same shape.
     dt : float
-        Length of the step > 0 [s].
+        Length of the time > 0 [s].
 
     Returns
     -------
     ndarray
-        y at the end of the step.
+        y at the end.
     """
-    way = np.asarray(target) - filtered
     with np.errstate(divide="ignore"):
-        part = -np.expm1(-dt / np.where(way > 0.0, rising, falling))
-    return filtered + part * way
+        x = dt / np.where(last > filtered, rising, falling)
+    part = -np.expm1(-x)
+    return filtered + part * (first - filtered) + (1.0 - part / x) * (last - first)
 
 
 def free_strain(filtered: np.ndarray, gain: np.ndarray, reference: np.ndarray, saturation: np.ndarray) -> np.ndarray:

@@ -58,6 +58,7 @@ class NewtonStatus(Enum):
     LINE_SEARCH = "no step along the Newton direction lowers the potential"
     INDEFINITE = "the Newton matrix cannot be made positive definite"
     NOT_FINITE = "the potential or its gradient is not finite"
+    BEYOND = "the end of the step, beyond its last stage, lies behind a surface"
     BLOCKED = "prescribed motion would push a surface through another one"
 
 

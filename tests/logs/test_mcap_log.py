@@ -157,9 +157,7 @@ while True:
 def test_a_log_of_a_killed_process_is_readable_up_to_its_last_second(tmp_path, root):
     path = tmp_path / "run.mcap"
     environment = {**os.environ, "PYTHONPATH": f"{root}{os.pathsep}{root / 'tests'}"}
-    writer = subprocess.Popen(
-        [sys.executable, "-c", KILLED, path], env=environment, stdout=subprocess.PIPE, text=True
-    )
+    writer = subprocess.Popen([sys.executable, "-c", KILLED, path], env=environment, stdout=subprocess.PIPE, text=True)
     with writer:
         observed = []
         for line in writer.stdout:
@@ -251,9 +249,7 @@ class FullDisk:
 
 
 def test_a_disk_that_fills_up_stops_the_run_and_is_told_again_at_the_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(
-        mcap_log, "open", lambda path, mode: FullDisk(path.open(mode), 300_000), raising=False
-    )
+    monkeypatch.setattr(mcap_log, "open", lambda path, mode: FullDisk(path.open(mode), 300_000), raising=False)
     recorder = McapRecorder(tmp_path / "run.mcap")
     recorder.start(synthetic_run.description())
     with pytest.raises(SimulationError, match=r"run\.mcap could not be written: No space left") as raised:

@@ -5,7 +5,8 @@ import pytest
 from sample_scenes import ball, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.integrate import implicit_euler
+from bilayer_core.integrate.integrators import INTEGRATORS
+from bilayer_core.integrate.motion import momentary_context
 from bilayer_core.integrate.stepper import Stepper
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
@@ -24,12 +25,14 @@ def bilayer(stations=9, torsion="laminate", length=0.02):
 def at_rest(scene_dict):
     """Model, stepper, and a context in which inertia asks for nothing."""
     model = build_model(load_scene(scene_dict))
-    stepper = Stepper(model, 1e3, 1e-6, 50, 0)  # so long a step that inertia does not count
+    stepper = Stepper(
+        model, INTEGRATORS["implicit_euler"], 1e3, 1e-6, 50, 0
+    )  # so long a step that inertia does not count
     state = initial_state(model)
     start = Configuration(model)
     start.take_state(state, state.body_position)
     undriven = np.zeros(model.edge_count), np.zeros(0)
-    stepper.potential.start_step(implicit_euler.predict(model, state, start, 1e3, *undriven))
+    stepper.potential.start_step(momentary_context(model, start, state, *undriven))
     return model, stepper.potential, start
 
 

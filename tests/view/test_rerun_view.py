@@ -116,9 +116,7 @@ def test_the_recording_holds_every_strand_body_and_curve(viewer):
     expected |= {"/plots/stimulus/humidity", "/plots/contact_force/on_ball", "/plots/height/robot", "/summary"}
     expected |= {"/plots/energy/bend", "/plots/solver/smallest_gap"}
     assert expected <= found
-    timeline = next(
-        item for item in viewer.client.get_state().recordings[0].timelines if item.name == "sim_time"
-    )
+    timeline = next(item for item in viewer.client.get_state().recordings[0].timelines if item.name == "sim_time")
     assert (timeline.time_type, timeline.start, timeline.end) == ("duration", 0, 4 * 10**9)
 
 

@@ -74,11 +74,12 @@ class Friction(Term):
         self._normal = np.zeros((room, 3))
         self._axis = np.zeros((room, 3))
         self._count = 0
-        self._turn = np.zeros((model.free_count, 3, 3))
+        self._turn, self._origin_turn = np.zeros((2, model.free_count, 3, 3))
 
     def start_step(self, context: StepContext) -> None:
         super().start_step(context)
         contact, carriers, start = self.model.scene.contact, self.model.carriers, context.start
+        self._origin_turn[:] = context.origin_body_rotation @ start.body_rotation.transpose(0, 2, 1)
         self._count = lag_friction(
             contact.barrier_distance,
             contact.stiffness,
@@ -108,9 +109,9 @@ class Friction(Term):
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
         carriers, contact, out = self.model.carriers, self.model.scene.contact, self.out
-        start, matrix = self.context.start, self.out.matrix
+        context, matrix = self.context, self.out.matrix
         for b in range(self.model.free_count):
-            self._turn[b] = at.body_rotation[b] @ start.body_rotation[b].T
+            self._turn[b] = at.body_rotation[b] @ context.start.body_rotation[b].T
         out.energy["friction"] = friction(
             self._count,
             self._first,
@@ -120,13 +121,14 @@ class Friction(Term):
             self._normal,
             self._axis,
             carriers.friction,
-            self.context.length,
+            context.length,
             contact.friction.speed_threshold,
             carriers.radius,
             at.carrier,
-            start.carrier,
+            context.origin_carrier,
             carriers.free_body,
             self._turn,
+            self._origin_turn,
             out.carrier,
             out.body,
             matrix.carrier_hessian,

@@ -42,7 +42,7 @@ class Drag(Term):
             self._flow,
             context.length,
             at.position,
-            context.start.position,
+            context.origin_position,
             self.out.node,
             self.out.matrix.carrier_hessian,
             with_hessian,
@@ -69,7 +69,7 @@ class AddedMass(Term):
         self.follow(context.start)
 
     def follow(self, at: Configuration) -> bool:
-        velocity = (at.position - self.context.start.position) / self.context.length
+        velocity = (at.position - self.context.origin_position) / self.context.length
         survey_fluid(self.model, at, velocity, self._still, self._momentum, self._shape_gradient)
         self._direction1[:], self._direction2[:] = at.director1, at.director2
         return True
@@ -82,11 +82,11 @@ class AddedMass(Term):
             self._direction1,
             self._direction2,
             self._shape_gradient,
-            context.fluid_momentum,
+            context.origin_fluid_momentum,
             self._flow,
             context.length,
             at.position,
-            context.start.position,
+            context.origin_position,
             at.turn,
             context.predicted_turn,
             out.node,

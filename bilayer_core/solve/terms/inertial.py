@@ -45,10 +45,10 @@ class Damping(Term):
     kind = Kind.DISSIPATIVE
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
-        model, start = self.model, self.context.start
-        factor = model.scene.damping.mass / self.context.length
-        energy = node_spring(model.node_mass, factor, at.position, start.position, self.out.node)
-        energy += angle_spring(model.spin_inertia, factor, at.turn, start.turn, self.out.edge)
+        model, context = self.model, self.context
+        factor = model.scene.damping.mass / context.length
+        energy = node_spring(model.node_mass, factor, at.position, context.origin_position, self.out.node)
+        energy += angle_spring(model.spin_inertia, factor, at.turn, context.origin_turn, self.out.edge)
         self.out.energy["damping"] = energy
 
 

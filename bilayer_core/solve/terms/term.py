@@ -16,37 +16,54 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class StepContext:
-    """What is frozen over a step.
+    """What is frozen over a stage of a step: it reads as an implicit Euler step from an origin (`integrate.method`).
+
+    The velocity of whatever is at q is (q − origin)/length.
 
     Attributes
     ----------
     length : float
-        h [s].
+        γ h [s].
     start : Configuration
-        At the start of the step.
+        From which Newton begins, where frames were last re-based, and where contacts for friction are looked up.
+    origin_carrier : Array
+        Positions of carriers at the origin [m], shape (n_carrier, 3); its first rows, `origin_position`, are the nodes.
+    origin_turn : Array
+        Of edges, counted from `start` [rad], shape (n_edge,).
+    origin_body_position, origin_body_rotation : Array
+        Of free bodies, shapes (n_free, 3), (n_free, 3, 3).
+    origin_fluid_momentum : Array
+        P̄ of the fluid at nodes [N s], shape (n_node, 3); (0, 3) without added mass.
     predicted_position : Array
         x̃ of nodes [m], shape (n_node, 3).
     predicted_turn : Array
-        Turn of edges that inertia prefers [rad], shape (n_edge,).
+        Turn of edges that inertia prefers, counted from `start` [rad], shape (n_edge,).
     predicted_body_position, predicted_body_rotation : Array
         X̃ [m] and R̃ of free bodies, shapes (n_free, 3), (n_free, 3, 3).
-    fluid_momentum : Array
-        P̄ of the fluid at nodes [N s], shape (n_node, 3); (0, 3) without added mass.
     eigenstrain : Array
-        η of each edge at the end of the step, shape (n_edge,).
+        η of each edge at the time of the stage, shape (n_edge,).
     load_factor : Array
         Factor of each load of the scene there, shape (n_load,).
     """
 
     length: float
     start: Configuration
+    origin_carrier: Array
+    origin_turn: Array
+    origin_body_position: Array
+    origin_body_rotation: Array
+    origin_fluid_momentum: Array
     predicted_position: Array
     predicted_turn: Array
     predicted_body_position: Array
     predicted_body_rotation: Array
-    fluid_momentum: Array
     eigenstrain: Array
     load_factor: Array
+
+    @property
+    def origin_position(self) -> Array:
+        """Of nodes [m], shape (n_node, 3)."""
+        return self.origin_carrier[: len(self.predicted_position)]
 
 
 class Accumulators:

@@ -1,0 +1,10 @@
+"""The table of integrators. A new one is a file with its `Method`, a line here, and its name in `scene.config`."""
+
+from __future__ import annotations
+
+from . import implicit_euler, implicit_midpoint, sdirk2
+from .method import Method
+
+INTEGRATORS: dict[str, Method] = {
+    module.METHOD.name: module.METHOD for module in (implicit_euler, sdirk2, implicit_midpoint)
+}

@@ -1,0 +1,229 @@
+"""Origins and predictions of the stages of a step, and where the step ends.
+
+Positions and momenta advance as `integrate.method` says. What is no vector needs a word:
+
+- A rotation advances along rotation vectors: R̄ = exp(h a f₁) … Rₙ with f = log(R R̄ᵀ)/(γ h) of each earlier stage. Over
+  the stage, inertia prefers R̃ = exp(γ h ω̃) R̄ with I(R̃) ω̃ = L̄: without a moment, the angular momentum L stays what
+  it was. Given the moment that acts at the end of the stage, L = L̄ + γ h × moment and ω = I(R)⁻¹ L. What ω differs by
+  from the rotation's own log(R R̄ᵀ)/(γ h) is of second order.
+- The angle of an edge counts from the start of the stage, where its frame was last re-based (`StepContext.start`); its
+  origin lies before or behind that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..kinematics.rotation import rotation_matrix, rotation_vector
+from ..model.model import Model
+from ..model.state import State
+from ..solve.configuration import Configuration
+from ..solve.terms.fluid import momentum_of_fluid
+from ..solve.terms.term import StepContext
+
+Array = np.ndarray
+SPIN_ITERATIONS = 50
+SPIN_CHANGE = 1e-15
+"""Relative change of ω̃ at which its iteration ends."""
+
+
+@dataclass
+class Point:
+    """Positions and momenta at the start of a step, at the origin of a stage, or at the end of one.
+
+    Attributes
+    ----------
+    carrier : Array
+        Positions of carriers, nodes first [m], shape (n_carrier, 3).
+    body_position : Array
+        Of all bodies [m], shape (n_body, 3).
+    turn : Array
+        Of edges about their tangents since the start of the step [rad], shape (n_edge,).
+    velocity, spin, body_velocity : Array
+        Of nodes [m/s], edges [rad/s] and free bodies [m/s].
+    angular_momentum : Array
+        Of free bodies about their mass centres [N m s], shape (n_free, 3).
+    fluid_momentum : Array
+        Of the fluid at nodes [N s], shape (n_node, 3) or (0, 3).
+    rotation : Array
+        Of free bodies, shape (n_free, 3, 3).
+    """
+
+    carrier: Array
+    body_position: Array
+    turn: Array
+    velocity: Array
+    spin: Array
+    body_velocity: Array
+    angular_momentum: Array
+    fluid_momentum: Array
+    rotation: Array
+
+
+VECTORS = tuple(part.name for part in fields(Point) if part.name != "rotation")
+
+
+def start_point(model: Model, state: State, start: Configuration) -> Point:
+    """The start of a step."""
+    free = model.bodies.body_of_free
+    return Point(
+        carrier=start.carrier.copy(),
+        body_position=state.body_position.copy(),
+        turn=np.zeros(model.edge_count),
+        velocity=state.velocity.copy(),
+        spin=state.spin.copy(),
+        body_velocity=state.body_velocity[free],
+        angular_momentum=_times(_inertia(model, start.body_rotation), state.body_angular_velocity[free]),
+        fluid_momentum=momentum_of_fluid(model, start, state.velocity),
+        rotation=start.body_rotation.copy(),
+    )
+
+
+def combine(first: Point, stages: Sequence[tuple[float, Point, Point]]) -> Point:
+    """yₙ + Σ w (yⱼ − ȳⱼ) over (w, ȳⱼ, yⱼ); rotations likewise on their group."""
+    vectors = {name: getattr(first, name).copy() for name in VECTORS}
+    rotation = first.rotation.copy()
+    for weight, origin, end in stages:
+        for name in VECTORS:
+            vectors[name] += weight * (getattr(end, name) - getattr(origin, name))
+        for b in range(len(rotation)):
+            turn = rotation_vector(end.rotation[b] @ origin.rotation[b].T)
+            rotation[b] = rotation_matrix(weight * turn) @ rotation[b]
+    return Point(**vectors, rotation=rotation)
+
+
+def predict(
+    model: Model,
+    origin: Point,
+    start: Configuration,
+    turned: Array,
+    length: float,
+    eigenstrain: Array,
+    load_factor: Array,
+) -> StepContext:
+    """Frozen data of a stage.
+
+    Parameters
+    ----------
+    origin : Point
+    start : Configuration
+        From which the stage is solved: the end of the stage before, or the start of the step.
+    turned : Array
+        Turn of edges from the start of the step to `start` [rad], shape (n_edge,).
+    length : float
+        γ h [s].
+    eigenstrain, load_factor : Array
+        At the time of the stage.
+    """
+    free = model.bodies.body_of_free
+    rotation = np.empty_like(origin.rotation)
+    for b in range(len(rotation)):
+        spin = _spin_without_moment(
+            model.bodies.second_moment[b], origin.rotation[b], origin.angular_momentum[b], length
+        )
+        rotation[b] = rotation_matrix(length * spin) @ origin.rotation[b]
+    return StepContext(
+        length=length,
+        start=start,
+        origin_carrier=origin.carrier,
+        origin_turn=origin.turn - turned,
+        origin_body_position=origin.body_position[free],
+        origin_body_rotation=origin.rotation,
+        predicted_position=origin.carrier[: model.node_count] + length * origin.velocity,
+        predicted_turn=origin.turn - turned + length * origin.spin,
+        predicted_body_position=origin.body_position[free] + length * origin.body_velocity,
+        predicted_body_rotation=rotation,
+        origin_fluid_momentum=origin.fluid_momentum,
+        eigenstrain=eigenstrain,
+        load_factor=load_factor,
+    )
+
+
+def end_point(
+    model: Model, context: StepContext, origin: Point, turned: Array, end: Configuration, body_position: Array
+) -> Point:
+    """The end of a stage that was solved.
+
+    Parameters
+    ----------
+    end : Configuration
+    turned : Array
+        As for `predict`.
+    body_position : Array
+        Of all bodies at the time of the stage, those of prescribed ones count [m], shape (n_body, 3).
+    """
+    h, bodies = context.length, model.bodies
+    position = body_position.copy()
+    position[bodies.body_of_free] = end.body_position
+    velocity = (end.position - context.origin_position) / h
+    momentum = origin.angular_momentum + h * _moment_of_inertia(model, context, end)
+    return Point(
+        carrier=end.carrier.copy(),
+        body_position=position,
+        turn=turned + end.turn,
+        velocity=velocity,
+        spin=(end.turn - context.origin_turn) / h,
+        body_velocity=(end.body_position - context.origin_body_position) / h,
+        angular_momentum=momentum,
+        fluid_momentum=momentum_of_fluid(model, end, velocity),
+        rotation=end.body_rotation.copy(),
+    )
+
+
+def write_state(model: Model, state: State, last: Point, end: Configuration, prescribed_velocity: Array) -> None:
+    """Take the end of a step into the state: positions, frames, velocities; shape of the last (n_body, 3) [m/s]."""
+    free = model.bodies.body_of_free
+    state.velocity[:] = last.velocity
+    state.position[:] = end.position
+    state.director1[:] = end.director1[: model.edge_count]
+    state.spin[:] = last.spin
+    state.twist[:] = end.joint_strain[:, 2]
+    state.body_velocity[:] = prescribed_velocity
+    state.body_velocity[free] = last.body_velocity
+    state.body_position[:] = last.body_position
+    inertia = _inertia(model, end.body_rotation)
+    for place, body in enumerate(free):
+        state.body_angular_velocity[body] = np.linalg.solve(inertia[place], last.angular_momentum[place])
+        state.body_rotation[body] = _orthonormal(end.body_rotation[place])
+
+
+def _inertia(model: Model, rotation: Array) -> Array:
+    """Inertia tensors of free bodies in the world's axes [kg m²], shape (n_free, 3, 3)."""
+    second = model.bodies.second_moment
+    tensor = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+    return rotation @ tensor @ rotation.transpose(0, 2, 1)
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    return np.einsum("bij,bj->bi", matrices, vectors)
+
+
+def _moment_of_inertia(model: Model, context: StepContext, end: Configuration) -> Array:
+    """Moment that acts on each free body at the end of a stage [N m]: the gradient of its inertia (`forces.body`),
+    shape (n_free, 3).
+    """
+    a = context.predicted_body_rotation @ model.bodies.second_moment @ end.body_rotation.transpose(0, 2, 1)
+    axial = np.stack([a[:, 2, 1] - a[:, 1, 2], a[:, 0, 2] - a[:, 2, 0], a[:, 1, 0] - a[:, 0, 1]], axis=1)
+    return -axial / context.length**2
+
+
+def _spin_without_moment(second_moment: Array, rotation: Array, momentum: Array, length: float) -> Array:
+    """ω̃ with I(exp(length ω̃) R̄) ω̃ = L̄ [rad/s], by iteration; at once for a ball."""
+    tensor = np.trace(second_moment) * np.eye(3) - second_moment
+    turned, spin = rotation, np.zeros(3)
+    for _ in range(SPIN_ITERATIONS):
+        previous, spin = spin, np.linalg.solve(turned @ tensor @ turned.T, momentum)
+        if np.abs(spin - previous).max() <= SPIN_CHANGE * np.abs(spin).max():
+            break
+        turned = rotation_matrix(length * spin) @ rotation
+    return spin
+
+
+def _orthonormal(matrix: Array) -> Array:
+    """The rotation matrix nearest to `matrix` to first order in its error: 1.5 R − 0.5 R Rᵀ R (a Newton–Schulz
+    step).
+    """
+    return 1.5 * matrix - 0.5 * matrix @ matrix.T @ matrix
