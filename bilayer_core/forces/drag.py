@@ -53,7 +53,7 @@ def drag(
     flow,
     step_length,
     position,
-    start_position,
+    origin,
     node_gradient_out,
     node_hessian_out,
     with_hessian,
@@ -72,8 +72,8 @@ def drag(
         Velocity of the fluid [m/s], shape (3,).
     step_length : float
         [s]
-    position, start_position : Array
-        Of nodes now and at the start of the step [m], shape (n_node, 3).
+    position, origin : Array
+        Of nodes now and at the origin of the stage [m], shape (n_node, 3).
     node_gradient_out, node_hessian_out : Array
         Shapes (n_node, 3) and (n_node, 3, 3) (upper triangle); added to.
     with_hessian : bool
@@ -84,7 +84,7 @@ def drag(
         for d in range(3):
             speed = 0.0
             for c in range(3):
-                speed += direction[k, d, c] * ((position[i, c] - start_position[i, c]) / step_length - flow[c])
+                speed += direction[k, d, c] * ((position[i, c] - origin[i, c]) / step_length - flow[c])
             size = abs(speed)
             energy += step_length * coefficient[k, d] * size**3 / 6.0
             force = 0.5 * coefficient[k, d] * size * speed

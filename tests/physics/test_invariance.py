@@ -27,9 +27,7 @@ def bilayer(stations=9, torsion="laminate", length=0.02):
 def at_rest(scene_dict):
     """Model, stepper, and a context in which inertia asks for nothing."""
     model = build_model(load_scene(scene_dict))
-    stepper = Stepper(
-        model, INTEGRATORS["implicit_euler"], 1e3, 1e-6, 50, 0
-    )  # so long a step that inertia does not count
+    stepper = Stepper(model, INTEGRATORS["implicit_euler"], 1e3, 1e-6, 50, 0)
     state = initial_state(model)
     start = Configuration(model)
     start.take_state(state, state.body_position)

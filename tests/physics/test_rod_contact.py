@@ -8,7 +8,8 @@ from sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import PenetrationError
-from bilayer_core.integrate import implicit_euler
+from bilayer_core.integrate.integrators import INTEGRATORS
+from bilayer_core.integrate.stages import predict, start_point
 from bilayer_core.integrate.stepper import Stepper
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
@@ -303,7 +304,7 @@ def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hu
     # without elasticity, whose gradient has symmetric differences only up to the holonomy of frames
     stiff = ("axial_stiffness", "joint_stiffness", "pair_stiffness")
     model = replace(model, **{name: 0.0 * getattr(model, name) for name in stiff})
-    stepper = Stepper(model, 1e-5, 1e-9, 50, 0)
+    stepper = Stepper(model, INTEGRATORS["implicit_euler"], 1e-5, 1e-9, 50, 0)
     state, rng = initial_state(model), np.random.default_rng(2)
     start = Configuration(model)
     free = np.setdiff1d(np.arange(model.node_count), model.attached_node)
@@ -313,7 +314,8 @@ def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hu
     start.take_state(state, state.body_position)
     start.carry_frames(start, np.zeros(model.edge_count))
     undriven = np.zeros(model.edge_count), np.zeros(0)
-    stepper.potential.start_step(implicit_euler.predict(model, state, start, 1e-5, *undriven))
+    origin, turned = start_point(model, state, start), np.zeros(model.edge_count)
+    stepper.potential.start_step(predict(model, origin, start, turned, 1e-5, *undriven))
     potential, size = stepper.potential, model.layout.size
     held = (model.layout.node[model.attached_node][:, None] + np.arange(3)).ravel()
     bodies = 6 * model.free_count

@@ -30,5 +30,5 @@ class RodFriction(Term):
     def add(self, at: Configuration, with_hessian: bool) -> None:
         context = self.context
         self.out.energy["rod friction"] = self.out.matrix.rods.friction(
-            at.position, context.start.position, context.length, self.out.carrier
+            at.position, context.origin_position, context.length, self.out.carrier
         )
