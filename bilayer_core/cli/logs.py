@@ -41,7 +41,7 @@ def info(file: str, as_json: bool) -> None:
 @click.option("--web", is_flag=True, help="In a browser.")
 @click.option("--save", metavar="FILE.rrd", help="Write a rerun recording instead of opening the viewer.")
 @click.option("--screenshot", "picture", metavar="FILE.png", help="Write a picture, without a screen.")
-@click.option("--time", "moment", type=Duration(), help="Simulated time of the picture; default: the end.")
+@click.option("--time", "moment", type=Duration(from_zero=True), help="Time of the picture; default: the end.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 def view(file: str, web: bool, save: str | None, picture: str | None, moment: float | None, force: bool) -> None:
     """Show a run in rerun."""

@@ -54,18 +54,21 @@ class VerbGroup(click.Group):
 
 
 class Duration(click.ParamType):
-    """A time above zero, in seconds or with a unit."""
+    """A time above zero, in seconds or with a unit; with `from_zero` zero as well."""
 
     name = "time"
+
+    def __init__(self, from_zero: bool = False):
+        self._from_zero = from_zero
 
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
         """The time [s]."""
         from pydantic import TypeAdapter, ValidationError
 
-        from bilayer_core.scene.units import PositiveTime
+        from bilayer_core.scene.units import NonNegativeTime, PositiveTime
 
         try:
-            return TypeAdapter(PositiveTime).validate_python(value)
+            return TypeAdapter(NonNegativeTime if self._from_zero else PositiveTime).validate_python(value)
         except ValidationError as error:
             fault = error.errors()[0]
             note = f", {fault['ctx']['note']}" if fault["ctx"]["note"] else ""

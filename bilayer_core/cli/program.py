@@ -10,6 +10,7 @@ import click
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
+from bilayer_core.cli.render import render
 from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import check, scenes, schema
 from bilayer_core.errors import BilayerError
@@ -37,7 +38,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, schema, check, run, converge, info, view):
+for verb in (scenes, schema, check, run, converge, info, view, render):
     program.add_command(verb)
 
 

@@ -24,15 +24,7 @@ CHANNEL_COLOURS = (
 
 def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
     """The robot at the left, large, over its legend; curves at the right."""
-    robot = rrb.Spatial3DView(
-        name="Robot",
-        origin="world",
-        background=BACKGROUND,
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
-        ),
-    )
+    robot = _robot(scales)
     legend = rrb.Spatial2DView(
         name="Strain",
         origin="legend",
@@ -47,13 +39,36 @@ def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
         rrb.TimeSeriesView(name=name, origin=f"plots/{group}", plot_legend=rrb.Corner2D.LeftTop)
         for group, name in plots
     ]
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(robot, rrb.Horizontal(legend, text, column_shares=[3, 5]), row_shares=[9, 2]),
-            rrb.Vertical(*curves),
-            column_shares=[5, 3],
+    content = rrb.Horizontal(
+        rrb.Vertical(robot, rrb.Horizontal(legend, text, column_shares=[3, 5]), row_shares=[9, 2]),
+        rrb.Vertical(*curves),
+        column_shares=[5, 3],
+    )
+    return _whole(content, time_panel="collapsed")
+
+
+def robot_alone(run: RunData, scales: Scales) -> rrb.Blueprint:
+    """The robot for pictures; the viewer's notices, at the upper right, appear over the text beside it."""
+    text = rrb.TextDocumentView(name="Run", origin="summary")
+    return _whole(rrb.Horizontal(_robot(scales), text, column_shares=[4, 1]), time_panel="hidden")
+
+
+def _robot(scales: Scales) -> rrb.Spatial3DView:
+    return rrb.Spatial3DView(
+        name="Robot",
+        origin="world",
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="paused"),
+    )
+
+
+def _whole(content: rrb.Container | rrb.View, time_panel: str) -> rrb.Blueprint:
+    return rrb.Blueprint(
+        content,
+        rrb.TimePanel(timeline=TIMELINE, state=time_panel, play_state="paused"),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         auto_views=False,

@@ -17,7 +17,7 @@ from bilayer_core.record.run_data import RunData
 
 def write_rrd(run: RunData, rrd_path: str | Path) -> None:
     """Write a run as a rerun recording with its layout inside. An existing file is replaced."""
-    _require_rerun()
+    require_rerun()
     from bilayer_core.view.rrd_writer import write_recording
 
     write_recording(run, rrd_path)
@@ -50,7 +50,7 @@ class RrdRecorder(MemoryRecorder):
 
     def __init__(self, path: str | Path, rate: float = 50.0, force: bool = False):
         super().__init__(rate)
-        _require_rerun()
+        require_rerun()
         self.path = check_output_path(path, force)
 
     def close(self, complete: bool, termination: str = "") -> None:
@@ -62,7 +62,7 @@ class RrdRecorder(MemoryRecorder):
 
 def open_viewer(path: str | Path, web: bool = False) -> None:
     """Show an ``.rrd`` or ``.mcap`` file in the rerun viewer (or a browser) and wait until it is closed."""
-    _require_rerun()
+    require_rerun()
     from bilayer_core.view.viewer_process import show
 
     with _as_recording(path) as recording:
@@ -74,7 +74,7 @@ def screenshot(path: str | Path, png_path: str | Path, time: float | None = None
 
     Raises InputError naming the missing Debian packages when there is no Vulkan driver.
     """
-    _require_rerun()
+    require_rerun()
     from bilayer_core.view.viewer_process import take_picture
 
     check_output_path(png_path, force=True)
@@ -104,6 +104,6 @@ def _as_recording(path: str | Path) -> Iterator[Path]:
         shutil.rmtree(directory, ignore_errors=True)
 
 
-def _require_rerun() -> None:
+def require_rerun() -> None:
     if importlib.util.find_spec("rerun") is None:
         raise InputError("the viewer is not installed; install it with: pip install 'bilayer_sim_ros[viewer]'")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.colours import STRAIN_MAP, strain_colours
@@ -21,16 +23,17 @@ BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
 HUB_COLOUR = (128, 140, 160)
 ARROW_COLOUR = (64, 224, 148)
 LEGEND_HEIGHT = 14  # pixels of the colour bar
+Layout = Callable[[RunData, Scales], rrb.Blueprint]
 
 
-def write_recording(run: RunData, rrd_path: str | Path) -> None:
+def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = blueprint) -> None:
     """Write `run` to an ``.rrd`` file. InputError if the run holds no frame, or the file cannot be written."""
     if not len(run.times) or not len(run.shape_times):
         raise InputError(f"{run.description.scene_name}: the run holds no frame, there is nothing to show")
     scales = choose_scales(run)
     recording = rr.RecordingStream("bilayer_sim")
     try:
-        recording.save(str(rrd_path), default_blueprint=blueprint(run, scales))
+        recording.save(str(rrd_path), default_blueprint=layout(run, scales))
     except RuntimeError as error:
         raise InputError(f"{rrd_path}: cannot be written: {error}") from error
     recording.send_recording_name(f"{run.description.scene_name}: {run.description.title}")

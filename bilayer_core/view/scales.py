@@ -13,7 +13,8 @@ SMALLEST_STRAIN = 1e-4
 ARROW_SHARE = 0.25  # length of the arrow of the reference force, in sizes of the robot
 SHOWN_SHARE = 0.005  # forces below this share of the reference force have no arrow
 VIEW_DIRECTION = np.array([0.62, -0.72, 0.30])  # from what is looked at to the eye
-VIEW_SLOPE = 0.44  # tangent of the angle over and under the line of sight that is filled; the viewer shows 0.52
+SHOWN_SLOPE = 0.52  # tangent of the angle over and under the line of sight that the viewer shows
+VIEW_SLOPE = 0.44  # the part of it that is filled
 VIEW_ASPECT = 1.5  # width of the view over its height
 VIEW_FRAMES = 200  # how many frames of a run decide on the camera
 
@@ -66,12 +67,7 @@ def choose_scales(run: RunData) -> Scales:
     reference = float(np.percentile(largest, 95)) if len(largest) else 1.0
     metres_per_newton = 1.0 / rounded_up(reference / (ARROW_SHARE * size))
     every = slice(None, None, max(1, len(run.shape_times) // VIEW_FRAMES))
-    positions = run.positions[every].reshape(-1, 3).astype(float)
-    points = [positions, positions + metres_per_newton * run.contact_forces[every].reshape(-1, 3)]
-    for index, body in enumerate(run.description.bodies):
-        poles = body.radius * np.concatenate([np.eye(3), -np.eye(3)])
-        points.append((run.body_positions[:, index, None] + poles).reshape(-1, 3))
-    seen = np.concatenate(points)
+    seen = visible_points(run, every, slice(None), metres_per_newton)
     eye, target = place_eye(seen)
     return Scales(
         strain_limit=rounded_up(strain),
@@ -83,6 +79,35 @@ def choose_scales(run: RunData) -> Scales:
         target=target,
         extent=0.5 * float(np.linalg.norm(np.ptp(seen, axis=0))),
     )
+
+
+def visible_points(
+    run: RunData, shapes: slice | np.ndarray, frames: slice | np.ndarray, metres_per_newton: float
+) -> np.ndarray:
+    """Points that a picture must hold: nodes, tips of arrows, poles of balls [m], shape (points, 3).
+
+    `shapes` and `frames` choose among `run.shape_times` and `run.times`.
+    """
+    positions = run.positions[shapes].reshape(-1, 3).astype(float)
+    points = [positions, positions + metres_per_newton * run.contact_forces[shapes].reshape(-1, 3)]
+    for index, body in enumerate(run.description.bodies):
+        poles = body.radius * np.concatenate([np.eye(3), -np.eye(3)])
+        points.append((run.body_positions[frames, index][:, None] + poles).reshape(-1, 3))
+    return np.concatenate(points)
+
+
+def seen_from(eye: np.ndarray, target: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Slopes of the lines of sight to `points`: to the right and upwards of the target, shape (points, 2)."""
+    axes = _picture_axes((eye - target) / np.linalg.norm(eye - target))
+    relative = (points - eye) @ axes.T
+    return relative[:, :2] / -relative[:, 2:]
+
+
+def _picture_axes(back: np.ndarray) -> np.ndarray:
+    """Unit vectors to the right, upwards and towards the eye, as rows; z is up in the picture."""
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(back, right), back])
 
 
 def place_eye(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -99,9 +124,7 @@ def place_eye(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         [m], shape (3,).
     """
     back = VIEW_DIRECTION / np.linalg.norm(VIEW_DIRECTION)
-    right = np.cross([0.0, 0.0, 1.0], back)
-    right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(back, right), back])
+    axes = _picture_axes(back)
     seen = points @ axes.T
     middle = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
     for _ in range(3):  # near points spread more than far ones: centre what is seen, not what is there

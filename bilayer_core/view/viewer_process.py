@@ -103,6 +103,9 @@ class HeadlessViewer:
         Of the viewer's process.
     """
 
+    def __init__(self, window_size: str = WINDOW_SIZE):
+        self._window_size = window_size
+
     def __enter__(self) -> HeadlessViewer:
         from rerun.experimental import ViewerClient
 
@@ -110,7 +113,7 @@ class HeadlessViewer:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
-        command = [str(viewer_executable()), "--headless", "--hide-welcome-screen", "--window-size", WINDOW_SIZE]
+        command = [str(viewer_executable()), "--headless", "--hide-welcome-screen", "--window-size", self._window_size]
         command += ["--bind", "127.0.0.1", "--port", str(port)]
         libc = ctypes.CDLL(None) if sys.platform == "linux" else None
         self._process = subprocess.Popen(
@@ -158,16 +161,21 @@ class HeadlessViewer:
             time = self._timeline(shown).end / 1e9
         self.client.set_time(TIMELINE, duration=float(time), play_state="paused")
 
-    def picture(self) -> bytes:
-        """PNG of the whole viewer, taken once two looks in a row show the same."""
+    def picture(self, view: str | None = None, period: float = DRAW_PERIOD) -> bytes:
+        """PNG of the whole viewer or of the view with this name, taken once two looks, a `period` [s] apart, show the
+        same. The viewer draws anew for each look; once it has loaded all meshes, a short period will do.
+        """
         deadline = clock.monotonic() + DRAW_LIMIT
+        shown = None
+        if view is not None:
+            shown = next(item.view_id for item in self.client.get_state().views if item.name == view)
         before = None
         while True:
-            now = self._ask("finish the picture", deadline, self.client.take_screenshot)
+            now = self._ask("finish the picture", deadline, lambda: self.client.take_screenshot(shown))
             if now == before:
                 return now
             before = now
-            self._check(deadline, "finish the picture")
+            self._check(deadline, "finish the picture", period)
 
     def complaints(self) -> list[str]:
         """What the viewer could not show, and the errors in its log."""
