@@ -22,6 +22,7 @@ from . import observe
 from .frame import Description, Frame
 from .integrators import INTEGRATORS
 from .ledger import EnergyLedger
+from .statics import StaticReport, solve_static
 from .statistics import RunStatistics, center_of_mass, largest_row
 from .stepper import Stepper, StepReport
 
@@ -359,6 +360,33 @@ class Simulator:
         return RunResult(
             termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
         )
+
+    def solve_static(self, tolerance: float | None = None) -> StaticReport:
+        """Go to an equilibrium under the present stimuli and loads without marching in time; see `integrate.statics`.
+
+        Parameters
+        ----------
+        tolerance : float, optional
+            Displacement that counts as rest [m]; default: 1e-10 of the longest rod.
+
+        Returns
+        -------
+        StaticReport
+            How it went, and whether the equilibrium is stable.
+
+        Raises
+        ------
+        SimulationError
+            If none is found; nothing is changed then.
+        """
+        self.compile()
+        begin, wall = clock.thread_time(), clock.perf_counter()
+        try:
+            return solve_static(self._stepper, self._state, tolerance)
+        finally:
+            self._stepper.rest(self._state)
+            self.cpu_time += clock.thread_time() - begin
+            self.wall_time += clock.perf_counter() - wall
 
     def save_state(self) -> Array:
         """Flat copy of the state; `load_state` continues from it bit for bit."""

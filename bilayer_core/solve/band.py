@@ -66,3 +66,28 @@ def band_kernels(half_bandwidth: int):
                     right[j, c] -= band[j, r] * right[j + r, c]
 
     return factor, solve, solve_border
+
+
+@cache
+def signed_factor(half_bandwidth: int):
+    """``factor(band, n)`` of `band_kernels` for matrices that need not be positive definite: it goes on behind negative
+    pivots and returns their number, which is that of negative eigenvalues (Sylvester's law of inertia).
+    """
+    b = half_bandwidth
+
+    @kernel
+    def factor(band, n):
+        negative = 0
+        for j in range(n):
+            pivot = band[j, 0]
+            negative += pivot < 0.0
+            inverse = 1.0 / pivot
+            for r in range(1, b + 1):
+                multiplier = band[j, r] * inverse
+                for s in range(r, b + 1):
+                    band[j + r, s - r] -= multiplier * band[j, s]
+            for r in range(1, b + 1):
+                band[j, r] *= inverse
+        return negative
+
+    return factor

@@ -18,7 +18,7 @@ import numpy as np
 from ..kinematics.rotation import skew
 from ..model.model import Model
 from .assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
-from .band import band_kernels
+from .band import band_kernels, signed_factor
 from .clamps import hand_nodes_to_bodies, hand_walls_to_bodies
 from .configuration import Configuration
 from .dense import eliminate, factor_dense, solve_dense
@@ -256,15 +256,33 @@ class NewtonMatrix:
         )
 
     def _factorise(self, factor: float) -> bool:
-        model, size = self._model, self._model.layout.size
+        schur = self._take_border(self.shift * factor)
+        if self._factor(self._band, self._model.layout.size) >= 0:
+            return False
+        if schur is None:
+            return True
+        self._eliminate_band(schur)
+        self._schur = schur
+        if len(self._leaving):
+            return factor_dense(schur)
+        try:
+            np.linalg.cholesky(schur)
+        except np.linalg.LinAlgError:
+            return False
+        return True
+
+    def _take_border(self, shift: float) -> Array | None:
+        """Free bodies and what leaves the band: their own second derivatives, or None if there are none of them.
+
+        Their couplings to the band become `_wide`; `shift` times their masses is added for bodies.
+        """
+        model = self._model
         self._leaving = self._rod_border.rows if self.rods else self._nothing
         if not model.free_count and not len(self._leaving):
-            return self._factor(self._band, size) < 0
+            return None
         freedom = model.bodies.freedom
-        schur = self._corner
-        if self.shift:
-            schur = schur + self.shift * factor * np.diag(self._body_masses)
-        schur = freedom.T @ schur @ freedom
+        corner = self._corner + shift * np.diag(self._body_masses) if shift else self._corner
+        schur = freedom.T @ corner @ freedom
         self._wide, self._wide_solution = self._border_free, self._border_solution
         if self._coupled:
             self._border[self._held_unknowns] = 0.0
@@ -275,23 +293,32 @@ class NewtonMatrix:
             self._coupled = True
             self._wide, schur = self._rod_border.widen(self._band, self._border_free, schur)
             self._wide_solution = np.empty_like(self._wide)
-        if self._factor(self._band, size) >= 0:
-            return False
-        if self._coupled:
-            self._wide_solution[:] = self._wide
-            self._solve_border(self._band, size, self._wide_solution)
+        return schur
+
+    def _eliminate_band(self, schur: Array) -> None:
+        """D − Uᵀ A⁻¹ U in place of D, given the factorised band."""
+        if not self._coupled:
+            return
+        size = self._model.layout.size
+        self._wide_solution[:] = self._wide
+        self._solve_border(self._band, size, self._wide_solution)
         if len(self._leaving):
             eliminate(self._wide, self._wide_solution, size, schur)
-            self._schur = schur
-            return factor_dense(schur)
-        if self._coupled:
+        else:
             schur -= self._wide.T @ self._wide_solution
-        try:
-            np.linalg.cholesky(schur)
-        except np.linalg.LinAlgError:
-            return False
-        self._schur = schur
-        return True
+
+    def count_negative(self, factor: float, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> int:
+        """Number of negative eigenvalues of the matrix of the last evaluation plus `factor` times the masses [1/s²].
+
+        Parameters as for `factorise`; in no direction is the potential concave if there is none at any factor above 0.
+        """
+        self.assemble(factor, at, edge_gradient, attached_gradient)
+        schur = self._take_border(factor)
+        count = int(signed_factor(self._model.layout.half_bandwidth)(self._band, self._model.layout.size))
+        if schur is not None:
+            self._eliminate_band(schur)
+            count += int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
+        return count
 
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
         """Minus the inverse matrix times the gradient: of rods, shape (size,), and of bodies, shape (n_free, 6)."""

@@ -192,6 +192,14 @@ class IncrementalPotential:
         """
         return self.matrix.factorise(self.diagonal_factor(), at, self.edge_gradient, self.attached_gradient)
 
+    def count_unstable(self, at: Configuration, rate: float) -> int:
+        """Number of directions away from a configuration in which disturbances grow faster than `rate` [1/s].
+
+        `at` is that of the last evaluation, made with second derivatives and in a step so long that inertia does not
+        count.
+        """
+        return self.matrix.count_negative(rate**2, at, self.edge_gradient, self.attached_gradient)
+
     def newton_step(self) -> tuple[Array, Array]:
         """Minus the inverse of the factorised matrix times the present gradient; see `NewtonMatrix.newton_step`."""
         return self.matrix.newton_step(self.gradient, self.body_gradient)

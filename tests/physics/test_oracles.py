@@ -12,7 +12,7 @@ from bilayer_core.contact.step_bound import KEPT_FRACTION, step_bound
 from bilayer_core.forces.bend_twist import bend_twist
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
-from bilayer_core.solve.band import band_kernels
+from bilayer_core.solve.band import band_kernels, signed_factor
 
 
 def random_frames(rng, count):
@@ -127,6 +127,24 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     assert one[:n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
     assert right[:n] == pytest.approx(expected, rel=1e-10, abs=1e-12)
     assert factor(indefinite, n) == 41
+
+
+@pytest.mark.parametrize("shift", [0.5, -2.0, -7.0])
+def test_the_signed_factor_counts_negative_eigenvalues(shift):
+    rng = np.random.default_rng(4)
+    n, b = 60, 10
+    dense = np.zeros((n, n))
+    for j in range(n):
+        for r in range(min(b, n - 1 - j) + 1):
+            dense[j + r, j] = dense[j, j + r] = rng.standard_normal()
+    dense += shift * np.eye(n)
+    band = np.zeros((n + b, b + 1))
+    for j in range(n):
+        for r in range(min(b, n - 1 - j) + 1):
+            band[j, r] = dense[j + r, j]
+    expected = np.count_nonzero(np.linalg.eigvalsh(dense) < 0.0)
+    assert 0 < expected < n
+    assert signed_factor(b)(band, n) == expected
 
 
 def test_barrier_derivatives_agree_with_differences_and_vanish_at_its_distance():
