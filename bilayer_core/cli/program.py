@@ -7,12 +7,13 @@ from collections.abc import Sequence
 
 import click
 
+from bilayer_core.cli.check import check
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
 from bilayer_core.cli.render import render
 from bilayer_core.cli.run import run
-from bilayer_core.cli.scenes import check, scenes, schema
+from bilayer_core.cli.scenes import scenes, schema
 from bilayer_core.errors import BilayerError
 
 INTERNAL_ERROR = 70

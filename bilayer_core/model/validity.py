@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,51 +17,112 @@ LARGE_STRAIN = 0.1  # linear elasticity and the rectangular section lose meaning
 SLENDER = 5.0  # least length over width
 THICK_CURVATURE = 0.2  # curvature × thickness
 PLATE_RANGE = (0.5, 3.0)  # of w²κ/H: between beam and plate
+FAR = 0.5  # barrier distance over thickness
+COARSE = 2.0  # edge length over thickness and barrier distance
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a scene on which the validity of the model depends.
+
+    Attributes
+    ----------
+    where : str
+        Key path.
+    what, value, limit : str
+        The quantity, its value with the unit, and the range in which the model is meant to be used.
+    outside : str
+        What it means that the value is out of the range; empty while it is within.
+    """
+
+    where: str
+    what: str
+    value: str
+    limit: str
+    outside: str = ""
+
+    def __str__(self) -> str:
+        text = f"{self.where}: {self.what} {self.value} ({self.limit})"
+        return f"{text}: {self.outside}" if self.outside else text
 
 
 def validity_warnings(scene: SceneConfig) -> Iterator[str]:
-    """Warnings, each with the figure and the limit."""
+    """The figures that are out of their range, each with the range and what that means."""
+    return (str(figure) for figure in validity_figures(scene) if figure.outside)
+
+
+def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
+    """All figures of a scene on which the validity of the model depends."""
     for rod in scene.rods:
         at_edges = EdgeFigures(scene, rod)
-        thickness, curvature, width = at_edges.thickness, at_edges.free_curvature(), at_edges.width
-        if rod.path.length < SLENDER * width.max():
-            yield (
-                f"rods.{rod.name}: length/width is {rod.path.length / width.max():.2g}; "
-                f"below {SLENDER:g} it is a plate more than a rod"
-            )
-        strain = at_edges.eigenstrain.max()
-        if strain > LARGE_STRAIN:
-            yield (
-                f"rods.{rod.name}: eigenstrain up to {100 * strain:.3g} %; "
-                f"the material law is linear, meant for up to {100 * LARGE_STRAIN:g} %"
-            )
-        if (curvature * thickness).max() > THICK_CURVATURE:
-            yield (
-                f"rods.{rod.name}: curvature × thickness reaches {(curvature * thickness).max():.2g}; "
-                f"above {THICK_CURVATURE:g} it is no thin rod"
-            )
-        ratio = width**2 * curvature / thickness
-        between = ratio[(ratio >= PLATE_RANGE[0]) & (ratio <= PLATE_RANGE[1])]
-        if len(between):
-            yield (
-                f"rods.{rod.name}: w²κ/H reaches {between.max():.2g}, between beam and plate: "
-                "an experiment may be up to 1/(1−ν²) stiffer and its swelling curvature 1+ν higher; "
-                "agreement below 30 % means nothing"
-            )
+        yield from _of_section(rod, at_edges)
         if scene.contact is not None:
-            distance = scene.contact.barrier_distance
-            thin = thickness.min()
-            if distance > 0.5 * thin:
-                yield (
-                    f"contact.barrier_distance: {1e3 * distance:g} mm against "
-                    f"{1e3 * thin:g} mm of thickness of rods.{rod.name}: surfaces float visibly apart; "
-                    "0.1 to 0.2 mm is closer"
-                )
-            if rod.edge_length > 2.0 * thin + 2.0 * distance:
-                yield (
-                    f"rods.{rod.name}: edges are {1e3 * rod.edge_length:.3g} mm long; "
-                    "only nodes feel surfaces, and a small obstacle fits between them"
-                )
+            yield from _of_contact(rod, at_edges.thickness.min(), scene.contact.barrier_distance)
+
+
+def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
+    where, width, thickness = f"rods.{rod.name}", at_edges.width, at_edges.thickness
+    curvature = at_edges.free_curvature()
+    slenderness = rod.path.length / width.max()
+    yield Figure(
+        where,
+        "length/width",
+        f"{slenderness:.2g}",
+        f"at least {SLENDER:g}",
+        "it is a plate more than a rod" if slenderness < SLENDER else "",
+    )
+    strain = at_edges.eigenstrain.max()
+    if strain == 0.0:
+        return
+    yield Figure(
+        where,
+        "eigenstrain up to",
+        f"{100 * strain:.3g} %",
+        f"at most {100 * LARGE_STRAIN:g} %",
+        "the law of the material is linear" if strain > LARGE_STRAIN else "",
+    )
+    bend = (curvature * thickness).max()
+    yield Figure(
+        where,
+        "curvature × thickness up to",
+        f"{bend:.2g}",
+        f"at most {THICK_CURVATURE:g}",
+        "it is no thin rod" if bend > THICK_CURVATURE else "",
+    )
+    ratio = width**2 * curvature / thickness
+    least, most = PLATE_RANGE
+    between = ratio[(ratio >= least) & (ratio <= most)]
+    yield Figure(
+        where,
+        "w²κ/H up to",
+        f"{(between if len(between) else ratio).max():.2g}",
+        f"below {least:g} or above {most:g}",
+        "between beam and plate an experiment may be up to 1/(1−ν²) stiffer and its swelling curvature 1+ν higher than "
+        "computed, and agreement within 30 % means nothing"
+        if len(between)
+        else "",
+    )
+
+
+def _of_contact(rod: Rod, thin: float, distance: float) -> Iterator[Figure]:
+    """Of a rod whose least thickness is `thin` [m]."""
+    yield Figure(
+        "contact.barrier_distance",
+        f"{1e3 * distance:g} mm is",
+        f"{distance / thin:.2g} of the least thickness of rods.{rod.name}",
+        f"at most {FAR:g}",
+        "surfaces float visibly apart; 0.1 to 0.2 mm is closer" if distance > FAR * thin else "",
+    )
+    reach = COARSE * (thin + distance)
+    yield Figure(
+        f"rods.{rod.name}",
+        "edge length",
+        f"{1e3 * rod.edge_length:.3g} mm",
+        f"at most {1e3 * reach:.3g} mm, {COARSE:g} times least thickness and barrier distance together",
+        "only nodes feel surfaces, and a small obstacle fits between them; more stations bring them closer"
+        if rod.edge_length > reach
+        else "",
+    )
 
 
 class EdgeFigures:

@@ -69,10 +69,29 @@ def test_the_list_of_scenes_has_a_line_for_each(capsys):
 def test_check_says_what_is_computed_and_why_the_rest_is_skipped(capsys):
     assert main(["check", "bending"]) == 0
     text = capsys.readouterr().out
-    for line in ("model       two_rod (", "gravity     skipped: gravity is zero", "bond        active", "  none"):
+    for line in (
+        "  strip         100 mm long, 10 mm wide, 41 stations 2.5 mm apart; start held by wall",
+        "bottom to top: passive 1 mm, active 1 mm",
+        "eigenstrain up to 1 %: if nothing hinders it, curvature up to 7.5 1/m, radius 133 mm",
+        "  swelling      0 to 1 [1], ramp",
+        "  model         two_rod (",
+        "  time          2 s in 2000 steps of 1 ms",
+        "  active        stretching, bending, twisting, bond, eigenstrain, inertia, damping\n",
+        "  skipped       gravity: gravity is zero\n",
+        "drag, added mass: no fluid\n",
+        "contact pairs\n  none\n",
+        "  within        rods.strip: length/width 10 (at least 5)\n",
+    ):
         assert line in text
     assert "/bilayer_sim/markers" in text and "20 Hz" in text
-    assert "contact pairs\n  none" in text
+    assert text.endswith("no faults, no warnings\n")
+
+
+def test_check_wraps_what_is_long_and_counts_the_warnings(capsys):
+    assert main(["check", "crawling_inchworm"]) == 0
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 120
+    assert text.endswith(f"no faults, {text.count('  WARNING  ')} warnings\n")
 
 
 def test_check_as_json_holds_the_same(capsys):
@@ -102,7 +121,7 @@ def test_a_scene_that_starts_in_penetration_is_refused_with_the_node_and_the_dep
         (["run", "cantilever", "--dt", "nan"], 'solver.dt: found "nan", not a number with a unit; must be a time [s]'),
         (["run", "cantilever", "--model", "beam"], "solver.model: found \"beam\"; must be 'auto' or 'two_rod'"),
         (["run", "cantilever", "--dimension", "4"], "solver.dimension: found 4; must be 'auto' or 3"),
-        (["run", "cantilever", "--integrator", "euler"], "solver.integrator: found \"euler\"; must be 'auto' or"),
+        (["run", "cantilever", "--integrator", "euler"], "solver.integrator: found \"euler\"; must be 'auto', "),
         (["run", "cantilever", "--tolerance", "0"], "solver.tolerance: found 0; must be a speed [m/s] above 0"),
         (["run", "cantilever", "--log-rate", "-1"], "output.rate: found -1; must be a rate [Hz] above 0, such as 50"),
         (["run", "cantilever", "--duration", "1 kg"], "found '1 kg', a quantity in kg; must be a time [s] above 0"),

@@ -1,0 +1,147 @@
+"""The verb ``check``."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterator
+from typing import Any
+
+import click
+
+from bilayer_core.cli.options import Verb, scene_argument, set_option
+
+WIDTH = 100
+"""Of the text beside a name [characters]."""
+
+
+@click.command(cls=Verb)
+@scene_argument
+@set_option
+@click.option("--json", "as_json", is_flag=True, help="As JSON.")
+def check(scene: str, overrides: tuple[str, ...], as_json: bool) -> None:
+    """Validate SCENE, and say what will be computed and what is skipped, each with its reason."""
+    from bilayer_core import Simulator, load_scene
+
+    report = _report(Simulator(load_scene(scene, overrides)))
+    if as_json:
+        click.echo(json.dumps(report, indent=2, ensure_ascii=False))
+        return
+    for line in _lines(report):
+        click.echo(line)
+
+
+def _report(simulator) -> dict[str, Any]:
+    """What will be computed, as the content of ``check --json``."""
+    from bilayer_core.model.validity import validity_figures
+    from bilayer_core.record.topics import Rate, output_topics
+
+    scene, plan, model = simulator.scene, simulator.plan, simulator.model
+    rates = {Rate.OUTPUT: scene.output.rate, Rate.DISPLAY: min(scene.output.rate, scene.output.marker_rate)}
+    return {
+        "scene": scene.name,
+        "title": scene.title,
+        "robot": _parts(scene),
+        "stimuli": {
+            name: f"{channel.minimum:g} to {channel.maximum:g} [{channel.unit}], {channel.schedule.type}"
+            for name, channel in scene.stimuli.items()
+        },
+        "model": plan.model,
+        "dimension": plan.dimension,
+        "integrator": plan.integrator,
+        "reasons": plan.reasons,
+        "nodes": model.node_count + model.point_count,
+        "dof": model.unknowns,
+        "dt": simulator.dt,
+        "duration": scene.duration,
+        "terms": plan.terms,
+        "contact_pairs": list(plan.contact_pairs),
+        "outputs": [
+            {"topic": topic.full_name(), "type": topic.type, "rate": rates[topic.rate]}
+            for topic in output_topics(simulator.description)
+        ],
+        "within_validity": [str(figure) for figure in validity_figures(scene) if not figure.outside],
+        "warnings": list(plan.warnings),
+    }
+
+
+def _parts(scene) -> dict[str, list[str]]:
+    """What the robot and its surroundings are made of, by name."""
+    from bilayer_core.model.validity import EdgeFigures
+    from bilayer_core.scene.profile import extremes
+
+    parts = {}
+    for rod in scene.rods:
+        copies = f"{rod.pattern.count} of them, each " if rod.pattern else ""
+        section = f"{1e3 * rod.path.length:.4g} mm long, {_millimetres(extremes(rod.width))} wide"
+        stations = f"{rod.stations} stations {1e3 * rod.edge_length:.3g} mm apart"
+        layers = ", ".join(f"{layer.name} {_millimetres(extremes(layer.thickness))}" for layer in rod.layers)
+        held = [f"{end} held by {name}" for end, name in (("start", rod.clamp_start), ("end", rod.clamp_end)) if name]
+        lines = [f"{copies}{section}, {stations}; {', '.join(held) or 'both ends free'}", f"bottom to top: {layers}"]
+        figures = EdgeFigures(scene, rod)
+        strain, curvature = figures.eigenstrain.max(), figures.free_curvature().max()
+        if curvature > 0.0:
+            lines.append(
+                f"eigenstrain up to {100 * strain:.3g} %: if nothing hinders it, curvature up to {curvature:.3g} 1/m, "
+                f"radius {1e3 / curvature:.3g} mm"
+            )
+        parts[rod.name] = lines
+    for body in scene.bodies:
+        surface = f", {body.surface.shape}" if body.surface else ""
+        parts[body.name] = [f"{body.motion.type} body{surface}"]
+    parts |= {obstacle.name: [f"{obstacle.type}, fixed"] for obstacle in scene.obstacles}
+    return parts
+
+
+def _millimetres(limits: tuple[float, float]) -> str:
+    """A length, or the range of one that varies."""
+    least, most = (f"{1e3 * limit:.4g}" for limit in limits)
+    return f"{least} mm" if least == most else f"{least} to {most} mm"
+
+
+def _lines(report: dict[str, Any]) -> Iterator[str]:
+    yield f"{report['scene']}: {report['title']}"
+    yield "robot and surroundings"
+    for name, lines in report["robot"].items():
+        yield from _block(name, lines)
+    if report["stimuli"]:
+        yield "stimuli"
+        for name, text in report["stimuli"].items():
+            yield from _block(name, [text])
+    yield "computation"
+    for key in ("model", "dimension", "integrator"):
+        yield from _block(key, [f"{report[key]} ({report['reasons'][key]})"])
+    yield from _block("size", [f"{report['nodes']} nodes, {report['dof']} unknowns"])
+    steps = round(report["duration"] / report["dt"])
+    yield from _block("time", [f"{report['duration']:g} s in {steps} steps of {1e3 * report['dt']:g} ms"])
+    yield from _forces(report["terms"])
+    yield "contact pairs"
+    yield from (f"  {pair}" for pair in report["contact_pairs"] or ["none"])
+    yield "output, in simulated time"
+    for stream in report["outputs"]:
+        yield f"  {stream['topic']:36}{stream['type']:40}{stream['rate']:g} Hz"
+    yield "validity of the model"
+    for text in report["within_validity"]:
+        yield from _block("within", [text])
+    for text in report["warnings"]:
+        yield from _block("WARNING", [text])
+    count = len(report["warnings"])
+    yield f"no faults, {count or 'no'} warning{'' if count == 1 else 's'}"
+
+
+def _block(name: str, lines: list[str]) -> Iterator[str]:
+    """A name, and lines beside it; long ones go on with an indent."""
+    parts = [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
+    for index, part in enumerate(parts):
+        yield f"  {name if index == 0 else '':{max(14, len(name) + 2)}}{part}"
+
+
+def _forces(terms: dict[str, str]) -> Iterator[str]:
+    """The terms that are computed on one line, the others by the reason for which they are skipped."""
+    yield "forces"
+    yield from _block("active", [", ".join(name for name, state in terms.items() if state == "active")])
+    skipped: dict[str, list[str]] = {}
+    for name, state in terms.items():
+        if state != "active":
+            skipped.setdefault(state.removeprefix("skipped: "), []).append(name)
+    yield from _block("skipped", [f"{', '.join(names)}: {reason}" for reason, names in skipped.items()])
