@@ -82,7 +82,7 @@ CASES = {
 def test_the_warning_is_given_beyond_the_limit_and_not_within(case):
     within, beyond, text = CASES[case]
     (found,) = (figure for figure in validity_figures(load_scene(beyond)) if str(figure).startswith(text))
-    same = [figure for figure in validity_figures(load_scene(within)) if figure.what[:10] == found.what[:10]]
+    same = [figure for figure in validity_figures(load_scene(within)) if figure.limit == found.limit]
     assert [figure.outside for figure in same] == [""]
 
 
