@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
 
 import numpy as np
 
@@ -22,26 +20,12 @@ from . import observe
 from .frame import Description, Frame
 from .integrators import INTEGRATORS
 from .ledger import EnergyLedger
+from .observer import Observer, Schedule
 from .statics import StaticReport, solve_static
 from .statistics import RunStatistics, center_of_mass, largest_row
 from .stepper import Stepper, StepReport
 
 Array = np.ndarray
-
-
-class Observer(Protocol):
-    """Something that looks at a run `rate` times in each simulated second."""
-
-    rate: float
-
-    def start(self, description: Description) -> None:
-        """Called once, before the first frame."""
-
-    def observe(self, frame: Frame) -> None:
-        """Called with every frame that is due, the first and the last included."""
-
-    def close(self, complete: bool, termination: str = "") -> None:
-        """Called once at the end; `complete` is false if the run was cut short, `termination` says why it ended."""
 
 
 class Termination(Enum):
@@ -339,7 +323,7 @@ class Simulator:
         self.compile()
         begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
         termination = Termination.INTERRUPTED
-        schedule = _Schedule(observers, self)
+        schedule = Schedule(observers, self)
         try:
             schedule.start()
             for done in range(1, steps + 1):
@@ -356,7 +340,7 @@ class Simulator:
             raise
         finally:
             self.termination = termination.value
-            schedule.finish(termination)
+            schedule.finish(termination is Termination.COMPLETED, termination.value)
         return RunResult(
             termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
         )
@@ -417,47 +401,3 @@ class Simulator:
         from .summary import summarise
 
         return summarise(self)
-
-
-class _Schedule:
-    """Which observer is due when; a frame is made once for all that are due."""
-
-    def __init__(self, observers: Sequence[Observer], simulator: Simulator):
-        self._observers = list(observers)
-        self._simulator = simulator
-        self._count = [0] * len(self._observers)
-        self._origin = simulator.time
-        self._last_seen = [-1] * len(self._observers)
-
-    def start(self) -> None:
-        if self._observers:
-            description = self._simulator.description
-            for observer in self._observers:
-                observer.start(description)
-            self._show(range(len(self._observers)))
-
-    def observe_due(self) -> None:
-        elapsed = self._simulator.time - self._origin + 1e-9 * self._simulator.dt
-        due = [i for i, observer in enumerate(self._observers) if elapsed >= (self._count[i] + 1) / observer.rate]
-        if due:
-            for i in due:
-                self._count[i] = int(elapsed * self._observers[i].rate)
-            self._show(due)
-
-    def _show(self, which) -> None:
-        frame = self._simulator.frame()
-        for i in which:
-            self._observers[i].observe(frame)
-            self._last_seen[i] = frame.step
-
-    def finish(self, termination: Termination) -> None:
-        """Show the last frame to whom it is missing, and close all, whatever goes wrong with one of them."""
-        if not self._observers:
-            return
-        step = round(self._simulator.time / self._simulator.dt)
-        with ExitStack() as closing:
-            for observer in reversed(self._observers):
-                closing.callback(observer.close, termination is Termination.COMPLETED, termination.value)
-            missing = [i for i, seen in enumerate(self._last_seen) if seen not in (-1, step)]
-            if missing:
-                self._show(missing)
