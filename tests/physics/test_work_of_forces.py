@@ -140,7 +140,7 @@ def sliding(coefficient=0.3):
 
 
 def test_friction_takes_weight_times_coefficient_times_distance_and_all_of_a_sliding_strips_energy():
-    simulator = run(sliding(), 0.12, 5e-4, (0.3, 0, 0))
+    simulator = run(sliding(), 0.12, 2e-4, (0.3, 0, 0))
     taken, mass = simulator.budget()["lost"]["friction"], simulator.model.node_mass.sum()
     distance = simulator.positions[0, 0]
     assert np.abs(simulator.velocities).max() < 1e-6
