@@ -11,9 +11,9 @@ SOFT = {"gel": {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0}}
 EXACT = {"tolerance": 1e-10}
 
 
-def run(description, duration, dt, velocity=None):
+def run(description, duration, dt, velocity=None, integrator="implicit_euler"):
     """A simulator with its budget kept, after `duration` [s]; `velocity` of nodes at the start [m/s]."""
-    simulator = Simulator(load_scene(description), dt=dt, budget=True)
+    simulator = Simulator(load_scene(description), dt=dt, integrator=integrator, budget=True)
     if velocity is not None:
         throw(simulator, np.broadcast_to(velocity, (simulator.model.node_count, 3)))
     simulator.run(duration)

@@ -16,13 +16,15 @@ something:
                                                                lost: to dissipative forces, and numerical
 
 *Numerical* is what the theorem of work and kinetic energy lacks: the dissipation of the integrator, and its errors in
-forces (a lagged friction), at the integrator's order; implicit Euler takes h ∫ v̇·M v̇ dt. The *residual* is the failure
-of works to be the differences of energies: the error of the quadrature, of second order, and any error of a gradient.
+forces (a lagged friction), at the integrator's order; implicit Euler takes h ∫ v̇·M v̇ dt. Under an integrator of
+second order the error of the quadrature is in it with as much. The *residual* is the failure of works to be the
+differences of energies: the error of the quadrature, of second order, and any error of a gradient.
 
 All is taken at the accepted ends of steps with the velocities there; stages of an integrator are not looked at. The
 powers of friction and drag are taken rather than force times displacement because each is of one sign however sharply
-the force depends on the velocity. Both ends have the loads and directions of their own, where a step of the
-integrator uses those of its start.
+the force depends on the velocity. Friction has the normal forces of either end there, where a step of the integrator
+has those of its start. What jumps between two steps (a load, a stimulus) is taken as a change over the second: an error
+of first order in the step in which it happens.
 """
 
 from __future__ import annotations
@@ -177,10 +179,9 @@ class EnergyLedger:
         at.take_state(state, state.body_position)
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
-        step = momentary_context(model, at, state, eigenstrain, load_factor)
-        potential.start_step(step)
+        potential.start_step(momentary_context(model, at, state, eigenstrain, load_factor))
         energy, gradient, power = {}, {}, {}
-        for term, name, value in potential.one_by_one(at, step):
+        for term, name, value in potential.one_by_one(at):
             self._kinds[name] = term.kind
             if term.kind is Kind.DISSIPATIVE:
                 power[name] = (moving.work(potential.accumulators), imposed.work(potential.accumulators))

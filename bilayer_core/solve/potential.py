@@ -133,14 +133,8 @@ class IncrementalPotential:
         self._expand(at)
         return sum(self.terms.values())
 
-    def one_by_one(self, at: Configuration, context: StepContext) -> Iterator[tuple[Term, str, float]]:
+    def one_by_one(self, at: Configuration) -> Iterator[tuple[Term, str, float]]:
         """Evaluate the terms at a configuration each by itself, those of inertia left out.
-
-        Parameters
-        ----------
-        at : Configuration
-        context : StepContext
-            From which velocities are taken. What `start_step` froze stays as it is.
 
         Yields
         ------
@@ -152,7 +146,6 @@ class IncrementalPotential:
         for term in (*self._of_rods_and_bodies, *self._of_carriers):
             if term.kind is Kind.INERTIAL:
                 continue
-            term.context = context
             for part in term.parts():
                 out.clear(False)
                 out.carrier.fill(0.0)
