@@ -116,6 +116,7 @@ class Simulator:
             solver.max_newton_iterations,
             solver.max_halvings,
         )
+        self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = initial_state(self.model)
         self._compile_time: float | None = None
@@ -186,13 +187,9 @@ class Simulator:
         self.compile()
         return observe.energies(self._stepper, self._state)
 
-    @property
-    def keeps_budget(self) -> bool:
-        """Whether `budget` has anything to say."""
-        return self._ledger is not None
-
     def budget(self) -> dict:
-        """Where the energy went since the start, the last `reset` or `load_state` [J]; see `ledger.EnergyLedger`.
+        """Where the energy went [J] since the start, or the last `reset`, `load_state` or `solve_static`; see
+        `ledger.EnergyLedger`.
 
         Raises
         ------
@@ -369,6 +366,7 @@ class Simulator:
             return solve_static(self._stepper, self._state, tolerance)
         finally:
             self._stepper.rest(self._state)
+            self._begin_budget()
             self.cpu_time += clock.thread_time() - begin
             self.wall_time += clock.perf_counter() - wall
 

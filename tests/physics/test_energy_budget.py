@@ -142,6 +142,9 @@ def test_keeping_the_budget_changes_nothing_and_a_loaded_state_starts_it_from_ze
     assert kept.summary()["budget"]["supplied"]["stimulus"] > 0.0
     kept.load_state(kept.save_state())
     assert kept.budget()["supplied"]["stimulus"] == kept.budget()["residual"] == 0.0
+    kept.run(0.01)
+    kept.solve_static()
+    assert kept.budget()["supplied"]["stimulus"] == kept.budget()["stored"]["bending"] == 0.0
 
 
 def test_parts_of_halved_steps_enter_the_budget():
