@@ -188,8 +188,7 @@ class Simulator:
         return observe.energies(self._stepper, self._state)
 
     def budget(self) -> dict:
-        """Where the energy went [J] since the start, or the last `reset`, `load_state` or `solve_static`; see
-        `ledger.EnergyLedger`.
+        """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
 
         Raises
         ------
