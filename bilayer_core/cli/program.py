@@ -10,6 +10,7 @@ import click
 from bilayer_core.cli.check import check
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.logs import info, view
+from bilayer_core.cli.new import new
 from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
 from bilayer_core.cli.render import render
 from bilayer_core.cli.run import run
@@ -39,7 +40,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, schema, check, run, converge, info, view, render):
+for verb in (scenes, new, schema, check, run, converge, info, view, render):
     program.add_command(verb)
 
 

@@ -1,4 +1,4 @@
-"""Where the bundled scenes are: one lookup for a checkout, a wheel, an editable install and both colcon installs."""
+"""Where bundled scenes and templates are: one lookup for a checkout, a wheel, an editable and both colcon installs."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ import bilayer_core
 from bilayer_core.errors import SceneError
 from bilayer_core.scene.faults import suggestion
 
-_SHARED = Path("share") / bilayer_core.DISTRIBUTION / "config" / "scenes"
+_SHARED = Path("share") / bilayer_core.DISTRIBUTION / "config"
 """Below the prefix that the package is installed to."""
 
 
 def _candidates() -> Iterator[Path]:
-    """Directories in which the scenes may be, the likeliest first."""
+    """Directories below which scenes and templates may be, the likeliest first."""
     # A checkout, an editable install, a colcon symlink install: the package is a link into the checkout.
     beside = Path(bilayer_core.__file__).resolve().parents[1]
-    yield beside / "config" / "scenes"
+    yield beside / "config"
     # A wheel; with ``pip install --target`` it is beside the package.
     for prefix in (sysconfig.get_path("data"), sys.prefix, beside):
         yield Path(prefix) / _SHARED
@@ -37,12 +37,12 @@ def _recorded() -> Iterator[Path]:
         recorded = files(bilayer_core.DISTRIBUTION) or []
     except PackageNotFoundError:
         return
-    parents = (Path(file.locate()).resolve().parent for file in recorded if file.suffix == ".yaml")
+    parents = (Path(file.locate()).resolve().parents[1] for file in recorded if file.suffix == ".yaml")
     yield from dict.fromkeys(parent for parent in parents if parent.parts[-len(_SHARED.parts) :] == _SHARED.parts)
 
 
-def scenes_directory() -> Path:
-    """The directory of the bundled scenes.
+def bundled_directory(kind: str) -> Path:
+    """The directory of the bundled ``scenes`` or ``templates``.
 
     Raises
     ------
@@ -50,19 +50,28 @@ def scenes_directory() -> Path:
         If there is none; lists where it was looked for.
     """
     looked = []
-    for directory in _candidates():
+    for directory in (candidate / kind for candidate in _candidates()):
         if directory in looked:
             continue
         if any(directory.glob("*.yaml")):
             return directory
         looked.append(directory)
     places = "".join(f"\n  {directory}" for directory in looked)
-    raise SceneError(f"the bundled scenes are not installed; looked in:{places}")
+    raise SceneError(f"the bundled {kind} are not installed; looked in:{places}")
+
+
+def _bundled(kind: str) -> dict[str, Path]:
+    return {path.stem: path for path in sorted(bundled_directory(kind).glob("*.yaml"))}
 
 
 def bundled_scenes() -> dict[str, Path]:
     """File of each bundled scene by its name, in alphabetical order."""
-    return {path.stem: path for path in sorted(scenes_directory().glob("*.yaml"))}
+    return _bundled("scenes")
+
+
+def bundled_templates() -> dict[str, Path]:
+    """File of each template of a new scene by its name, in alphabetical order."""
+    return _bundled("templates")
 
 
 def bundled_scene(name: str) -> Path:
@@ -78,5 +87,5 @@ def bundled_scene(name: str) -> Path:
         return scenes[name]
     raise SceneError(
         f"{name}: neither a scene file nor a bundled scene{suggestion(name, scenes)}; "
-        f"bundled are {', '.join(scenes)} (in {scenes_directory()})"
+        f"bundled are {', '.join(scenes)} (in {bundled_directory('scenes')})"
     )

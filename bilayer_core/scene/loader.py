@@ -41,14 +41,18 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     """
     if isinstance(scene, Mapping):
         return _validated(dict(scene), "scene", overrides, Path())
-    path = _find(scene)
+    path = find_scene(scene)
+    return parse_scene(read_scene_file(path), str(path), overrides, path.parent)
+
+
+def read_scene_file(path: Path) -> str:
+    """Text of a scene file. SceneError if it cannot be read."""
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise SceneError(f"{path}: is not UTF-8 text: {error.reason} at byte {error.start}") from None
-    return parse_scene(text, str(path), overrides, path.parent)
 
 
 def parse_scene(text: str, source: str, overrides: Sequence[str] = (), directory: Path = Path()) -> SceneConfig:
@@ -67,7 +71,7 @@ def _content(config: SceneConfig) -> dict[str, Any]:
     return config.model_dump(mode="json", by_alias=True)
 
 
-def _find(scene: str | Path) -> Path:
+def find_scene(scene: str | Path) -> Path:
     """A path if it is one or looks like one, else that of the bundled scene of this name."""
     path = Path(scene)
     if isinstance(scene, Path) or path.suffix in SUFFIXES or len(path.parts) > 1 or path.is_file():

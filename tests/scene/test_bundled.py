@@ -7,7 +7,7 @@ import bilayer_core
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.scene import bundled
-from bilayer_core.scene.bundled import bundled_scenes, scenes_directory
+from bilayer_core.scene.bundled import bundled_directory, bundled_scenes, bundled_templates
 
 SHARED = "share/bilayer_sim_ros/config/scenes"
 
@@ -31,7 +31,14 @@ def put_scene(directory: Path) -> Path:
 
 
 def test_scenes_of_the_checkout_are_found_first(root):
-    assert scenes_directory() == root / "config" / "scenes"
+    assert bundled_directory("scenes") == root / "config" / "scenes"
+
+
+def test_templates_lie_beside_the_scenes(nowhere, monkeypatch):
+    put_scene(nowhere / "install" / SHARED)
+    directory = put_scene(nowhere / "install" / SHARED.replace("scenes", "templates"))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(nowhere / "install"))
+    assert bundled_templates() == {"robot": directory / "robot.yaml"}
 
 
 def test_scenes_are_found_through_a_link_to_the_package(nowhere, monkeypatch):
@@ -40,13 +47,13 @@ def test_scenes_are_found_through_a_link_to_the_package(nowhere, monkeypatch):
     (nowhere / "build").mkdir()
     (nowhere / "build" / "bilayer_core").symlink_to(nowhere / "checkout" / "bilayer_core")
     monkeypatch.setattr(bilayer_core, "__file__", str(nowhere / "build" / "bilayer_core" / "__init__.py"))
-    assert scenes_directory() == directory
+    assert bundled_directory("scenes") == directory
 
 
 @pytest.mark.parametrize("prefix", ["data", "prefix", "site-packages"])
 def test_scenes_of_a_wheel_are_found_below_the_prefix(nowhere, prefix):
     directory = put_scene(nowhere / prefix / SHARED)
-    assert scenes_directory() == directory
+    assert bundled_directory("scenes") == directory
 
 
 def test_scenes_are_found_where_the_installer_recorded_them(nowhere, monkeypatch):
@@ -57,20 +64,20 @@ def test_scenes_are_found_where_the_installer_recorded_them(nowhere, monkeypatch
     (info / "RECORD").write_text(f"robots.py,,\n../{SHARED}/robot.yaml,,\n")
     monkeypatch.syspath_prepend(str(info.parent))
     monkeypatch.setattr(bilayer_core, "DISTRIBUTION", "robots")
-    assert scenes_directory() == directory
+    assert bundled_directory("scenes") == directory
 
 
 def test_scenes_of_a_colcon_install_are_found_in_its_prefix(nowhere, monkeypatch):
     directory = put_scene(nowhere / "install" / SHARED)
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"/opt/ros/none:{nowhere / 'install'}")
-    assert scenes_directory() == directory
+    assert bundled_directory("scenes") == directory
     assert bundled_scenes() == {"robot": directory / "robot.yaml"}
 
 
 def test_without_scenes_the_error_lists_where_they_were_looked_for(nowhere, monkeypatch):
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(nowhere / "install"))
     with pytest.raises(SceneError) as refused:
-        scenes_directory()
+        bundled_directory("scenes")
     for place in (nowhere / "site-packages" / "config/scenes", nowhere / "data" / SHARED, nowhere / "install" / SHARED):
         assert f"\n  {place}" in str(refused.value)
 
