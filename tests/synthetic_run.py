@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.integrate.frame import BodyInfo, Description, Frame, PlaneInfo, Strand
+from bilayer_core.integrate.frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
 
 ARMS = 4
 NODES = 41
@@ -19,6 +19,11 @@ LIFT = 0.1
 TERMS = ("kinetic", "stretch", "bend", "twist", "coupling", "gravity", "barrier")
 
 SCENE_TEXT = "schema: 1\nname: synthetic\ntitle: Four ribbons and a ball\n"
+
+
+def shape(kind: str, size: float) -> ShapeInfo:
+    """A shape at the origin, as large along every axis."""
+    return ShapeInfo(kind, (size,) * 3, 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 
 
 def description() -> Description:
@@ -46,8 +51,8 @@ def description() -> Description:
         node_count=node_count,
         edge_count=len(strands) * (NODES - 1),
         strands=tuple(strands),
-        bodies=(BodyInfo("hub", 0.0, True), BodyInfo("ball", RADIUS, False)),
-        obstacles=(PlaneInfo("ground", np.zeros(3), np.array([0.0, 0.0, 1.0])),),
+        bodies=(BodyInfo("hub", None, True), BodyInfo("ball", shape("sphere", 2 * RADIUS), False)),
+        obstacles=(ObstacleInfo("ground", shape("plane", 0.0)),),
         channels=("humidity",),
         channel_ranges=((0.0, 1.0),),
         state_layout=(("positions", (node_count, 3)), ("velocities", (node_count, 3)), ("step", (1,))),

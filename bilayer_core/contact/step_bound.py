@@ -1,8 +1,15 @@
 """The largest fraction of a step over which every gap keeps a tenth of its present size.
 
-Carriers move along straight lines within an iterate, so the bound is exact: a node cannot jump over a surface however
-long the step
-(continuous collision detection; Li et al. 2020, sec. 5).
+The gap of a carrier and a convex surface is a convex function of the carrier's place p in the surface's frame. So from
+a moment t of the step on
+
+    d(t + τ) ≥ d + d′ τ − ½ C τ²,   |p″| ≤ C = |φ_A|² |a| + 2 |φ_B| V + |φ_B|² (|ρ| + V),   V = |δX_A − δX_B| + |φ_A|
+    |a|
+
+for a carrier that body A carries at the arm a, a surface of body B and ρ between them; C is zero where nothing turns.
+Advancing to the τ at which the right side falls to the kept gap, again and again, approaches the first moment at which
+d does from below: without turning this is Newton's method on a convex function, exact for a plane at once. A carrier
+cannot jump over a surface however long the step (continuous collision detection; Li et al. 2020, sec. 5).
 """
 
 from __future__ import annotations
@@ -10,60 +17,145 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
+from .near import gap_normal
+from .shapes import SPHERE
 
 KEPT_FRACTION = 0.1  # of each gap
+CLOSE_ENOUGH = 1e-6  # of a gap: how near to the kept gap the search ends
+MAX_ADVANCES = 50  # what is reached by then is kept: a bound all the same
 
 
 @kernel
-def step_bound(position, step, radius, plane_point, plane_normal, pair_first, pair_second):
-    """Largest α ≤ 1 such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
+def _turned(v0, v1, v2, t, r0, r1, r2):
+    """exp(t [r]×) v"""
+    angle = t * math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    if angle == 0.0:
+        return v0, v1, v2
+    r0, r1, r2 = t * r0 / angle, t * r1 / angle, t * r2 / angle
+    cosine, sine = math.cos(angle), math.sin(angle)
+    along = (1.0 - cosine) * (r0 * v0 + r1 * v1 + r2 * v2)
+    return (
+        cosine * v0 + sine * (r1 * v2 - r2 * v1) + along * r0,
+        cosine * v1 + sine * (r2 * v0 - r0 * v2) + along * r1,
+        cosine * v2 + sine * (r0 * v1 - r1 * v0) + along * r2,
+    )
+
+
+@kernel
+def step_bound(
+    count,
+    near_carrier,
+    near_surface,
+    carrier,
+    radius,
+    carrier_body,
+    node_step,
+    kind,
+    size,
+    rounding,
+    place,
+    turn,
+    surface_body,
+    body_position,
+    body_motion,
+):
+    """Largest α ≤ 1 such that all gaps keep `KEPT_FRACTION` of themselves along β step, 0 ≤ β ≤ α.
 
     Parameters
     ----------
-    position, step : Array
-        Of every carrier [m], shape (n_carrier, 3).
-    radius : Array
-        Of every carrier [m], shape (n_carrier,).
-    plane_point, plane_normal : Array
-        Shape (n_plane, 3).
-    pair_first, pair_second : Array
-        Carriers that can meet, shape (n_pair,).
+    count, near_carrier, near_surface
+        From `near.list_near`.
+    carrier, radius, carrier_body : Array
+        Of carriers: positions [m], radii [m], and the body that carries each (−1: a node with unknowns of its own).
+    node_step : Array
+        Displacement of such nodes [m], shape (n_node, 3).
+    kind, size, rounding, place, turn
+        Of surfaces: see `near.gap_normal`.
+    surface_body : Array
+        Body of each surface, shape (n_surface,).
+    body_position, body_motion : Array
+        Of bodies and of the world: position [m], and displacement [m] and rotation vector [rad] in the step, shapes
+        (n_body + 1, 3), (n_body + 1, 6).
 
     Returns
     -------
     alpha : float
     blocking : int
-        Carrier that sets the bound, −1 if none.
+        Place in the list of the pair that sets the bound, −1 if none.
     """
     alpha = 1.0
     blocking = -1
-    for m in range(plane_normal.shape[0]):
-        for i in range(radius.shape[0]):
-            gap = -radius[i]
-            rate = 0.0
-            for j in range(3):
-                gap += plane_normal[m, j] * (position[i, j] - plane_point[m, j])
-                rate += plane_normal[m, j] * step[i, j]
-            if gap + alpha * rate < KEPT_FRACTION * gap:
-                alpha = (KEPT_FRACTION - 1.0) * gap / rate
-                blocking = i
-    for k in range(pair_first.shape[0]):
-        i, j = pair_first[k], pair_second[k]
-        x0, x1, x2 = position[i, 0] - position[j, 0], position[i, 1] - position[j, 1], position[i, 2] - position[j, 2]
-        s0, s1, s2 = step[i, 0] - step[j, 0], step[i, 1] - step[j, 1], step[i, 2] - step[j, 2]
-        xs = x0 * s0 + x1 * s1 + x2 * s2
-        if xs >= 0.0:
+    for k in range(count):
+        i, s = near_carrier[k], near_surface[k]
+        x0, x1, x2 = carrier[i, 0], carrier[i, 1], carrier[i, 2]
+        a, b = carrier_body[i], surface_body[s]
+        r0 = r1 = r2 = 0.0  # turn of the carrier's body
+        a0 = a1 = a2 = 0.0  # arm on it
+        if a >= 0:
+            u0, u1, u2 = body_motion[a, 0], body_motion[a, 1], body_motion[a, 2]
+            r0, r1, r2 = body_motion[a, 3], body_motion[a, 4], body_motion[a, 5]
+            a0, a1, a2 = x0 - body_position[a, 0], x1 - body_position[a, 1], x2 - body_position[a, 2]
+        else:
+            u0, u1, u2 = node_step[i, 0], node_step[i, 1], node_step[i, 2]
+        u0, u1, u2 = u0 - body_motion[b, 0], u1 - body_motion[b, 1], u2 - body_motion[b, 2]
+        f0, f1, f2 = body_motion[b, 3], body_motion[b, 4], body_motion[b, 5]
+        if kind[s] == SPHERE:
+            f0 = f1 = f2 = 0.0
+        arm, turn_a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+        turn_b = math.sqrt(f0 * f0 + f1 * f1 + f2 * f2)
+        z0, z1, z2 = x0 - body_position[b, 0], x1 - body_position[b, 1], x2 - body_position[b, 2]
+        lever = math.sqrt(z0 * z0 + z1 * z1 + z2 * z2)
+        speed = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) + turn_a * arm
+        gap, n0, n1, n2, _, _, _ = gap_normal(kind, size, rounding, radius[i], place, turn, s, x0, x1, x2)
+        kept = KEPT_FRACTION * gap
+        if gap - (speed + turn_b * (lever + speed)) * alpha >= kept:
             continue
-        distance = math.sqrt(x0 * x0 + x1 * x1 + x2 * x2)
-        reach = radius[i] + radius[j]
-        kept = reach + KEPT_FRACTION * (distance - reach)
-        # first root of |x + β s|² = kept²
-        ss = s0 * s0 + s1 * s1 + s2 * s2
-        c = (distance - kept) * (distance + kept)
-        discriminant = xs * xs - ss * c
-        if discriminant > 0.0:
-            root = c / (-xs + math.sqrt(discriminant))
-            if root < alpha:
-                alpha = root
-                blocking = i
+        bend = turn_a * turn_a * arm + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)
+        # the carrier in a frame that moves and turns with the surface from where that is now
+        t = 0.0
+        d = gap
+        b0, b1, b2 = a0, a1, a2
+        for _ in range(MAX_ADVANCES):
+            # rate of p in the frame of the surface at t: u + φ_A × a − φ_B × z
+            w0 = u0 + r1 * b2 - r2 * b1
+            w1 = u1 + r2 * b0 - r0 * b2
+            w2 = u2 + r0 * b1 - r1 * b0
+            if turn_b > 0.0:
+                w0, w1, w2 = _turned(w0, w1, w2, -t, f0, f1, f2)
+                w0, w1, w2 = w0 - (f1 * z2 - f2 * z1), w1 - (f2 * z0 - f0 * z2), w2 - (f0 * z1 - f1 * z0)
+            rate = n0 * w0 + n1 * w1 + n2 * w2
+            if bend == 0.0:
+                if rate >= 0.0:
+                    t = 1.0
+                    break
+                t += (kept - d) / rate
+            else:
+                # d + rate τ − ½ bend τ² = kept, the positive root without cancellation
+                root = math.sqrt(rate * rate + 2.0 * bend * (d - kept))
+                t += 2.0 * (d - kept) / (root - rate) if rate <= 0.0 else (rate + root) / bend
+            if t >= alpha:
+                break
+            b0, b1, b2 = _turned(a0, a1, a2, t, r0, r1, r2)
+            z0 = x0 - a0 + t * u0 + b0 - body_position[b, 0]
+            z1 = x1 - a1 + t * u1 + b1 - body_position[b, 1]
+            z2 = x2 - a2 + t * u2 + b2 - body_position[b, 2]
+            if turn_b > 0.0:
+                z0, z1, z2 = _turned(z0, z1, z2, -t, f0, f1, f2)
+            d, n0, n1, n2, _, _, _ = gap_normal(
+                kind,
+                size,
+                rounding,
+                radius[i],
+                place,
+                turn,
+                s,
+                z0 + body_position[b, 0],
+                z1 + body_position[b, 1],
+                z2 + body_position[b, 2],
+            )
+            if d <= kept + CLOSE_ENOUGH * gap:
+                break
+        if t < alpha:
+            alpha = t
+            blocking = k
     return alpha, blocking

@@ -1,28 +1,65 @@
-"""Barrier contact of carriers with planes and with each other.
+"""Barrier contact of carriers with surfaces.
 
     C = K_c b(d) Δl,   force −K_c b′(d) Δl n, repulsive along the outward normal n        (paper, eq. 24; bracket's
     sign put right)
 
-Plane: d = n·(x − p) − r. Two carriers: d = |x_i − x_j| − r_i − r_j, n = (x_i − x_j)/|x_i − x_j|. With b′, b″ at d, P
-= I − n nᵀ:
+The surface of a body at X, R has the signed distance φ in its own frame. For a carrier at x with radius r, ρ = x − X:
 
-    gradient  K_c Δl b′ n,      Hessian  K_c Δl (b″ n nᵀ + b′/|x_i − x_j| P)   (the second part for two carriers; it
-    is negative)
+    p = Rᵀ ρ,   d = φ(p) − r,   n = R ∇φ,   H = R ∇²φ Rᵀ
+    ∂d/∂x = n,   ∂d/∂X = −n,   ∂d/∂φ = −ρ × n                                (chart R → exp([φ]×) R)
+
+To second order p moves with y = ρ + δ − φ × (ρ + δ) + ½ φ × (φ × ρ), δ = δx − δX, so that with w = δ − φ × ρ
+
+    d → d + n·w + ½ wᵀ H w − δ·(n × φ) + ½ ((n·φ)(ρ·φ) − (n·ρ) φ·φ)
+
+and, with g = K_c Δl b′ n and M = K_c Δl (b″ n nᵀ + b′ H), C has the gradient (g, −g, −ρ × g) and a second derivative
+whose blocks `forces.coupled` hands to nodes and bodies.
 """
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
+from ..contact.near import gap_normal
+from ..contact.shapes import shape_curvature
 from ..jit import kernel
+from .coupled import add_coupled, add_force
 
 
 @kernel
-def plane_contact(
-    d_hat, stiffness, weight, radius, position, plane_point, plane_normal, gradient_out, hessian_out, with_hessian
+def surface_contact(
+    d_hat,
+    stiffness,
+    count,
+    near_carrier,
+    near_surface,
+    carrier,
+    radius,
+    weight,
+    carrier_body,
+    kind,
+    size,
+    rounding,
+    place,
+    turn,
+    surface_body,
+    body_position,
+    free_index,
+    carrier_gradient_out,
+    contact_out,
+    near_gap_out,
+    node_hessian_out,
+    body_hessian_out,
+    links,
+    link_node_out,
+    link_body_out,
+    link_hessian_out,
+    with_hessian,
 ):
-    """Add the barrier between every carrier and every plane.
+    """Add the barrier between every carrier and every surface near it.
 
     Parameters
     ----------
@@ -30,125 +67,98 @@ def plane_contact(
         Barrier distance [m].
     stiffness : float
         K_c [Pa].
-    weight, radius : Array
-        Δl [m] and radius [m] of each carrier, shape (n_carrier,).
-    position : Array
-        Of each carrier [m], shape (n_carrier, 3).
-    plane_point, plane_normal : Array
-        Shape (n_plane, 3).
-    gradient_out, hessian_out : Array
-        Of carriers, shapes (n_carrier, 3) and (n_carrier, 3, 3) (upper triangle); added to.
+    count, near_carrier, near_surface
+        From `contact.near.list_near`.
+    carrier, radius, weight, carrier_body : Array
+        Of carriers: position [m], radius [m], Δl [m], body that carries it (−1: a node with unknowns of its own).
+    kind, size, rounding, place, turn, surface_body : Array
+        Of surfaces: see `contact.near.gap_normal`; and the body of each.
+    body_position, free_index : Array
+        Of all bodies and of the world: position [m], shape (n_body + 1, 3), and place among the free ones or −1.
+    carrier_gradient_out, contact_out : Array
+        Of carriers [N], shape (n_carrier, 3), and of (X, φ) of bodies, shape (n_body + 1, 6); added to.
+    near_gap_out : Array
+        Written: gaps in the order of the list [m].
+    node_hessian_out, body_hessian_out, links, link_node_out, link_body_out, link_hessian_out
+        See `forces.coupled`.
     with_hessian : bool
 
     Returns
     -------
     energy : float
-        [J]; infinite if a carrier is behind a plane.
+        [J]; infinite if a carrier is behind a surface.
     min_gap : float
-        [m]; infinite without planes.
+        [m]; infinite if none is near.
+    links : int
+        How many links are listed now.
     """
     energy = 0.0
     min_gap = math.inf
-    for m in range(plane_normal.shape[0]):
-        n0, n1, n2 = plane_normal[m, 0], plane_normal[m, 1], plane_normal[m, 2]
-        height = n0 * plane_point[m, 0] + n1 * plane_point[m, 1] + n2 * plane_point[m, 2]
-        for i in range(radius.shape[0]):
-            d = n0 * position[i, 0] + n1 * position[i, 1] + n2 * position[i, 2] - height - radius[i]
-            min_gap = min(min_gap, d)
-            if d >= d_hat:
-                continue
-            if d <= 0.0:
-                return math.inf, min_gap
-            c = stiffness * weight[i]
-            energy += c * barrier(d, d_hat)
-            slope = c * barrier_gradient(d, d_hat)
-            gradient_out[i, 0] += slope * n0
-            gradient_out[i, 1] += slope * n1
-            gradient_out[i, 2] += slope * n2
-            if with_hessian:
-                curve = c * barrier_hessian(d, d_hat)
-                hessian_out[i, 0, 0] += curve * n0 * n0
-                hessian_out[i, 0, 1] += curve * n0 * n1
-                hessian_out[i, 0, 2] += curve * n0 * n2
-                hessian_out[i, 1, 1] += curve * n1 * n1
-                hessian_out[i, 1, 2] += curve * n1 * n2
-                hessian_out[i, 2, 2] += curve * n2 * n2
-    return energy, min_gap
-
-
-@kernel
-def pair_contact(
-    d_hat,
-    stiffness,
-    weight,
-    radius,
-    position,
-    pair_first,
-    pair_second,
-    gradient_out,
-    hessian_out,
-    pair_hessian_out,
-    pair_gap_out,
-    with_hessian,
-):
-    """Add the barrier between two carriers, weighted with the Δl of the first.
-
-    Parameters are as for `plane_contact`, and
-
-    pair_first, pair_second : Array
-        Carriers of each pair, shape (n_pair,).
-    pair_hessian_out : Array
-        ∂²/∂x_first ∂x_second, shape (n_pair, 3, 3); added to.
-    pair_gap_out : Array
-        Written: the gap of each pair [m], shape (n_pair,).
-
-    Returns
-    -------
-    energy, min_gap : float
-        As for `plane_contact`.
-    """
-    energy = 0.0
-    min_gap = math.inf
-    for k in range(pair_first.shape[0]):
-        i, j = pair_first[k], pair_second[k]
-        n0, n1, n2 = position[i, 0] - position[j, 0], position[i, 1] - position[j, 1], position[i, 2] - position[j, 2]
-        distance = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
-        d = distance - radius[i] - radius[j]
-        pair_gap_out[k] = d
+    m = np.zeros((3, 3))
+    g = np.zeros(3)
+    arm = np.zeros(3)
+    lever = np.zeros(3)
+    scratch = np.zeros((15, 12))
+    for k in range(count):
+        i, s = near_carrier[k], near_surface[k]
+        x0, x1, x2 = carrier[i, 0], carrier[i, 1], carrier[i, 2]
+        d, n0, n1, n2, p0, p1, p2 = gap_normal(kind, size, rounding, radius[i], place, turn, s, x0, x1, x2)
+        near_gap_out[k] = d
         min_gap = min(min_gap, d)
         if d >= d_hat:
             continue
         if d <= 0.0:
-            return math.inf, min_gap
-        n0, n1, n2 = n0 / distance, n1 / distance, n2 / distance
+            return math.inf, min_gap, links
+        a, b = carrier_body[i], surface_body[s]
         c = stiffness * weight[i]
         energy += c * barrier(d, d_hat)
         slope = c * barrier_gradient(d, d_hat)
-        gradient_out[i, 0] += slope * n0
-        gradient_out[i, 1] += slope * n1
-        gradient_out[i, 2] += slope * n2
-        gradient_out[j, 0] -= slope * n0
-        gradient_out[j, 1] -= slope * n1
-        gradient_out[j, 2] -= slope * n2
-        if with_hessian:
-            side = slope / distance
-            curve = c * barrier_hessian(d, d_hat) - side
-            h00, h01, h02 = curve * n0 * n0 + side, curve * n0 * n1, curve * n0 * n2
-            h11, h12, h22 = curve * n1 * n1 + side, curve * n1 * n2, curve * n2 * n2 + side
-            for e in (i, j):
-                hessian_out[e, 0, 0] += h00
-                hessian_out[e, 0, 1] += h01
-                hessian_out[e, 0, 2] += h02
-                hessian_out[e, 1, 1] += h11
-                hessian_out[e, 1, 2] += h12
-                hessian_out[e, 2, 2] += h22
-            pair_hessian_out[k, 0, 0] -= h00
-            pair_hessian_out[k, 0, 1] -= h01
-            pair_hessian_out[k, 0, 2] -= h02
-            pair_hessian_out[k, 1, 0] -= h01
-            pair_hessian_out[k, 1, 1] -= h11
-            pair_hessian_out[k, 1, 2] -= h12
-            pair_hessian_out[k, 2, 0] -= h02
-            pair_hessian_out[k, 2, 1] -= h12
-            pair_hessian_out[k, 2, 2] -= h22
-    return energy, min_gap
+        g[0], g[1], g[2] = slope * n0, slope * n1, slope * n2
+        lever[0], lever[1], lever[2] = x0 - body_position[b, 0], x1 - body_position[b, 1], x2 - body_position[b, 2]
+        for j in range(3):
+            carrier_gradient_out[i, j] += g[j]
+        if a >= 0:
+            arm[0], arm[1], arm[2] = x0 - body_position[a, 0], x1 - body_position[a, 1], x2 - body_position[a, 2]
+            add_force(contact_out, a, 1.0, arm, g)
+        add_force(contact_out, b, -1.0, lever, g)
+        if not with_hessian:
+            continue
+        curve = c * barrier_hessian(d, d_hat)
+        h = shape_curvature(kind[s], size[s, 0], size[s, 1], size[s, 2], p0, p1, p2)
+        _in_world(turn, s, slope, h, m)
+        m[0, 0] += curve * n0 * n0
+        m[0, 1] += curve * n0 * n1
+        m[0, 2] += curve * n0 * n2
+        m[1, 1] += curve * n1 * n1
+        m[1, 2] += curve * n1 * n2
+        m[2, 2] += curve * n2 * n2
+        links = add_coupled(
+            m,
+            g,
+            arm,
+            lever,
+            1.0,
+            i if a < 0 else -1,
+            free_index[a] if a >= 0 else -1,
+            free_index[b],
+            scratch,
+            node_hessian_out,
+            body_hessian_out,
+            links,
+            link_node_out,
+            link_body_out,
+            link_hessian_out,
+        )
+    return energy, min_gap, links
+
+
+@kernel
+def _in_world(turn, s, factor, h, m_out):
+    """Upper triangle of factor R h Rᵀ, h a symmetric matrix as (h₀₀, h₀₁, h₀₂, h₁₁, h₁₂, h₂₂)."""
+    for i in range(3):
+        r0, r1, r2 = factor * turn[s, i, 0], factor * turn[s, i, 1], factor * turn[s, i, 2]
+        v0 = r0 * h[0] + r1 * h[1] + r2 * h[2]
+        v1 = r0 * h[1] + r1 * h[3] + r2 * h[4]
+        v2 = r0 * h[2] + r1 * h[4] + r2 * h[5]
+        for j in range(i, 3):
+            m_out[i, j] = v0 * turn[s, j, 0] + v1 * turn[s, j, 1] + v2 * turn[s, j, 2]

@@ -33,21 +33,44 @@ class Strand:
 
 
 @dataclass(frozen=True)
+class ShapeInfo:
+    """A shape in the frame of its owner: a body, or the world for an obstacle.
+
+    Attributes
+    ----------
+    kind : str
+        ``"plane"`` (the half space below z = 0), ``"sphere"``, ``"box"`` or ``"cylinder"`` (axis along z), each about
+        the origin of its own frame.
+    size : tuple of float
+        Whole lengths along its own axes [m]; zero for a plane.
+    rounding : float
+        Radius of its edges [m].
+    position, quaternion : tuple of float
+        Of its own frame [m], and x y z w.
+    """
+
+    kind: str
+    size: tuple[float, ...]
+    rounding: float
+    position: tuple[float, ...]
+    quaternion: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class BodyInfo:
-    """A rigid body. `radius` [m] is that of a sphere, or 0 for a body without a surface of its own."""
+    """A rigid body; `shape` is None for one without a surface of its own."""
 
     name: str
-    radius: float
+    shape: ShapeInfo | None
     prescribed: bool
 
 
 @dataclass(frozen=True)
-class PlaneInfo:
-    """A fixed plane: a point on it [m] and its outward unit normal, shape (3,)."""
+class ObstacleInfo:
+    """A fixed surface."""
 
     name: str
-    point: np.ndarray
-    normal: np.ndarray
+    shape: ShapeInfo
 
 
 @dataclass(frozen=True)
@@ -60,10 +83,11 @@ class Description:
     scene_text : str
         YAML from which `load_scene` rebuilds the configuration, overrides included.
     node_count, edge_count : int
-        Nodes of all strands, then contact points of bodies; edges of all strands.
+        Nodes of all strands, then contact points of bodies (corners and rims of their surfaces too); edges of all
+        strands.
     strands : tuple of Strand
     bodies : tuple of BodyInfo
-    obstacles : tuple of PlaneInfo
+    obstacles : tuple of ObstacleInfo
     channels : tuple of str
         Stimulus channels in the scene's order.
     channel_ranges : tuple of (float, float)
@@ -81,7 +105,7 @@ class Description:
     edge_count: int
     strands: tuple[Strand, ...]
     bodies: tuple[BodyInfo, ...]
-    obstacles: tuple[PlaneInfo, ...]
+    obstacles: tuple[ObstacleInfo, ...]
     channels: tuple[str, ...]
     channel_ranges: tuple[tuple[float, float], ...]
     state_layout: tuple[tuple[str, tuple[int, ...]], ...]

@@ -176,7 +176,7 @@ class EnergyLedger:
     def _look(self, state: State, eigenstrain: Array, load_factor: Array) -> _Instant:
         model, potential = self._model, self._potential
         at = Configuration(model)
-        at.take_state(state, state.body_position)
+        at.take_state(state)
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
         potential.start_step(momentary_context(model, at, state, eigenstrain, load_factor))

@@ -13,7 +13,7 @@ from ..solve.configuration import Configuration
 from ..solve.terms.term import Accumulators, StepContext
 
 Array = np.ndarray
-PARTS = ("node", "edge", "pair", "body", "carrier")
+PARTS = ("node", "edge", "pair", "body", "carrier", "contact")
 MOMENT = 1e-6
 """Time over which potentials see a velocity as a displacement [s]; rounding makes 1e-10 m/s of it."""
 
@@ -27,6 +27,7 @@ class Gradient:
     pair: Array
     body: Array
     carrier: Array
+    contact: Array
 
     @classmethod
     def copy_of(cls, out: Accumulators) -> Gradient:
@@ -38,8 +39,9 @@ class Gradient:
 class Motion:
     """Displacement [m, rad] or velocity [m/s, rad/s] of everything that a term may differentiate by.
 
-    Parts and shapes are those of `Accumulators`; `node` and the first rows of `carrier` are the same vectors, because a
-    term adds to one of them.
+    Parts and shapes are those of `Accumulators`. `node` and the first rows of `carrier` are the same vectors, and so
+    are `body` and the rows of free bodies of `contact`, because a term adds to one of them; the other rows of `carrier`
+    are zero, because what bodies carry counts with these.
     """
 
     node: Array
@@ -47,18 +49,22 @@ class Motion:
     pair: Array
     body: Array
     carrier: Array
+    contact: Array
 
     def work(self, gradient: Gradient | Accumulators) -> float:
         """Work [J] of forces with the given gradient over this displacement; power [W] if it is a velocity."""
         return -sum(float(np.vdot(getattr(gradient, part), getattr(self, part))) for part in PARTS)
 
 
-def compose(model: Model, carrier: Array, turn: Array, wall: Array, body: Array) -> Motion:
-    """A motion from that of carriers, of edges about their tangents (n_edge,), of walls (n_wall, 4), of bodies."""
-    node, i = carrier[: model.node_count], model.edge_node
+def compose(model: Model, node: Array, turn: Array, wall: Array, contact: Array) -> Motion:
+    """A motion from that of nodes, of edges about their tangents (n_edge,), of walls (n_wall, 4), of all bodies."""
+    i = model.edge_node
     edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), wall])
     middle = 0.5 * (node[i] + node[i + 1])
-    return Motion(node, edge, middle[model.pair_top] - middle[model.pair_bottom], body, carrier)
+    carrier = np.zeros((len(model.carriers.weight), 3))
+    carrier[: model.node_count] = node
+    body = contact[model.bodies.body_of_free]
+    return Motion(node, edge, middle[model.pair_top] - middle[model.pair_bottom], body, carrier, contact)
 
 
 def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:
@@ -66,28 +72,20 @@ def displacement(model: Model, start: Configuration, end: Configuration) -> Moti
     edges = model.edge_count
     turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
     wall = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
-    body = np.zeros((model.free_count, 6))
-    body[:, :3] = end.body_position - start.body_position
-    for b in range(model.free_count):
-        body[b, 3:] = rotation_vector(end.body_rotation[b] @ start.body_rotation[b].T)
-    return compose(model, end.carrier - start.carrier, turn[:edges], wall, body)
+    contact = np.hstack([end.place - start.place, np.zeros_like(end.place)])
+    for b in range(len(model.bodies.names)):
+        contact[b, 3:] = rotation_vector(end.rotation[b] @ start.rotation[b].T)
+    return compose(model, end.position - start.position, turn[:edges], wall, contact)
 
 
 def velocity(model: Model, at: Configuration, state: State) -> Motion:
     """Velocities of a state whose configuration is `at`."""
-    bodies, carriers = model.bodies, model.carriers
-    carrier = np.zeros_like(at.carrier)
-    carrier[: model.node_count] = state.velocity
-    first_sphere = model.node_count + model.point_count
-    arms = np.einsum("kij,kj->ki", state.body_rotation[carriers.point_body], carriers.point_position)
-    carrier[model.node_count : first_sphere] = state.body_velocity[carriers.point_body]
-    carrier[model.node_count : first_sphere] += np.cross(state.body_angular_velocity[carriers.point_body], arms)
-    carrier[first_sphere:] = state.body_velocity[carriers.sphere_body]
-    body = np.hstack([state.body_velocity[bodies.body_of_free], state.body_angular_velocity[bodies.body_of_free]])
+    world = np.zeros((1, 6))
+    contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
     tangent = at.tangent[model.edge_count :]
-    spin = np.where((model.wall_free >= 0)[:, None], state.body_angular_velocity[model.wall_body], 0.0)
+    spin = contact[model.wall_body, 3:]
     wall = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
-    return compose(model, carrier, state.spin, wall, body)
+    return compose(model, state.velocity, state.spin, wall, contact)
 
 
 def momentary_context(
@@ -97,17 +95,21 @@ def momentary_context(
 
     Inertia is at rest in it: it has nothing to ask for.
     """
-    moving = velocity(model, at, state)
-    rotation = np.empty_like(at.body_rotation)
-    for b in range(model.free_count):
-        rotation[b] = rotation_matrix(-MOMENT * moving.body[b, 3:]) @ at.body_rotation[b]
+    moving, free = velocity(model, at, state), model.bodies.body_of_free
+    place = at.place - MOMENT * moving.contact[:, :3]
+    rotation = at.rotation.copy()
+    for b, turn in enumerate(moving.contact[:, 3:]):
+        if turn.any():
+            rotation[b] = rotation_matrix(-MOMENT * turn) @ at.rotation[b]
     return StepContext(
         length=MOMENT,
         start=at,
-        origin_carrier=at.carrier - MOMENT * moving.carrier,
+        origin_position=at.position - MOMENT * moving.node,
         origin_turn=at.turn - MOMENT * state.spin,
-        origin_body_position=at.body_position - MOMENT * moving.body[:, :3],
-        origin_body_rotation=rotation,
+        origin_place=place,
+        origin_rotation=rotation,
+        origin_body_position=place[free],
+        origin_body_rotation=rotation[free],
         origin_fluid_momentum=np.zeros((model.node_count if len(model.fluid_mass) else 0, 3)),
         predicted_position=at.position,
         predicted_turn=at.turn,
@@ -119,15 +121,17 @@ def momentary_context(
 
 
 def of_prescribed(model: Model, motion: Motion) -> Motion:
-    """The part of a motion that prescribed bodies impose: held nodes, contact points and spheres. They do not turn."""
-    free = model.bodies.free_index
-    imposed = np.zeros(len(motion.carrier), dtype=bool)
-    imposed[model.attached_node[model.attached_free < 0]] = True
-    carrying = np.concatenate([model.carriers.point_body, model.carriers.sphere_body])
-    imposed[model.node_count :] = free[carrying] < 0
-    carrier = np.where(imposed[:, None], motion.carrier, 0.0)
+    """The part of a motion that prescribed bodies impose: on held nodes, clamps' directions, points and surfaces."""
+    prescribed = model.bodies.free_index < 0
+    held = np.zeros(model.node_count, dtype=bool)
+    held[model.attached_node] = model.attached_free < 0
+    walls = motion.edge[model.edge_count :]
     return compose(
-        model, carrier, np.zeros(model.edge_count), np.zeros((model.wall_count, 4)), np.zeros_like(motion.body)
+        model,
+        np.where(held[:, None], motion.node, 0.0),
+        np.zeros(model.edge_count),
+        np.where(prescribed[model.wall_body, None], walls, 0.0),
+        np.where(prescribed[:, None], motion.contact, 0.0),
     )
 
 

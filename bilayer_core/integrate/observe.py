@@ -8,9 +8,10 @@ import numpy as np
 
 from ..kinematics.rotation import quaternion_from_matrix
 from ..model.model import Model
+from ..model.shapes import Shape, obstacle_pose, shape_of
 from ..model.state import State
 from ..solve.terms.fluid import energy_of_fluid
-from .frame import BodyInfo, Description, Frame, PlaneInfo, Strand
+from .frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper
 
@@ -57,11 +58,11 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         edge_count=model.edge_count,
         strands=strands,
         bodies=tuple(
-            BodyInfo(name, float(bodies.radius[i]), bool(bodies.free_index[i] < 0))
-            for i, name in enumerate(bodies.names)
+            BodyInfo(name, _shape_info(shape) if shape else None, bool(free < 0))
+            for name, shape, free in zip(bodies.names, bodies.shapes, bodies.free_index, strict=False)
         ),
         obstacles=tuple(
-            PlaneInfo(plane.name, np.array(plane.point), np.array(plane.normal)) for plane in scene.obstacles
+            ObstacleInfo(part.name, _shape_info(shape_of(part), *obstacle_pose(part))) for part in scene.obstacles
         ),
         channels=tuple(scene.stimuli),
         channel_ranges=tuple((channel.minimum, channel.maximum) for channel in scene.stimuli.values()),
@@ -70,19 +71,33 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
     )
 
 
+def _shape_info(shape: Shape, position: Array | None = None, turn: Array | None = None) -> ShapeInfo:
+    """A shape of an owner at a pose, by default that of the owner's frame."""
+    place = (0.0, 0.0, 0.0) if position is None else tuple(position.tolist())
+    turn = shape.turn if turn is None else turn @ shape.turn
+    rounding = 0.0 if shape.kind == "sphere" else shape.rounding
+    size, quaternion = (2.0 * shape.half).tolist(), quaternion_from_matrix(turn).tolist()
+    return ShapeInfo(shape.kind, tuple(size), rounding, place, tuple(quaternion))
+
+
 def positions_with_points(model: Model, state: State) -> Array:
     """Positions of nodes, then of contact points of bodies [m], shape (n_node + n_point, 3)."""
-    carriers = model.carriers
-    arms = np.einsum("kij,kj->ki", state.body_rotation[carriers.point_body], carriers.point_position)
-    return np.concatenate([state.position, state.body_position[carriers.point_body] + arms])
+    body, arms = _points(model, state)
+    return np.concatenate([state.position, state.body_position[body] + arms])
 
 
 def velocities_with_points(model: Model, state: State) -> Array:
     """Their velocities [m/s], shape (n_node + n_point, 3)."""
-    body, carriers = model.carriers.point_body, model.carriers
-    arms = np.einsum("kij,kj->ki", state.body_rotation[body], carriers.point_position)
+    body, arms = _points(model, state)
     points = state.body_velocity[body] + np.cross(state.body_angular_velocity[body], arms)
     return np.concatenate([state.velocity, points])
+
+
+def _points(model: Model, state: State) -> tuple[Array, Array]:
+    """Body of each point, shape (n_point,), and its arm from the body's position [m], shape (n_point, 3)."""
+    body = model.carriers.body[model.node_count : model.node_count + model.point_count]
+    arms = np.einsum("kij,kj->ki", state.body_rotation[body], model.carriers.position[: model.point_count])
+    return body, arms
 
 
 def contact_forces(stepper: Stepper) -> Array:
@@ -91,22 +106,9 @@ def contact_forces(stepper: Stepper) -> Array:
     return -stepper.potential.carrier_gradient[: model.node_count + model.point_count]
 
 
-def body_wrenches(stepper: Stepper, state: State) -> Array:
+def body_wrenches(stepper: Stepper) -> Array:
     """Contact force [N] and moment about its position [N m] on every body, shape (n_body, 6)."""
-    model, carriers = stepper.model, stepper.model.carriers
-    wrench = np.zeros((len(model.bodies.names), 6))
-    wrench[model.bodies.body_of_free] = -stepper.potential.body_contact_gradient
-    first = model.node_count
-    for k, body in enumerate(carriers.point_body):
-        if model.bodies.free_index[body] >= 0:
-            continue
-        force = -stepper.potential.carrier_gradient[first + k]
-        wrench[body, :3] += force
-        wrench[body, 3:] += np.cross(carriers.point_position[k], force)
-    for k, body in enumerate(carriers.sphere_body):
-        if model.bodies.free_index[body] < 0:
-            wrench[body, :3] -= stepper.potential.carrier_gradient[first + len(carriers.point_body) + k]
-    return wrench
+    return -stepper.potential.contact_gradient[:-1]
 
 
 def node_strain(model: Model, stepper: Stepper) -> Array:
@@ -176,7 +178,7 @@ def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStati
         body_quaternions=np.array([quaternion_from_matrix(r) for r in state.body_rotation]).reshape(-1, 4),
         body_velocities=state.body_velocity.copy(),
         body_angular_velocities=state.body_angular_velocity.copy(),
-        body_wrenches=body_wrenches(stepper, state),
+        body_wrenches=body_wrenches(stepper),
         com=center_of_mass(model, state),
         stimulus=stepper.stimulus.copy(),
         energy=energies(stepper, state),

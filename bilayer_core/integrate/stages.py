@@ -36,8 +36,8 @@ class Point:
 
     Attributes
     ----------
-    carrier : Array
-        Positions of carriers, nodes first [m], shape (n_carrier, 3).
+    position : Array
+        Of nodes [m], shape (n_node, 3).
     body_position : Array
         Of all bodies [m], shape (n_body, 3).
     turn : Array
@@ -49,10 +49,10 @@ class Point:
     fluid_momentum : Array
         Of the fluid at nodes [N s], shape (n_node, 3) or (0, 3).
     rotation : Array
-        Of free bodies, shape (n_free, 3, 3).
+        Of all bodies, shape (n_body, 3, 3).
     """
 
-    carrier: Array
+    position: Array
     body_position: Array
     turn: Array
     velocity: Array
@@ -70,7 +70,7 @@ def start_point(model: Model, state: State, start: Configuration) -> Point:
     """The start of a step."""
     free = model.bodies.body_of_free
     return Point(
-        carrier=start.carrier.copy(),
+        position=start.position.copy(),
         body_position=state.body_position.copy(),
         turn=np.zeros(model.edge_count),
         velocity=state.velocity.copy(),
@@ -78,7 +78,7 @@ def start_point(model: Model, state: State, start: Configuration) -> Point:
         body_velocity=state.body_velocity[free],
         angular_momentum=_times(_inertia(model, start.body_rotation), state.body_angular_velocity[free]),
         fluid_momentum=momentum_of_fluid(model, start, state.velocity),
-        rotation=start.body_rotation.copy(),
+        rotation=state.body_rotation.copy(),
     )
 
 
@@ -119,20 +119,23 @@ def predict(
         At the time of the stage.
     """
     free = model.bodies.body_of_free
-    rotation = np.empty_like(origin.rotation)
+    origin_rotation = origin.rotation[free]
+    rotation = np.empty_like(origin_rotation)
     for b in range(len(rotation)):
         spin = _spin_without_moment(
-            model.bodies.second_moment[b], origin.rotation[b], origin.angular_momentum[b], length
+            model.bodies.second_moment[b], origin_rotation[b], origin.angular_momentum[b], length
         )
-        rotation[b] = rotation_matrix(length * spin) @ origin.rotation[b]
+        rotation[b] = rotation_matrix(length * spin) @ origin_rotation[b]
     return StepContext(
         length=length,
         start=start,
-        origin_carrier=origin.carrier,
+        origin_position=origin.position,
         origin_turn=origin.turn - turned,
         origin_body_position=origin.body_position[free],
-        origin_body_rotation=origin.rotation,
-        predicted_position=origin.carrier[: model.node_count] + length * origin.velocity,
+        origin_body_rotation=origin_rotation,
+        origin_place=np.concatenate([origin.body_position, np.zeros((1, 3))]),
+        origin_rotation=np.concatenate([origin.rotation, np.eye(3)[None]]),
+        predicted_position=origin.position + length * origin.velocity,
         predicted_turn=origin.turn - turned + length * origin.spin,
         predicted_body_position=origin.body_position[free] + length * origin.body_velocity,
         predicted_body_rotation=rotation,
@@ -143,7 +146,12 @@ def predict(
 
 
 def end_point(
-    model: Model, context: StepContext, origin: Point, turned: Array, end: Configuration, body_position: Array
+    model: Model,
+    context: StepContext,
+    origin: Point,
+    turned: Array,
+    end: Configuration,
+    poses: tuple[Array, Array],
 ) -> Point:
     """The end of a stage that was solved.
 
@@ -152,16 +160,17 @@ def end_point(
     end : Configuration
     turned : Array
         As for `predict`.
-    body_position : Array
-        Of all bodies at the time of the stage, those of prescribed ones count [m], shape (n_body, 3).
+    poses : tuple of Array
+        Positions [m] and rotations of all bodies at the time of the stage, those of prescribed ones count, shapes
+        (n_body, 3), (n_body, 3, 3).
     """
     h, bodies = context.length, model.bodies
-    position = body_position.copy()
-    position[bodies.body_of_free] = end.body_position
+    position, rotation = poses[0].copy(), poses[1].copy()
+    position[bodies.body_of_free], rotation[bodies.body_of_free] = end.body_position, end.body_rotation
     velocity = (end.position - context.origin_position) / h
     momentum = origin.angular_momentum + h * _moment_of_inertia(model, context, end)
     return Point(
-        carrier=end.carrier.copy(),
+        position=end.position.copy(),
         body_position=position,
         turn=turned + end.turn,
         velocity=velocity,
@@ -169,21 +178,23 @@ def end_point(
         body_velocity=(end.body_position - context.origin_body_position) / h,
         angular_momentum=momentum,
         fluid_momentum=momentum_of_fluid(model, end, velocity),
-        rotation=end.body_rotation.copy(),
+        rotation=rotation,
     )
 
 
-def write_state(model: Model, state: State, last: Point, end: Configuration, prescribed_velocity: Array) -> None:
-    """Take the end of a step into the state: positions, frames, velocities; shape of the last (n_body, 3) [m/s]."""
+def write_state(model: Model, state: State, last: Point, end: Configuration, prescribed_motion: Array) -> None:
+    """Take the end of a step into the state: positions, frames, velocities; the last of prescribed bodies, shape
+    (n_body, 6) [m/s, rad/s].
+    """
     free = model.bodies.body_of_free
     state.velocity[:] = last.velocity
     state.position[:] = end.position
     state.director1[:] = end.director1[: model.edge_count]
     state.spin[:] = last.spin
     state.twist[:] = end.joint_strain[:, 2]
-    state.body_velocity[:] = prescribed_velocity
+    state.body_velocity[:], state.body_angular_velocity[:] = prescribed_motion[:, :3], prescribed_motion[:, 3:]
     state.body_velocity[free] = last.body_velocity
-    state.body_position[:] = last.body_position
+    state.body_position[:], state.body_rotation[:] = last.body_position, last.rotation
     inertia = _inertia(model, end.body_rotation)
     for place, body in enumerate(free):
         state.body_angular_velocity[body] = np.linalg.solve(inertia[place], last.angular_momentum[place])

@@ -104,7 +104,7 @@ class _Search:
         self.load_factor = stepper.load_factor(self.time)
         self.start, self.end, self.trial = (Configuration(model) for _ in range(3))
         for configuration in (self.start, self.end, self.trial):
-            configuration.take_state(state, state.body_position)
+            configuration.take_state(state)
         self.first_position = state.position.copy()
         self.rounds = self.iterations = self.factorisations = 0
 
@@ -151,10 +151,12 @@ class _Search:
         return StepContext(
             length=length,
             start=at,
-            origin_carrier=at.carrier,
+            origin_position=at.position,
             origin_turn=at.turn,
             origin_body_position=at.body_position,
             origin_body_rotation=at.body_rotation,
+            origin_place=at.place,
+            origin_rotation=at.rotation,
             origin_fluid_momentum=momentum_of_fluid(model, at, np.zeros_like(at.position)),
             predicted_position=at.position,
             predicted_turn=at.turn,
@@ -168,7 +170,8 @@ class _Search:
         """Largest displacement of a material point in the last round [m]."""
         largest = np.linalg.norm(self.end.position - self.start.position, axis=1).max()
         largest = max(largest, float(np.max(np.abs(self.end.turn) * self.model.half_width)))
-        for b, reach in enumerate(self.model.bodies.reach):
+        bodies = self.model.bodies
+        for b, reach in enumerate(bodies.reach[bodies.body_of_free]):
             shift = np.linalg.norm(self.end.body_position[b] - self.start.body_position[b])
             turn = np.linalg.norm(rotation_vector(self.end.body_rotation[b] @ self.start.body_rotation[b].T))
             largest = max(largest, shift + reach * turn)

@@ -29,7 +29,7 @@ def center_of_mass(model: Model, state: State) -> np.ndarray:
 
 @dataclass
 class BodyContact:
-    """Contact of a ball with nodes: when it began [s], how many nodes took part at most, and at the end."""
+    """Contact of a body's surface with nodes: when it began [s], how many nodes took part at most, and at the end."""
 
     first_contact: float | None = None
     most_nodes: int = 0
@@ -71,17 +71,19 @@ class RunStatistics:
         self.min_gap = min(self.min_gap, potential.min_gap)
         nodes = potential.carrier_gradient[: model.node_count]
         self.max_contact_force = max(self.max_contact_force, largest_row(nodes))
-        if potential.has_balls:
+        if potential.near is not None:
             self._count_contacts(report.time, stepper)
 
     def _count_contacts(self, time: float, stepper: Stepper) -> None:
-        model, carriers = stepper.model, stepper.model.carriers
-        touching = stepper.potential.pair_gap < model.scene.contact.barrier_distance
-        touching &= carriers.pair_first < model.node_count
-        first_sphere = model.node_count + model.point_count
-        for place, body in enumerate(carriers.sphere_body):
+        model, near = stepper.model, stepper.potential.near
+        touching = near.gap[: near.count] < model.scene.contact.barrier_distance
+        touching &= near.carrier[: near.count] < model.node_count
+        nodes = np.bincount(near.surface[: near.count][touching], minlength=len(model.surfaces.names))
+        for surface, body in enumerate(model.surfaces.body):
+            if body == len(model.bodies.names):
+                continue
             found = self.bodies.setdefault(model.bodies.names[body], BodyContact())
-            found.nodes = int(np.count_nonzero(touching & (carriers.pair_second == first_sphere + place)))
+            found.nodes = int(nodes[surface])
             found.most_nodes = max(found.most_nodes, found.nodes)
             if found.nodes and found.first_contact is None:
                 found.first_contact = time

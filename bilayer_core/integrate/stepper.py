@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import SimulationError
-from ..model.model import Model, body_displacement
+from ..kinematics.rotation import rotation_vector
+from ..model.model import Model, scheduled_pose
 from ..model.state import State
 from ..scene.schedule import value_before
 from ..scene.transduction import follow, free_strain
@@ -92,20 +93,21 @@ class Stepper:
         self._target = Configuration(model)
         self.end = Configuration(model)
         self._trial = Configuration(model)
+        self._prescribed = np.flatnonzero(model.bodies.free_index[:-1] < 0)
         self._channels = list(model.scene.stimuli.values())
         self.stimulus = np.zeros(len(self._channels))
         self.eigenstrain = np.zeros(model.edge_count)
         self.ledger: EnergyLedger | None = None
 
-    def body_positions(self, state: State, time: float) -> Array:
-        """Positions of all bodies: prescribed ones at `time`, free ones as they are [m], shape (n_body, 3)."""
+    def body_poses(self, state: State, time: float) -> tuple[Array, Array]:
+        """Poses of all bodies: prescribed ones at `time`, free ones as they are: positions [m], shape (n_body, 3), and
+        rotations, shape (n_body, 3, 3).
+        """
         bodies = self.model.bodies
-        position = state.body_position.copy()
-        for index in np.flatnonzero(bodies.free_index < 0):
-            position[index] = bodies.start_position[index] + body_displacement(
-                bodies.times[index], bodies.displacements[index], time
-            )
-        return position
+        position, rotation = state.body_position.copy(), state.body_rotation.copy()
+        for index in self._prescribed:
+            position[index], rotation[index] = scheduled_pose(bodies, index, time)
+        return position, rotation
 
     def stimulus_at(self, state: State, time: float, ended: float = 0.0) -> Array:
         """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's.
@@ -129,7 +131,7 @@ class Stepper:
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
         time = float(state.step[0]) * self.dt
-        self.end.take_state(state, state.body_position)
+        self.end.take_state(state)
         self.stimulus = self.stimulus_at(state, time)
         self.eigenstrain = self.eigenstrain_of(state.transduction)
         self._look_at(state, self.eigenstrain, self.load_factor(time))
@@ -187,7 +189,7 @@ class Stepper:
     def _attempt(self, state: State, h: float, time: float) -> NewtonReport:
         """Try one part of length `h` [s] that ends at `time` [s]; `state` changes only if it converged."""
         model, method = self.model, self.method
-        self._start.take_state(state, state.body_position)
+        self._start.take_state(state)
         first = start_point(model, state, self._start)
         first_stimulus = self.stimulus_at(state, time - h)
         turned, length = np.zeros(model.edge_count), method.diagonal * h
@@ -199,31 +201,32 @@ class Stepper:
             origin = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
             drive = self._drive(state, first_stimulus, time - h, node * h)
             context = predict(model, origin, self._start, turned, length, drive.eigenstrain, drive.load_factor)
-            body_position = self.body_positions(state, time - (1.0 - node) * h)
-            report = self._solve(context, body_position)
+            poses = self.body_poses(state, time - (1.0 - node) * h)
+            report = self._solve(context, poses)
             iterations += report.iterations
             factorisations += report.factorisations
             backtracks += report.backtracks
             if not report.converged:
                 return replace(report, iterations=iterations, factorisations=factorisations, backtracks=backtracks)
             residual = max(residual, report.residual)
-            stages.append((origin, end_point(model, context, origin, turned, self.end, body_position)))
+            stages.append((origin, end_point(model, context, origin, turned, self.end, poses)))
             turned = stages[-1][1].turn
             if len(stages) < len(method.nodes):
                 self._start, self.end = self.end, self._start
                 self._start.turn[:] = 0.0
         report = NewtonReport(NewtonStatus.CONVERGED, iterations, factorisations, residual, backtracks)
         origin, last = stages[-1]
-        prescribed_velocity = (last.body_position - origin.body_position) / length
+        prescribed_motion = self._rates(origin, last, length)
         if method.weights is not None:
             weights = [weight / method.diagonal for weight in method.weights]
             last = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
             drive = self._drive(state, first_stimulus, time - h, h)
-            prescribed = model.bodies.free_index < 0
-            last.body_position[prescribed] = self.body_positions(state, time)[prescribed]
+            position, rotation = self.body_poses(state, time)
+            last.body_position[self._prescribed] = position[self._prescribed]
+            last.rotation[self._prescribed] = rotation[self._prescribed]
             if not self._go_beyond(last, turned):
                 return replace(report, status=NewtonStatus.BEYOND, residual=math.inf)
-        write_state(model, state, last, self.end, prescribed_velocity)
+        write_state(model, state, last, self.end, prescribed_motion)
         if method.weights is not None:
             self._look_at(state, drive.eigenstrain, drive.load_factor)
         state.transduction[:] = drive.transduction
@@ -231,6 +234,15 @@ class Stepper:
         if self.ledger is not None:
             self.ledger.record(state, drive.eigenstrain, drive.load_factor, h)
         return report
+
+    def _rates(self, origin: Point, end: Point, length: float) -> Array:
+        """Velocity [m/s] and angular velocity [rad/s] of prescribed bodies over a stage, shape (n_body, 6)."""
+        rates = np.zeros((len(end.body_position), 6))
+        for b in self._prescribed:
+            rates[b, :3] = (end.body_position[b] - origin.body_position[b]) / length
+            if len(self.model.bodies.rotations[b]):
+                rates[b, 3:] = rotation_vector(end.rotation[b] @ origin.rotation[b].T) / length
+        return rates
 
     def _drive(self, state: State, first_stimulus: Array, begin: float, elapsed: float) -> _Drive:
         """What acts from outside `elapsed` [s] after `begin` [s], the start of a step."""
@@ -243,12 +255,12 @@ class Stepper:
         load_factor = self.load_factor(begin + elapsed, elapsed)
         return _Drive(stimulus, transduction, self.eigenstrain_of(transduction), load_factor)
 
-    def _solve(self, context: StepContext, body_position: Array) -> NewtonReport:
-        """Solve a stage at whose end prescribed bodies are at `body_position` [m]; its result is `end`."""
-        model = self.model
+    def _solve(self, context: StepContext, poses: tuple[Array, Array]) -> NewtonReport:
+        """Solve a stage at whose end prescribed bodies have the given positions [m] and rotations; its result is
+        `end`.
+        """
         self.potential.start_step(context)
-        self._target.place_prescribed(body_position)
-        self._target.position[model.attached_node] = body_position[model.attached_body] + model.attached_position
+        self._target.place_prescribed(*poses)
         report = self.solver.first_guess(context, self._target, self.end)
         if report is not None:
             return report
@@ -260,13 +272,13 @@ class Stepper:
     def _go_beyond(self, last: Point, turned: Array) -> bool:
         """Move `end` from the last stage on to the end of the step; false if a surface is in the way."""
         begin, end, free = self.end, self._trial, self.model.bodies.body_of_free
-        end.carrier[:] = last.carrier
-        end.body_position[:], end.body_rotation[:] = last.body_position[free], last.rotation
-        end.place_prescribed(last.body_position)
+        end.position[:] = last.position
+        end.body_position[:], end.body_rotation[:] = last.body_position[free], last.rotation[free]
+        end.place_prescribed(last.body_position, last.rotation)
         end.place_held()
         end.carry_frames(begin, last.turn - turned)
         end.joint_strain[:, 2] = begin.joint_strain[:, 2]
-        if self.solver.bound(begin, end.carrier - begin.carrier)[0] < 1.0:
+        if self.solver.bound_between(begin, end) < 1.0:
             return False
         if not math.isfinite(self.potential.evaluate(end, False)):
             return False

@@ -65,3 +65,18 @@ def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
         quaternion[3] = matrix[k, j] - matrix[j, k]
     quaternion /= np.linalg.norm(quaternion)
     return quaternion if quaternion[3] >= 0.0 else -quaternion
+
+
+def quaternion_product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Quaternion x y z w of the rotation by `second` followed by that by `first`, shape (..., 4)."""
+    x, y, z, w = np.moveaxis(np.asarray(first, dtype=float), -1, 0)
+    a, b, c, d = np.moveaxis(np.asarray(second, dtype=float), -1, 0)
+    return np.stack(
+        [
+            w * a + x * d + y * c - z * b,
+            w * b - x * c + y * d + z * a,
+            w * c + x * b - y * a + z * d,
+            w * d - x * a - y * b - z * c,
+        ],
+        axis=-1,
+    )

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..scene.config import SceneConfig
-from .bodies import build_bodies, build_carriers, refuse_penetration
+from .bodies import build_bodies
+from .carriers import build_contact, refuse_penetration
 from .layout import number_unknowns
 from .model import Model
 from .points import add_point_masses, build_loads
@@ -29,6 +30,7 @@ def build_model(scene: SceneConfig) -> Model:
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found)
+    carriers, surfaces = build_contact(scene, found, bodies)
     walls = found.column("wall_tangent", width=3)
     wall_a = _resolve_walls(found.column("joint_a", np.int64), edge_count)
     wall_b = _resolve_walls(found.column("joint_b", np.int64), edge_count)
@@ -42,7 +44,8 @@ def build_model(scene: SceneConfig) -> Model:
         strands=tuple(found.strands),
         layout=number_unknowns(found.rods, found.node_count, edge_count, found.column("attached_node", np.int64)),
         bodies=bodies,
-        carriers=build_carriers(scene, found, bodies),
+        carriers=carriers,
+        surfaces=surfaces,
         dead_loads=build_loads(scene, found, bodies, "world"),
         follower_loads=build_loads(scene, found, bodies, "material"),
         rod_surfaces=build_rod_surfaces(scene, found),

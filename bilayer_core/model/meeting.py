@@ -131,5 +131,6 @@ def _region(scene: SceneConfig, rod: Rod) -> tuple[np.ndarray, float] | None:
             figures = EdgeFigures(scene, rod)
             stretched = 1.0 + figures.eigenstrain.max()
             offset = float(np.linalg.norm(start - np.array(body.position)))
+            offset *= 2.0 if body.motion.rotations else 1.0
             return start, rod.path.length * stretched + moved + offset + figures.thickness.max()
     return None

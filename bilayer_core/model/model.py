@@ -6,9 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kinematics.rotation import rotation_matrix
 from ..scene.config import SceneConfig
 from .layout import Layout, ReadOnlyArrays
 from .rod_surfaces import RodSurfaces
+from .shapes import Shape
 
 Array = np.ndarray
 
@@ -30,13 +32,14 @@ class StrandArrays(ReadOnlyArrays):
 @dataclass(frozen=True)
 class Bodies(ReadOnlyArrays):
     """Rigid bodies, in the scene's order. *Free* bodies, guided ones among them, have unknowns, in the order in which
-    they occur.
+    they occur. After the last body comes the world, which never moves.
     """
 
     names: tuple[str, ...]
-    free_index: Array  # place among the free bodies, −1 for a prescribed one, shape (n_body,)
+    free_index: Array  # place among the free bodies, −1 for a prescribed one and the world, shape (n_body + 1,)
     body_of_free: Array  # the reverse, shape (n_free,)
     start_position: Array  # [m], shape (n_body, 3)
+    start_rotation: Array  # shape (n_body, 3, 3)
     start_velocity: Array  # [m/s], shape (n_body, 3)
     start_angular_velocity: Array  # [rad/s], shape (n_body, 3)
     mass: Array  # of free bodies [kg], shape (n_free,)
@@ -45,29 +48,44 @@ class Bodies(ReadOnlyArrays):
     freedom: (
         Array  # motions (X, φ) that free bodies are allowed, one a column, orthonormal, shape (6 n_free, n_freedom)
     )
-    reach: Array  # of a free body: largest distance of its points, or its radius of gyration [m], shape (n_free,)
-    radius: Array  # of the sphere, 0 without one [m], shape (n_body,)
+    reach: Array  # largest distance of what a body carries, or a radius of gyration [m], shape (n_body + 1,)
+    shapes: tuple[Shape | None, ...]  # surface of each body
     times: tuple[Array, ...]  # keyframes of each prescribed body [s]
     displacements: tuple[Array, ...]  # and its displacements there [m], shape (n_keyframe, 3)
+    rotations: tuple[Array, ...]  # and its rotation vectors [rad], shape (n_keyframe, 3)
 
 
 @dataclass(frozen=True)
 class Carriers(ReadOnlyArrays):
-    """Points with a radius that feel surfaces: all nodes, then contact points of bodies, then spheres."""
+    """Points with a radius that feel surfaces: all nodes, then *points* of bodies (contact points of the scene; corners
+    and rims of surfaces), then *centres* of balls and points of obstacles.
+    """
 
     weight: Array  # Δl of the barrier [m], shape (n_carrier,)
     radius: Array  # half thickness, offset, or radius [m], shape (n_carrier,)
+    friction: Array  # coefficients forward, backward and sideways, shape (n_carrier, 3)
     node_edges: Array  # edges before and after each node, the same at an end, shape (n_node, 2)
     node_axis: Array  # which direction counts as forward: 0 t, 1 m1, 2 m2, shape (n_node,)
-    friction: Array  # coefficients forward, backward and sideways, shape (n_carrier, 3)
-    point_body: Array  # body of each contact point, shape (n_point,)
-    point_position: Array  # in the body's frame [m], shape (n_point, 3)
-    sphere_body: Array  # body of each sphere, shape (n_sphere,)
-    free_body: Array  # free body of a sphere with unknowns, −1 otherwise, shape (n_carrier,)
-    pair_first: Array  # carriers that can meet, shape (n_pair,)
-    pair_second: Array
-    plane_point: Array  # [m], shape (n_plane, 3)
-    plane_normal: Array  # outward unit, shape (n_plane, 3)
+    body: Array  # body that takes the force, −1 for nodes, shape (n_carrier,)
+    follows: Array  # body that moves it, −1 for nodes that none holds, shape (n_carrier,)
+    position: Array  # of points and centres in the body's frame [m], shape (n_carrier − n_node, 3)
+    point_count: int
+    group: Array  # carriers of a group meet the same surfaces, shape (n_carrier,)
+
+
+@dataclass(frozen=True)
+class Surfaces(ReadOnlyArrays):
+    """Surfaces that carriers can meet: obstacles, then bodies'. See `contact.shapes` for their numbers."""
+
+    names: tuple[str, ...]
+    kind: Array  # shape (n_surface,)
+    size: Array  # half sizes of what is rounded [m], shape (n_surface, 3)
+    rounding: Array  # [m], shape (n_surface,)
+    bound: Array  # radius of a ball about the position that holds it [m], shape (n_surface,)
+    body: Array  # body that it belongs to, or the world, shape (n_surface,)
+    position: Array  # in the body's frame [m], shape (n_surface, 3)
+    turn: Array  # its own axes in the body's frame, shape (n_surface, 3, 3)
+    meets: Array  # whether carriers of a group can meet it, shape (n_surface, n_group)
 
 
 @dataclass(frozen=True)
@@ -111,6 +129,7 @@ class Model(ReadOnlyArrays):
     layout: Layout
     bodies: Bodies
     carriers: Carriers
+    surfaces: Surfaces
     dead_loads: PointLoads  # of fixed direction
     follower_loads: PointLoads  # along path, normal and path × normal of a rod, or in the axes of a body
     rod_surfaces: RodSurfaces | None  # None where no rod can meet another or itself
@@ -121,8 +140,8 @@ class Model(ReadOnlyArrays):
     bend_count: int
 
     start_position: Array  # of nodes [m], shape (n_node, 3)
-    start_director1: Array  # of edges and walls, unit, shape (n_edge + n_wall, 3)
-    wall_tangent: Array  # unit, shape (n_wall, 3)
+    start_director1: Array  # of edges, and of walls in the frame of their bodies, unit, shape (n_edge + n_wall, 3)
+    wall_tangent: Array  # in the frame of its body, unit, shape (n_wall, 3)
     attached_node: Array  # nodes held by bodies, shape (n_attached,)
     attached_body: Array  # shape (n_attached,)
     attached_position: Array  # in the body's frame [m], shape (n_attached, 3)
@@ -165,8 +184,13 @@ class Model(ReadOnlyArrays):
 
     @property
     def point_count(self) -> int:
-        """Number of contact points of bodies."""
-        return len(self.carriers.point_body)
+        """Number of contact points of bodies, corners and rims of their surfaces among them."""
+        return self.carriers.point_count
+
+    @property
+    def meets_surfaces(self) -> bool:
+        """Whether any carrier can meet a surface."""
+        return self.scene.contact is not None and bool(self.surfaces.meets.any())
 
     @property
     def free_count(self) -> int:
@@ -196,14 +220,24 @@ class Model(ReadOnlyArrays):
         return self.bodies.free_index[self.wall_body]
 
 
-def body_displacement(times: Array, displacements: Array, time: float) -> Array:
-    """Displacement of a prescribed body [m]: cubic smoothstep between keyframes, constant outside them, shape (3,)."""
-    if len(times) == 0:
+def between_keyframes(times: Array, values: Array, time: float) -> Array:
+    """Value of a schedule of vectors: cubic smoothstep between keyframes, constant outside them, shape (3,)."""
+    if len(times) == 0 or len(values) == 0:
         return np.zeros(3)
     right = int(np.searchsorted(times, time, side="right"))
     if right == 0:
-        return displacements[0]
+        return values[0]
     if right == len(times):
-        return displacements[-1]
+        return values[-1]
     s = (time - times[right - 1]) / (times[right] - times[right - 1])
-    return displacements[right - 1] + s * s * (3.0 - 2.0 * s) * (displacements[right] - displacements[right - 1])
+    return values[right - 1] + s * s * (3.0 - 2.0 * s) * (values[right] - values[right - 1])
+
+
+def scheduled_pose(bodies: Bodies, index: int, time: float) -> tuple[Array, Array]:
+    """Position [m], shape (3,), and rotation of a prescribed body, shape (3, 3)."""
+    times = bodies.times[index]
+    position = bodies.start_position[index] + between_keyframes(times, bodies.displacements[index], time)
+    if not len(bodies.rotations[index]):
+        return position, bodies.start_rotation[index]
+    turn = rotation_matrix(between_keyframes(times, bodies.rotations[index], time))
+    return position, turn @ bodies.start_rotation[index]

@@ -8,6 +8,7 @@ from ..errors import SceneError
 from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
 from .meeting import Meeting, meetings, passing_warnings
+from .parties import contact_pairs
 from .validity import validity_warnings
 
 MODELS = ("two_rod",)
@@ -84,7 +85,7 @@ def _terms(scene: SceneConfig) -> dict[str, str]:
     def state(needed: bool, reason: str) -> str:
         return "active" if needed else f"skipped: {reason}"
 
-    pairs = _surface_pairs(scene)
+    pairs = contact_pairs(scene)
     rods = meetings(scene)
     touch, apart = any(meeting.active for meeting in rods), _why_apart(rods)
     friction = scene.contact.friction if scene.contact else None
@@ -132,18 +133,4 @@ def _why_apart(found: tuple[Meeting, ...]) -> str:
 
 
 def _contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
-    return (*_surface_pairs(scene), *(meeting.what for meeting in meetings(scene) if meeting.active))
-
-
-def _surface_pairs(scene: SceneConfig) -> tuple[str, ...]:
-    if scene.contact is None:
-        return ()
-    balls = [body for body in scene.bodies if body.surface is not None]
-    free = {body.name for body in scene.bodies if not isinstance(body.motion, Prescribed)}
-    touching = ["rods"] + [body.name for body in scene.bodies if body.contact_points or body.surface]
-    pairs = [f"{name} – {plane.name}" for plane in scene.obstacles for name in touching]
-    for index, ball in enumerate(balls):
-        pairs.append(f"rods – {ball.name}")
-        others = [body for body in scene.bodies if body.contact_points and body is not ball] + balls[:index]
-        pairs += [f"{body.name} – {ball.name}" for body in others if {body.name, ball.name} & free]
-    return tuple(pairs)
+    return (*contact_pairs(scene), *(meeting.what for meeting in meetings(scene) if meeting.active))

@@ -194,6 +194,7 @@ def _add_strand(
         voronoi_length=inner,
     )
     for body, end in clamps:
+        own = rotation_matrix(np.array(scene.bodies[body].rotation))  # columns: axes of the body's frame
         wall = -1 - sum(len(part) for part in found.columns.get("wall_tangent", []))
         node = strand.first_node if end == 0 else strand.first_node + nodes - 1
         edge = first_edge if end == 0 else first_edge + edges - 1
@@ -201,11 +202,11 @@ def _add_strand(
         moving = (shape.tangents[[end]], shape.normals[[end]])
         from_start = (*fixed, *moving) if end == 0 else (*moving, *fixed)
         found.add(
-            wall_tangent=fixed[0],
-            wall_director1=fixed[1],
+            wall_tangent=fixed[0] @ own,
+            wall_director1=fixed[1] @ own,
             attached_node=node,
             attached_body=body,
-            attached_position=(shape.positions[end] - np.array(scene.bodies[body].position))[None],
+            attached_position=(shape.positions[end] - np.array(scene.bodies[body].position))[None] @ own,
             joint_a=wall if end == 0 else edge,
             joint_b=edge if end == 0 else wall,
             joint_stiffness=(bend[end] / voronoi[end])[None],

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import InputError
-from .model import Model, body_displacement
+from .model import Model
 
 Array = np.ndarray
 
@@ -66,11 +66,7 @@ class State:
 def initial_state(model: Model) -> State:
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies."""
     bodies = model.bodies
-    count = len(bodies.names)
     channels = list(model.scene.stimuli.values())
-    body_position = bodies.start_position.copy()
-    for index in range(count):
-        body_position[index] += body_displacement(bodies.times[index], bodies.displacements[index], 0.0)
     first_values = np.array([channel.schedule.value(0.0) for channel in channels])
     return State(
         step=np.zeros(1),
@@ -80,8 +76,8 @@ def initial_state(model: Model) -> State:
         director1=model.start_director1[: model.edge_count].copy(),
         spin=np.zeros(model.edge_count),
         twist=np.zeros(len(model.joint_a)),
-        body_position=body_position,
-        body_rotation=np.tile(np.eye(3), (count, 1, 1)),
+        body_position=bodies.start_position.copy(),
+        body_rotation=bodies.start_rotation.copy(),
         body_velocity=bodies.start_velocity.copy(),
         body_angular_velocity=bodies.start_angular_velocity.copy(),
         transduction=first_values[model.law_channel] if len(channels) else np.zeros(0),

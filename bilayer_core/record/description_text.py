@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 
 import numpy as np
 
-from bilayer_core.integrate.frame import BodyInfo, Description, PlaneInfo, Strand
+from bilayer_core.integrate.frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
 
 
 def _plain(value):
@@ -15,6 +15,11 @@ def _plain(value):
     if isinstance(value, slice):
         return [value.start, value.stop]
     return np.asarray(value).tolist()
+
+
+def _shape(values: dict) -> ShapeInfo:
+    """A shape from its attributes, in which JSON has made lists of tuples."""
+    return ShapeInfo(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
 
 
 def to_text(description: Description) -> dict[str, str]:
@@ -36,10 +41,11 @@ def from_text(attributes: dict[str, str], scene_text: str) -> Description:
         )
         for strand in values["strands"]
     )
-    values["bodies"] = tuple(BodyInfo(**body) for body in values["bodies"])
-    values["obstacles"] = tuple(
-        PlaneInfo(plane["name"], np.array(plane["point"]), np.array(plane["normal"])) for plane in values["obstacles"]
+    values["bodies"] = tuple(
+        BodyInfo(body["name"], _shape(body["shape"]) if body["shape"] else None, body["prescribed"])
+        for body in values["bodies"]
     )
+    values["obstacles"] = tuple(ObstacleInfo(part["name"], _shape(part["shape"])) for part in values["obstacles"])
     values["channels"] = tuple(values["channels"])
     values["channel_ranges"] = tuple((lower, upper) for lower, upper in values["channel_ranges"])
     values["state_layout"] = tuple((name, tuple(shape)) for name, shape in values["state_layout"])

@@ -3,8 +3,9 @@
 ================================ =============================================================================
 ``strands/<rod>/<layer>``        LINE_LIST: one bar across the width at each node, as thick as the spacing of
                                  nodes, so that the bars tile the ribbon; coloured by strain, full at `STRAIN_LIMIT`
-``bodies/<name>``                SPHERE, or a small CUBE for a body without a surface
-``obstacles/<name>``             CUBE of `PLANE_SIZE`, its upper face on the plane
+``bodies/<name>``                SPHERE, CUBE or CYLINDER (edges sharp, whatever their rounding); a small CUBE for a
+                                 body without a surface
+``obstacles/<name>``             the same; a plane is a CUBE of `PLANE_SIZE`, its upper face on the plane
 ``contact_forces``               LINE_LIST of arrows from nodes and contact points. Contact forces of one scene
                                  differ by decades, so length is logarithmic: `ARROW_DECADE` times
                                  log10(1 + force / `ARROW_FORCE`). Deleted while nothing touches.
@@ -15,7 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.integrate.frame import Description, Frame
+from bilayer_core.integrate.frame import Description, Frame, ShapeInfo
+from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
 from bilayer_core.record.cdr import Template
 from bilayer_core.record.colours import strain_colours
 from bilayer_core.record.node_frames import NodeFrames
@@ -32,10 +34,10 @@ HEAD_SHARE = 0.25  # of an arrow's length
 HEAD_HALF_WIDTH = 0.1  # of an arrow's length
 
 BODY_COLOUR = (0.93, 0.62, 0.13, 1.0)
-PLANE_COLOUR = (0.42, 0.45, 0.50, 0.6)
+OBSTACLE_COLOUR = (0.42, 0.45, 0.50, 0.6)
 ARROW_COLOUR = (0.10, 0.75, 0.35, 1.0)
 
-CUBE, SPHERE, LINE_LIST = 1, 2, 5
+CUBE, SPHERE, CYLINDER, LINE_LIST = 1, 2, 3, 5
 ADD, DELETE = 0, 2
 _IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -66,14 +68,13 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray) -> np.ndarray:
     return np.stack([origins, tip, tip, base + sideways, tip, base - sideways], axis=1).reshape(-1, 3)
 
 
-def plane_pose(point: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Position and quaternion x y z w that put a box of `PLANE_THICKNESS` under a plane, z along its normal."""
-    normal = np.asarray(normal) / np.linalg.norm(normal)
-    # The half-way rotation from z to the normal; a half turn about x if they are opposite.
-    rotation = np.array([-normal[1], normal[0], 0.0, 1.0 + normal[2]])
-    size = np.linalg.norm(rotation)
-    rotation = rotation / size if size > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
-    return np.concatenate([point - 0.5 * PLANE_THICKNESS * normal, rotation])
+def shape_marker(shape: ShapeInfo) -> tuple[int, tuple[float, ...], np.ndarray]:
+    """Type, scale [m] and pose (position, quaternion x y z w) in the owner's frame of the marker of a shape."""
+    pose = np.array([*shape.position, *shape.quaternion])
+    if shape.kind != "plane":
+        return {"sphere": SPHERE, "box": CUBE, "cylinder": CYLINDER}[shape.kind], tuple(shape.size), pose
+    pose[:3] -= 0.5 * PLANE_THICKNESS * matrix_from_quaternion(pose[3:])[:, 2]
+    return CUBE, (PLANE_SIZE, PLANE_SIZE, PLANE_THICKNESS), pose
 
 
 class MarkerEncoder:
@@ -98,16 +99,19 @@ class MarkerEncoder:
             template.put("<u4", count)
             template.array(f"colours{index}", "<f4", (count, 4))
             _tail(template)
+        self._own_poses: list[np.ndarray] = []
         hub = max(strand.width.max() for strand in description.strands)
         for index, body in enumerate(description.bodies):
-            shape, size = (SPHERE, 2 * body.radius) if body.radius else (CUBE, hub)
-            _head(template, f"bodies/{body.name}", shape, BODY_COLOUR, (size,) * 3, pose_field=f"pose{index}")
+            shape, size, pose = CUBE, (hub,) * 3, np.array(_IDENTITY)
+            if body.shape:
+                shape, size, pose = shape_marker(body.shape)
+            self._own_poses.append(pose)
+            _head(template, f"bodies/{body.name}", shape, BODY_COLOUR, size, pose_field=f"pose{index}")
             template.put("<u4", 0, 0)
             _tail(template)
-        for plane in description.obstacles:
-            size = (PLANE_SIZE, PLANE_SIZE, PLANE_THICKNESS)
-            pose = plane_pose(plane.point, plane.normal)
-            _head(template, f"obstacles/{plane.name}", CUBE, PLANE_COLOUR, size, pose)
+        for obstacle in description.obstacles:
+            shape, size, pose = shape_marker(obstacle.shape)
+            _head(template, f"obstacles/{obstacle.name}", shape, OBSTACLE_COLOUR, size, pose)
             template.put("<u4", 0, 0)
             _tail(template)
         _head(template, "contact_forces", LINE_LIST, ARROW_COLOUR, (ARROW_WIDTH, 0.0, 0.0), action_field="arrows")
@@ -144,8 +148,11 @@ class MarkerEncoder:
             colour[:] = colours[own]
             spacing[0] = lengths[own.start : own.stop - 1].mean()
         for index, pose in enumerate(self._body_poses):
+            own, quaternion = self._own_poses[index], frame.body_quaternions[index]
             pose[:3] = frame.body_positions[index]
-            pose[3:] = frame.body_quaternions[index]
+            if own[:3].any():
+                pose[:3] += matrix_from_quaternion(quaternion) @ own[:3]
+            pose[3:] = quaternion if own[6] == 1.0 else quaternion_product(quaternion, own[3:])
         self._template.set_time(frame.time)
 
         forces = frame.contact_forces

@@ -10,6 +10,7 @@ from bilayer_core.scene import checks
 from bilayer_core.scene.faults import refuse_all
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.schedule import faults_of_times
+from bilayer_core.scene.shape import RotationVector, Surface
 from bilayer_core.scene.units import (
     AngularSpeed,
     NonNegativeLength,
@@ -28,7 +29,7 @@ class Free(Part):
     mass: PositiveMass
     """Its own, without that of the rods it holds."""
     inertia: tuple[PositiveInertia, PositiveInertia, PositiveInertia] | None = None
-    """Principal moments of inertia; without them those of a solid ball, or of a hollow one if `shell` is true."""
+    """Principal moments of inertia; without them those of the solid surface, or of a hollow ball if `shell` is true."""
     shell: bool = False
     """Whether a ball is hollow: moment of inertia 2/3 m r² instead of 2/5 m r²."""
     velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
@@ -55,30 +56,36 @@ class Guided(Part):
 
 
 class Prescribed(Part):
-    """A body that is guided: at rest, or through points with a rest at each (cubic smoothstep between them)."""
+    """A body on a schedule: at rest, or through poses with a rest at each (cubic smoothstep between them)."""
 
     type: Literal["prescribed"]
     times: list[NonNegativeTime] = []
     """Increasing; without any the body stays where it is."""
     displacements: list[Point] = []
     """From the body's position, at each of the times; the first is zero."""
+    rotations: list[RotationVector] = []
+    """From the body's rotation at the start, about the axes of the world, at each of the times; the first is zero."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is ever elsewhere than at the start."""
+        return any(any(part) for part in (*self.displacements, *self.rotations))
 
     @model_validator(mode="after")
     def _check(self) -> Prescribed:
-        faults = faults_of_times(self.times, ("displacements",), self.displacements)
-        if self.displacements and any(self.displacements[0]):
-            found = self.displacements[0]
-            faults.append((("displacements", 0), found, "must be [0, 0, 0]: `position` is where the body starts"))
+        faults = []
+        if self.displacements or not self.rotations:
+            faults += faults_of_times(self.times, ("displacements",), self.displacements)
+        if self.rotations:
+            faults += [f for f in faults_of_times(self.times, ("rotations",), self.rotations) if f not in faults]
+        for key, start, values in (
+            ("displacements", "position", self.displacements),
+            ("rotations", "rotation", self.rotations),
+        ):
+            if values and any(values[0]):
+                faults.append(((key, 0), values[0], f"must be [0, 0, 0]: `{start}` is where the body starts"))
         refuse_all("Prescribed", faults)
         return self
-
-
-class Sphere(Part):
-    """A spherical surface about the body's position."""
-
-    shape: Literal["sphere"]
-    radius: PositiveLength
-    """About the mass centre."""
 
 
 class ContactPoint(Part):
@@ -101,7 +108,9 @@ class Body(Part):
     """Of the mass centre at the start."""
     motion: Annotated[Free | Guided | Prescribed, Field(discriminator="type")]
     """What moves it."""
-    surface: Sphere | None = None
+    rotation: RotationVector = (0.0, 0.0, 0.0)
+    """Of its frame at the start, axis times angle: `[0, 0, 30 deg]` turns it about z."""
+    surface: Surface | None = None
     """What others touch; without one nothing does."""
     contact_points: list[ContactPoint] = []
     """Points by which the body itself touches surfaces."""

@@ -107,6 +107,13 @@ def faults_of_load(load: Load) -> list[Fault]:
     return faults
 
 
+def faults_of_rounding(rounding: float, largest: float, what: str) -> list[Fault]:
+    """Whether a shape has room for the radius of its edges."""
+    if rounding <= (1.0 + ROUNDING) * largest:
+        return []
+    return [(("rounding",), rounding, f"must be at most {what} ({largest:g} m)")]
+
+
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
     """Names that refer to other parts, names that occur twice, and parts that need another."""
     return [*_names(scene), *_references(scene), *_clamps(scene), *_surfaces(scene), *_points(scene)]
@@ -154,8 +161,17 @@ def _clamps(scene: SceneConfig) -> Iterator[Fault]:
 
 def _surfaces(scene: SceneConfig) -> Iterator[Fault]:
     for index, body in enumerate(scene.bodies):
-        if body.motion.type == "free" and body.surface is None and body.motion.inertia is None:
-            yield ("bodies", index, "motion", "inertia"), None, "must be given for a free body that is no sphere"
+        if body.motion.type != "free":
+            continue
+        shape = body.surface.shape if body.surface is not None else None
+        if shape == "plane":
+            demand = "must be `sphere`, `box` or `cylinder` for a free body: a plane has no end"
+            yield ("bodies", index, "surface", "shape"), shape, demand
+        elif shape is None and body.motion.inertia is None:
+            demand = "must be given for a free body without a surface"
+            yield ("bodies", index, "motion", "inertia"), None, demand
+        if body.motion.shell and shape not in ("sphere", None, "plane"):
+            yield ("bodies", index, "motion", "shell"), True, "is for spheres: give `inertia` for a hollow body"
     touching = [plane.name for plane in scene.obstacles] + [
         body.name for body in scene.bodies if body.surface is not None or body.contact_points
     ]

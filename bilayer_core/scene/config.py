@@ -10,9 +10,10 @@ from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
 from bilayer_core.scene.faults import refuse, refuse_all
 from bilayer_core.scene.load import Load, PointMass
-from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.part import Name, Part
 from bilayer_core.scene.rod import Rod
 from bilayer_core.scene.schedule import Schedule
+from bilayer_core.scene.shape import Obstacle
 from bilayer_core.scene.units import (
     Acceleration,
     NonNegativeNumber,
@@ -60,18 +61,6 @@ class Stimulus(Part):
     def _check(self) -> Stimulus:
         refuse_all("Stimulus", checks.faults_of_range(self))
         return self
-
-
-class Plane(Part):
-    """A fixed plane; rods and bodies stay on the side to which the normal points."""
-
-    name: Name
-    """Unique among rods, bodies and obstacles."""
-    type: Literal["plane"]
-    point: Point
-    """Any point of the plane."""
-    normal: Direction
-    """Out of the obstacle, towards the robot."""
 
 
 class Friction(Part):
@@ -227,7 +216,7 @@ class SceneConfig(Part):
     """Masses fixed to rods."""
     loads: list[Load] = []
     """Forces and moments from outside."""
-    obstacles: list[Plane] = []
+    obstacles: list[Obstacle] = []
     """Surfaces fixed in the world."""
     contact: Contact | None = None
     """Must be given where there is something to touch."""

@@ -95,7 +95,7 @@ def expand_edges(
     spin_inertia,
     factor,
     edge_hessian,
-    carrier_hessian,
+    node_hessian,
     with_node_blocks,
     band_out,
 ):
@@ -105,7 +105,7 @@ def expand_edges(
         for c in range(3):
             band_out[d + c, 0] += factor * node_mass[i]
         if with_node_blocks:
-            _add_own_block(band_out, d, 1.0, carrier_hessian, i)
+            _add_own_block(band_out, d, 1.0, node_hessian, i)
     for k in range(edge_node.shape[0]):
         d0, d1, t = node_unknown[edge_node[k]], node_unknown[edge_node[k] + 1], edge_unknown[k]
         _add_own_block(band_out, d0, 1.0, edge_hessian, k)

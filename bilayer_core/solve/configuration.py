@@ -35,6 +35,45 @@ def _second_director(tangent, director1, director2_out):
         director2_out[k, 2] = tangent[k, 0] * director1[k, 1] - tangent[k, 1] * director1[k, 0]
 
 
+@kernel
+def _place(body, local, position, rotation, arm_out, place_out):
+    """X + R r of points r of bodies, and the arms R r [m]."""
+    for k in range(body.shape[0]):
+        b = body[k]
+        for i in range(3):
+            arm = rotation[b, i, 0] * local[k, 0] + rotation[b, i, 1] * local[k, 1] + rotation[b, i, 2] * local[k, 2]
+            arm_out[k, i] = arm
+            place_out[k, i] = position[b, i] + arm
+
+
+@kernel
+def _turn_walls(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
+    """t and m1 of walls, edges from `first` on, turned with their bodies, and m2 = t × m1."""
+    for k in range(body.shape[0]):
+        b, w = body[k], first + k
+        for i in range(3):
+            tangent[w, i] = director1[w, i] = 0.0
+            for j in range(3):
+                tangent[w, i] += rotation[b, i, j] * local_tangent[k, j]
+                director1[w, i] += rotation[b, i, j] * local_director1[w, j]
+        director2[w, 0] = tangent[w, 1] * director1[w, 2] - tangent[w, 2] * director1[w, 1]
+        director2[w, 1] = tangent[w, 2] * director1[w, 0] - tangent[w, 0] * director1[w, 2]
+        director2[w, 2] = tangent[w, 0] * director1[w, 1] - tangent[w, 1] * director1[w, 0]
+
+
+@kernel
+def _turn(body, local, rotation, turn_out):
+    """R L of matrices L of bodies."""
+    for k in range(body.shape[0]):
+        b = body[k]
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for m in range(3):
+                    total += rotation[b, i, m] * local[k, m, j]
+                turn_out[k, i, j] = total
+
+
 class Configuration:
     """Positions, frames and bodies at one point of a Newton iteration.
 
@@ -50,6 +89,10 @@ class Configuration:
         κ₁ κ₂ ψ of joints [rad], shape (n_joint, 3); the third column is the unwrapped twist.
     body_position, body_rotation : Array
         Of free bodies, shapes (n_free, 3), (n_free, 3, 3).
+    place, rotation : Array
+        Of all bodies and last of the world, shapes (n_body + 1, 3), (n_body + 1, 3, 3).
+    surface_place, surface_turn : Array
+        Positions [m] and axes of surfaces, shapes (n_surface, 3), (n_surface, 3, 3).
     arm : Array
         From the position of its body to each attached node [m], shape (n_attached, 3).
     """
@@ -57,14 +100,13 @@ class Configuration:
     def __init__(self, model: Model):
         self._model = model
         edges = model.edge_count + model.wall_count
-        carriers = model.carriers
-        self._first_sphere = model.node_count + model.point_count
-        self._balls = np.flatnonzero(carriers.free_body >= 0)
-        self._held = np.flatnonzero(model.attached_free >= 0)  # attached nodes, walls and points of free bodies
-        self._walls = np.flatnonzero(model.wall_free >= 0)
-        self._points = np.flatnonzero(model.bodies.free_index[carriers.point_body] >= 0)
+        carriers, surfaces, bodies = model.carriers, model.surfaces, len(model.bodies.names)
+        self._prescribed = np.flatnonzero(model.bodies.free_index[:bodies] < 0)
         self.carrier = np.zeros((len(carriers.weight), 3))
         self.position = self.carrier[: model.node_count]
+        self._point = self.carrier[model.node_count :]
+        self._point_body = carriers.body[model.node_count :]
+        self._point_arm = np.zeros_like(self._point)
         self.length = np.ones(edges)
         self.tangent = np.zeros((edges, 3))
         self.director1 = np.zeros((edges, 3))
@@ -73,14 +115,20 @@ class Configuration:
         self.joint_strain = np.zeros((len(model.joint_a), 3))
         self.body_position = np.zeros((model.free_count, 3))
         self.body_rotation = np.zeros((model.free_count, 3, 3))
-        self.arm = model.attached_position.copy()
+        self.place = np.zeros((bodies + 1, 3))
+        self.rotation = np.tile(np.eye(3), (bodies + 1, 1, 1))
+        self.surface_place = np.zeros((len(surfaces.kind), 3))
+        self._surface_arm = np.zeros_like(self.surface_place)
+        self.surface_turn = np.zeros((len(surfaces.kind), 3, 3))
+        self.arm = np.zeros((len(model.attached_node), 3))
+        self._held = np.zeros_like(self.arm)
         self._angle = np.zeros(model.edge_count)
-        self.tangent[model.edge_count :] = model.wall_tangent
-        self.director1[model.edge_count :] = model.start_director1[model.edge_count :]
-        _second_director(self.tangent, self.director1, self.director2)
+        self._surfaces_move = bool((surfaces.body < bodies).any())
+        if len(surfaces.kind):
+            self._place_surfaces()
 
-    def take_state(self, state: State, body_position: Array) -> None:
-        """Start from a state, with prescribed bodies at `body_position` [m], shape (n_body, 3)."""
+    def take_state(self, state: State) -> None:
+        """Start from a state."""
         model = self._model
         self.position[:] = state.position
         self.director1[: model.edge_count] = state.director1
@@ -88,37 +136,41 @@ class Configuration:
         self.joint_strain[:, 2] = state.twist
         self.body_position[:] = state.body_position[model.bodies.body_of_free]
         self.body_rotation[:] = state.body_rotation[model.bodies.body_of_free]
-        self.place_prescribed(body_position)
+        self.place_prescribed(state.body_position, state.body_rotation)
         self.place_held()
         edge_geometry(self.position, model.edge_node, self.length, self.tangent)
         _second_director(self.tangent, self.director1, self.director2)
 
-    def place_prescribed(self, body_position: Array) -> None:
-        """Put contact points and spheres of prescribed bodies to where the bodies are."""
-        model, carriers = self._model, self._model.carriers
-        self.carrier[model.node_count : self._first_sphere] = (
-            body_position[carriers.point_body] + carriers.point_position
-        )
-        self.carrier[self._first_sphere :] = body_position[carriers.sphere_body]
+    def place_prescribed(self, position: Array, rotation: Array) -> None:
+        """Take the poses of prescribed bodies from those of all, shapes (n_body, 3), (n_body, 3, 3)."""
+        self.place[self._prescribed] = position[self._prescribed]
+        self.rotation[self._prescribed] = rotation[self._prescribed]
 
     def place_held(self) -> None:
-        """Put what free bodies carry to where these are: nodes, clamps' directions, contact points, spheres."""
-        model, carriers = self._model, self._model.carriers
-        for carrier in self._balls:
-            self.carrier[carrier] = self.body_position[carriers.free_body[carrier]]
-        for k in self._held:
-            free = model.attached_free[k]
-            self.arm[k] = self.body_rotation[free] @ model.attached_position[k]
-            self.position[model.attached_node[k]] = self.body_position[free] + self.arm[k]
-        for k in self._points:
-            free = model.bodies.free_index[carriers.point_body[k]]
-            arm = self.body_rotation[free] @ carriers.point_position[k]
-            self.carrier[model.node_count + k] = self.body_position[free] + arm
-        for k in self._walls:
-            wall, rotation = model.edge_count + k, self.body_rotation[model.wall_free[k]]
-            self.tangent[wall] = rotation @ model.wall_tangent[k]
-            self.director1[wall] = rotation @ model.start_director1[wall]
-            self.director2[wall] = np.cross(self.tangent[wall], self.director1[wall])
+        """Put what bodies carry to where these are: nodes, clamps' directions, points, surfaces."""
+        model = self._model
+        if not model.bodies.names:
+            return
+        free = model.bodies.body_of_free
+        self.place[free] = self.body_position
+        self.rotation[free] = self.body_rotation
+        if len(self.arm):
+            held = (model.attached_body, model.attached_position, self.place, self.rotation)
+            _place(*held, self.arm, self._held)
+            self.position[model.attached_node] = self._held
+            walls = (model.wall_body, model.wall_tangent, model.start_director1, self.rotation, model.edge_count)
+            _turn_walls(*walls, self.tangent, self.director1, self.director2)
+        if len(self._point):
+            points = (self._point_body, model.carriers.position, self.place, self.rotation)
+            _place(*points, self._point_arm, self._point)
+        if self._surfaces_move:
+            self._place_surfaces()
+
+    def _place_surfaces(self) -> None:
+        surfaces = self._model.surfaces
+        owned = (surfaces.body, surfaces.position, self.place, self.rotation)
+        _place(*owned, self._surface_arm, self.surface_place)
+        _turn(surfaces.body, surfaces.turn, self.rotation, self.surface_turn)
 
     def set_moved(self, base: Configuration, step: Array, body_step: Array, alpha: float) -> None:
         """Become `base` moved by α times a step of the unknowns, shape (size,), and of free bodies, shape (n_free,
@@ -126,7 +178,8 @@ class Configuration:
         """
         model = self._model
         layout = model.layout
-        self.carrier[model.node_count :] = base.carrier[model.node_count :]
+        self.place[self._prescribed] = base.place[self._prescribed]
+        self.rotation[self._prescribed] = base.rotation[self._prescribed]
         _take_step(
             step, alpha, layout.node, layout.edge, base.position, base.turn, self.position, self._angle, self.turn
         )

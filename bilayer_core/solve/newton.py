@@ -16,9 +16,9 @@ from enum import Enum
 
 import numpy as np
 
-from ..contact.step_bound import step_bound
 from ..jit import kernel
-from ..model.bodies import carrier_names
+from ..kinematics.rotation import rotation_vector
+from ..model.carriers import carrier_names
 from ..model.model import Model
 from .configuration import Configuration
 from .potential import IncrementalPotential
@@ -102,10 +102,12 @@ class NewtonSolver:
         self._potential = potential
         self._tolerance = tolerance
         self._max_iterations = max_iterations
-        self._carrier_step = np.zeros((len(model.carriers.weight), 3))
-        self._node_step = model.layout.node[:, None] + np.arange(3)
-        self._reach = model.bodies.reach
-        self._moving = _Moving(model)
+        bodies = model.bodies
+        self._node_unknown = model.layout.node[:, None] + np.arange(3)
+        self._reach = bodies.reach[bodies.body_of_free]
+        self._prescribed = np.flatnonzero(bodies.free_index[:-1] < 0)
+        self._turns = [f >= 0 or len(r) > 0 for f, r in zip(bodies.free_index, bodies.rotations, strict=False)]
+        self._motion = np.zeros((len(bodies.names) + 1, 6))  # of all bodies and of the world
 
     def speed(self, step: Array, body_step: Array) -> float:
         """Largest displacement of a material point in a step, over the length of the time step [m/s]; NaN if any is."""
@@ -118,36 +120,54 @@ class NewtonSolver:
             largest = max(largest, math.sqrt(body_step[b, :3] @ body_step[b, :3]) + turn)
         return float(largest / self._potential.context.length)
 
-    def bound(self, at: Configuration, carrier_step: Array) -> tuple[float, int]:
-        """`contact.step_bound` of carriers at a configuration."""
-        if not self._potential.has_contact:
-            return 1.0, -1
-        carriers = self._model.carriers
-        pairs = slice(None) if self._potential.has_balls else slice(0)
-        planes = slice(None) if self._potential.has_planes else slice(0)
-        alpha, blocking = step_bound(
-            at.carrier,
-            carrier_step,
-            carriers.radius,
-            carriers.plane_point[planes],
-            carriers.plane_normal[planes],
-            carriers.pair_first[pairs],
-            carriers.pair_second[pairs],
-        )
-        rods, nodes = self._potential.matrix.rods, self._model.node_count
-        if rods is None:
-            return alpha, blocking
-        between, node = rods.step_bound(at.position, carrier_step[:nodes])
-        return (alpha, blocking) if alpha <= between else (between, node)
+    def bound(self, at: Configuration, node_step: Array, body_motion: Array) -> tuple[float, int]:
+        """Largest fraction of a step that keeps all gaps open, and the near pair that sets it (−1: none, or rods).
+
+        Parameters
+        ----------
+        at : Configuration
+        node_step : Array
+            Displacement of nodes [m], shape (n_node, 3); those that bodies hold follow their bodies.
+        body_motion : Array
+            Displacement [m] and rotation vector [rad] of bodies and of the world, shape (n_body + 1, 6).
+        """
+        model, near, rods = self._model, self._potential.near, self._potential.matrix.rods
+        alpha, blocking = near.bound(at, node_step, body_motion) if near else (1.0, -1)
+        if rods is not None:
+            node_step, held = node_step.copy(), body_motion[model.attached_body]
+            node_step[model.attached_node] = held[:, :3] + np.cross(held[:, 3:], at.arm)
+            between, _ = rods.step_bound(at.position, node_step)
+            if between < alpha:
+                return between, -1
+        return alpha, blocking
+
+    def bound_between(self, start: Configuration, end: Configuration) -> float:
+        """`bound` from one configuration to another."""
+        self._find_motion(start, end, range(len(self._motion) - 1))
+        return self.bound(start, end.position - start.position, self._motion)[0]
+
+    def _find_motion(self, start: Configuration, end: Configuration, bodies) -> None:
+        """Motion of some bodies from one configuration to another."""
+        for b in bodies:
+            self._motion[b, :3] = end.place[b] - start.place[b]
+            if self._turns[b]:
+                self._motion[b, 3:] = rotation_vector(end.rotation[b] @ start.rotation[b].T)
+
+    def _who_blocks(self, pair: int) -> str:
+        if pair < 0:
+            return "a rod would reach another"
+        model, near = self._model, self._potential.near
+        surface = model.surfaces.names[near.surface[pair]]
+        return f"{carrier_names(model)[near.carrier[pair]]} would reach the surface of {surface}"
 
     def first_guess(self, context: StepContext, target: Configuration, guess: Configuration) -> NewtonReport | None:
-        """Set `guess` to the start of the step moved by its velocity, prescribed nodes and points to their place.
+        """Set `guess` to the start of the step moved by its velocity, prescribed bodies to their place.
 
         Parameters
         ----------
         context : StepContext
         target : Configuration
-            Whose carriers hold the prescribed positions at the end of the step; is overwritten.
+            Whose prescribed bodies are where they are to be at the end of the step.
         guess : Configuration
 
         Returns
@@ -155,27 +175,25 @@ class NewtonSolver:
         NewtonReport or None
             A report if prescribed motion is blocked.
         """
-        model, start = self._model, context.start
-        free = self._moving.free
-        move = target.carrier - start.carrier
-        inertial = np.zeros_like(move)
-        inertial[: model.node_count] = context.predicted_position - start.position
-        self._moving.add_bodies(context.predicted_body_position - start.body_position, inertial)
+        start, bodies, motion = context.start, self._model.bodies, self._motion
+        self._find_motion(start, target, self._prescribed)
+        motion[bodies.body_of_free, 3:] = 0.0
+        inertial = context.predicted_position - start.position
+        body_inertial = context.predicted_body_position - start.body_position
         fraction = 1.0
         for retry in (0.5, 0.0, None):
-            move[free] = fraction * inertial[free]
-            alpha, blocking = self.bound(start, move)
+            motion[bodies.body_of_free, :3] = fraction * body_inertial
+            alpha, blocking = self.bound(start, fraction * inertial, motion)
             if alpha >= 1.0:
                 break
             if retry is None:
-                name = carrier_names(model)[blocking] if blocking >= 0 else "a rod"
-                return NewtonReport(NewtonStatus.BLOCKED, 0, 0, math.inf, detail=f"{name} would reach a surface")
+                return NewtonReport(NewtonStatus.BLOCKED, 0, 0, math.inf, detail=self._who_blocks(blocking))
             fraction *= retry * alpha
-        guess.carrier[:] = start.carrier + move
+        guess.position[:] = start.position + fraction * inertial
         guess.turn[:] = fraction * context.predicted_turn
-        guess.body_position[:] = start.body_position + fraction * (
-            context.predicted_body_position - start.body_position
-        )
+        guess.place[self._prescribed] = target.place[self._prescribed]
+        guess.rotation[self._prescribed] = target.rotation[self._prescribed]
+        guess.body_position[:] = start.body_position + fraction * body_inertial
         guess.body_rotation[:] = start.body_rotation
         guess.place_held()
         guess.carry_frames(start, guess.turn)
@@ -240,10 +258,9 @@ class NewtonSolver:
         potential, model = self._potential, self._model
         slope = float(potential.gradient @ step) + float(np.sum(potential.body_gradient * body_step))
         noise = ROUNDING * sum(abs(value) for value in potential.terms.values())
-        self._carrier_step[: model.node_count] = step[self._node_step]
-        self._moving.add_bodies(body_step[:, :3], self._carrier_step)
-        self._moving.add_turns(body_step[:, 3:], at, self._carrier_step)
-        alpha, _ = self.bound(at, self._carrier_step)
+        self._motion[self._prescribed] = 0.0
+        self._motion[model.bodies.body_of_free] = body_step
+        alpha, _ = self.bound(at, step[self._node_unknown], self._motion)
         bounded = alpha < 1.0
         for halvings in range(MAX_BACKTRACKS):
             trial.set_moved(at, step, body_step, alpha)
@@ -252,37 +269,3 @@ class NewtonSolver:
                 return value, halvings + bounded
             alpha *= BACKTRACKING
         return None
-
-
-class _Moving:
-    """Which carriers move freely, and which of them a free body carries.
-
-    What a turning body carries moves on an arc, which the bound follows along its tangent at the start of the iterate.
-    Where the arc ends behind a surface the potential is infinite, and the line search turns less.
-    """
-
-    def __init__(self, model: Model):
-        carriers = model.carriers
-        body = np.full(len(carriers.weight), -1, dtype=np.int64)
-        body[model.attached_node] = model.attached_free
-        body[model.node_count : model.node_count + model.point_count] = model.bodies.free_index[carriers.point_body]
-        balls = carriers.free_body >= 0
-        body[balls] = carriers.free_body[balls]
-        self._carried = np.flatnonzero(body >= 0)
-        self._body = body[self._carried]
-        self._turned = np.flatnonzero((body >= 0) & ~balls)
-        self._body_of_turned = body[self._turned]
-        self.free = np.zeros(len(carriers.weight), dtype=bool)
-        self.free[: model.node_count] = True
-        self.free[model.attached_node] = False
-        self.free[self._carried] = True
-
-    def add_bodies(self, displacement: Array, carrier_step: Array) -> None:
-        """Write the displacement of free bodies [m], shape (n_free, 3), into the steps of what they carry."""
-        carrier_step[self._carried] = displacement[self._body]
-
-    def add_turns(self, turn: Array, at: Configuration, carrier_step: Array) -> None:
-        """Add what rotation vectors of free bodies [rad], shape (n_free, 3), do to nodes and points off centre."""
-        if len(self._turned):
-            arms = at.carrier[self._turned] - at.body_position[self._body_of_turned]
-            carrier_step[self._turned] += np.cross(turn[self._body_of_turned], arms)

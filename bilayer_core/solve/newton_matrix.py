@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..jit import kernel
 from ..kinematics.rotation import skew
 from ..model.model import Model
 from .assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
@@ -41,34 +42,44 @@ def zeros_in_one(shapes: dict[str, tuple[int, ...]]) -> tuple[Array, list[Array]
     ]
 
 
+@kernel
+def _add_links(links, link_node, link_body, link_hessian, node_unknown, border_out):
+    """Add the blocks between nodes and free bodies to the border."""
+    for k in range(links):
+        row, column = node_unknown[link_node[k]], 6 * link_body[k]
+        for m in range(3):
+            for n in range(6):
+                border_out[row + m, column + n] += link_hessian[k, m, n]
+
+
 class NewtonMatrix:
     """Second derivatives in edge space, filled by the forces, and the factorised matrix of the unknowns."""
 
-    def __init__(self, model: Model, has_node_blocks: bool, has_balls: bool, carrier_gradient: Array):
+    def __init__(self, model: Model, has_node_blocks: bool):
         self._model = model
         self.rods = RodContact(model) if model.rod_surfaces is not None else None
         self._rod_border = RodBorder(model) if self.rods else None
         self._has_node_blocks = has_node_blocks
-        self.carrier_gradient = carrier_gradient
         edges = model.edge_count + model.wall_count
-        pairs, carriers = len(model.pair_top), model.carriers
+        pairs = len(model.pair_top)
         size, b = model.layout.size, model.layout.half_bandwidth
-        balls = len(carriers.pair_first) if has_balls else 0
-        carrier_blocks = len(carriers.weight) if has_node_blocks else 0
+        node_blocks = model.node_count if has_node_blocks else 0
         shapes = {
             "edge_hessian": (edges, 4, 4),
             "cross_hessian": (len(model.joint_a), 4, 4),
             "pair_hessian": (pairs, 3, 3),
             "top_hessian": (pairs, 3, 4),
             "bottom_hessian": (pairs, 3, 4),
-            "carrier_hessian": (carrier_blocks, 3, 3),
-            "ball_hessian": (balls, 3, 3),
-            "ball_turn_hessian": (balls, 3, 3),
+            "node_hessian": (node_blocks, 3, 3),
             "body_hessian": (6 * model.free_count, 6 * model.free_count),
         }
         self._second_derivatives, parts = zeros_in_one(shapes)
         self.edge_hessian, self.cross_hessian, self.pair_hessian, self.top_hessian, self.bottom_hessian = parts[:5]
-        self.carrier_hessian, self.ball_hessian, self.ball_turn_hessian, self.body_hessian = parts[5:]
+        self.node_hessian, self.body_hessian = parts[5:]
+        self.links = 0  # blocks between nodes and free bodies: the node, the free body, and ∂²/∂x ∂(X, φ) of each
+        self.link_node = np.zeros(0, dtype=np.int64)
+        self.link_body = np.zeros(0, dtype=np.int64)
+        self.link_hessian = np.zeros((0, 3, 6))
         self._band = np.zeros((size + b, b + 1))
         self._factor, self._solve, self._solve_border = band_kernels(b)
         self._right = np.zeros(size + b)
@@ -85,23 +96,20 @@ class NewtonMatrix:
         self._nothing = self._leaving = np.zeros(0, dtype=np.int64)
         self._wide, self._wide_solution = self._border_free, self._border_solution
         self._coupled = False
-        points = model.bodies.free_index[carriers.point_body]
-        self._points = [(model.node_count + k, points[k]) for k in np.flatnonzero(points >= 0)]
-        self._balls = [(k, carriers.free_body[k]) for k in np.flatnonzero(carriers.free_body >= 0)]
         self.shift, self.simplified = 0.0, 0
 
     def clear(self) -> None:
         """Set all second derivatives to zero."""
         self._second_derivatives.fill(0.0)
+        self.links = 0
 
-    def add_carriers_to_bodies(self, carrier_gradient: Array, at: Configuration, body_gradient: Array) -> None:
-        """Hand the force on the centre of each ball and on each contact point to its free body."""
-        for carrier, free in self._balls:
-            body_gradient[free, :3] += carrier_gradient[carrier]
-        for carrier, free in self._points:
-            body_gradient[free, :3] += carrier_gradient[carrier]
-            arm = at.carrier[carrier] - at.body_position[free]
-            body_gradient[free, 3:] += np.cross(arm, carrier_gradient[carrier])
+    def make_room_for_links(self, room: int) -> None:
+        """Have room for so many links; those listed stay."""
+        if room > len(self.link_node):
+            links, extra = self.links, room
+            self.link_node = np.concatenate([self.link_node[:links], np.zeros(extra, dtype=np.int64)])
+            self.link_body = np.concatenate([self.link_body[:links], np.zeros(extra, dtype=np.int64)])
+            self.link_hessian = np.concatenate([self.link_hessian[:links], np.zeros((extra, 3, 6))])
 
     def factorise(self, factor: float, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> bool:
         """Assemble and factorise; false if no shift makes the matrix positive definite.
@@ -141,7 +149,9 @@ class NewtonMatrix:
         self._corner[:] = self.body_hessian
         self._coupled = False
         if model.free_count:
-            self._add_contact_of_bodies(at)
+            if self.links:
+                self._coupled = True
+                _add_links(self.links, self.link_node, self.link_body, self.link_hessian, layout.node, self._border)
             if (model.attached_free >= 0).any():
                 self._add_clamps(at, edge_gradient, attached_gradient)
         hold_unknowns(layout.attached, layout.half_bandwidth, self._band)
@@ -158,7 +168,7 @@ class NewtonMatrix:
             model.spin_inertia,
             factor,
             self.edge_hessian,
-            self.carrier_hessian,
+            self.node_hessian,
             self._has_node_blocks,
             band,
         )
@@ -176,40 +186,6 @@ class NewtonMatrix:
                 self.cross_hessian,
                 band,
             )
-
-    def _add_contact_of_bodies(self, at: Configuration) -> None:
-        """Contact of carriers on free bodies, with planes (D), with nodes (U) and with each other (D)."""
-        model, carriers, corner = self._model, self._model.carriers, self._corner
-        if not self._has_node_blocks:
-            return
-        carried = {}
-        for carrier, free in self._balls:
-            own = self.carrier_hessian[carrier]
-            corner[6 * free : 6 * free + 3, 6 * free : 6 * free + 3] += own + np.triu(own, 1).T
-            carried[carrier] = free, np.eye(3, 6)
-        for carrier, free in self._points:
-            own, force = self.carrier_hessian[carrier], self.carrier_gradient[carrier]
-            arm = at.carrier[carrier] - at.body_position[free]
-            jacobian = np.hstack([np.eye(3), -skew(arm)])
-            rows, turns = slice(6 * free, 6 * free + 6), slice(6 * free + 3, 6 * free + 6)
-            corner[rows, rows] += jacobian.T @ (own + np.triu(own, 1).T) @ jacobian
-            corner[turns, turns] += 0.5 * (np.outer(arm, force) + np.outer(force, arm)) - (arm @ force) * np.eye(3)
-            carried[carrier] = free, jacobian
-        for k in np.flatnonzero(self.ball_hessian.any(axis=(1, 2))):
-            i, j = carriers.pair_first[k], carriers.pair_second[k]
-            ball = carriers.free_body[j]
-            if i < model.node_count:
-                if ball >= 0:
-                    rows = slice(model.layout.node[i], model.layout.node[i] + 3)
-                    self._border[rows, 6 * ball : 6 * ball + 3] += self.ball_hessian[k]
-                    self._border[rows, 6 * ball + 3 : 6 * ball + 6] += self.ball_turn_hessian[k]
-                    self._coupled = True
-            elif i in carried and ball >= 0:
-                first, jacobian = carried[i]
-                rows, columns = slice(6 * first, 6 * first + 6), slice(6 * ball, 6 * ball + 6)
-                block = jacobian.T @ np.hstack([self.ball_hessian[k], self.ball_turn_hessian[k]])
-                corner[rows, columns] += block
-                corner[columns, rows] += block.T
 
     def _add_clamps(self, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> None:
         """Rows of nodes attached to free bodies, from the band and the border, and clamps' elements: into U and D."""

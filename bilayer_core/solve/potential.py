@@ -30,29 +30,26 @@ class IncrementalPotential:
     After `evaluate`, `terms` has each term's energy [J], `gradient` that of the unknowns (zero where nodes are held),
     shape (size,), and
     `body_gradient` that of free bodies, shape (n_free, 6). `carrier_gradient`, shape (n_carrier, 3), and
-    `body_contact_gradient`
-    are the parts of contact and friction alone.
+    `contact_gradient`, of all bodies and of the world, shape (n_body + 1, 6), are the parts of contact and friction
+    alone. `near` lists the pairs that can touch, None without contact.
     """
 
     def __init__(self, model: Model):
         self.model = model
-        contact, carriers = model.scene.contact, model.carriers
-        self.has_planes = contact is not None and len(carriers.plane_point) > 0
-        self.has_balls = contact is not None and len(carriers.pair_first) > 0
-        has_surfaces = self.has_planes or self.has_balls
-        has_rods = model.rod_surfaces is not None
+        contact = model.scene.contact
+        has_surfaces, has_rods = model.meets_surfaces, model.rod_surfaces is not None
         self.has_contact = has_surfaces or has_rods
         has_drag, has_added_mass = len(model.drag_node) > 0, len(model.fluid_mass) > 0
         has_node_blocks = self.has_contact or has_drag or has_added_mass
 
         self.gradient = np.zeros(model.layout.size)
-        self.accumulators = Accumulators(model, has_node_blocks, self.has_balls)
+        self.accumulators = Accumulators(model, has_node_blocks)
         self.terms = self.accumulators.energy
         self.matrix = self.accumulators.matrix
         self.edge_gradient = self.accumulators.edge
         self.body_gradient = self.accumulators.body
         self.carrier_gradient = self.accumulators.carrier
-        self.body_contact_gradient = np.zeros((model.free_count, 6))
+        self.contact_gradient = self.accumulators.contact
         self.attached_gradient = np.zeros((len(model.attached_node), 3))
         self._attached_free, self._wall_free = model.attached_free, model.wall_free
         self.context: StepContext | None = None
@@ -61,6 +58,7 @@ class IncrementalPotential:
         law = contact.friction if contact else None
         slides = law is not None and law.acts
         self._barrier = Barrier(model, self.accumulators) if has_surfaces else None
+        self.near = self._barrier.near if self._barrier else None
         self._of_rods_and_bodies = self._needed(
             (Stretching, True),
             (BendingAndTwisting, True),
@@ -75,8 +73,9 @@ class IncrementalPotential:
             (AddedMass, has_added_mass),
         )
         self._of_carriers = [self._barrier] if has_surfaces else []
+        if has_surfaces and slides:
+            self._of_carriers.append(Friction(model, self.accumulators, self.near))
         self._of_carriers += self._needed(
-            (Friction, has_surfaces and slides),
             (RodBarrier, has_rods),
             (RodFriction, has_rods and slides and law.coefficient > 0.0),
         )
@@ -91,11 +90,6 @@ class IncrementalPotential:
         """
         rods = self.matrix.rods.min_gap if self.matrix.rods else math.inf
         return min(self._barrier.min_gap, rods) if self._barrier else rods
-
-    @property
-    def pair_gap(self) -> Array:
-        """Gap of each pair of carriers there [m], shape (n_pair,)."""
-        return self._barrier.pair_gap
 
     @property
     def energies(self) -> dict[str, float]:
@@ -123,13 +117,11 @@ class IncrementalPotential:
         for term in self._of_rods_and_bodies:
             term.add(at, with_hessian)
         if self._of_carriers:
-            others = out.body.copy()
-            out.carrier.fill(0.0)
+            out.clear_contact()
             for term in self._of_carriers:
                 term.add(at, with_hessian)
             out.node += out.carrier[: self.model.node_count]
-            self.matrix.add_carriers_to_bodies(out.carrier, at, out.body)
-            self.body_contact_gradient = out.body - others
+            out.body += out.contact[self.model.bodies.body_of_free]
         self._expand(at)
         return sum(self.terms.values())
 
@@ -148,7 +140,7 @@ class IncrementalPotential:
                 continue
             for part in term.parts():
                 out.clear(False)
-                out.carrier.fill(0.0)
+                out.clear_contact()
                 part.add(at, False)
                 yield part, part.names[0], float(self.terms[part.names[0]])
 

@@ -1,10 +1,10 @@
-"""Surfaces to draw: ribbons of a run, a ball whose rotation is seen, the ground. Plain numpy."""
+"""Surfaces to draw: ribbons of a run, shapes whose rotation is seen, the ground. Plain numpy."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.integrate.frame import PlaneInfo, Strand
+from bilayer_core.integrate.frame import ShapeInfo, Strand
 
 # Corners of a cross-section along (m1, m2), in half thicknesses and half widths. Every corner is there twice, once
 # for the wide face and once for the narrow one, so that narrow faces can be darker and edges stay sharp.
@@ -56,41 +56,84 @@ def ribbon_triangles(nodes: int) -> np.ndarray:
     return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.uint32)
 
 
-def ball_mesh(
-    radius: float, colours: tuple[tuple[int, int, int], tuple[int, int, int]], segments: int = 8, steps: int = 6
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A sphere about the origin whose segments, like a beach ball's, alternate between two colours.
+Colours = tuple[tuple[int, int, int], tuple[int, int, int]]
+Mesh = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+ARC_STEPS = 12  # rows of vertices along a quarter of a circle
 
-    Parameters
-    ----------
-    segments, steps : int
-        Segments round the axis z, and vertices across each of them.
+
+def shape_mesh(shape: ShapeInfo, colours: Colours) -> Mesh:
+    """A sphere, box or cylinder in the frame of its owner, in patches of two colours that show how it turns.
 
     Returns
     -------
     vertices, normals, colours, triangles : ndarray
         Shapes (v, 3), (v, 3), (v, 3) uint8, (t, 3).
     """
-    rows = 4 * steps
-    polar = np.linspace(0.0, np.pi, rows + 1)[:, None]
-    vertices, shades, triangles = [], [], []
-    corner = np.arange(rows)[:, None] * (steps + 1) + np.arange(steps)
-    quad = np.stack([corner, corner + steps + 1, corner + steps + 2, corner + 1], axis=-1).reshape(-1, 4)
+    half = 0.5 * np.array(shape.size)
+    rounding = half[0] if shape.kind == "sphere" else shape.rounding
+    core = np.maximum(half - rounding, 0.0)
+    patches = _box_patches(core, rounding) if shape.kind == "box" else _round_patches(core[0], core[2], rounding)
+    first, vertices, normals, shades, triangles = 0, [], [], [], []
+    for number, (points, directions) in enumerate(patches):
+        rows, columns = points.shape[:2]
+        corner = first + np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)
+        quads = np.stack([corner, corner + columns, corner + columns + 1, corner + 1], axis=-1).reshape(-1, 4)
+        triangles += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
+        vertices.append(points.reshape(-1, 3))
+        normals.append(directions.reshape(-1, 3))
+        shades.append(np.tile(np.array(colours[number % 2], np.uint8), (rows * columns, 1)))
+        first += rows * columns
+    turn = np.stack([rotated(np.array(shape.quaternion), axis) for axis in range(3)])
+    placed = np.concatenate(vertices) @ turn + np.array(shape.position)
+    directions = np.concatenate(normals) @ turn
+    return (
+        placed.astype(np.float32),
+        directions.astype(np.float32),
+        np.concatenate(shades),
+        np.concatenate(triangles).astype(np.uint32),
+    )
+
+
+def _round_patches(radius: float, half_length: float, rounding: float, segments: int = 8, steps: int = 6):
+    """Segments round the axis z, like those of a beach ball: points and normals, shapes (rows, steps + 1, 3)."""
+    polar = np.linspace(0.0, np.pi, 2 * ARC_STEPS + 1)
+    polar = np.concatenate([[0.0], polar[: ARC_STEPS + 1], polar[ARC_STEPS:], [np.pi]])
+    flat = np.concatenate([[0.0], np.full(2 * ARC_STEPS + 2, radius), [0.0]])  # ends begin at the axis
+    side = np.repeat([half_length, -half_length], ARC_STEPS + 2)
+    across, up = flat + rounding * np.sin(polar), side + rounding * np.cos(polar)
     for segment in range(segments):
         turn = 2 * np.pi * (segment + np.linspace(0.0, 1.0, steps + 1)) / segments
-        unit = np.stack(
-            np.broadcast_arrays(np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)), axis=-1
-        ).reshape(-1, 3)
-        quads = quad + len(unit) * segment
-        triangles += [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
-        vertices.append(unit)
-        shades.append(np.tile(np.array(colours[segment % 2], np.uint8), (len(unit), 1)))
-    normals = np.concatenate(vertices).astype(np.float32)
-    return normals * np.float32(radius), normals, np.concatenate(shades), np.concatenate(triangles).astype(np.uint32)
+        circle = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
+        axis = np.array([0.0, 0.0, 1.0])
+        points = across[:, None, None] * circle + up[:, None, None] * axis
+        yield points, np.sin(polar)[:, None, None] * circle + np.cos(polar)[:, None, None] * axis
+
+
+def _box_patches(core: np.ndarray, rounding: float):
+    """Faces of a box with their share of its rounded edges: points and normals, shapes (rows, columns, 3)."""
+    quarter = np.linspace(0.0, 0.25 * np.pi, ARC_STEPS // 2 + 1)
+    slopes = np.tan(np.concatenate([-quarter[::-1], quarter]))
+    signs = np.repeat([-1.0, 1.0], len(quarter))
+    for axis in range(3):
+        for side in (1.0, -1.0):
+            first, second = ((axis + 1) % 3, (axis + 2) % 3)[:: int(side)]
+            direction, corner = np.zeros((len(slopes), len(slopes), 3)), np.zeros((len(slopes), len(slopes), 3))
+            direction[..., axis], corner[..., axis] = side, side
+            direction[..., first], corner[..., first] = slopes[:, None], signs[:, None]
+            direction[..., second], corner[..., second] = slopes, signs
+            direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
+            yield core * corner + rounding * direction, direction
+
+
+def shape_extent(shape: ShapeInfo) -> np.ndarray:
+    """Corners of a box that holds a shape, in the frame of its owner [m], shape (8, 3); its position for a plane."""
+    turn = np.stack([rotated(np.array(shape.quaternion), axis) for axis in range(3)])
+    signs = np.array(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5])).reshape(3, -1).T
+    return np.array(shape.position) + (signs * np.array(shape.size)) @ turn
 
 
 def plane_mesh(
-    plane: PlaneInfo, center: np.ndarray, half_size: float, cell: float, colours: tuple[tuple[int, ...], ...]
+    plane: ShapeInfo, center: np.ndarray, half_size: float, cell: float, colours: tuple[tuple[int, ...], ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """A chequered disc on a plane round the point below `center`, fading out at its rim.
 
@@ -108,11 +151,11 @@ def plane_mesh(
     vertices, colours, triangles : ndarray
         Shapes (v, 3), (v, 3) uint8, (t, 3).
     """
-    normal = plane.normal / np.linalg.norm(plane.normal)
+    normal, point = rotated(np.array(plane.quaternion), 2), np.array(plane.position)
     across = np.cross([0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0], normal)
     across /= np.linalg.norm(across)
     along = np.cross(normal, across)
-    relative = center - plane.point
+    relative = center - point
     middle = np.array([relative @ across, relative @ along])
     first = np.floor((middle - half_size) / cell).astype(int)
     count = int(np.ceil(2 * half_size / cell)) + 1
@@ -121,7 +164,7 @@ def plane_mesh(
     i, j = i[inside], j[inside]
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     at = (np.stack([i, j], axis=-1)[:, None] + corners) * cell
-    vertices = plane.point + at[..., :1] * across + at[..., 1:] * along
+    vertices = point + at[..., :1] * across + at[..., 1:] * along
     distance = np.linalg.norm(at - middle, axis=-1, keepdims=True) / half_size
     fade = np.clip((distance - 0.35) / 0.65, 0.0, 1.0) ** 1.5
     light, dark, rim = (np.array(colour, float) for colour in colours)

@@ -91,7 +91,7 @@ def summary(run: RunData, scales: Scales) -> str:
     ]
     if run.contact_forces.any():
         lines.append(f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.")
-    if description.obstacles:
+    if any(obstacle.shape.kind == "plane" for obstacle in description.obstacles):
         lines.append(f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.")
     lines.append(f"- **Computed with:** {', '.join(settings)}.")
     return "\n".join(lines)

@@ -139,6 +139,6 @@ class Studio:
         parts = [f"{run.description.scene_name}: axial strain from -{percent:g} % (blue) to +{percent:g} % (red)"]
         if run.contact_forces.any():
             parts.append("contact forces (green)")
-        if run.description.obstacles:
+        if any(obstacle.shape.kind == "plane" for obstacle in run.description.obstacles):
             parts.append(f"squares of {1e3 * self._scales.cell:g} mm")
         return ", ".join(parts)

@@ -10,6 +10,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from bilayer_core.errors import InputError
+from bilayer_core.integrate.frame import ShapeInfo
 from bilayer_core.record.colours import STRAIN_MAP, strain_colours
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view import geometry
@@ -19,6 +20,7 @@ from bilayer_core.view.scales import Scales, choose_scales
 CHUNK = 150  # frames in a chunk: chunks are what the viewer loads, caches and drops
 SIDE_SHADE = 0.55  # brightness of the narrow faces of ribbons
 GROUND_COLOURS = ((74, 79, 88), (62, 66, 74), (28, 30, 34))
+OBSTACLE_COLOURS = ((112, 122, 138), (98, 107, 122))
 BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
 HUB_COLOUR = (128, 140, 160)
 ARROW_COLOUR = (64, 224, 148)
@@ -40,9 +42,9 @@ def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = bluepri
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     recording.log("summary", rr.TextDocument(summary(run, scales), media_type="text/markdown"), static=True)
     _log_legend(recording, scales)
-    _log_ground(recording, run, scales)
+    _log_obstacles(recording, run, scales)
     _send_strands(recording, run, scales)
-    _send_bodies(recording, run)
+    _send_bodies(recording, run, scales)
     _send_forces(recording, run, scales)
     _send_series(recording, run)
     recording.flush()
@@ -75,13 +77,25 @@ def _log_legend(recording: rr.RecordingStream, scales: Scales) -> None:
     recording.log("legend/ticks", labels, static=True)
 
 
-def _log_ground(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
-    for plane in run.description.obstacles:
-        vertices, colours, triangles = geometry.plane_mesh(
-            plane, scales.target, scales.size + 2 * scales.extent, scales.cell, GROUND_COLOURS
-        )
-        mesh = rr.Mesh3D(vertex_positions=vertices, vertex_colors=colours, triangle_indices=triangles)
-        recording.log(f"world/obstacles/{plane.name}", mesh, static=True)
+def _log_obstacles(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+    for obstacle in run.description.obstacles:
+        shape = obstacle.shape
+        mesh = _plane(shape, scales) if shape.kind == "plane" else _mesh(geometry.shape_mesh(shape, OBSTACLE_COLOURS))
+        recording.log(f"world/obstacles/{obstacle.name}", mesh, static=True)
+
+
+def _plane(shape: ShapeInfo, scales: Scales) -> rr.Mesh3D:
+    vertices, colours, triangles = geometry.plane_mesh(
+        shape, scales.target, scales.size + 2 * scales.extent, scales.cell, GROUND_COLOURS
+    )
+    return rr.Mesh3D(vertex_positions=vertices, vertex_colors=colours, triangle_indices=triangles)
+
+
+def _mesh(parts: geometry.Mesh) -> rr.Mesh3D:
+    vertices, normals, colours, triangles = parts
+    return rr.Mesh3D(
+        vertex_positions=vertices, vertex_normals=normals, vertex_colors=colours, triangle_indices=triangles
+    )
 
 
 def _send_strands(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
@@ -108,19 +122,18 @@ def _send_strands(recording: rr.RecordingStream, run: RunData, scales: Scales) -
             )
 
 
-def _send_bodies(recording: rr.RecordingStream, run: RunData) -> None:
+def _send_bodies(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
     width = max(strand.width.max() for strand in run.description.strands)
     thickness = max(strand.thickness.max() for strand in run.description.strands)
     for index, body in enumerate(run.description.bodies):
         path = f"world/bodies/{body.name}"
-        if body.radius:
-            vertices, normals, colours, triangles = geometry.ball_mesh(body.radius, BALL_COLOURS)
-            shape = rr.Mesh3D(
-                vertex_positions=vertices, vertex_normals=normals, vertex_colors=colours, triangle_indices=triangles
-            )
-        else:
+        if body.shape is None:
             half = (0.6 * width, 0.6 * width, 2.2 * thickness)
             shape = rr.Boxes3D(half_sizes=[half], colors=HUB_COLOUR, fill_mode="solid")
+        elif body.shape.kind == "plane":
+            shape = _plane(body.shape, scales)
+        else:
+            shape = _mesh(geometry.shape_mesh(body.shape, BALL_COLOURS))
         recording.log(path, shape, static=True)
         for part in _chunks(len(run.times)):
             recording.send_columns(

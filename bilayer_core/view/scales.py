@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bilayer_core.record.run_data import RunData
+from bilayer_core.view.geometry import rotated, shape_extent
 
 _STEPS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0])
 SMALLEST_STRAIN = 1e-4
@@ -84,15 +85,18 @@ def choose_scales(run: RunData) -> Scales:
 def visible_points(
     run: RunData, shapes: slice | np.ndarray, frames: slice | np.ndarray, metres_per_newton: float
 ) -> np.ndarray:
-    """Points that a picture must hold: nodes, tips of arrows, poles of balls [m], shape (points, 3).
+    """Points that a picture must hold: nodes, tips of arrows, boxes about bodies and obstacles [m], shape (points, 3).
 
     `shapes` and `frames` choose among `run.shape_times` and `run.times`.
     """
     positions = run.positions[shapes].reshape(-1, 3).astype(float)
     points = [positions, positions + metres_per_newton * run.contact_forces[shapes].reshape(-1, 3)]
     for index, body in enumerate(run.description.bodies):
-        poles = body.radius * np.concatenate([np.eye(3), -np.eye(3)])
-        points.append((run.body_positions[frames, index][:, None] + poles).reshape(-1, 3))
+        corners = shape_extent(body.shape) if body.shape else np.zeros((1, 3))
+        axes = [rotated(run.body_quaternions[frames, index], axis) for axis in range(3)]
+        placed = run.body_positions[frames, index][:, None] + np.einsum("atj,ca->tcj", axes, corners)
+        points.append(placed.reshape(-1, 3))
+    points += [shape_extent(o.shape) for o in run.description.obstacles if o.shape.kind != "plane"]
     return np.concatenate(points)
 
 

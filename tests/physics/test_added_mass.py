@@ -59,7 +59,7 @@ def random_problem(seed=0):
     model = build_model(load_scene(content))
     state = initial_state(model)
     start, bent = Configuration(model), Configuration(model)
-    start.take_state(state, state.body_position)
+    start.take_state(state)
     bent.position[:] = start.position + 4e-4 * rng.standard_normal((model.node_count, 3))
     bent.carry_frames(start, 0.3 * rng.standard_normal(model.edge_count))
     return model, bent, rng.standard_normal((model.node_count, 3)), rng.standard_normal(model.edge_count)

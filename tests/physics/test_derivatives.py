@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from sample_scenes import everything
+from sample_scenes import ball, contact, everything, layer, rod, scene
 
 from bilayer_core.integrate.integrators import INTEGRATORS
 from bilayer_core.integrate.stages import predict, start_point
@@ -68,30 +68,16 @@ class Problem:
     Unknowns that are angles are multiplied with a length, so that all entries are of one kind.
     """
 
-    def __init__(self, force, hub, seed):
-        rng = np.random.default_rng(seed)
-        scene = everything()
-        scene["bodies"][0]["motion"] = HUBS[hub]
-        h = STEP
-        if force not in (OTHERS, "everything"):  # elasticity, or loads, by themselves
-            h = LONG_STEP
-            scene |= {"gravity": [0, 0, 0], "damping": {}, "fluid": None, "obstacles": [], "contact": None}
-            if force == "loads":
-                scene["bodies"][0]["contact_points"] = []
-                del scene["bodies"][1]["surface"]
-                scene["bodies"][1]["motion"] = {**HUBS["free hub"]}
-            else:
-                scene["bodies"] = [{**scene["bodies"][0], "contact_points": []}]
-                scene["loads"] = []
+    def __init__(self, scene, force, h, rng, noise=2e-4):
         model = FORCES[force](build_model(load_scene(scene)))
         stepper = Stepper(model, INTEGRATORS["implicit_euler"], h, 1e-6, 50, 0)
         state = initial_state(model)
         rest = Configuration(model)
-        rest.take_state(state, state.body_position)
+        rest.take_state(state)
         bent = Configuration(model)
-        bent.take_state(state, state.body_position)
+        bent.take_state(state)
         free = np.setdiff1d(np.arange(model.node_count), model.attached_node)
-        bent.position[free] += 2e-4 * rng.standard_normal((len(free), 3))
+        bent.position[free] += noise * rng.standard_normal((len(free), 3))
         bent.carry_frames(rest, 0.1 * rng.standard_normal(model.edge_count))
         state.position[:] = bent.position
         state.director1[:] = bent.director1[: model.edge_count]
@@ -101,12 +87,12 @@ class Problem:
             state.body_velocity[body] = 0.02 * rng.standard_normal(3)
             state.body_angular_velocity[body] = rng.standard_normal(3)
         start = Configuration(model)
-        start.take_state(state, state.body_position)
-        drive = stepper.eigenstrain_of(np.array([0.7])), stepper.load_factor(0.03)
+        start.take_state(state)
+        drive = stepper.eigenstrain_of(np.full(len(model.law_gain), 0.7)), stepper.load_factor(0.03)
         origin = start_point(model, state, start)  # of a later stage: not where that is solved from
-        origin.carrier[:] += 1e-5 * rng.standard_normal(origin.carrier.shape)
+        origin.position[:] += 1e-5 * rng.standard_normal(origin.position.shape)
         origin.body_position[:] += 1e-5 * rng.standard_normal(origin.body_position.shape)
-        for b in range(model.free_count):
+        for b in range(len(origin.rotation)):
             origin.rotation[b] = rotation_matrix(1e-2 * rng.standard_normal(3)) @ origin.rotation[b]
         turned = 1e-2 * rng.standard_normal(model.edge_count)
         context = predict(model, origin, start, turned, h, *drive)
@@ -170,18 +156,27 @@ class Problem:
         return np.array(gradient), np.array(rows)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("hub", HUBS)
-@pytest.mark.parametrize("force", FORCES)
-def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
-    problem = Problem(force, hub, seed)
+def of_everything(force, hub, seed):
+    """One force, or all, of the scene that has every one."""
+    scene = everything()
+    scene["bodies"][0]["motion"] = HUBS[hub]
+    h = STEP
+    if force not in (OTHERS, "everything"):  # elasticity, or loads, by themselves
+        h = LONG_STEP
+        scene |= {"gravity": [0, 0, 0], "damping": {}, "fluid": None, "obstacles": [], "contact": None}
+        if force == "loads":
+            scene["bodies"][0]["contact_points"] = []
+            del scene["bodies"][1]["surface"]
+            scene["bodies"][1]["motion"] = {**HUBS["free hub"]}
+        else:
+            scene["bodies"] = [{**scene["bodies"][0], "contact_points": []}]
+            scene["loads"] = []
+    return Problem(scene, force, h, np.random.default_rng(seed))
+
+
+def check(problem):
+    """Compare both derivatives with differences."""
     gradient, hessian = problem.derivatives()
-    if force in (OTHERS, "everything"):
-        assert all(problem.potential.terms[term] > 0.0 for term in ("barrier", "friction", "drag", "damping"))
-        assert problem.potential.terms["added mass"] != 0.0
-        assert problem.coupling > 0.0
-    if force == "loads":
-        assert {"loads", "followers", "moments"} <= problem.potential.terms.keys()
     gradient_errors, hessian_errors = [], []
     for h in (3e-8, 1e-7, 3e-7, 1e-6):
         by_energy, by_gradient = problem.differences(h)
@@ -192,3 +187,83 @@ def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
     assert min(gradient_errors) < GRADIENT_LIMIT
     assert min(hessian_errors) < HESSIAN_LIMIT
     assert np.abs(hessian - hessian.T).max() < 1e-14 * np.abs(hessian).max()
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("hub", HUBS)
+@pytest.mark.parametrize("force", FORCES)
+def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
+    problem = of_everything(force, hub, seed)
+    check(problem)
+    if force in (OTHERS, "everything"):
+        assert all(problem.potential.terms[term] > 0.0 for term in ("barrier", "friction", "drag", "damping"))
+        assert problem.potential.terms["added mass"] != 0.0
+        assert problem.coupling > 0.0
+    if force == "loads":
+        assert {"loads", "followers", "moments"} <= problem.potential.terms.keys()
+
+
+SHAPES = {
+    "sphere": {"radius": 0.01},
+    "box": {"size": [0.02, 0.016, 0.012]},
+    "rounded box": {"size": [0.02, 0.016, 0.012], "rounding": 2e-3},
+    "cylinder": {"radius": 0.01, "length": 0.014, "rim_points": 12},
+    "capsule": {"radius": 0.006, "length": 0.014, "rounding": 0.006},
+}
+FEATURES = {  # a point of the surface and the way out of it
+    "sphere": {"pole": ([0.006, 0.0, 0.008], [0.6, 0, 0.8])},
+    "box": {"face": ([0.01, 0.001, 0.0005], [1, 0, 0]), "edge": ([0.01, 0.008, 0.001], [1, 1, 0])},
+    "cylinder": {"side": ([0.006, 0.008, 0.001], [0.6, 0.8, 0]), "rim": ([0.01, 0, 0.007], [1, 0, 1])},
+}
+FEATURES["box"]["corner"] = ([0.01, 0.008, 0.006], [1, 1, 1])
+FEATURES["rounded box"] = {"corner": ([0.01 - 0.85e-3, 0.008 - 0.85e-3, 0.006 - 0.85e-3], [1, 1, 1])}
+FEATURES["capsule"] = {"end": ([0.0036, 0, 0.0058], [0.6, 0, 0.8])}
+
+
+def around_a_shape(shape, feature, owner):
+    """A short strip at a feature of a shape, a ball at the opposite one, and a tilted box over its upper face."""
+    kind = {"rounded box": "box", "capsule": "cylinder"}.get(shape, shape)
+    point, normal = (np.array(value, dtype=float) for value in FEATURES[shape][feature])
+    normal /= np.linalg.norm(normal)
+    along = np.cross(normal, [0.3, -0.5, 0.8])
+    along /= np.linalg.norm(along)
+    strip = rod([layer()], length=2e-3, stations=5, width=2e-3)
+    strip["path"] |= {"start": list(point + 1.2e-3 * normal - 1e-3 * along), "direction": list(along)}
+    strip["normal"] = list(normal)
+    free = {"type": "free", "mass": 1e-3}
+    top = {"sphere": 0.01, "box": 0.006, "cylinder": 0.007}[kind]
+    corner = np.sqrt(3) * 3e-3  # one corner of the small box points straight down
+    tilt = np.arccos(-1 / np.sqrt(3)) * np.array([1, -1, 0]) / np.sqrt(2)
+    bodies = [
+        {**ball(list(-point - 5.6e-3 * normal), radius=5e-3), "name": "ball"},
+        {
+            "name": "small",
+            "position": [1e-3, 0.5e-3, top + corner + 0.5e-3],
+            "rotation": list(tilt),
+            "motion": free,
+            "surface": {"shape": "box", "size": [6e-3, 6e-3, 6e-3]},
+        },
+    ]
+    obstacles = []
+    if owner == "obstacle":
+        obstacles = [{"name": "shape", "type": kind, "position": [0, 0, 0], **SHAPES[shape]}]
+    else:
+        motion = {"type": "prescribed"} if owner == "prescribed" else {"type": "free", "mass": 2e-3}
+        surface = {"shape": kind, **SHAPES[shape]}
+        bodies.append({"name": "shape", "position": [0, 0, 0], "motion": motion, "surface": surface})
+    law = contact(coefficient=0.5, speed_threshold=1e-2)
+    return scene([strip], bodies=bodies, obstacles=obstacles, contact=law, gravity=[0.1, 0, -9.81])
+
+
+@pytest.mark.parametrize("owner", ["obstacle", "prescribed", "free"])
+@pytest.mark.parametrize(("shape", "feature"), [(shape, f) for shape, found in FEATURES.items() for f in found])
+def test_derivatives_of_contact_agree_with_differences_at_every_feature_of_a_shape(shape, feature, owner):
+    rng = np.random.default_rng(3)
+    problem = Problem(around_a_shape(shape, feature, owner), OTHERS, STEP, rng, noise=5e-5)
+    check(problem)
+    assert all(problem.potential.terms[term] > 0.0 for term in ("barrier", "friction"))
+    near = problem.potential.near
+    touching = near.gap[: near.count] < 1e-3
+    nodes = near.carrier[: near.count] < problem.model.node_count
+    assert touching[nodes].any() and np.count_nonzero(touching[~nodes]) >= 2  # strip, ball and box
+    assert (problem.coupling > 0.0) == (owner == "free")

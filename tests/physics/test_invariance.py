@@ -30,7 +30,7 @@ def at_rest(scene_dict):
     stepper = Stepper(model, INTEGRATORS["implicit_euler"], 1e3, 1e-6, 50, 0)
     state = initial_state(model)
     start = Configuration(model)
-    start.take_state(state, state.body_position)
+    start.take_state(state)
     undriven = np.zeros(model.edge_count), np.zeros(0)
     still = momentary_context(model, start, state, *undriven)
     stepper.potential.start_step(replace(still, length=1e3))  # so long that inertia does not count

@@ -8,7 +8,6 @@ from oracles import discrete_rod
 
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from bilayer_core.contact.step_bound import KEPT_FRACTION, step_bound
 from bilayer_core.forces.bend_twist import bend_twist
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
@@ -169,30 +168,6 @@ def test_friction_reaches_coulombs_value_at_the_threshold_and_is_the_slope_of_it
         assert friction_slope(v, threshold) == pytest.approx(difference / (2 * h), rel=1e-5, abs=1e-9)
     assert friction_over_speed(threshold, threshold) * threshold == pytest.approx(1.0)
     assert friction_over_speed(0.5 * threshold, threshold) * 0.5 * threshold == pytest.approx(0.75)
-
-
-def test_step_bound_is_the_first_moment_at_which_a_gap_shrinks_to_the_kept_fraction():
-    rng = np.random.default_rng(4)
-    limited = 0
-    for _ in range(200):
-        position = np.vstack([rng.standard_normal((3, 3)) * 0.5 + [0, 0, 2.0], [[0, 0, 4.0]]])
-        step = 3.0 * rng.standard_normal((4, 3))
-        radius = np.array([0.01, 0.02, 0.0, 0.5])
-        pairs = np.array([0, 1, 2]), np.array([3, 3, 3])
-        planes = np.zeros((1, 3)), np.array([[0, 0, 1.0]])
-        at = np.array([position + t * step for t in np.linspace(0.0, 1.0, 4001)])
-        gaps = np.concatenate(
-            [at[:, :, 2] - radius, np.linalg.norm(at[:, :3] - at[:, 3:], axis=2) - radius[:3] - radius[3]], axis=1
-        )
-        if gaps[0].min() <= 0.0:
-            continue
-        alpha, blocking = step_bound(position, step, radius, *planes, *pairs)
-        below = np.flatnonzero((gaps < KEPT_FRACTION * gaps[0]).any(axis=1))
-        expected = below[0] / 4000 if below.size else 1.0
-        assert alpha == pytest.approx(expected, abs=3e-4)
-        assert (blocking >= 0) == (alpha < 1.0)
-        limited += alpha < 1.0
-    assert limited > 50
 
 
 def test_quaternions_and_rotation_vectors_describe_the_same_rotation():

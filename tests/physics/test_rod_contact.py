@@ -311,7 +311,7 @@ def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hu
     state.position[free] += 5e-5 * rng.standard_normal((len(free), 3))
     under = model.strands[2]
     state.position[under.first_node : under.first_node + under.node_count, 2] += 0.9e-3 - 0.3e-3
-    start.take_state(state, state.body_position)
+    start.take_state(state)
     start.carry_frames(start, np.zeros(model.edge_count))
     undriven = np.zeros(model.edge_count), np.zeros(0)
     origin, turned = start_point(model, state, start), np.zeros(model.edge_count)

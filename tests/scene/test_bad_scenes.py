@@ -188,7 +188,7 @@ def test_a_fault_is_told_with_its_place_the_value_found_and_what_is_allowed(path
         (
             "bodies.ball.surface",
             None,
-            "ball.motion.inertia: found null; must be given for a free body that is no sphere",
+            "ball.motion.inertia: found null; must be given for a free body without a surface",
         ),
         ("loads.crank.name", "tug", 'loads.tug.name: found "tug"; must be a name of its own among the loads'),
         ("loads.crank.body", DELETE, "loads.crank.rod: found null; must be given, or `body` instead of it: a"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import synthetic_run
 
-from bilayer_core.integrate.frame import PlaneInfo
+from bilayer_core.integrate.frame import ShapeInfo
 from bilayer_core.record.colours import strain_colours
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.view import geometry
@@ -47,21 +47,41 @@ def test_a_tapered_ribbon_is_drawn_with_its_taper():
     assert volume == pytest.approx(6e-3 * synthetic_run.THICKNESS * 0.06, rel=1e-6)
 
 
-def test_the_surface_of_a_ball_holds_its_volume_and_has_segments_of_both_colours():
+TILTED = (0.0, 0.6, 0.0, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "rounding", "volume"),
+    [
+        ("sphere", (0.04, 0.04, 0.04), 0.0, 4 / 3 * np.pi * 0.02**3),
+        ("box", (0.03, 0.02, 0.01), 0.0, 6e-6),
+        ("box", (0.02, 0.02, 0.02), 0.01, 4 / 3 * np.pi * 0.01**3),  # rounded to a ball
+        ("cylinder", (0.02, 0.02, 0.05), 0.0, np.pi * 0.01**2 * 0.05),
+        ("cylinder", (0.02, 0.02, 0.05), 0.01, np.pi * 0.01**2 * 0.03 + 4 / 3 * np.pi * 0.01**3),  # a capsule
+    ],
+)
+def test_the_surface_of_a_shape_holds_its_volume_and_shows_both_colours(kind, size, rounding, volume):
+    shape = ShapeInfo(kind, size, rounding, (0.1, 0.2, 0.3), TILTED)
     colours = ((1, 2, 3), (4, 5, 6))
-    vertices, normals, shades, triangles = geometry.ball_mesh(0.02, colours)
-    assert closed_volume(vertices, triangles) == pytest.approx(4 / 3 * np.pi * 0.02**3, rel=0.01)
-    np.testing.assert_allclose(vertices, 0.02 * normals, rtol=1e-6)
+    vertices, normals, shades, triangles = geometry.shape_mesh(shape, colours)
+    assert closed_volume(vertices - np.float32([0.1, 0.2, 0.3]), triangles) == pytest.approx(volume, rel=0.02)
+    assert np.linalg.norm(normals, axis=1) == pytest.approx(np.ones(len(normals)), abs=1e-6)
     assert {tuple(shade) for shade in shades.tolist()} == set(colours)
+    corners = geometry.shape_extent(shape)
+    for axis in range(3):
+        direction = geometry.rotated(np.array(TILTED), axis)
+        found = (vertices @ direction).min(), (vertices @ direction).max()
+        assert found == pytest.approx(((corners @ direction).min(), (corners @ direction).max()), abs=1e-7)
 
 
 def test_squares_of_a_plane_lie_in_it_and_stay_where_they_are():
-    normal = np.array([0.6, 0.0, 0.8])
-    plane = PlaneInfo("slope", np.array([0.1, 0.0, 0.2]), normal)
+    turn = 0.5 * np.arctan2(0.6, 0.8)
+    normal, point = np.array([0.6, 0.0, 0.8]), np.array([0.1, 0.0, 0.2])
+    plane = ShapeInfo("plane", (0.0, 0.0, 0.0), 0.0, tuple(point), (0.0, np.sin(turn), 0.0, np.cos(turn)))
     colours = ((100, 100, 100), (50, 50, 50), (0, 0, 0))
     here, shades, triangles = geometry.plane_mesh(plane, np.zeros(3), 0.1, 0.02, colours)
     there, _, _ = geometry.plane_mesh(plane, np.array([0.0, 0.013, 0.0]), 0.1, 0.02, colours)
-    np.testing.assert_allclose((here - plane.point) @ normal, 0.0, atol=1e-8)
+    np.testing.assert_allclose((here - point) @ normal, 0.0, atol=1e-8)
     shared = {tuple(row) for row in np.round(here, 6).tolist()} & {tuple(row) for row in np.round(there, 6).tolist()}
     assert len(shared) > 60
     assert (shades.min(), shades.max()) == (0, 100)

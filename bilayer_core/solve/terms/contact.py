@@ -1,4 +1,4 @@
-"""Contact and friction of carriers. These terms add to the derivatives of carriers, and of bodies' rotations."""
+"""Contact and friction of carriers with surfaces. These terms add to the derivatives of carriers and of bodies."""
 
 from __future__ import annotations
 
@@ -6,55 +6,71 @@ import math
 
 import numpy as np
 
-from ...forces.contact import pair_contact, plane_contact
+from ...forces.contact import surface_contact
 from ...forces.friction import friction, lag_axes, lag_friction
 from ...model.model import Model
 from ..configuration import Configuration
+from ..neighbours import Neighbours
 from .term import Accumulators, Kind, StepContext, Term
 
 
 class Barrier(Term):
-    """Barrier of carriers against planes and each other.
+    """Barrier of carriers against the surfaces near them.
 
     Attributes
     ----------
+    near : Neighbours
     min_gap : float
         Smallest gap at the last evaluation [m].
-    pair_gap : Array
-        Gap of each pair there [m], shape (n_pair,).
     """
 
     names = ("barrier",)
 
     def __init__(self, model: Model, out: Accumulators):
         super().__init__(model, out)
-        carriers = model.carriers
-        self.has_planes = len(carriers.plane_point) > 0
-        self.has_balls = len(carriers.pair_first) > 0
+        self.near = Neighbours(model)
         self.min_gap = math.inf
-        self.pair_gap = np.full(len(carriers.pair_first), math.inf)
+
+    def start_step(self, context: StepContext) -> None:
+        super().start_step(context)
+        self.near.update(context.start)
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
-        carriers, contact, out = self.model.carriers, self.model.scene.contact, self.out
-        law = (contact.barrier_distance, contact.stiffness, carriers.weight, carriers.radius, at.carrier)
-        carrier_out = (out.carrier, out.matrix.carrier_hessian)
-        barrier, self.min_gap = 0.0, math.inf
-        if self.has_planes:
-            barrier, self.min_gap = plane_contact(
-                *law, carriers.plane_point, carriers.plane_normal, *carrier_out, with_hessian
-            )
-        if self.has_balls:
-            energy, gap = pair_contact(
-                *law,
-                carriers.pair_first,
-                carriers.pair_second,
-                *carrier_out,
-                out.matrix.ball_hessian,
-                self.pair_gap,
-                with_hessian,
-            )
-            barrier, self.min_gap = barrier + energy, min(self.min_gap, gap)
-        out.energy["barrier"] = barrier
+        model, near, out, matrix = self.model, self.near, self.out, self.out.matrix
+        carriers, surfaces, contact = model.carriers, model.surfaces, model.scene.contact
+        if with_hessian:
+            matrix.make_room_for_links(near.count)
+        out.energy["barrier"], self.min_gap, links = surface_contact(
+            contact.barrier_distance,
+            contact.stiffness,
+            near.count,
+            near.carrier,
+            near.surface,
+            at.carrier,
+            carriers.radius,
+            carriers.weight,
+            carriers.body,
+            surfaces.kind,
+            surfaces.size,
+            surfaces.rounding,
+            at.surface_place,
+            at.surface_turn,
+            surfaces.body,
+            at.place,
+            model.bodies.free_index,
+            out.carrier,
+            out.contact,
+            near.gap,
+            matrix.node_hessian,
+            matrix.body_hessian,
+            matrix.links,
+            matrix.link_node,
+            matrix.link_body,
+            matrix.link_hessian,
+            with_hessian,
+        )
+        if with_hessian:
+            matrix.links = links
 
 
 class Friction(Term):
@@ -63,38 +79,53 @@ class Friction(Term):
     names = ("friction",)
     kind = Kind.DISSIPATIVE
 
-    def __init__(self, model: Model, out: Accumulators):
+    def __init__(self, model: Model, out: Accumulators, near: Neighbours):
         super().__init__(model, out)
-        carriers = model.carriers
-        room = len(carriers.weight) * len(carriers.plane_point) + len(carriers.pair_first)
+        self._near = near
+        self._count = 0
+        self._turn, self._origin_turn, self._back = np.zeros((3, len(model.bodies.names) + 1, 3, 3))
+        self._make_room(0)
+
+    def _make_room(self, room: int) -> None:
         self._first = np.zeros(room, dtype=np.int64)
-        self._second = np.zeros(room, dtype=np.int64)
-        self._pair = np.zeros(room, dtype=np.int64)
+        self._surface = np.zeros(room, dtype=np.int64)
         self._load = np.zeros(room)
         self._normal = np.zeros((room, 3))
         self._axis = np.zeros((room, 3))
-        self._count = 0
-        self._turn, self._origin_turn = np.zeros((2, model.free_count, 3, 3))
+        self._arm = np.zeros((room, 3))
+        self._lever = np.zeros((room, 3))
 
     def start_step(self, context: StepContext) -> None:
         super().start_step(context)
-        contact, carriers, start = self.model.scene.contact, self.model.carriers, context.start
-        self._origin_turn[:] = context.origin_body_rotation @ start.body_rotation.transpose(0, 2, 1)
+        near, start = self._near, context.start
+        carriers, surfaces, contact = self.model.carriers, self.model.surfaces, self.model.scene.contact
+        self._back = start.rotation.transpose(0, 2, 1).copy()
+        np.matmul(context.origin_rotation, self._back, out=self._origin_turn)
+        if near.count > len(self._first):
+            self._make_room(len(near.carrier))
         self._count = lag_friction(
             contact.barrier_distance,
             contact.stiffness,
-            carriers.weight,
-            carriers.radius,
+            near.count,
+            near.carrier,
+            near.surface,
             start.carrier,
-            carriers.plane_point,
-            carriers.plane_normal,
-            carriers.pair_first,
-            carriers.pair_second,
+            carriers.radius,
+            carriers.weight,
+            carriers.body,
+            surfaces.kind,
+            surfaces.size,
+            surfaces.rounding,
+            start.surface_place,
+            start.surface_turn,
+            surfaces.body,
+            start.place,
             self._first,
-            self._second,
-            self._pair,
+            self._surface,
             self._load,
             self._normal,
+            self._arm,
+            self._lever,
         )
         lag_axes(
             self._count,
@@ -108,32 +139,41 @@ class Friction(Term):
         )
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
-        carriers, contact, out = self.model.carriers, self.model.scene.contact, self.out
-        context, matrix = self.context, self.out.matrix
-        for b in range(self.model.free_count):
-            self._turn[b] = at.body_rotation[b] @ context.start.body_rotation[b].T
-        out.energy["friction"] = friction(
+        model, out, matrix, context = self.model, self.out, self.out.matrix, self.context
+        carriers, surfaces, contact = model.carriers, model.surfaces, model.scene.contact
+        np.matmul(at.rotation, self._back, out=self._turn)
+        if with_hessian:
+            matrix.make_room_for_links(matrix.links + self._count)
+        out.energy["friction"], links = friction(
             self._count,
             self._first,
-            self._second,
-            self._pair,
+            self._surface,
             self._load,
             self._normal,
             self._axis,
+            self._arm,
+            self._lever,
             carriers.friction,
             context.length,
             contact.friction.speed_threshold,
-            carriers.radius,
-            at.carrier,
-            context.origin_carrier,
-            carriers.free_body,
+            at.position,
+            context.origin_position,
+            carriers.body,
+            surfaces.body,
+            at.place,
+            context.origin_place,
             self._turn,
             self._origin_turn,
+            model.bodies.free_index,
             out.carrier,
-            out.body,
-            matrix.carrier_hessian,
-            matrix.ball_hessian,
-            matrix.ball_turn_hessian,
+            out.contact,
+            matrix.node_hessian,
             matrix.body_hessian,
+            matrix.links,
+            matrix.link_node,
+            matrix.link_body,
+            matrix.link_hessian,
             with_hessian,
         )
+        if with_hessian:
+            matrix.links = links

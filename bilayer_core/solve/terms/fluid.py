@@ -44,7 +44,7 @@ class Drag(Term):
             at.position,
             context.origin_position,
             self.out.node,
-            self.out.matrix.carrier_hessian,
+            self.out.matrix.node_hessian,
             with_hessian,
         )
 
@@ -90,7 +90,7 @@ class AddedMass(Term):
             at.turn,
             context.predicted_turn,
             out.node,
-            out.matrix.carrier_hessian,
+            out.matrix.node_hessian,
             out.edge,
             out.matrix.edge_hessian,
             with_hessian,

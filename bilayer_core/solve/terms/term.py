@@ -26,12 +26,14 @@ class StepContext:
         γ h [s].
     start : Configuration
         From which Newton begins, where frames were last re-based, and where contacts for friction are looked up.
-    origin_carrier : Array
-        Positions of carriers at the origin [m], shape (n_carrier, 3); its first rows, `origin_position`, are the nodes.
+    origin_position : Array
+        Of nodes [m], shape (n_node, 3).
     origin_turn : Array
         Of edges, counted from `start` [rad], shape (n_edge,).
     origin_body_position, origin_body_rotation : Array
         Of free bodies, shapes (n_free, 3), (n_free, 3, 3).
+    origin_place, origin_rotation : Array
+        Of all bodies and last of the world, shapes (n_body + 1, 3), (n_body + 1, 3, 3).
     origin_fluid_momentum : Array
         P̄ of the fluid at nodes [N s], shape (n_node, 3); (0, 3) without added mass.
     predicted_position : Array
@@ -48,10 +50,12 @@ class StepContext:
 
     length: float
     start: Configuration
-    origin_carrier: Array
+    origin_position: Array
     origin_turn: Array
     origin_body_position: Array
     origin_body_rotation: Array
+    origin_place: Array
+    origin_rotation: Array
     origin_fluid_momentum: Array
     predicted_position: Array
     predicted_turn: Array
@@ -59,11 +63,6 @@ class StepContext:
     predicted_body_rotation: Array
     eigenstrain: Array
     load_factor: Array
-
-    @property
-    def origin_position(self) -> Array:
-        """Of nodes [m], shape (n_node, 3)."""
-        return self.origin_carrier[: len(self.predicted_position)]
 
 
 class Accumulators:
@@ -73,14 +72,17 @@ class Accumulators:
     ----------
     energy : dict of str to float
         Of each term [J], in the order of the register.
-    node, edge, pair, body, carrier : Array
+    node, edge, pair, body : Array
         ∂/∂x of nodes [N], shape (n_node, 3); ∂/∂(e, θ) of edges and walls, shape (n_edge + n_wall, 4); ∂/∂p of paired
-        edges, shape (n_pair, 3); ∂/∂(X, φ) of free bodies, shape (n_free, 6); ∂/∂x of carriers, (n_carrier, 3).
+        edges, shape (n_pair, 3); ∂/∂(X, φ) of free bodies, shape (n_free, 6).
+    carrier, contact : Array
+        Of contact alone: ∂/∂x of carriers [N], shape (n_carrier, 3), of which nodes take theirs; ∂/∂(X, φ) of all
+        bodies and of the world, shape (n_body + 1, 6), of which free bodies take theirs.
     matrix : NewtonMatrix
         Second derivatives.
     """
 
-    def __init__(self, model: Model, has_node_blocks: bool, has_balls: bool):
+    def __init__(self, model: Model, has_node_blocks: bool):
         edges = model.edge_count + model.wall_count
         shapes = {
             "node": (model.node_count, 3),
@@ -92,14 +94,20 @@ class Accumulators:
         self.node, self.edge, self.pair, self.body = parts
         self.carrier = np.zeros((len(model.carriers.weight), 3))
         self.energy: dict[str, float] = {}
-        self.matrix = NewtonMatrix(model, has_node_blocks, has_balls, self.carrier)
+        self.contact = np.zeros((len(model.bodies.names) + 1, 6))
+        self.matrix = NewtonMatrix(model, has_node_blocks)
 
     def clear(self, with_hessian: bool) -> None:
-        """Forget energies and first derivatives, those of carriers apart, and second ones on request."""
+        """Forget energies and first derivatives, those of contact apart, and second ones on request."""
         self.energy.clear()
         self._all_but_carriers.fill(0.0)
         if with_hessian:
             self.matrix.clear()
+
+    def clear_contact(self) -> None:
+        """Forget the first derivatives of contact."""
+        self.carrier.fill(0.0)
+        self.contact.fill(0.0)
 
 
 class Kind(Enum):

@@ -1,0 +1,134 @@
+"""Shapes of surfaces, on bodies and as obstacles."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from bilayer_core.scene import checks
+from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.units import Angle, NonNegativeLength, PositiveLength, whole
+
+RotationVector = tuple[Angle, Angle, Angle]
+"""Axis times angle."""
+
+
+class _Plane(Part):
+    """A half space; rods and bodies stay on the side to which the normal points."""
+
+    normal: Direction
+    """Out of the half space, towards the robot."""
+
+
+class _Sphere(Part):
+    """A ball."""
+
+    radius: PositiveLength
+    """About its position."""
+
+
+class _Box(Part):
+    """A box."""
+
+    size: tuple[PositiveLength, PositiveLength, PositiveLength]
+    """Lengths of its edges, along its own x, y and z."""
+    rounding: NonNegativeLength = 0.0
+    """Radius of its edges and corners; the box keeps its size."""
+
+    @model_validator(mode="after")
+    def _check(self) -> _Box:
+        refuse_all("Box", checks.faults_of_rounding(self.rounding, 0.5 * min(self.size), "half the shortest edge"))
+        return self
+
+
+class _Cylinder(Part):
+    """A cylinder with flat ends."""
+
+    axis: Direction = (0.0, 0.0, 1.0)
+    """In the frame of the body, or in the world."""
+    radius: PositiveLength
+    """About its axis."""
+    length: PositiveLength
+    """Along its axis, between its ends."""
+    rounding: NonNegativeLength = 0.0
+    """Radius of its rims; the cylinder keeps its size."""
+    rim_points: whole(3) = 32
+    """Points on each rim that feel other surfaces."""
+
+    @model_validator(mode="after")
+    def _check(self) -> _Cylinder:
+        largest = min(self.radius, 0.5 * self.length)
+        refuse_all("Cylinder", checks.faults_of_rounding(self.rounding, largest, "the radius and half the length"))
+        return self
+
+
+class Plane(_Plane):
+    """A half space through the body's position; not for free bodies."""
+
+    shape: Literal["plane"]
+
+
+class Sphere(_Sphere):
+    """A sphere about the body's position."""
+
+    shape: Literal["sphere"]
+
+
+class Box(_Box):
+    """A box about the body's position, its edges along the axes of the body's frame."""
+
+    shape: Literal["box"]
+
+
+class Cylinder(_Cylinder):
+    """A cylinder about the body's position, its axis in the body's frame."""
+
+    shape: Literal["cylinder"]
+
+
+class PlaneObstacle(_Plane):
+    """A fixed half space."""
+
+    name: Name
+    """Unique among rods, bodies and obstacles."""
+    type: Literal["plane"]
+    point: Point
+    """Any point of the plane."""
+
+
+class SphereObstacle(_Sphere):
+    """A fixed ball."""
+
+    name: Name
+    """Unique among rods, bodies and obstacles."""
+    type: Literal["sphere"]
+    position: Point
+    """Of its middle."""
+
+
+class BoxObstacle(_Box):
+    """A fixed box."""
+
+    name: Name
+    """Unique among rods, bodies and obstacles."""
+    type: Literal["box"]
+    position: Point
+    """Of its middle."""
+    rotation: RotationVector = (0.0, 0.0, 0.0)
+    """Axis times angle: `[0, 0, 30 deg]` turns it about z."""
+
+
+class CylinderObstacle(_Cylinder):
+    """A fixed cylinder."""
+
+    name: Name
+    """Unique among rods, bodies and obstacles."""
+    type: Literal["cylinder"]
+    position: Point
+    """Of its middle."""
+
+
+Surface = Annotated[Plane | Sphere | Box | Cylinder, Field(discriminator="shape")]
+Obstacle = Annotated[PlaneObstacle | SphereObstacle | BoxObstacle | CylinderObstacle, Field(discriminator="type")]
