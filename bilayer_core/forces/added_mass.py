@@ -29,9 +29,10 @@ In time: over a stage of length h from an origin where the fluid had the momentu
 
     R = (P − P̄)/h − ∂T/∂q,    all at the end of the stage; for spins j (ω − ω̄)/h.
 
-That is the integrator's own rule, for momenta, and has its order: 1 for implicit Euler. R is no gradient: the part of
-its derivative that comes from ∂²T/∂v∂q is antisymmetric (gyroscopic). Therefore directions and ∂T/∂q are held at a
-configuration z, and R is the gradient at q = z of the convex potential
+That is the integrator's own rule, for momenta, and has its order: 1 for implicit Euler, 2 for SDIRK2 and implicit
+midpoint (measured: 0.96, 1.98, 1.87; vibrations too fast for the step reduce SDIRK2's, as they do without a fluid). R
+is no gradient: the part of its derivative that comes from ∂²T/∂v∂q is antisymmetric (gyroscopic). Therefore directions
+and ∂T/∂q are held at a configuration z, and R is the gradient at q = z of the convex potential
 
     ½ Σ m (u·m_z)² − P̄·(x − x̄)/h − (∂T/∂q)_z·q + ½ j (ω − ω̄)²,
 

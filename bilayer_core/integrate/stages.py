@@ -6,6 +6,8 @@ Positions and momenta advance as `integrate.method` says. What is no vector need
   the stage, inertia prefers R̃ = exp(γ h ω̃) R̄ with I(R̃) ω̃ = L̄: without a moment, the angular momentum L stays what
   it was. Given the moment that acts at the end of the stage, L = L̄ + γ h × moment and ω = I(R)⁻¹ L. What ω differs by
   from the rotation's own log(R R̄ᵀ)/(γ h) is of second order.
+- The momentum of the fluid is no fixed multiple of a velocity. Where the end of a step lies beyond its last stage, both
+  are extrapolated, and what they differ by at the end (second order in h) is kept in the state; the momentum counts.
 - The angle of an edge counts from the start of the stage, where its frame was last re-based (`StepContext.start`); its
   origin lies before or behind that.
 """
@@ -77,7 +79,7 @@ def start_point(model: Model, state: State, start: Configuration) -> Point:
         spin=state.spin.copy(),
         body_velocity=state.body_velocity[free],
         angular_momentum=_times(_inertia(model, start.body_rotation), state.body_angular_velocity[free]),
-        fluid_momentum=momentum_of_fluid(model, start, state.velocity),
+        fluid_momentum=momentum_of_fluid(model, start, state.velocity) + state.fluid_excess,
         rotation=state.body_rotation.copy(),
     )
 
@@ -189,6 +191,7 @@ def write_state(model: Model, state: State, last: Point, end: Configuration, pre
     free = model.bodies.body_of_free
     state.velocity[:] = last.velocity
     state.position[:] = end.position
+    state.fluid_excess[:] = last.fluid_momentum - momentum_of_fluid(model, end, last.velocity)
     state.director1[:] = end.director1[: model.edge_count]
     state.spin[:] = last.spin
     state.twist[:] = end.joint_strain[:, 2]

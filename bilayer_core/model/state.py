@@ -25,6 +25,7 @@ class State:
     velocity: Array  # [m/s], shape (n_node, 3)
     director1: Array  # material director m1 of edges, unit, shape (n_edge, 3)
     spin: Array  # rate of edges about their tangent [rad/s], shape (n_edge,)
+    fluid_excess: Array  # the fluid's momentum less that of `velocity` [N s], shape (n_node, 3) or (0, 3) (`stages`)
     twist: Array  # unwrapped twist angle of joints [rad], shape (n_joint,)
     body_position: Array  # [m], shape (n_body, 3)
     body_rotation: Array  # shape (n_body, 3, 3)
@@ -75,6 +76,7 @@ def initial_state(model: Model) -> State:
         velocity=np.zeros((model.node_count, 3)),
         director1=model.start_director1[: model.edge_count].copy(),
         spin=np.zeros(model.edge_count),
+        fluid_excess=np.zeros((model.node_count if len(model.fluid_mass) else 0, 3)),
         twist=np.zeros(len(model.joint_a)),
         body_position=bodies.start_position.copy(),
         body_rotation=bodies.start_rotation.copy(),

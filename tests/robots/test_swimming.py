@@ -1,0 +1,101 @@
+"""What the swimmer does, from its scene file alone."""
+
+import numpy as np
+import pytest
+
+from bilayer_core import Simulator, load_scene
+
+pytestmark = pytest.mark.slow
+PERIOD = 0.6
+# Arms do not touch, and the hub moves up and down alone: one arm with an eighth of the hub is the whole robot.
+ONE_ARM = ("rods.arm.pattern.count=1", "bodies.hub.motion.mass=0.11875 g")
+ADDED = {"drag alone": "fluid.added_mass=false", "with added mass": "fluid.added_mass=true"}
+
+
+def height(simulator):
+    """Of the mass centre of arms and hub [m]."""
+    nodes, hub = simulator.model.node_mass, simulator.model.bodies.mass[0]
+    total = nodes @ simulator.positions[:, 2] + hub * simulator.bodies["hub"].position[2]
+    return total / (nodes.sum() + hub)
+
+
+def strokes(count, *changes, **options):
+    """Rise of the mass centre in each of the first strokes [m], and the simulator."""
+    simulator = Simulator(load_scene("swimming", [*ONE_ARM, *changes]), **options)
+    heights = [height(simulator)]
+    for _ in range(count):
+        simulator.run(PERIOD)
+        heights.append(height(simulator))
+    return np.diff(heights), simulator
+
+
+@pytest.fixture(scope="module", params=ADDED)
+def swimming(request):
+    fluid = ADDED[request.param]
+    return fluid, *strokes(3, fluid)
+
+
+def test_the_swimmer_has_the_papers_parameters():
+    simulator = Simulator(load_scene("swimming"))
+    strands = simulator.model.strands
+    passive, active = (sum(s.node_count for s in strands if s.layer == name) for name in ("passive", "active"))
+    assert (passive + 1, active) == (321, 288)  # the hub is one
+    assert (simulator.dt, simulator.scene.gravity) == (1e-3, (0.0, 0.0, 0.0))
+    assert simulator.scene.fluid.added_mass is None
+    drag = simulator.model.drag_coefficient[5]
+    assert drag / drag[1] == pytest.approx([0.01, 1.0, 0.2])  # sideways the thickness counts, not the width
+
+
+def test_one_arm_with_an_eighth_of_the_hub_moves_as_the_whole_robot():
+    whole = Simulator(load_scene("swimming", ["fluid.added_mass=true"]))
+    whole.run(0.05)
+    one = Simulator(load_scene("swimming", [*ONE_ARM, "fluid.added_mass=true"]))
+    one.run(0.05)
+    assert abs(height(whole)) > 1e-3
+    assert height(one) == pytest.approx(height(whole), abs=1e-9)
+
+
+def test_every_stroke_lifts_it_and_by_the_same_from_the_second_on(swimming):
+    _, rises, simulator = swimming
+    assert (rises > 3e-3).all()
+    assert rises[2] == pytest.approx(rises[1], rel=0.02)
+    assert np.abs(simulator.positions[:, 1]).max() < 1e-9
+    assert simulator.summary()["converged"] is True
+
+
+def test_twice_the_step_or_twice_the_nodes_change_the_rise_little(swimming):
+    fluid, rises, _ = swimming
+    coarser, _ = strokes(2, fluid, dt=2e-3)
+    assert coarser[1] == pytest.approx(rises[1], rel=0.01)
+    # first order: no element bends the half edge where the driven layer ends
+    smoother, _ = strokes(2, fluid, "rods.arm.stations=79", dt=2e-3)
+    assert smoother[1] == pytest.approx(coarser[1], rel=0.05)
+
+
+def test_it_sinks_with_every_stroke_when_its_arms_beat_upwards(swimming):
+    fluid, rises, _ = swimming
+    turned, _ = strokes(1, fluid, "rods.arm.normal=[0, 0, -1]")
+    assert turned[0] == pytest.approx(-rises[0], rel=1e-6)
+
+
+def test_without_a_fluid_nothing_moves_its_mass_centre():
+    simulator = Simulator(load_scene("swimming", [*ONE_ARM, "fluid=null", "solver.tolerance=1e-9"]))
+    start, largest = height(simulator), 0.0
+    for _ in range(60):
+        simulator.step()
+        largest = max(largest, abs(height(simulator) - start))
+    assert simulator.bodies["hub"].position[2] > 2e-2  # while the arms go down
+    assert largest < 1e-9
+
+
+def test_a_slower_cycle_moves_it_as_far():
+    """Drag and inertia both grow with the square of the speed; the shape follows the light."""
+    times = [f"rods.arm.layers.active.eigenstrain.time_constant_{way}=0" for way in ("rising", "falling")]
+    ends = []
+    for period in (3.0, 10.0):
+        light = f"stimuli.light.schedule={{type: sine, mean: 0.5, amplitude: 0.5, period: {period} s, phase: -90 deg}}"
+        simulator = Simulator(load_scene("swimming", [*ONE_ARM, light, *times]), dt=period / 400)
+        simulator.run(2 * period)
+        ends.append(height(simulator))
+    assert ends[0] > 5e-3
+    assert ends[1] == pytest.approx(ends[0], rel=0.01)
