@@ -48,10 +48,10 @@ def test_the_swimmer_has_the_papers_parameters():
 
 def test_one_arm_with_an_eighth_of_the_hub_moves_as_the_whole_robot():
     whole = Simulator(load_scene("swimming", ["fluid.added_mass=true"]))
-    whole.run(0.05)
+    whole.run(0.02)
     one = Simulator(load_scene("swimming", [*ONE_ARM, "fluid.added_mass=true"]))
-    one.run(0.05)
-    assert abs(height(whole)) > 1e-3
+    one.run(0.02)
+    assert abs(height(whole)) > 1e-4
     assert height(one) == pytest.approx(height(whole), abs=1e-9)
 
 
