@@ -28,6 +28,28 @@ def circle(start: Array, tangent: Array, normal: Array, curvature: float, arc: A
     )
 
 
+def spiral(
+    start: Array, tangent: Array, normal: Array, radius: float, growth: float, side: float, angle: Array
+) -> tuple[Array, Array, Array]:
+    """Points [m], tangents and normals of an Archimedean spiral r = r₀ + a φ at angles φ [rad] about its centre, which
+    lies on the side ±1 of the normal.
+
+    With e₁ the direction from the centre to the start, e₂ that in which φ grows, ρ = cos φ e₁ + sin φ e₂ and ρ′ =
+    ∂ρ/∂φ,
+
+    x = C + r ρ,   t = (a ρ + r ρ′)/√(r² + a²),   n = ± (a ρ′ − r ρ)/√(r² + a²)
+    """
+    slant = np.hypot(radius, growth)
+    inward = side * normal
+    e1, e2 = (growth * tangent - radius * inward) / slant, (radius * tangent + growth * inward) / slant
+    own = (radius + growth * angle)[:, None]
+    outward = np.outer(np.cos(angle), e1) + np.outer(np.sin(angle), e2)
+    around = np.outer(np.cos(angle), e2) - np.outer(np.sin(angle), e1)
+    slant = np.hypot(own, growth)
+    points = start - radius * e1 + own * outward
+    return points, (growth * outward + own * around) / slant, side * (growth * around - own * outward) / slant
+
+
 def rest_strains(tangent_a: Array, m1_a: Array, tangent_b: Array, m1_b: Array) -> Array:
     """κ₁, κ₂, ψ [rad] between edges a and b (see `forces.bend_twist`), shape (n, 3)."""
 

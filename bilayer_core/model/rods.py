@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..kinematics.path import circle, rest_strains, straight
+from ..kinematics.path import circle, rest_strains, spiral, straight
 from ..kinematics.rotation import rotation_matrix
 from ..scene.config import Fluid, SceneConfig
 from ..scene.profile import values_at
-from ..scene.rod import ArcPath, Layer, Rod
+from ..scene.rod import ArcPath, Layer, Rod, SpiralPath
 from .model import StrandArrays
 from .section import Section, bond, outline, sections
 
@@ -118,6 +118,9 @@ def _strand_shape(rod: Rod, height: np.ndarray, first: int, last: int, turn: Tur
 
     def along(stations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         arc = rod.edge_length * stations
+        if isinstance(rod.path, SpiralPath):
+            side = 1.0 if rod.path.toward == "normal" else -1.0
+            return spiral(*frame, rod.path.start_radius, rod.path.growth, side, rod.path.angle_at(arc))
         if isinstance(rod.path, ArcPath):
             return circle(*frame, rod.path.curvature, arc)
         return straight(*frame, arc)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bilayer_core.scene.body import Free
     from bilayer_core.scene.config import SceneConfig, Stimulus
     from bilayer_core.scene.load import Load, PointMass
-    from bilayer_core.scene.rod import Layer, Rod
+    from bilayer_core.scene.rod import Layer, Rod, SpiralPath
 
 ROUNDING = 1e-9
 """Relative difference of typed numbers that is not taken for a fault."""
@@ -29,6 +29,13 @@ def faults_of_range(stimulus: Stimulus) -> list[Fault]:
         for key, value in stimulus.schedule.points().items()
         if not low <= value <= high
     ]
+
+
+def faults_of_spiral(path: SpiralPath) -> list[Fault]:
+    """Radii that make it no spiral."""
+    if math.isclose(path.start_radius, path.end_radius, rel_tol=ROUNDING):
+        return [(("end_radius",), path.end_radius, "must differ from `start_radius`; with equal radii it is an `arc`")]
+    return []
 
 
 def faults_of_rod(rod: Rod) -> list[Fault]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, Field, field_serializer, model_validator
 
 from bilayer_core.scene import checks
@@ -79,6 +80,64 @@ class ArcPath(Part):
         return (1.0 if self.toward == "normal" else -1.0) / self.radius
 
 
+class SpiralPath(Part):
+    """An Archimedean spiral in the plane of its direction and the rod's normal: its radius changes evenly with the
+    angle.
+    """
+
+    shape: Literal["spiral"]
+    start: Point
+    """Where it begins."""
+    direction: Direction
+    """Tangent at the start."""
+    start_radius: PositiveLength
+    """Distance of the start from the centre."""
+    end_radius: PositiveLength
+    """Distance of the end from the centre."""
+    angle: PositiveAngle
+    """By which it goes round its centre; may exceed a full turn."""
+    toward: Literal["normal", "opposite"] = "normal"
+    """Side on which the centre lies: that of the rod's normal at the start, or the other."""
+
+    @model_validator(mode="after")
+    def _check(self) -> SpiralPath:
+        refuse_all("SpiralPath", checks.faults_of_spiral(self))
+        return self
+
+    @property
+    def growth(self) -> float:
+        """Change of the radius with the angle [m/rad]."""
+        return (self.end_radius - self.start_radius) / self.angle
+
+    def _length_to(self, angle: Any) -> Any:
+        """∫ √(r² + a²) dφ from the start to an angle [rad], with the radius r = r₀ + a φ [m]."""
+
+        def primitive(radius):
+            slant = np.hypot(radius, self.growth)
+            return 0.5 * (radius * slant / self.growth + self.growth * np.log((radius + slant) / abs(self.growth)))
+
+        return primitive(self.start_radius + self.growth * angle) - primitive(self.start_radius)
+
+    @property
+    def length(self) -> float:
+        """Length of the spiral [m]."""
+        return float(self._length_to(self.angle))
+
+    def angle_at(self, arc: np.ndarray) -> np.ndarray:
+        """Angles about the centre [rad] at lengths `arc` [m] from the start: Newton's method on the length."""
+        angle = self.angle * arc / self.length
+        for _ in range(20):
+            slope = np.hypot(self.start_radius + self.growth * angle, self.growth)
+            angle = angle - (self._length_to(angle) - arc) / slope
+        return angle
+
+    @property
+    def turn(self) -> float:
+        """Angle by which its tangent turns [rad]."""
+        slope = math.atan2(self.growth, self.start_radius) - math.atan2(self.growth, self.end_radius)
+        return self.angle + slope
+
+
 class Pattern(Part):
     """Copies of a rod, turned about an axis at equal angles; the first is the rod itself."""
 
@@ -123,7 +182,7 @@ class Rod(Part):
     """Unique among rods, bodies and obstacles."""
     width: varying(PositiveLength)
     """Of its rectangular section, across path and normal."""
-    path: Annotated[StraightPath | ArcPath, Field(discriminator="shape")]
+    path: Annotated[StraightPath | ArcPath | SpiralPath, Field(discriminator="shape")]
     """Where the rod lies at the start, free of stress."""
     normal: Direction
     """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path."""
