@@ -102,7 +102,7 @@ class Contact(Part):
     """Of the barrier, per length of rod; a larger one leaves the gap nearer to `barrier_distance`."""
     friction: Friction | None = None
     """Of all surfaces; without it they are smooth."""
-    rods: Literal["auto"] | bool = "auto"
+    rods: Literal["auto", True, False] = "auto"
     """Whether rods touch each other and themselves; `auto`: where their lengths and free curvatures let them meet."""
 
 

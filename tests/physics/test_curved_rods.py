@@ -60,3 +60,35 @@ def test_growth_of_the_outer_layer_closes_an_arc_as_it_bends_a_straight_strip():
     assert before == pytest.approx(1.0 / (RADIUS + 0.5e-3), rel=1e-3)
     # of the outer centreline, per its rest length: Timoshenko's 1.5 η/H to first order in thickness over radius
     assert simulator.curvatures[15] - before == pytest.approx(1.5 * 0.01 / 2e-3, rel=0.03)
+
+
+@pytest.mark.parametrize("toward", ["normal", "opposite"])
+@pytest.mark.parametrize("end_radius", [0.03, 0.08])
+def test_a_spiral_has_its_radii_even_spacing_and_no_stress(toward, end_radius):
+    angle, stations = 7.5, 601
+    coil = rod([layer("bottom"), layer("top")], stations=stations, clamp_start="wall")
+    coil["path"] = {
+        "shape": "spiral",
+        "start": [0, 0, 0],
+        "direction": [1, 0, 0],
+        "start_radius": RADIUS,
+        "end_radius": end_radius,
+        "angle": angle,
+        "toward": toward,
+    }
+    simulator = Simulator(load_scene(scene([coil], bodies=[fixed()])))
+    side = 1.0 if toward == "normal" else -1.0
+    growth = (end_radius - RADIUS) / angle
+    center = RADIUS * np.array([-growth, 0, side * RADIUS]) / np.hypot(RADIUS, growth)
+    strands = [simulator.positions[s.first_node : s.first_node + stations] for s in simulator.model.strands]
+    path = 0.5 * (strands[0] + strands[1])  # the layers are half a millimetre to either side
+    outward = path - center
+    radius = np.linalg.norm(outward, axis=1)
+    turned = side * np.unwrap(np.arctan2(outward[:, 2], outward[:, 0]))
+    assert radius == pytest.approx(RADIUS + growth * (turned - turned[0]), rel=1e-9)
+    assert radius[[0, -1]] == pytest.approx([RADIUS, end_radius], rel=1e-9)
+    assert turned[-1] - turned[0] == pytest.approx(angle, rel=1e-9)
+    spacing = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    assert np.ptp(spacing) < 1e-3 * spacing.mean()  # chords of equal arcs
+    assert spacing.sum() == pytest.approx(simulator.scene.rods[0].path.length, rel=1e-4)
+    assert sum(simulator.energy().values()) < 1e-16

@@ -80,9 +80,22 @@ def faults_of(content) -> list[str]:
         ("rods.arm.torsion", "layer", "found \"layer\"; must be 'laminate' or 'layers'"),
         (
             "rods.arm.path",
-            {"shape": "spiral"},
-            "found {\"shape\": \"spiral\"}; `shape` must be one of 'straight', 'arc'",
+            {"shape": "circle"},
+            "found {\"shape\": \"circle\"}; `shape` must be one of 'straight', 'arc', 'spiral'",
         ),
+        (
+            "rods.arm.path",
+            {
+                "shape": "spiral",
+                "start": [0, 0, 0],
+                "direction": [1, 0, 0],
+                "start_radius": 1,
+                "end_radius": 1,
+                "angle": 7,
+            },
+            "end_radius: found 1.0; must differ from `start_radius`; with equal radii it is an `arc`",
+        ),
+        ("contact.rods", "sometimes", "found \"sometimes\"; must be 'auto', "),
         ("stimuli.humidity.schedule", {"value": 1}, "found {\"value\": 1}; the key 'type' is missing"),
         (
             "rods.arm.layers.active.material",

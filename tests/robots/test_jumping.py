@@ -1,0 +1,111 @@
+"""What the jumper does, from its scene file alone."""
+
+import numpy as np
+import pytest
+
+from bilayer_core import Simulator, load_scene
+
+pytestmark = pytest.mark.slow
+
+RELEASE = 1.0  # when the current stops [s]
+GRAVITY = 10.0
+
+
+class Flight:
+    """Watches the mass centre and the lowest face."""
+
+    rate = 500.0
+
+    def start(self, description):
+        self.times, self.heights, self.clearance, self.elastic, self.self_contact = [], [], [], [], 0.0
+
+    def observe(self, frame):
+        self.times.append(frame.time)
+        self.heights.append(frame.com[2])
+        self.clearance.append(frame.positions[:, 2].min() - 0.5e-3)
+        self.elastic.append(sum(frame.energy[term] for term in ("stretching", "bending", "bond")))
+        self.self_contact = max(self.self_contact, frame.energy["rod barrier"])
+
+    def close(self, complete, termination):
+        assert complete
+        self.times, self.heights, self.clearance = map(np.array, (self.times, self.heights, self.clearance))
+        self.released = int(np.searchsorted(self.times, RELEASE - 1e-9))
+
+    @property
+    def rise(self):
+        """Of the mass centre after the release [m]."""
+        return self.heights[self.released :].max() - self.heights[self.released]
+
+    @property
+    def take_off(self):
+        """When the ground is last felt before the apex, after the release [s]."""
+        apex = self.released + int(self.heights[self.released :].argmax())
+        touching = np.flatnonzero(self.clearance[:apex] < 1e-3)
+        return self.times[touching[-1]] - RELEASE
+
+
+def watched(*overrides, until=1.3):
+    flight = Flight()
+    simulator = Simulator(load_scene("jumping", overrides))
+    simulator.run(until, observers=[flight])
+    return simulator, flight
+
+
+@pytest.fixture(scope="module")
+def jump():
+    return watched()
+
+
+def test_the_jumper_has_the_papers_parameters():
+    simulator = Simulator(load_scene("jumping"))
+    strands = simulator.model.strands
+    assert {strand.layer: strand.node_count for strand in strands} == {"passive": 100, "active": 100}
+    assert all(np.all(s.width == 0.01) and np.all(s.thickness == 1e-3) for s in strands)
+    scene = simulator.scene
+    assert scene.gravity == (0.0, 0.0, -10.0)
+    assert {(m.youngs_modulus, m.density) for m in scene.materials.values()} == {(1e8, 1000.0)}
+    assert (scene.contact.barrier_distance, scene.contact.stiffness) == (1e-3, 1e7)
+    assert (scene.contact.friction.coefficient, scene.contact.friction.speed_threshold) == (0.5, 1e-4)
+    assert simulator.plan.terms["rod barrier"] == simulator.plan.terms["rod friction"] == "active"
+
+
+def test_it_stores_energy_slowly_and_lies_still_before_it_lets_go(jump):
+    _, flight = jump
+    held = slice(flight.released - 50, flight.released + 1)
+    assert np.ptp(flight.heights[held]) < 2e-4
+    assert flight.heights[flight.released] < 0.25 * flight.heights[0]  # flat on the ground
+
+
+def test_it_takes_off_within_milliseconds_and_rises_by_more_than_its_length(jump):
+    simulator, flight = jump
+    assert simulator.summary()["converged"] is True
+    assert 0.01 < flight.take_off < 0.03
+    assert 0.30 < flight.rise < 0.40
+    assert 0.0 < simulator.statistics.min_gap < 1e-3
+
+
+def test_it_rises_no_higher_than_its_elastic_energy_could_lift_it(jump):
+    simulator, flight = jump
+    mass = simulator.model.node_mass.sum()
+    eta, density, modulus = 0.05, 1000.0, 1e8
+    assert flight.rise < 0.094 * modulus * eta**2 / (density * GRAVITY)
+    in_flight = simulator.energy()
+    gained = in_flight["gravity"] + in_flight["kinetic"]
+    assert mass * GRAVITY * flight.rise < gained
+
+
+def test_its_ends_do_not_pass_through_each_other(jump):
+    _, flight = jump
+    assert flight.self_contact > 0.0
+
+
+def test_a_slow_release_does_not_make_it_jump():
+    coarse = ("solver.integrator=implicit_euler", "solver.dt=1 ms")
+    _, flight = watched("rods.loop.layers.active.eigenstrain.time_constant_falling=0.2 s", *coarse, until=1.5)
+    assert flight.clearance[flight.released :].max() < 5e-3
+
+
+@pytest.mark.parametrize("change", ["solver.dt=0.25 ms", "rods.loop.stations=51"])
+def test_half_the_step_and_other_meshes_jump_as_high(jump, change):
+    _, flight = watched(change)
+    assert flight.rise == pytest.approx(jump[1].rise, rel=0.05)
