@@ -54,8 +54,10 @@ class _Cylinder(Part):
     """Along its axis, between its ends."""
     rounding: NonNegativeLength = 0.0
     """Radius of its rims; the cylinder keeps its size."""
-    rim_points: whole(3) = 32
-    """Points on each rim that feel other surfaces."""
+    rim_points: whole(3) = 64
+    """Points on each rim that feel other surfaces. Rolling down a slope of 0.3 rad, 64 lose 1 to 3 % of the
+    acceleration of a round one, 32 lose 13 %, 128 nothing.
+    """
 
     @model_validator(mode="after")
     def _check(self) -> _Cylinder:
