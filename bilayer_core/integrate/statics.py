@@ -18,7 +18,7 @@ from ..errors import InputError, SimulationError
 from ..kinematics.rotation import rotation_vector
 from ..model.state import State
 from ..solve.configuration import Configuration
-from ..solve.newton import NewtonReport, NewtonSolver
+from ..solve.newton import NewtonReport, NewtonSolver, NewtonStatus
 from ..solve.terms.fluid import momentum_of_fluid
 from ..solve.terms.term import StepContext
 from .stepper import Stepper
@@ -30,6 +30,8 @@ SETTLED, LONGEST = 1.0, 100.0
 """Two rounds at least so long [s] must find the shape at rest, one after the other but for failures, which come
 from rounding where nothing holds the robot; no round is longer than the second."""
 MAX_ROUNDS = 300
+WORTH_KEEPING = 1e-6
+"""Of the longest rod: displacement of a round without convergence that is no rounding."""
 OUT_OF_SIGHT = 100.0
 """Times the longest rod: displacement at which to conclude that nothing holds the robot."""
 RELATIVE_TOLERANCE = 1e-10
@@ -115,7 +117,8 @@ class _Search:
             self.rounds += 1
             self.iterations += attempt.iterations
             self.factorisations += attempt.factorisations
-            if not attempt.converged:
+            lost = not attempt.converged and attempt.status is not NewtonStatus.MAX_ITERATIONS
+            if lost or (not attempt.converged and self._moved() < WORTH_KEEPING * self.size):
                 length *= SHRINKAGE
                 if length < SHORTEST:
                     raise self._failure(attempt.status.value, moved)
@@ -125,6 +128,9 @@ class _Search:
                 raise self._failure("nothing holds the robot, or not all of it", moved)
             self.start, self.end = self.end, self.start
             self.start.turn[:] = 0.0
+            if not attempt.converged:  # V has fallen all the same
+                length, settled = SHRINKAGE * length, 0
+                continue
             settled = settled + 1 if moved <= self.tolerance and length >= SETTLED else 0
             if settled == 2:
                 unstable = self._count_unstable()
