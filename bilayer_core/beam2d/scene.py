@@ -1,0 +1,91 @@
+"""Which scenes are one straight planar bilayer, and the beam that they describe."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import SceneError
+from ..model.section import sections
+from ..scene.body import Prescribed
+from ..scene.config import SceneConfig
+from ..scene.profile import Profile
+from ..scene.rod import Rod, StraightPath
+from ..scene.transduction import free_strain
+from .beam import PlanarBeam
+from .energy import Section
+
+Array = np.ndarray
+IN_PLANE = 1e-12  # of gravity's size: what its part across the plane may be
+
+
+def beam_of(scene: SceneConfig) -> PlanarBeam:
+    """The beam of a scene, straight and without eigenstrain.
+
+    Raises
+    ------
+    SceneError
+        If the scene has anything that the beam cannot be: the message says what.
+    """
+    rod = _only_rod(scene)
+    halves = [sections(rod, layer, scene.materials[layer.material], np.zeros(1)) for layer in rod.layers]
+    height = (-0.5 * rod.layers[0].thickness, 0.5 * rod.layers[1].thickness)
+    section = Section(
+        axial=float(sum(half.axial_stiffness[0] for half in halves)),
+        coupling=float(sum(half.axial_stiffness[0] * z for half, z in zip(halves, height, strict=True))),
+        bending=float(
+            sum(
+                half.bending_stiffness[0][0] + half.axial_stiffness[0] * z**2
+                for half, z in zip(halves, height, strict=True)
+            )
+        ),
+        mass=float(sum(half.mass[0] for half in halves)),
+    )
+    axes = np.array([rod.path.direction, rod.normal])
+    gravity = tuple(float(part) for part in axes @ scene.gravity)
+    return PlanarBeam(section, rod.path.length, rod.stations, clamped=rod.clamp_start is not None, gravity=gravity)
+
+
+def set_stimuli(beam: PlanarBeam, scene: SceneConfig, values: dict[str, float]) -> None:
+    """Let the beam of a scene follow settled stimuli, given by channel in its unit."""
+    rod = scene.rods[0]
+    beam.force[:] = beam.moment[:] = 0.0
+    for layer, side in zip(rod.layers, (-0.5, 0.5), strict=True):
+        strain = np.zeros(rod.stations - 1)
+        for law in layer.eigenstrain:
+            limit = np.array([np.inf if law.saturation is None else law.saturation])
+            grown = free_strain(np.array([values[law.stimulus]]), np.array([law.gain]), law.reference, limit)
+            strain[list(rod.driven_edges(layer, law))] += grown[0]
+        stiffness = sections(rod, layer, scene.materials[layer.material], np.zeros(1)).axial_stiffness[0]
+        beam.force += stiffness * strain
+        beam.moment += stiffness * side * layer.thickness * strain
+
+
+def _only_rod(scene: SceneConfig) -> Rod:
+    rod = scene.rods[0]
+    gravity, normal = np.array(scene.gravity), np.cross(rod.path.direction, rod.normal)
+    held = {body.name: body for body in scene.bodies}.get(rod.clamp_start)
+    layers = rod.layers
+    needs = {
+        "rods: must be one, without a pattern": len(scene.rods) == 1 and rod.pattern is None,
+        "rods[0].path: must be straight": isinstance(rod.path, StraightPath),
+        "rods[0].layers: must be two over the whole path": len(layers) == 2
+        and all(layer.interval is None for layer in layers),
+        "rods[0]: width, thickness and stiffness must not vary": not any(
+            isinstance(value, Profile) for layer in layers for value in (rod.width, layer.thickness, layer.stiffness)
+        ),
+        "rods[0].layers: natural curvature and twist must be zero": not any(
+            layer.natural_curvature or layer.natural_twist for layer in layers
+        ),
+        "rods[0].clamp_end: must be free": rod.clamp_end is None,
+        "rods[0].clamp_start: must be a body at rest, or none": rod.clamp_start is None
+        or (isinstance(held.motion, Prescribed) and not held.motion.times),
+        "gravity: must lie in the plane of path and normal": abs(gravity @ normal)
+        <= IN_PLANE * np.linalg.norm(gravity),
+        "contact, fluid, loads, masses, damping: must not be there": not (
+            (scene.contact and scene.obstacles) or scene.fluid or scene.loads or scene.masses or scene.damping.mass
+        ),
+    }
+    for demand, met in needs.items():
+        if not met:
+            raise SceneError(f"{scene.name}: the planar beam of Appendix A cannot be this scene: {demand}")
+    return rod
