@@ -80,11 +80,13 @@ setup(
     extras_require={
         "ros": [f"{wheel} ; {ROS_PLATFORM}" for wheel in ROS_WHEELS],
         "viewer": ["rerun-sdk>=0.41,<0.42", "pillow>=10.1"],
+        "plot": ["matplotlib>=3.8"],
         "sweep": ["dask>=2024.8", "distributed>=2024.8"],
         "bench": ["matplotlib>=3.8", "mujoco>=3.3", "pyelastica>=0.3.2"],
         "test": [
             "hypothesis>=6.100",
             "jsonschema>=4.20",
+            "matplotlib>=3.8",
             "mcap-ros2-support>=0.5",
             "pillow>=10.1",
             "pytest>=8",

@@ -15,6 +15,7 @@ from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
 from bilayer_core.cli.render import render
 from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import scenes, schema
+from bilayer_core.cli.validate import validate
 from bilayer_core.errors import BilayerError
 
 INTERNAL_ERROR = 70
@@ -40,7 +41,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, new, schema, check, run, converge, info, view, render):
+for verb in (scenes, new, schema, check, run, converge, validate, info, view, render):
     program.add_command(verb)
 
 

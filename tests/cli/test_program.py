@@ -13,7 +13,7 @@ import bilayer_core.cli.program
 from bilayer_core.cli import main
 from bilayer_core.scene.bundled import bundled_scenes
 
-VERBS = ("scenes", "new", "schema", "check", "run", "converge", "info", "view", "render")
+VERBS = ("scenes", "new", "schema", "check", "run", "converge", "validate", "info", "view", "render")
 
 
 @pytest.fixture

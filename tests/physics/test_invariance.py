@@ -118,19 +118,6 @@ def test_twist_of_a_bonded_strip_costs_its_torsional_stiffness_at_every_mesh(tor
     assert energy == pytest.approx(stored - missing, rel=2e-3)
 
 
-def test_a_free_strip_keeps_its_linear_momentum():
-    simulator = Simulator(load_scene(bilayer()), dt=1e-4)
-    state = simulator.save_state()
-    layout = dict(simulator.description.state_layout)
-    start = sum(int(np.prod(shape)) for name, shape in list(layout.items())[:3])
-    rng = np.random.default_rng(3)
-    state[start : start + int(np.prod(layout["velocity"]))] = 0.2 * rng.standard_normal(np.prod(layout["velocity"]))
-    simulator.load_state(state)
-    momentum = simulator.model.node_mass @ simulator.velocities
-    simulator.run(0.02)
-    assert np.abs(simulator.model.node_mass @ simulator.velocities - momentum).max() < 1e-9 * np.linalg.norm(momentum)
-
-
 def test_friction_and_barrier_between_ball_and_strip_keep_their_total_momentum():
     strip = rod([layer()], length=0.04, stations=21, start=(-0.02, 0, 0.0213))
     sphere = ball((0, 0, 0), velocity=[0.05, 0.1, 0.2], angular_velocity=[3, 0, 5])

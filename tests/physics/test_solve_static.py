@@ -1,4 +1,4 @@
-"""Equilibria found without marching in time; those with a known answer are in `test_statics`."""
+"""Equilibria found without marching in time; those with a known answer are in `bilayer_core.validate`."""
 
 import math
 

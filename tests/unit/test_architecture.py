@@ -27,7 +27,9 @@ ALLOWED = {
     "record": NUMERICS,
     "view": NUMERICS | {"record"},
     "converge": NUMERICS,
-    "cli": NUMERICS | {"record", "view", "converge"},
+    "beam2d": {"errors", "scene", "model"},
+    "validate": NUMERICS | {"beam2d"},
+    "cli": NUMERICS | {"record", "view", "converge", "validate"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
 FACES = {"__init__": NUMERICS, "__main__": {"cli"}}

@@ -1,0 +1,73 @@
+"""A naturally helical layer bonded to a straight one (paper, section 3.2, Fig. 4): radius and pitch in its middle."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..integrate.simulator import Simulator
+from ..scene.loader import load_scene
+from .case import Case
+from .parts import fixed, layer, rod, scene
+from .references import bonded_helix
+
+Array = np.ndarray
+NATURAL = ((40.0, 20.0), (100.0, 50.0), (-80.0, 30.0))
+"""Curvature and twist of the helical layer by itself [1/m]."""
+TILT = {"layers": 0.0, "laminate": 2000.0 / 3.0}
+"""k_φ [N] of the bond, 4 w G h/2, for the two kinds of torsion."""
+STATIONS, LENGTH = 61, 0.09
+
+
+def strip(torsion: str, curvature: float, twist: float, stations: int, length: float) -> dict:
+    """The clamped bilayer."""
+    top = layer("top", natural_curvature=curvature, natural_twist=twist)
+    ribbon = rod([layer("bottom"), top], length, stations, torsion=torsion, clamp_start="wall")
+    return scene([ribbon], bodies=[fixed()])
+
+
+def equilibrium(torsion: str, curvature: float, twist: float, stations: int, length: float) -> tuple[Array, Array]:
+    """Points midway between the layers [m], shape (stations, 3), and the bottom layer's m2 there, likewise."""
+    simulator = Simulator(load_scene(strip(torsion, curvature, twist, stations, length)))
+    simulator.solve_static()
+    bottom, top = simulator.positions.reshape(2, stations, 3)
+    across = np.cross(np.diff(bottom, axis=0), simulator.frame().directors[: stations - 1])
+    across = np.concatenate([across[:1], 0.5 * (across[:-1] + across[1:]), across[-1:]])
+    return 0.5 * (bottom + top), across / np.linalg.norm(across, axis=1, keepdims=True)
+
+
+@cache
+def middle_curve(torsion: str, curvature: float, twist: float) -> Array:
+    """Points midway between the layers of the strip that is measured [m], shape (STATIONS, 3)."""
+    return equilibrium(torsion, curvature, twist, STATIONS, LENGTH)[0]
+
+
+def screw(points: Array) -> tuple[float, float]:
+    """Radius and pitch [m] of the helix through equidistant points, shape (4, 3)."""
+    d = np.diff(points, axis=0)
+    axis = np.cross(d[1] - d[0], d[2] - d[1])
+    axis /= np.linalg.norm(axis)
+    advance = d[1] @ axis
+    a, b = (v - (v @ axis) * axis for v in (d[0], d[1]))
+    angle = np.arctan2(np.cross(a, b) @ axis, a @ b)
+    return np.linalg.norm(b) / (2.0 * abs(np.sin(angle / 2.0))), 2.0 * np.pi * abs(advance / angle)
+
+
+def measured(torsion: str, curvature: float, twist: float) -> tuple[float, float]:
+    """Radius and pitch [m] in the middle of the strip."""
+    center = STATIONS // 2
+    return screw(middle_curve(torsion, curvature, twist)[center - 8 : center + 9 : 5])
+
+
+def _case(torsion: str, curvature: float, twist: float, index: int) -> Case:
+    def measure() -> tuple[float, float]:
+        answer = bonded_helix(curvature, twist, TILT[torsion])
+        return 1e3 * measured(torsion, curvature, twist)[index], 1e3 * answer[index]
+
+    figure = ("radius", "pitch")[index]
+    name = f"helix/{torsion} ({curvature:g}, {twist:g})/{figure}"
+    return Case(name, "least energy per length of two bonded rods", 0.005, measure, "mm")
+
+
+CASES = [_case(torsion, *natural, index) for torsion in TILT for natural in NATURAL for index in (0, 1)]

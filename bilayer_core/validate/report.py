@@ -1,0 +1,91 @@
+"""Results as json, csv and a page."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+
+from ..errors import InputError
+from .case import Result
+
+NOTHING = 1e-8
+
+
+def write_json(results: Sequence[Result], path: Path) -> None:
+    """``{"cases": [{case, computed, reference, error, limit, pass, …}, …]}``."""
+    text = json.dumps({"cases": [result.record() for result in results]}, indent=2, allow_nan=False)
+    _write(path, text + "\n")
+
+
+def write_csv(results: Sequence[Result], path: Path) -> None:
+    """The same, a line each."""
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            table = csv.DictWriter(file, list(results[0].record()))
+            table.writeheader()
+            table.writerows(result.record() for result in results)
+    except OSError as error:
+        raise _unwritable(path, error) from error
+
+
+def write_page(results: Sequence[Result], path: Path) -> None:
+    """Tables in Markdown, one a family."""
+    _write(path, page(results))
+
+
+def page(results: Sequence[Result]) -> str:
+    """What `write_page` writes. Errors are rounded up to one digit, so that the page says the same on every machine."""
+    lines = []
+    for family, members in groupby(results, lambda result: result.case.family):
+        lines += [
+            f"### {family}",
+            "",
+            "| case | against | computed | reference | error below | limit | |",
+            "|---" * 7 + "|",
+        ]
+        lines += [_row(result) for result in members]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _row(result: Result) -> str:
+    case = result.case
+    unit = "" if case.unit == "1" else f" {case.unit}"
+    numbers = (f"{shown(result.computed)}{unit}", f"{shown(result.reference)}{unit}", shown_error(result.error))
+    cells = (
+        case.name.split("/", 1)[1],
+        case.against,
+        *numbers,
+        f"{case.limit:g}",
+        "pass" if result.passed else "**fail**",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def shown(value: float) -> str:
+    """Five digits; what is smaller than `NOTHING` is rounding, and another on each machine."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.5g}" if value == 0.0 or abs(value) >= NOTHING else f"< {NOTHING:g}"
+
+
+def shown_error(error: float) -> str:
+    """Next power of ten above an error, `NOTHING` at least."""
+    if not math.isfinite(error):
+        return "–"
+    return f"1e{math.ceil(math.log10(max(error, NOTHING))):d}"
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise _unwritable(path, error) from error
+
+
+def _unwritable(path: Path, error: OSError) -> InputError:
+    return InputError(f"{path}: cannot be written: {error.strerror or error}")
