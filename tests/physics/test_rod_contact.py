@@ -1,13 +1,12 @@
-"""Rods that touch each other and themselves: derivatives, sums of forces, gaps, and that nothing passes through."""
+"""The contact of rods by itself: derivatives, sums of forces, the Newton matrix, the search for pairs."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from sample_scenes import contact, layer, rod, scene
 
-from bilayer_core import Simulator, load_scene
-from bilayer_core.errors import PenetrationError
+from bilayer_core import load_scene
 from bilayer_core.integrate.integrators import INTEGRATORS
 from bilayer_core.integrate.stages import predict, start_point
 from bilayer_core.integrate.stepper import Stepper
@@ -182,109 +181,6 @@ def test_parallel_ribbons_press_on_each_other_with_the_same_force_on_any_meshes(
     assert -gradient[stations[0] :].sum(axis=0) == pytest.approx([0, 0, force], rel=1e-12, abs=1e-9 * force)
 
 
-def stacked(lower_stations, upper_stations):
-    """A ribbon on another one of the same length on the ground; barriers soft enough for both to stay straight."""
-    lower = rod([layer(thickness=2e-3)], stations=lower_stations, start=(0, 0, 1.9e-3), name="lower")
-    upper = rod([layer()], stations=upper_stations, start=(0, 0, 4.3e-3), name="upper")
-    soft = contact(coefficient=0.5) | {"stiffness": 1e4}
-    return scene([lower, upper], gravity=[0, 0, -10.0], obstacles=[GROUND], contact=soft, damping={"mass": 60.0})
-
-
-@pytest.mark.parametrize("stations", MESHES[1:])
-def test_parallel_ribbons_rest_at_the_gap_that_the_barrier_demands_on_any_meshes(stations):
-    simulator = Simulator(load_scene(stacked(*stations)))
-    simulator.run(0.3)
-    upper = simulator.model.strands[1].first_node
-    heights, weights = simulator.positions[:, 2], simulator.model.carriers.weight
-    gap = np.average(heights[upper:], weights=weights[upper:])
-    gap -= np.average(heights[:upper], weights=weights[:upper]) + 1.5e-3
-    s = gap - D_HAT
-    weight = 0.1  # N/m
-    assert 1e4 * (2.0 * s * np.log(gap / D_HAT) + s * s / gap) == pytest.approx(weight, rel=1e-3)
-    total = simulator.contact_forces
-    assert total[upper:].sum(axis=0) == pytest.approx([0, 0, weight * 0.1], rel=1e-5, abs=1e-7)
-    assert total.sum(axis=0) == pytest.approx([0, 0, 3.0 * weight * 0.1], rel=1e-5, abs=1e-7)
-
-
-@pytest.mark.parametrize("speed", [0.5, 20.0])
-def test_a_ribbon_that_falls_across_the_middle_of_another_does_not_pass(speed):
-    lower = rod([layer()], stations=6, length=0.05, start=(-0.025, 0, 0), name="lower")
-    lower |= {"clamp_start": "left", "clamp_end": "right"}
-    upper = turned(rod([layer()], stations=6, length=0.05, start=(0, -0.025, 0.02), name="upper"), (0, 1, 0))
-    crossing = scene(
-        [lower, upper],
-        bodies=[fixed("left", (-0.025, 0, 0)), fixed("right", (0.025, 0, 0))],
-        contact=contact(coefficient=0.3),
-    )
-    simulator = Simulator(load_scene(crossing))
-    upper_nodes = slice(6, 12)
-    simulator._state.velocity[upper_nodes, 2] = -speed
-    lowest, smallest = np.inf, np.inf
-    for _ in range(round(0.05 / simulator.dt)):
-        simulator.step()
-        middle = simulator.positions[8:10, 2].mean() - simulator.positions[2:4, 2].mean()
-        lowest = min(lowest, middle)
-        smallest = min(smallest, simulator.frame().min_gap)
-    assert smallest < D_HAT  # they met
-    # points of a rod are half a thickness apart: centrelines of two crossing ones stay this far apart
-    assert lowest > np.sqrt(1e-3**2 - 0.25e-3**2)
-
-
-def curling(stations=46, **more):
-    """A bilayer with a straight tail that would curl up by more than a turn, in the air."""
-    active = layer("active", eigenstrain={"stimulus": "heat", "gain": 0.06, "interval": [0.04, 0.2]})
-    return scene(
-        [rod([layer("passive"), active], length=0.2, stations=stations)],
-        stimuli={"heat": {"schedule": {"type": "ramp", "start": 0, "end": 0.1, "from": 0, "to": 1}}},
-        damping={"mass": 100.0},
-        **more,
-    )
-
-
-def least_distance(simulator):
-    """Of points on one layer from others on it that are a quarter of the strip away or more."""
-    count = simulator.model.strands[0].node_count
-    nodes = simulator.positions[:count]
-    part = np.linspace(0, count - 1, 20 * count)
-    line = np.stack([np.interp(part, np.arange(count), nodes[:, c]) for c in range(3)], axis=1)
-    distance = np.linalg.norm(line[:, None] - line[None], axis=2)
-    return distance[np.abs(np.subtract.outer(part, part)) > 0.25 * count].min()
-
-
-def test_a_bilayer_that_curls_up_closes_on_itself_and_does_not_pass_through_itself():
-    closed = Simulator(load_scene(curling(contact=contact())))
-    free = Simulator(load_scene(curling(contact={**contact(), "rods": False})))
-    nearest = {True: np.inf, False: np.inf}
-    for _ in range(15):
-        for simulator in (closed, free):
-            simulator.run(0.01)
-            nearest[simulator is closed] = min(nearest[simulator is closed], least_distance(simulator))
-    assert closed.statistics.min_gap < D_HAT
-    assert closed.summary()["converged"] is True
-    assert nearest[False] < 0.1e-3  # passes through itself
-    assert nearest[True] > 1e-3
-
-
-def test_ribbons_that_collide_in_flight_keep_their_momentum_and_slow_down_by_friction():
-    lower = rod([layer("bottom"), layer("top")], stations=12, length=0.05, name="lower")
-    upper = rod([layer()], stations=9, length=0.04, start=(0.003, 0, 4e-3), name="upper")
-    flight = scene([lower, upper], contact=contact(coefficient=0.5, speed_threshold=1e-2), solver={"tolerance": 1e-10})
-    simulator = Simulator(load_scene(flight))
-    nodes = simulator.model.strands[-1].first_node
-    simulator._state.velocity[nodes:] = [0.3, 0.1, -0.5]
-    mass = simulator.model.node_mass
-    before = mass @ simulator.velocities
-    relative = simulator.velocities[nodes, 0]
-    simulator.run(0.05)
-    after = mass @ simulator.velocities
-    exchanged = np.abs(before).sum()
-    assert simulator.statistics.min_gap < D_HAT
-    assert np.abs(after - before).max() < 1e-9 * exchanged
-    parts = (slice(nodes), slice(nodes, None))
-    mean = [np.average(simulator.velocities[part, 0], weights=mass[part]) for part in parts]
-    assert abs(mean[1] - mean[0]) < 0.9 * relative
-
-
 def pressed(hub):
     """Two bilayer arms of a hub, bent onto each other, and a third rod across them; held nodes take part in contact."""
     arms = rod(
@@ -387,54 +283,3 @@ def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_
         found = list(zip(pairs.point[: pairs.count].tolist(), pairs.edge[: pairs.count].tolist(), strict=True))
         assert found == sorted(expected) and len(found) > 1000
     assert counts[2] - counts[1] == 2 * (counts[1] - counts[0])
-
-
-def test_a_run_with_rods_in_contact_continues_bit_for_bit_from_a_saved_state():
-    description = curling(contact=contact(coefficient=0.5))
-    whole = Simulator(load_scene(description))
-    whole.run(0.12)
-    saved = whole.save_state()
-    whole.run(0.02)
-    assert whole.frame().min_gap < D_HAT
-    other = Simulator(load_scene(description))
-    other.load_state(saved)
-    other.run(0.02)
-    assert np.array_equal(other.save_state(), whole.save_state(), equal_nan=True)
-    assert np.array_equal(other.contact_forces, whole.contact_forces)
-    assert np.abs(whole.contact_forces).max() > 0.0
-    assert whole.energy()["rod barrier"] > 0.0
-
-
-def test_rods_that_start_in_each_other_are_refused_by_name():
-    rods = [rod([layer()], name="a"), rod([layer("skin")], name="b", start=(0.013, 0, 0.6e-3))]
-    with pytest.raises(PenetrationError, match=r"node \d+ of [ab]/\w+ is 0\.4 mm inside node \d+ of [ab]/\w+"):
-        model_of(rods)
-
-
-def test_contact_of_rods_is_left_out_where_geometry_excludes_it_and_the_plan_says_why():
-    def plan_of(rods, **more):
-        return Simulator(load_scene(scene(rods, **{"contact": contact(coefficient=0.3), **more}))).plan
-
-    short = plan_of([rod([layer()])])
-    assert short.terms["rod barrier"].startswith("skipped: turns by 0° at most")
-    walls = [fixed("left"), fixed("right", (0, 0, 1))]
-    apart = plan_of(
-        [rod([layer()], name="a", clamp_start="left"), rod([layer()], name="b", start=(0, 0, 1), clamp_start="right")],
-        bodies=walls,
-    )
-    assert "a – b: held 79" in apart.terms["rod friction"]
-    free = plan_of([rod([layer()], name="a"), rod([layer()], name="b", start=(0, 0, 1))])
-    assert free.terms["rod barrier"] == free.terms["rod friction"] == "active" and free.contact_pairs == ("a – b",)
-    off = plan_of([rod([layer()], name="a"), rod([layer()], name="b")], contact={**contact(), "rods": False})
-    assert off.terms["rod barrier"] == "skipped: contact.rods is false"
-    assert any("rods may pass through each other: a – b" in warning for warning in off.warnings)
-    none = plan_of([rod([layer()])], contact=None)
-    assert none.terms["rod barrier"] == "skipped: no contact settings" and none.warnings == ()
-
-
-def test_arms_that_a_hub_holds_side_by_side_do_not_feel_what_joins_them():
-    star = rod([layer()], length=0.03, stations=16, name="arm", clamp_start="hub", pattern={"count": 12})
-    simulator = Simulator(load_scene(scene([star], bodies=[fixed("hub")], contact=contact())))
-    assert simulator.plan.contact_pairs == ("arm – its copies",)
-    simulator.run(0.01)
-    assert np.abs(simulator.contact_forces).max() == 0.0
