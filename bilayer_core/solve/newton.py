@@ -135,7 +135,9 @@ class NewtonSolver:
         alpha, blocking = near.bound(at, node_step, body_motion) if near else (1.0, -1)
         if rods is not None:
             node_step, held = node_step.copy(), body_motion[model.attached_body]
-            node_step[model.attached_node] = held[:, :3] + np.cross(held[:, 3:], at.arm)
+            node_step[model.attached_node] = held[:, :3]
+            if held[:, 3:].any():
+                node_step[model.attached_node] += np.cross(held[:, 3:], at.arm)
             between, _ = rods.step_bound(at.position, node_step)
             if between < alpha:
                 return between, -1
