@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
-from scipy.optimize import minimize
+from scipy.optimize import brentq, minimize
 
 EULER_FREE_END = math.pi**2 / 4.0
 """P L²/EI at which a column with one free end buckles."""
@@ -128,3 +128,46 @@ def oblique_slide(force: tuple[float, float], coefficients: tuple[float, float],
 
     start = 1e-6 * np.array(force)
     return solve_ivp(acceleration, (1e-6, time), start, rtol=1e-9, atol=1e-12).y[:, -1]
+
+
+def end_loaded_cantilever(load: float, follower: bool) -> np.ndarray:
+    """Tip (x, z)/L of an inextensible cantilever along x under a force F L²/EI = `load` at its end: along z, or, as a
+    `follower`, along its normal there.
+
+    Seen from the tip, θ'' = −F cos(θ − θ_F) with θ' = 0 there, and θ = 0 at the wall.
+    """
+
+    def from_tip(angle: float, of_force: float) -> np.ndarray:
+        def change(_, y):
+            return [y[1], -load * np.cos(y[0] - of_force), np.cos(y[0]), np.sin(y[0])]
+
+        return solve_ivp(change, (0.0, 1.0), [angle, 0.0, 0.0, 0.0], rtol=1e-10, atol=1e-12).y[:, -1]
+
+    if follower:  # turned as a whole: the angle at the tip is minus that found at the wall
+        angle = -from_tip(0.0, 0.0)[0]
+        return from_tip(angle, angle)[2:]
+    angle = brentq(lambda tip: from_tip(tip, 0.0)[0], 0.0, 1.5)
+    return from_tip(angle, 0.0)[2:]
+
+
+def kirchhoff_plate(velocity: tuple[float, float], own: float, whole: float, moment: float, time: float) -> float:
+    """Angle [rad] to which a rigid plate turns that is thrown aslant into a perfect fluid at rest (Lamb 1932, ch. VI).
+
+    In its plane of motion, with u along the plate, v across it, m its own mass and n that with the fluid it takes
+    along:  m u̇ = n ω v,  n v̇ = −m ω u,  I ω̇ = −(n − m) u v,  θ̇ = ω.
+
+    Parameters
+    ----------
+    velocity : tuple of float
+        u and v at the start [m/s].
+    own, whole, moment : float
+        m [kg], n [kg], I with the fluid [kg m²].
+    time : float
+        [s]
+    """
+
+    def rate(_, y):
+        u, v, omega, _ = y
+        return [whole * omega * v / own, -own * omega * u / whole, -(whole - own) * u * v / moment, omega]
+
+    return float(solve_ivp(rate, (0.0, time), [*velocity, 0.0, 0.0], rtol=1e-10, atol=1e-12).y[3, -1])

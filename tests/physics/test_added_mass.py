@@ -1,4 +1,4 @@
-"""Inertia of the fluid against closed forms, Kirchhoff's equations of a rigid plate, and what it must conserve."""
+"""Inertia of the fluid: derivatives, what it must conserve, and vibrations; more answers are in `validate.fluid`."""
 
 import math
 
@@ -125,67 +125,10 @@ def test_a_turn_of_body_motion_and_flow_leaves_the_fluids_energy_unchanged():
     assert np.abs(moment).max() < 1e-12 * np.abs(relative).max() * np.abs(moments).sum()
 
 
-@pytest.mark.parametrize("layers", [WHOLE, HALVES], ids=["one layer", "two layers"])
-@pytest.mark.parametrize(
-    ("direction", "added"),
-    [((0, 0, 1.0), ADDED), ((0, 1.0, 0), SIDEWAYS), ((1.0, 0, 0), 0.0)],
-    ids=["through", "sideways", "along"],
-)
-def test_a_straight_strip_accelerates_with_its_own_mass_and_that_of_the_fluid(layers, direction, added):
-    content = scene([rod(layers, length=0.05, stations=11)], gravity=list(direction), fluid=water())
-    simulator = Simulator(load_scene(content))
-    simulator.run(0.1)
-    expected = 0.1 * OWN / (OWN + added) * np.array(direction)
-    assert simulator.velocities == pytest.approx(np.tile(expected, (len(simulator.velocities), 1)), abs=1e-11)
-
-
 def test_multiples_of_the_flat_plates_mass_are_the_scenes():
     content = scene([rod(WHOLE)], fluid=water(added_mass={"through": 0.5, "sideways": 3.0, "turning": 2.0}))
     model = build_model(load_scene(content))
     assert model.fluid_mass.sum(axis=0) == pytest.approx([0.05 * ADDED, 0.3 * SIDEWAYS, 0.2 * TURNING])
-
-
-def kirchhoff(velocity, spin, length, duration):
-    """Angle and velocity of a rigid plate in a perfect fluid at rest, in its plane of motion (Lamb 1932, ch. VI).
-
-    With m and n its own and its whole mass across, I its moment of inertia and that of its fluid:
-    m u̇ = n ω v,  n v̇ = −m ω u,  I ω̇ = −(n − m) u v,  θ̇ = ω; classical Runge–Kutta.
-    """
-    own, whole = OWN * length, (OWN + ADDED) * length
-    # masses at eleven nodes, halves at the ends
-    arms = np.linspace(-0.5, 0.5, 11) * length
-    weights = np.full(11, 0.1)
-    weights[[0, -1]] = 0.05
-    moment = whole * float(weights @ arms**2)
-
-    def rate(y):
-        u, v, omega, _ = y
-        return np.array([whole * omega * v / own, -own * omega * u / whole, -(whole - own) * u * v / moment, omega])
-
-    y, h = np.array([velocity[0], velocity[2], -spin[1], 0.0]), 1e-5
-    for _ in range(round(duration / h)):
-        a = rate(y)
-        b = rate(y + 0.5 * h * a)
-        c = rate(y + 0.5 * h * b)
-        y = y + h / 6.0 * (a + 2 * b + 2 * c + rate(y + h * c))
-    return y
-
-
-def angle_of(simulator):
-    chord = simulator.positions[-1] - simulator.positions[0]
-    return math.atan2(chord[2], chord[0])
-
-
-@pytest.mark.parametrize("velocity", [(0.3, 0.0, 0.2), (0.3, 0.0, -0.2)])
-def test_a_plate_that_moves_aslant_turns_broadside_on_as_munks_moment_says(velocity):
-    errors = []
-    for dt in (5e-4, 2.5e-4):
-        simulator, _ = thrown(velocity, (0, 0, 0), dt, 0.1)
-        errors.append(angle_of(simulator) - kirchhoff(velocity, (0, 0, 0), 0.05, 0.1)[3])
-    assert abs(angle_of(simulator)) > 0.5
-    assert angle_of(simulator) * velocity[2] < 0.0  # the normal turns towards the velocity
-    assert abs(errors[1]) < 0.01
-    assert abs(2 * errors[1] - errors[0]) < 1e-4  # what is left is of second order
 
 
 @pytest.mark.parametrize("integrator", ["implicit_euler", "sdirk2", "implicit_midpoint"])
