@@ -1,13 +1,33 @@
 """Python and the command line in processes of their own."""
 
 import os
+import random
+import socket
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
 TIMEOUT = 240
 """Longest time that a command may take, compilation of all kernels included [s]."""
+
+# A test holds the TCP port of its ROS domain's number above this one.
+FIRST_LOCK_PORT = 21000
+
+
+@contextmanager
+def claimed_domain():
+    """A ROS domain that no other test of this machine uses, those of other test runs included."""
+    for domain in random.sample(range(1, 101), 100):
+        with socket.socket() as lock:
+            try:
+                lock.bind(("127.0.0.1", FIRST_LOCK_PORT + domain))
+            except OSError:
+                continue
+            yield domain
+            return
+    raise RuntimeError("all ROS domains are in use by tests")
 
 
 def environment() -> dict[str, str]:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 WINDOW_SIZE = "2040x1180"  # four fifths of the width for the robot
 MARGIN = 0.16  # round what is to be seen, in its longer side
+HEADROOM = 0.1  # for the time, in heights
 ASPECTS = (0.7, 2.6)  # least and largest width over height of a picture
 SHORT_PERIOD = 0.02  # between two looks once all meshes are loaded [s]
 
@@ -129,7 +130,7 @@ class Studio:
         least, most = ASPECTS
         half = np.array([max(half[0], least * half[1]), max(half[1], half[0] / most)])
         middle = 0.5 * (low + high)
-        left, upper = np.clip(middle - half, 0, size)
+        left, upper = np.clip(middle - half - (0, HEADROOM * 2 * half[1]), 0, size)
         right, lower = np.clip(middle + half, 0, size)
         return int(left), int(upper), int(np.ceil(right)), int(np.ceil(lower))
 

@@ -2,15 +2,13 @@
 
 import itertools
 import os
-import random
-import socket
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
 
 import pytest
 import rclpy
+from processes import claimed_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -20,24 +18,7 @@ NODE = "/bilayer_sim"
 # Longest wait for anything that needs discovery or a first compilation [s].
 LIMIT = 120.0
 
-# A test holds the TCP port of its domain's number above this one.
-FIRST_LOCK_PORT = 21000
-
 _numbers = itertools.count()
-
-
-@contextmanager
-def claimed_domain():
-    """A ROS domain that no other test of this machine uses, those of other test runs included."""
-    for domain in random.sample(range(1, 101), 100):
-        with socket.socket() as lock:
-            try:
-                lock.bind(("127.0.0.1", FIRST_LOCK_PORT + domain))
-            except OSError:
-                continue
-            yield domain
-            return
-    raise RuntimeError("all ROS domains are in use by tests")
 
 
 class NodeProcess:

@@ -1,0 +1,82 @@
+"""What the pages tell users to type exists: commands, options, files, links, programs."""
+
+import re
+import shlex
+import subprocess
+import sys
+
+import click
+import pytest
+from documents import blocks
+from processes import TIMEOUT, environment
+
+from bilayer_core.cli.program import program
+
+PAGES = ("README.md", "CHANGELOG.md", *(f"docs/{name}.md" for name in ("tutorial", "gallery", "stimuli", "design")))
+PLACEHOLDER = re.compile(r"\b[A-Z]{2,}\b")
+
+
+def typed_commands(root):
+    """Page and words of each command `bilayer ...` in a fenced block."""
+    for page in PAGES:
+        for block in blocks(root / page):
+            if block.info not in ("sh", "sh ros", "console"):
+                continue
+            for line in block.text.splitlines():
+                words = shlex.split(line, comments=True)
+                if words and words[0] == "bilayer":
+                    yield page, words[1:]
+
+
+def named_commands(root):
+    """Page and words of each command `bilayer ...` in running text; arguments may be missing there."""
+    for page in PAGES:
+        text = re.sub(r"^```.*?^```$", "", (root / page).read_text(encoding="utf-8"), flags=re.M | re.S)
+        for span in re.findall(r"`bilayer (?!_)([^`]+)`", text):
+            if not PLACEHOLDER.search(span):
+                yield page, span.split()
+
+
+def test_every_command_of_a_fenced_block_is_understood(root):
+    found = list(typed_commands(root))
+    assert len(found) > 10
+    for page, words in found:
+        try:
+            program.commands[words[0]].make_context(words[0], words[1:])
+        except (click.ClickException, KeyError) as error:
+            pytest.fail(f"{page}: bilayer {' '.join(words)}: {error!r}")
+
+
+def test_every_command_that_a_page_names_exists_with_its_options(root):
+    found = list(named_commands(root))
+    assert len(found) > 10
+    for page, (verb, *words) in found:
+        assert verb in program.commands, f"{page}: there is no bilayer {verb}"
+        options = {name for parameter in program.commands[verb].params for name in parameter.opts} | {"--help"}
+        unknown = {word.partition("=")[0] for word in words if word.startswith("--")} - options
+        assert not unknown, f"{page}: bilayer {verb} has no {unknown}"
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_link_of_a_page_leads_to_a_file(root, page):
+    text = (root / page).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
+        if not target.startswith("http"):
+            assert ((root / page).parent / target).exists(), f"{page}: there is no {target}"
+
+
+@pytest.mark.slow
+def test_the_programs_of_the_readme_run(root, tmp_path):
+    programs = [block.text for block in blocks(root / "README.md") if block.info == "python"]
+    assert programs
+    for text in programs:
+        run = subprocess.run(
+            [sys.executable, "-c", text],
+            cwd=tmp_path,
+            env=environment(),
+            capture_output=True,
+            text=True,
+            timeout=TIMEOUT,
+        )
+        assert run.returncode == 0, run.stderr
+        assert len(run.stdout.splitlines()) >= 3
