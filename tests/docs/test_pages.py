@@ -4,15 +4,19 @@ import re
 import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
 from documents import blocks
 from processes import TIMEOUT, environment
 
+from bilayer_core.cli.options import Settings
 from bilayer_core.cli.program import program
+from bilayer_core.scene.bundled import bundled_scenes
 
-PAGES = ("README.md", "CHANGELOG.md", *(f"docs/{name}.md" for name in ("tutorial", "gallery", "stimuli", "design")))
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = ("README.md", "CHANGELOG.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
 PLACEHOLDER = re.compile(r"\b[A-Z]{2,}\b")
 
 
@@ -42,7 +46,7 @@ def test_every_command_of_a_fenced_block_is_understood(root):
     assert len(found) > 10
     for page, words in found:
         try:
-            program.commands[words[0]].make_context(words[0], words[1:])
+            program.commands[words[0]].make_context(words[0], words[1:], obj=Settings())
         except (click.ClickException, KeyError) as error:
             pytest.fail(f"{page}: bilayer {' '.join(words)}: {error!r}")
 
@@ -80,3 +84,18 @@ def test_the_programs_of_the_readme_run(root, tmp_path):
         )
         assert run.returncode == 0, run.stderr
         assert len(run.stdout.splitlines()) >= 3
+
+
+def test_pictures_are_small_and_each_is_shown_on_a_page(root):
+    text = "".join((root / page).read_text(encoding="utf-8") for page in PAGES)
+    for picture in (root / "docs/images").rglob("*.png"):
+        assert picture.stat().st_size < 300_000, picture
+        assert picture.relative_to(root / "docs").as_posix() in text, picture
+
+
+def test_the_gallery_shows_bundled_scenes(root):
+    page = (root / "docs/gallery.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^## (\w+)$", page, re.M)
+    assert set(shown) <= set(bundled_scenes()) and len(shown) >= 4
+    for name in shown:
+        assert f"bilayer run {name} --log {name}.mcap" in page
