@@ -70,15 +70,16 @@ def choose_scales(run: RunData) -> Scales:
     every = slice(None, None, max(1, len(run.shape_times) // VIEW_FRAMES))
     seen = visible_points(run, every, slice(None), metres_per_newton)
     eye, target = place_eye(seen)
+    extent = 0.5 * float(np.linalg.norm(np.ptp(seen, axis=0)))
     return Scales(
         strain_limit=rounded_up(strain),
         metres_per_newton=metres_per_newton,
         shown_force=SHOWN_SHARE * reference,
         size=size,
-        cell=rounded_up(size / 8),
+        cell=rounded_up(max(size, 0.5 * extent) / 8),  # of what goes far, small squares would flicker
         eye=eye,
         target=target,
-        extent=0.5 * float(np.linalg.norm(np.ptp(seen, axis=0))),
+        extent=extent,
     )
 
 

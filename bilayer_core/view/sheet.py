@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from bilayer_core.errors import InputError
 from bilayer_core.view.layout import BACKGROUND
 
-SHEET_WIDTH = 1200  # of a sheet, at most [pixels]
+SHEET_WIDTH = 1120  # of a sheet, at most [pixels]
 GIF_SIZE = 480  # longer side of an animation, at most [pixels]
 SHEET_ASPECT = 2.0  # width over height of a sheet that is aimed at
 GAP = 6  # between the pictures of a sheet [pixels]

@@ -96,6 +96,6 @@ def test_pictures_are_small_and_each_is_shown_on_a_page(root):
 def test_the_gallery_shows_bundled_scenes(root):
     page = (root / "docs/gallery.md").read_text(encoding="utf-8")
     shown = re.findall(r"^## (\w+)$", page, re.M)
-    assert set(shown) <= set(bundled_scenes()) and len(shown) >= 4
+    assert set(shown) <= set(bundled_scenes()) and len(shown) >= 6
     for name in shown:
         assert f"bilayer run {name} --log {name}.mcap" in page
