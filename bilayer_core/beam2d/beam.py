@@ -1,7 +1,8 @@
 """Statics and dynamics of the planar bilayer beam.
 
-Both minimise E(x) − Σ m g·x + ½ |x − x̃|²_m/h² with Newton's method and a line search: a step of implicit Euler takes
-x̃ = x + h v and its length for h, a search for equilibrium x̃ = x and ever larger h (see `integrate.statics`).
+Both minimise E(x) − Σ m g·x + ½ |x − x̃|²_m/h² + ½ α |x − xₙ|²_m/h with Newton's method and a line search: a step of
+implicit Euler takes x̃ = xₙ + h v and its length for h, a search for equilibrium x̃ = xₙ and ever larger h (see
+`integrate.statics`). α is the damping.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ class PlanarBeam:
         Whether a wall holds the first node and its direction.
     gravity : tuple of float
         In the plane [m/s²].
+    damping : float
+        Force per mass and velocity [1/s].
 
     Attributes
     ----------
@@ -44,10 +47,12 @@ class PlanarBeam:
         N [N] and M [N m] from the eigenstrain of each edge, shape (n_edge,).
     """
 
-    def __init__(self, section: Section, length: float, node_count: int, *, clamped=True, gravity=(0.0, 0.0)):
+    def __init__(
+        self, section: Section, length: float, node_count: int, *, clamped=True, gravity=(0.0, 0.0), damping=0.0
+    ):
         edge_length = length / (node_count - 1)
         wall = np.array([1.0, 0.0]) if clamped else None
-        self.length, self.section = length, section
+        self.length, self.section, self.damping = length, section, damping
         self.energy_law = BeamEnergy(section, edge_length, node_count, wall)
         self.position = np.column_stack([np.linspace(0.0, length, node_count), np.zeros(node_count)])
         self.velocity = np.zeros((node_count, 2))
@@ -98,19 +103,22 @@ class PlanarBeam:
 
     def _potential(self, position: Array, predicted: Array, length: float) -> float:
         inertia = 0.5 / length**2 * self._mass @ np.square(position - predicted).sum(axis=1)
+        lost = 0.5 * self.damping / length * self._mass @ np.square(position - self.position).sum(axis=1)
         elastic = self.energy_law.value(position, self.force, self.moment)
-        return elastic - float(np.sum(self._weight * position)) + float(inertia)
+        return elastic - float(np.sum(self._weight * position)) + float(inertia + lost)
 
     def _minimum(self, predicted: Array, length: float) -> Array:
         """Where the potential of a step is least [m], shape (n_node, 2)."""
         masses = np.repeat(self._mass, 2) / length**2
+        friction = np.repeat(self._mass, 2) * self.damping / length
         at = predicted.copy()
         at[0 : len(self._held) // 2] = self.position[0 : len(self._held) // 2]
         value = self._potential(at, predicted, length)
         for _ in range(MAX_ITERATIONS):
             gradient, band = self.energy_law.derivatives(at, self.force, self.moment)
             gradient += masses * (at - predicted).ravel() - self._weight.ravel()
-            band[0] += masses
+            gradient += friction * (at - self.position).ravel()
+            band[0] += masses + friction
             step = self._newton_step(gradient, band)
             size = np.abs(step).max()
             if size <= TOLERANCE * self.length:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import SceneError
+from ..errors import InputError, SceneError
 from ..model.section import sections
 from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
@@ -42,11 +42,29 @@ def beam_of(scene: SceneConfig) -> PlanarBeam:
     )
     axes = np.array([rod.path.direction, rod.normal])
     gravity = tuple(float(part) for part in axes @ scene.gravity)
-    return PlanarBeam(section, rod.path.length, rod.stations, clamped=rod.clamp_start is not None, gravity=gravity)
+    return PlanarBeam(
+        section,
+        rod.path.length,
+        rod.stations,
+        clamped=rod.clamp_start is not None,
+        gravity=gravity,
+        damping=scene.damping.mass,
+    )
 
 
 def set_stimuli(beam: PlanarBeam, scene: SceneConfig, values: dict[str, float]) -> None:
-    """Let the beam of a scene follow settled stimuli, given by channel in its unit."""
+    """Let the layers of a scene's beam follow settled stimuli, each channel's value given in its unit.
+
+    Raises
+    ------
+    InputError
+        If a channel has no value, or there is no such channel.
+    """
+    if values.keys() != scene.stimuli.keys():
+        known = ", ".join(scene.stimuli) or "none"
+        raise InputError(
+            f"stimuli: found values for {', '.join(values) or 'none'}; the scene {scene.name!r} has: {known}"
+        )
     rod = scene.rods[0]
     beam.force[:] = beam.moment[:] = 0.0
     for layer, side in zip(rod.layers, (-0.5, 0.5), strict=True):
@@ -81,8 +99,8 @@ def _only_rod(scene: SceneConfig) -> Rod:
         or (isinstance(held.motion, Prescribed) and not held.motion.times),
         "gravity: must lie in the plane of path and normal": abs(gravity @ normal)
         <= IN_PLANE * np.linalg.norm(gravity),
-        "contact, fluid, loads, masses, damping: must not be there": not (
-            (scene.contact and scene.obstacles) or scene.fluid or scene.loads or scene.masses or scene.damping.mass
+        "contact, fluid, loads, masses: must not be there": not (
+            scene.contact or scene.fluid or scene.loads or scene.masses
         ),
     }
     for demand, met in needs.items():

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from sample_scenes import fixed, layer, rod, scene
 
-from bilayer_core import load_scene
+from bilayer_core import Simulator, load_scene
 from bilayer_core.beam2d.beam import PlanarBeam
 from bilayer_core.beam2d.energy import BeamEnergy, Section
-from bilayer_core.beam2d.scene import beam_of
-from bilayer_core.errors import SceneError, SimulationError
+from bilayer_core.beam2d.scene import beam_of, set_stimuli
+from bilayer_core.errors import InputError, SceneError, SimulationError
 from bilayer_core.validate import beams
 from bilayer_core.validate.bending import strip
 
@@ -101,6 +101,13 @@ def test_it_vibrates_at_its_first_frequency():
     assert 1.0 / ((lowest[1] - lowest[0]) * dt) == pytest.approx(frequency, rel=0.005)
 
 
+def test_damping_slows_a_free_beam_exponentially():
+    beam = PlanarBeam(SECTION, 1.0, 11, clamped=False, gravity=(0.0, -10.0), damping=3.0)
+    for _ in range(400):
+        beam.step(1e-3)
+    assert beam.velocity[:, 1] == pytest.approx(np.full(11, -10.0 / 3.0 * (1.0 - math.exp(-1.2))), rel=2e-3)
+
+
 def test_a_free_beam_that_falls_has_no_equilibrium_and_stays_where_it_was():
     beam = PlanarBeam(SECTION, 1.0, 11, clamped=False, gravity=(0.0, -9.81))
     before = beam.position.copy()
@@ -128,3 +135,24 @@ def test_scenes_that_are_no_straight_planar_bilayer_are_refused_with_the_reason(
     BAD[demand](content)
     with pytest.raises(SceneError, match=f"planar beam of Appendix A cannot be this scene: .*{demand}"):
         beam_of(load_scene(content))
+
+
+def test_both_layers_of_the_bundled_strip_follow_their_laws_as_two_rods_do():
+    config = load_scene("bending")
+    beam = beam_of(config)
+    values = {name: 0.7 * channel.maximum for name, channel in config.stimuli.items()}
+    set_stimuli(beam, config, values)
+    beam.solve_static()
+    simulator = Simulator(config)
+    for name, value in values.items():
+        simulator.set_stimulus(name, value)
+    simulator.solve_static()
+    middle = config.rods[0].stations // 2
+    assert beam.curvatures[middle] == pytest.approx(simulator.curvatures[middle], rel=1e-3)
+
+
+@pytest.mark.parametrize("values", [{}, {"heat": 1.0, "light": 1.0}])
+def test_stimuli_that_do_not_fit_the_scene_are_refused(values):
+    config = load_scene(strip(1.0, 1.0, 0.01))
+    with pytest.raises(InputError, match="the scene 'sample' has: heat"):
+        set_stimuli(beam_of(config), config, values)

@@ -112,3 +112,13 @@ def test_a_robot_that_falls_for_ever_has_no_equilibrium_and_stays_where_it_was()
 def test_a_tolerance_that_is_none_is_refused(tolerance):
     with pytest.raises(InputError, match="positive number of metres"):
         column(EULER).solve_static(tolerance)
+
+
+@pytest.mark.parametrize(("name", "channel"), [("gripping", "humidity"), ("crawling_dual_leg", "humidity")])
+def test_a_robot_in_equilibrium_stays_there(name, channel):
+    simulator = Simulator(load_scene(name))
+    simulator.set_stimulus(channel, 1.0)
+    assert simulator.solve_static().stable
+    before = simulator.positions
+    simulator.run(0.02)
+    assert np.abs(simulator.positions - before).max() < 1e-7

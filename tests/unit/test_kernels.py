@@ -19,6 +19,7 @@ for description in (everything(), everything(stations=7), scene([rod([layer()])]
     simulator = Simulator(load_scene(description), budget=True)
     simulator.run(0.005)
     simulator.frame()
+Simulator(load_scene(scene([rod([layer(), layer("top")])]))).solve_static()
 
 used = {}
 for part in ("kinematics", "contact", "forces", "solve", "integrate"):
