@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FAILED = 1
 """Exit code if a case fails."""
-WIDTHS = (48, 13, 13, 9, 7, 6)
+WIDTHS = (52, 13, 13, 9, 7, 6)
 """Of the table's columns; it is written line by line."""
 
 
