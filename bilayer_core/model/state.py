@@ -7,9 +7,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import InputError
+from ..scene.schedule import value_before
 from .model import Model
 
 Array = np.ndarray
+MOMENT = 1e-3
+"""Length of a step that ends at time 0, for the value of a schedule before a jump there [s]."""
 
 
 @dataclass
@@ -65,10 +68,13 @@ class State:
 
 
 def initial_state(model: Model) -> State:
-    """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies."""
+    """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
+
+    Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
+    """
     bodies = model.bodies
     channels = list(model.scene.stimuli.values())
-    first_values = np.array([channel.schedule.value(0.0) for channel in channels])
+    before = np.array([value_before(channel.schedule.value, 0.0, MOMENT) for channel in channels])
     return State(
         step=np.zeros(1),
         halvings=np.zeros(1),
@@ -82,6 +88,6 @@ def initial_state(model: Model) -> State:
         body_rotation=bodies.start_rotation.copy(),
         body_velocity=bodies.start_velocity.copy(),
         body_angular_velocity=bodies.start_angular_velocity.copy(),
-        transduction=first_values[model.law_channel] if len(channels) else np.zeros(0),
+        transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels), np.nan),
     )

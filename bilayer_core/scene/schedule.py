@@ -120,7 +120,7 @@ class Sequence(BaseModel):
     def value(self, t: float) -> float:
         """Value at time `t` [s], in the unit of the channel."""
         total = sum(part.duration for part in self.parts)
-        elapsed = t + ROUNDING * total
+        elapsed = max(t, 0.0) + ROUNDING * total
         if self.repeat:
             elapsed %= total
         for part in self.parts[:-1]:
