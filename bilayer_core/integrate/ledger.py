@@ -4,6 +4,7 @@ Between two accepted configurations, a step h apart, with g the gradient of one 
 edge space (`motion`), and η the eigenstrain:
 
     work of a conservative force   W = −½ (gₙ + gₙ₊₁)·Δq                      error O(h³) a step: −ΔE to second order
+    work of a barrier              W = −∫ g·dq, straight from qₙ to qₙ₊₁      by Simpson's rule, halved where it must be
     work of a dissipative force    W = ½ h (Pₙ + Pₙ₊₁),  P = −g·v             likewise, and never above zero
     work of the stimulus           W = ½ (sₙ + sₙ₊₁)·Δη,  s = ∂E/∂η = −EA (ε − η) |ē|
     work of prescribed bodies      what moves held nodes and surfaces against all these forces, and their kinetic energy
@@ -20,7 +21,8 @@ forces (a lagged friction), at the integrator's order; implicit Euler takes h �
 second order the error of the quadrature is in it with as much. The *residual* is the failure of works to be the
 differences of energies: the error of the quadrature, of second order, and any error of a gradient.
 
-All is taken at the accepted ends of steps with the velocities there; stages of an integrator are not looked at. The
+A barrier is so steep that an impact happens within a step: at its two ends little or nothing may be left of it. All
+else is taken at the accepted ends of steps with the velocities there; stages of an integrator are not looked at. The
 powers of friction and drag are taken rather than force times displacement because each is of one sign however sharply
 the force depends on the velocity. Friction has the normal forces of either end there, where a step of the integrator
 has those of its start. What jumps between two steps (a load, a stimulus) is taken as a change over the second: an error
@@ -34,6 +36,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kinematics.rotation import rotation_matrix
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
@@ -42,8 +45,13 @@ from ..solve.terms.fluid import survey_fluid
 from ..solve.terms.term import Kind
 from .motion import Gradient, Motion, displacement, momentary_context, of_prescribed, velocity
 from .observe import kinetic_energy
+from .quadrature import simpson
 
 Array = np.ndarray
+BARRIERS = ("barrier", "rod barrier")
+BARRIER_ERROR = 1e-4
+"""Of the work of a barrier over a step, as a part of its energy."""
+BARRIER_HALVINGS = 10
 
 
 @dataclass(frozen=True)
@@ -112,8 +120,13 @@ class EnergyLedger:
         moved = displacement(self._model, before.at, after.at)
         imposed = of_prescribed(self._model, moved)
         for name, gradient in after.gradient.items():
-            for sums, motion in ((self._work, moved), (self._imposed, imposed)):
-                sums[name] += 0.5 * (motion.work(before.gradient[name]) + motion.work(gradient))
+            if name in BARRIERS and max(before.energy[name], after.energy[name]) > 0.0:
+                works = self._work_of_barrier(name, before, after, state, (moved, imposed))
+            else:
+                ends = before.gradient[name], gradient
+                works = [0.5 * sum(motion.work(end) for end in ends) for motion in (moved, imposed)]
+            for sums, work in zip((self._work, self._imposed), works, strict=True):
+                sums[name] += work
         for name, power in after.power.items():
             for sums, start, end in zip((self._work, self._imposed), before.power[name], power, strict=True):
                 sums[name] += 0.5 * h * (start + end)
@@ -155,6 +168,28 @@ class EnergyLedger:
             "residual": residual,
             "relative_residual": residual / largest if largest > 0.0 else 0.0,
         }
+
+    def _work_of_barrier(
+        self, name: str, before: _Instant, after: _Instant, state: State, motions: tuple[Motion, Motion]
+    ) -> Array:
+        """Work [J] of one barrier over each of the motions along the straight way from one instant to the other."""
+        moved, start, potential = motions[0], before.at, self._potential
+        between, at = State(**{key: array.copy() for key, array in vars(state).items()}), Configuration(self._model)
+        position, rotation = start.place[:-1], start.rotation[:-1]
+
+        def rates(s: float) -> Array:
+            between.position[:] = start.position + s * moved.node
+            between.body_position[:] = position + s * moved.contact[:-1, :3]
+            for b, turn in enumerate(moved.contact[:-1, 3:]):
+                between.body_rotation[b] = rotation_matrix(s * turn) @ rotation[b]
+            at.take_state(between)
+            for _ in potential.one_by_one(at, only=(name,)):
+                return np.array([motion.work(potential.accumulators) for motion in motions])
+            raise KeyError(name)
+
+        ends = [np.array([motion.work(end.gradient[name]) for motion in motions]) for end in (before, after)]
+        energy = max(before.energy[name], after.energy[name])
+        return simpson(rates, (0.0, 1.0), (ends[0], rates(0.5), ends[1]), BARRIER_ERROR * energy, BARRIER_HALVINGS)
 
     def _work_of_fluid(self, before: _Instant, after: _Instant, imposed: Motion) -> float:
         """Work [J] of the fluid's inertia, dP/dt − ∂T/∂q, on what prescribed bodies impose."""

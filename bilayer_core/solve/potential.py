@@ -125,8 +125,8 @@ class IncrementalPotential:
         self._expand(at)
         return sum(self.terms.values())
 
-    def one_by_one(self, at: Configuration) -> Iterator[tuple[Term, str, float]]:
-        """Evaluate the terms at a configuration each by itself, those of inertia left out.
+    def one_by_one(self, at: Configuration, only: tuple[str, ...] | None = None) -> Iterator[tuple[Term, str, float]]:
+        """Evaluate the terms at a configuration each by itself, those of inertia left out, or `only` those named.
 
         Yields
         ------
@@ -139,6 +139,8 @@ class IncrementalPotential:
             if term.kind is Kind.INERTIAL:
                 continue
             for part in term.parts():
+                if only is not None and part.names[0] not in only:
+                    continue
                 out.clear(False)
                 out.clear_contact()
                 part.add(at, False)
