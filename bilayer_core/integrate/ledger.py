@@ -3,10 +3,10 @@
 Between two accepted configurations, a step h apart, with g the gradient of one term and Δq the displacement, both in
 edge space (`motion`), and η the eigenstrain:
 
-    work of a conservative force   W = −½ (gₙ + gₙ₊₁)·Δq                      error O(h³) a step: −ΔE to second order
-    work of a barrier              W = −∫ g·dq, straight from qₙ to qₙ₊₁      by Simpson's rule, halved where it must be
-    work of a dissipative force    W = ½ h (Pₙ + Pₙ₊₁),  P = −g·v             likewise, and never above zero
-    work of the stimulus           W = ½ (sₙ + sₙ₊₁)·Δη,  s = ∂E/∂η = −EA (ε − η) |ē|
+    work of a conservative force   W = −∫ g·dq, straight from qₙ to qₙ₊₁      by Simpson's rule: −ΔE to fourth order
+    work of a barrier              the same, on halves where it must be
+    work of a dissipative force    W = ½ h (Pₙ + Pₙ₊₁),  P = −g·v             second order, and never above zero
+    work of the stimulus           W = ∫ s·dη, along the same way,  s = ∂E/∂η = −EA (ε − η) |ē|
     work of prescribed bodies      what moves held nodes and surfaces against all these forces, and their kinetic energy
 
 Energies E and the kinetic energy T come from states alone, works from gradients alone, so that two sums measure
@@ -76,6 +76,7 @@ class _Instant:
     fluid: _Fluid | None
     velocity: Array  # of nodes [m/s], shape (n_node, 3)
     eigenstrain: Array
+    load_factor: Array
     stimulus: Array  # ∂E/∂η of each edge [J], shape (n_edge,)
     energy: dict[str, float]
     gradient: dict[str, Gradient]
@@ -119,12 +120,16 @@ class EnergyLedger:
         before, after = self._last, self._look(state, eigenstrain, load_factor)
         moved = displacement(self._model, before.at, after.at)
         imposed = of_prescribed(self._model, moved)
+        way = _Way(self._model, before, state, moved)
+        strain = 0.5 * (before.eigenstrain + after.eigenstrain)
+        middle = self._look_at(way.at(0.5), way.state, strain, 0.5 * (before.load_factor + load_factor))
         for name, gradient in after.gradient.items():
+            three = before.gradient[name], middle.gradient[name], gradient
+            rates = [np.array([motion.work(each) for motion in (moved, imposed)]) for each in three]
             if name in BARRIERS and max(before.energy[name], after.energy[name]) > 0.0:
-                works = self._work_of_barrier(name, before, after, state, (moved, imposed))
+                works = self._work_of_barrier(name, way, rates, (moved, imposed), before, after)
             else:
-                ends = before.gradient[name], gradient
-                works = [0.5 * sum(motion.work(end) for end in ends) for motion in (moved, imposed)]
+                works = (rates[0] + 4.0 * rates[1] + rates[2]) / 6.0
             for sums, work in zip((self._work, self._imposed), works, strict=True):
                 sums[name] += work
         for name, power in after.power.items():
@@ -133,7 +138,7 @@ class EnergyLedger:
         if after.fluid is not None:
             self._imposed["fluid"] += self._work_of_fluid(before, after, imposed)
         rise = after.eigenstrain - before.eigenstrain
-        self._stimulus += 0.5 * float((before.stimulus + after.stimulus) @ rise)
+        self._stimulus += float((before.stimulus + 4.0 * middle.stimulus + after.stimulus) @ rise) / 6.0
         self._last = after
 
     def budget(self) -> dict:
@@ -170,26 +175,24 @@ class EnergyLedger:
         }
 
     def _work_of_barrier(
-        self, name: str, before: _Instant, after: _Instant, state: State, motions: tuple[Motion, Motion]
+        self,
+        name: str,
+        way: _Way,
+        rates: list[Array],
+        motions: tuple[Motion, Motion],
+        before: _Instant,
+        after: _Instant,
     ) -> Array:
-        """Work [J] of one barrier over each of the motions along the straight way from one instant to the other."""
-        moved, start, potential = motions[0], before.at, self._potential
-        between, at = State(**{key: array.copy() for key, array in vars(state).items()}), Configuration(self._model)
-        position, rotation = start.place[:-1], start.rotation[:-1]
+        """Work [J] of a barrier over each of the motions; `rates` are those at the start, in the middle, at the end."""
+        potential = self._potential
 
-        def rates(s: float) -> Array:
-            between.position[:] = start.position + s * moved.node
-            between.body_position[:] = position + s * moved.contact[:-1, :3]
-            for b, turn in enumerate(moved.contact[:-1, 3:]):
-                between.body_rotation[b] = rotation_matrix(s * turn) @ rotation[b]
-            at.take_state(between)
-            for _ in potential.one_by_one(at, only=(name,)):
+        def rate(part: float) -> Array:
+            for _ in potential.one_by_one(way.at(part), only=(name,)):
                 return np.array([motion.work(potential.accumulators) for motion in motions])
             raise KeyError(name)
 
-        ends = [np.array([motion.work(end.gradient[name]) for motion in motions]) for end in (before, after)]
         energy = max(before.energy[name], after.energy[name])
-        return simpson(rates, (0.0, 1.0), (ends[0], rates(0.5), ends[1]), BARRIER_ERROR * energy, BARRIER_HALVINGS)
+        return simpson(rate, (0.0, 1.0), tuple(rates), BARRIER_ERROR * energy, BARRIER_HALVINGS)
 
     def _work_of_fluid(self, before: _Instant, after: _Instant, imposed: Motion) -> float:
         """Work [J] of the fluid's inertia, dP/dt − ∂T/∂q, on what prescribed bodies impose."""
@@ -209,9 +212,12 @@ class EnergyLedger:
         return _Fluid(relative + carried, momentum, shape_gradient)
 
     def _look(self, state: State, eigenstrain: Array, load_factor: Array) -> _Instant:
-        model, potential = self._model, self._potential
-        at = Configuration(model)
+        at = Configuration(self._model)
         at.take_state(state)
+        return self._look_at(at, state, eigenstrain, load_factor)
+
+    def _look_at(self, at: Configuration, state: State, eigenstrain: Array, load_factor: Array) -> _Instant:
+        model, potential = self._model, self._potential
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
         potential.start_step(momentary_context(model, at, state, eigenstrain, load_factor))
@@ -231,8 +237,30 @@ class EnergyLedger:
             velocity=state.velocity.copy(),
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
             eigenstrain=eigenstrain.copy(),
+            load_factor=load_factor.copy(),
             stimulus=-model.axial_stiffness * strain * model.rest_length,
             energy=energy,
             gradient=gradient,
             power=power,
         )
+
+
+class _Way:
+    """The straight way from an instant to a state: positions along lines, turns at constant rates."""
+
+    def __init__(self, model: Model, begin: _Instant, end: State, moved: Motion):
+        self._model, self._begin, self._moved = model, begin.at, moved
+        self.state = State(**{key: array.copy() for key, array in vars(end).items()})
+
+    def at(self, part: float) -> Configuration:
+        """Configuration after a part of the way; `state` goes along, its velocities apart."""
+        begin, moved, state = self._begin, self._moved, self.state
+        state.position[:] = begin.position + part * moved.node
+        state.body_position[:] = begin.place[:-1] + part * moved.contact[:-1, :3]
+        for b, turn in enumerate(moved.contact[:-1, 3:]):
+            state.body_rotation[b] = rotation_matrix(part * turn) @ begin.rotation[b]
+        at = Configuration(self._model)
+        at.take_state(state)
+        at.carry_frames(begin, part * moved.edge[: self._model.edge_count, 3])
+        at.joint_strain[:, 2] = begin.joint_strain[:, 2]
+        return at

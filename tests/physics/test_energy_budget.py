@@ -17,19 +17,26 @@ from bilayer_core.solve.newton import NewtonStatus
 
 
 def test_what_implicit_euler_loses_is_what_its_velocities_say():
-    """With a = Δv/h the accelerations of its steps: Σ ½ (aₙ + aₙ₊₁)·M Δx − ΔT, from velocities and masses alone."""
-    simulator = Simulator(load_scene(clamped((0, 0, -9.81))), dt=1e-3, integrator="implicit_euler", budget=True)
-    mass = simulator.model.node_mass[1:, None]
-    v, a = np.zeros((8, 3)), np.array([0, 0, -9.81])
-    work = 0.0
-    for _ in range(50):
-        simulator.step()
-        new = simulator.velocities[1:]
-        work += 0.5 * np.sum(mass * (a + (new - v) / 1e-3) * new) * 1e-3
-        a, v = (new - v) / 1e-3, new
-    lost = simulator.budget()["lost"]["numerical"]
-    assert lost == pytest.approx(work - 0.5 * np.sum(mass * v**2), rel=1e-5)
-    assert lost > 0.01 * simulator.budget()["stored"]["kinetic"]
+    """With a = Δv/h the accelerations of its steps: Σ ½ (aₙ + aₙ₊₁)·M Δx − ΔT, from velocities and masses alone.
+
+    These are trapezoids, so the two come together at second order.
+    """
+    differences = []
+    for dt in (1e-3, 5e-4):
+        simulator = Simulator(load_scene(clamped((0, 0, -9.81))), dt=dt, integrator="implicit_euler", budget=True)
+        mass = simulator.model.node_mass[1:, None]
+        v, a = np.zeros((8, 3)), np.array([0, 0, -9.81])
+        work = 0.0
+        for _ in range(round(0.05 / dt)):
+            simulator.step()
+            new = simulator.velocities[1:]
+            work += 0.5 * np.sum(mass * (a + (new - v) / dt) * new) * dt
+            a, v = (new - v) / dt, new
+        lost = simulator.budget()["lost"]["numerical"]
+        differences.append(abs(lost - (work - 0.5 * np.sum(mass * v**2))))
+        assert lost > 0.005 * simulator.budget()["stored"]["kinetic"]
+        assert differences[-1] < 2e-3 * lost
+    assert math.log2(differences[0] / differences[1]) > 1.6
 
 
 def test_the_spin_of_a_tumbling_body_costs_only_what_the_integrator_loses():
@@ -81,16 +88,20 @@ def flyer():
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("description", [driven(gravity=[0, 0, -9.81]), flyer()], ids=["clamped", "flying"])
+@pytest.mark.parametrize(
+    ("description", "quadrature"),
+    [(driven(gravity=[0, 0, -9.81]), 4.0), (flyer(), 2.0)],  # what a turning body holds goes along arcs
+    ids=["clamped", "flying"],
+)
 def test_the_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_falls_at_the_integrators_order(
-    description, integrator
+    description, quadrature, integrator
 ):
     budgets = [run(description, 0.15, dt, integrator=integrator).budget() for dt in (5e-4, 2.5e-4)]
     residual = [abs(budget["residual"]) for budget in budgets]
     numerical = [budget["lost"]["numerical"] for budget in budgets]
     largest = budgets[1]["residual"] / budgets[1]["relative_residual"]
     assert residual[1] < 1e-5 * largest
-    assert math.log2(residual[0] / residual[1]) == pytest.approx(2.0, abs=0.4)
+    assert math.log2(residual[0] / residual[1]) == pytest.approx(quadrature, abs=0.4)
     order = INTEGRATORS[integrator].order
     assert abs(numerical[1]) < (0.05 if order == 1 else 5e-4) * largest
     assert math.log2(numerical[0] / numerical[1]) == pytest.approx(order, abs=0.25)
