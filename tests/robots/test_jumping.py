@@ -109,3 +109,24 @@ def test_a_slow_release_does_not_make_it_jump():
 def test_half_the_step_and_other_meshes_jump_as_high(jump, change):
     _, flight = watched(change)
     assert flight.rise == pytest.approx(jump[1].rise, rel=0.05)
+
+
+def test_the_energy_of_the_jump_is_found_again():
+    loaded = Simulator(load_scene("jumping"))
+    loaded.run(RELEASE - 0.01)
+    budgets = []
+    for dt in (5e-4, 2.5e-4):
+        simulator = Simulator(load_scene("jumping"), dt=dt, budget=True)
+        state = loaded.save_state()
+        state[0] = round((RELEASE - 0.01) / dt)  # steps done
+        simulator.load_state(state)
+        simulator.run(0.11)
+        budgets.append(simulator.budget())
+    # of the work of the stimulus after the release, that is with the stored energy
+    for budget in budgets:
+        supplied = budget["supplied"]["stimulus"] - budget["stored"]["bending"]
+        assert supplied > 0.03
+        assert abs(budget["residual"]) < 1e-4 * supplied
+        assert abs(budget["lost"]["numerical"]) < 0.02 * supplied
+        assert budget["lost"]["rod friction"] > budget["lost"]["friction"] > 0.0
+    assert abs(budgets[1]["lost"]["numerical"]) < abs(budgets[0]["lost"]["numerical"])

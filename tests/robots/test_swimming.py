@@ -99,3 +99,14 @@ def test_a_slower_cycle_moves_it_as_far():
         ends.append(height(simulator))
     assert ends[0] > 5e-3
     assert ends[1] == pytest.approx(ends[0], rel=0.01)
+
+
+@pytest.mark.parametrize("fluid", ADDED.values(), ids=ADDED)
+def test_drag_takes_what_the_stimulus_supplies_over_a_stroke(fluid):
+    budgets = [strokes(1, fluid, dt=dt, budget=True)[1].budget() for dt in (1e-3, 5e-4)]
+    for budget in budgets:
+        supplied = budget["supplied"]["stimulus"]
+        assert abs(budget["residual"]) < 1e-4 * supplied
+        assert budget["lost"]["drag"] + sum(budget["stored"].values()) == pytest.approx(supplied, rel=0.01)
+    numerical = [abs(budget["lost"]["numerical"]) for budget in budgets]
+    assert numerical[1] < 0.4 * numerical[0] and numerical[1] < 0.005 * budgets[1]["supplied"]["stimulus"]
