@@ -203,7 +203,7 @@ def refuse_penetration(model: Model) -> None:
         surface = f"body {surface}" if surface in bodies.names else surface
         raise PenetrationError(
             f"{model.scene.name}: the scene starts in penetration: {names[carrier]} at "
-            f"({', '.join(f'{1e3 * c:.3f}' for c in position[carrier])}) mm is {-1e3 * depth:.4g} mm behind "
+            f"({', '.join(f'{1e3 * c:.3f}' for c in position[carrier])}) mm is {abs(1e3 * depth):.4g} mm behind "
             f"the surface of {surface}{f', and {len(faults) - 1} more' if len(faults) > 1 else ''}; "
             "all gaps must be positive at the start"
         )

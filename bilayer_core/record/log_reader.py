@@ -15,6 +15,7 @@ from typing import BinaryIO
 
 import numpy as np
 
+from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
 from bilayer_core.integrate.frame import Description
 from bilayer_core.record import encoders
@@ -316,7 +317,16 @@ def _read_head(path: Path) -> _Head:
                 break
     if scene is None or "description" not in metadata:
         raise InputError(f"{path}: is an MCAP file, but no log of bilayer_sim_ros: scene or description is missing")
-    return _Head(from_text(metadata["description"], scene), metadata["versions"], metadata["settings"])
+    versions = metadata["versions"]
+    try:
+        description = from_text(metadata["description"], scene)
+    except (KeyError, TypeError, ValueError):
+        writer = versions.get(DISTRIBUTION, "unknown")
+        raise InputError(
+            f"{path}: describes its run in another way than this version reads (it was written by {DISTRIBUTION} "
+            f"{writer}); run its scene again"
+        ) from None
+    return _Head(description, versions, metadata["settings"])
 
 
 def _read_summary(file: BinaryIO):

@@ -19,6 +19,7 @@ from rosbags.highlevel import AnyReader
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.record import mcap_log
+from bilayer_core.record.description_text import to_text
 from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.memory import MemoryRecorder
@@ -48,6 +49,16 @@ def assert_equal_descriptions(found, expected):
                     np.testing.assert_array_equal(getattr(strand, part.name), getattr(own, part.name))
         else:
             assert one == other
+
+
+def test_a_log_of_another_version_is_refused_with_the_version_that_wrote_it(tmp_path, monkeypatch):
+    def older(description):
+        return {name: text for name, text in to_text(description).items() if name != "obstacles"}
+
+    monkeypatch.setattr(mcap_log, "to_text", older)
+    synthetic_run.run(McapRecorder(tmp_path / "run.mcap", rate=25.0, marker_rate=25.0), TIMES[:2])
+    with pytest.raises(InputError, match=r"run\.mcap: describes its run in another way .* bilayer_sim_ros [\d.]+"):
+        read_description(tmp_path / "run.mcap")
 
 
 def test_info_says_what_the_log_holds(log):

@@ -46,7 +46,8 @@ def test_the_bundled_scenes_are_found(prefix, run):
 
 def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
     assert (prefix / "share/ament_index/resource_index/packages/bilayer_sim_ros").is_file()
-    for name in ("package.xml", "config/sim_node.yaml", "config/scenes/gripping.yaml", "launch/simulation.launch.py"):
+    configuration = ("config/sim_node.yaml", "config/scenes/gripping.yaml", "config/templates/strip.yaml")
+    for name in ("package.xml", *configuration, "launch/simulation.launch.py"):
         assert (prefix / "share/bilayer_sim_ros" / name).is_file()
 
 
