@@ -81,10 +81,10 @@ def _parts(scene) -> dict[str, list[str]]:
         figures = EdgeFigures(scene, rod)
         strain, curvature = figures.eigenstrain.max(), figures.free_curvature().max()
         if curvature > 0.0:
-            lines.append(
-                f"eigenstrain up to {100 * strain:.3g} %: if nothing hinders it, curvature up to {curvature:.3g} 1/m, "
-                f"radius {1e3 / curvature:.3g} mm"
-            )
+            bends = f"curvature up to {curvature:.3g} 1/m, radius {1e3 / curvature:.3g} mm"
+            if rod.path.shape != "straight":
+                bends = f"curvature changed by up to {curvature:.3g} 1/m"
+            lines.append(f"eigenstrain up to {100 * strain:.3g} %: if nothing hinders it, {bends}")
         parts[rod.name] = lines
     for body in scene.bodies:
         surface = f", {body.surface.shape}" if body.surface else ""

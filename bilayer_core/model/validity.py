@@ -53,11 +53,15 @@ def validity_warnings(scene: SceneConfig) -> Iterator[str]:
 
 def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
     """All figures of a scene on which the validity of the model depends."""
+    thinnest = {}
     for rod in scene.rods:
         at_edges = EdgeFigures(scene, rod)
+        thinnest[rod.name] = at_edges.thickness.min()
         yield from _of_section(rod, at_edges)
         if scene.contact is not None:
-            yield from _of_contact(rod, at_edges.thickness.min(), scene.contact.barrier_distance)
+            yield _of_edges(rod, thinnest[rod.name], scene.contact.barrier_distance)
+    if scene.contact is not None:
+        yield _of_barrier(*min(thinnest.items(), key=lambda item: item[1]), scene.contact.barrier_distance)
 
 
 def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
@@ -104,17 +108,21 @@ def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
     )
 
 
-def _of_contact(rod: Rod, thin: float, distance: float) -> Iterator[Figure]:
-    """Of a rod whose least thickness is `thin` [m]."""
-    yield Figure(
+def _of_barrier(name: str, thin: float, distance: float) -> Figure:
+    """Of the rod with the least thickness, `thin` [m]."""
+    return Figure(
         "contact.barrier_distance",
         f"{1e3 * distance:g} mm is",
-        f"{distance / thin:.2g} of the least thickness of rods.{rod.name}",
+        f"{distance / thin:.2g} of the least thickness, that of rods.{name}",
         f"at most {FAR:g}",
         "surfaces float visibly apart; 0.1 to 0.2 mm is closer" if distance > FAR * thin else "",
     )
+
+
+def _of_edges(rod: Rod, thin: float, distance: float) -> Figure:
+    """Of a rod whose least thickness is `thin` [m]."""
     reach = COARSE * (thin + distance)
-    yield Figure(
+    return Figure(
         f"rods.{rod.name}",
         "edge length",
         f"{1e3 * rod.edge_length:.3g} mm",

@@ -31,7 +31,7 @@ def test_a_slender_rod_of_small_strain_has_no_warning_and_all_its_figures_are_to
         "eigenstrain up to 1 % (at most 10 %)",
         "curvature × thickness up to 0.015 (at most 0.2)",
         "w²κ/H up to 0.24 (below 0.5 or above 3)",
-        "contact.barrier_distance: 0.1 mm is 0.1 of the least thickness of rods.rod (at most 0.5)",
+        "contact.barrier_distance: 0.1 mm is 0.1 of the least thickness, that of rods.rod (at most 0.5)",
         "edge length 2 mm (at most 2.2 mm",
     ):
         assert text in told
@@ -68,7 +68,7 @@ CASES = {
     "barrier distance": (
         bilayer(contact=contact(barrier_distance=0.49e-3)),
         bilayer(contact=contact(barrier_distance=0.51e-3)),
-        "contact.barrier_distance: 0.51 mm is 0.51 of the least thickness of rods.rod (at most 0.5): surfaces float",
+        "contact.barrier_distance: 0.51 mm is 0.51 of the least thickness, that of rods.rod (at most 0.5): surfaces",
     ),
     "edges": (
         bilayer(length=0.109, contact=contact(barrier_distance=1e-4)),
