@@ -27,14 +27,16 @@ the layers of a section share it in proportion to their thickness. Error: second
 
 In time: over a stage of length h from an origin where the fluid had the momentum P̄,
 
-    R = (P − P̄)/h − ∂T/∂q,    all at the end of the stage; for spins j (ω − ω̄)/h.
+    R = (P − P̄)/h′ − ∂T/∂q,    all at the end of the stage; for spins j (ω − ω̄)/h′,
+
+h′ being the length over which momenta advance (`integrate.method`; h for most integrators).
 
 That is the integrator's own rule, for momenta, and has its order: 1 for implicit Euler, 2 for SDIRK2 and implicit
 midpoint (measured: 0.96, 1.98, 1.87; vibrations too fast for the step reduce SDIRK2's, as they do without a fluid). R
 is no gradient: the part of its derivative that comes from ∂²T/∂v∂q is antisymmetric (gyroscopic). Therefore directions
 and ∂T/∂q are held at a configuration z, and R is the gradient at q = z of the convex potential
 
-    ½ Σ m (u·m_z)² − P̄·(x − x̄)/h − (∂T/∂q)_z·q + ½ j (ω − ω̄)²,
+    [½ Σ m (u·m_z)² − P̄·(x − x̄)/h + ½ j (ω − ω̄)²] h/h′ − (∂T/∂q)_z·q,
 
 whose Hessian is block-diagonal. z moves along with every correction of Newton, and the step ends where nothing changes
 any more. What is left out of the Hessian makes Newton linear instead of quadratic, by a factor of about
@@ -115,6 +117,7 @@ def added_mass(
     origin_momentum,
     flow,
     step_length,
+    momentum_length,
     position,
     origin,
     turn,
@@ -137,8 +140,8 @@ def added_mass(
         (∂T/∂q)_z [N, N m], shape (n_edge, 4).
     origin_momentum : Array
         P̄ of nodes [N s], shape (n_node, 3).
-    step_length : float
-        h [s].
+    step_length, momentum_length : float
+        h and h′ [s].
     position, origin : Array
         Of nodes, now and at the origin of the stage [m], shape (n_node, 3).
     turn, predicted_turn : Array
@@ -152,7 +155,7 @@ def added_mass(
     energy = 0.0
     for i in range(origin_momentum.shape[0]):
         for c in range(3):
-            force = origin_momentum[i, c] / step_length
+            force = origin_momentum[i, c] / momentum_length
             node_gradient_out[i, c] -= force
             energy -= force * (position[i, c] - origin[i, c])
     for k in range(mass.shape[0]):
@@ -164,20 +167,20 @@ def added_mass(
                 through += relative * direction1[k, c]
                 across += relative * direction2[k, c]
             mass1, mass2 = 0.5 * mass[k, 0], 0.5 * mass[k, 1]
-            energy += 0.5 * (mass1 * through**2 + mass2 * across**2)
+            energy += 0.5 * (mass1 * through**2 + mass2 * across**2) * step_length / momentum_length
             for m in range(3):
                 momentum = mass1 * through * direction1[k, m] + mass2 * across * direction2[k, m]
-                node_gradient_out[i, m] += momentum / step_length
+                node_gradient_out[i, m] += momentum / momentum_length
                 if with_hessian:
                     for n in range(m, 3):
                         node_hessian_out[i, m, n] += (
                             mass1 * direction1[k, m] * direction1[k, n] + mass2 * direction2[k, m] * direction2[k, n]
-                        ) / step_length**2
+                        ) / (step_length * momentum_length)
         for c in range(3):
             stretch = position[first + 1, c] - origin[first + 1, c] - position[first, c] + origin[first, c]
             energy -= shape_gradient[k, c] * stretch
             edge_gradient_out[k, c] -= shape_gradient[k, c]
-        inertia, ahead = mass[k, 2] / step_length**2, turn[k] - predicted_turn[k]
+        inertia, ahead = mass[k, 2] / (step_length * momentum_length), turn[k] - predicted_turn[k]
         energy += 0.5 * inertia * ahead**2 - shape_gradient[k, 3] * turn[k]
         edge_gradient_out[k, 3] += inertia * ahead - shape_gradient[k, 3]
         if with_hessian:

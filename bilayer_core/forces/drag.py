@@ -25,7 +25,7 @@ from ..jit import kernel
 
 
 @kernel
-def lag_directions(node, edge_before, edge_after, tangent, director1, direction_out):
+def node_directions(node, edge_before, edge_after, tangent, director1, direction_out):
     """Mean directions (t, m1, m2) at nodes, made orthonormal; written, shape (n_drag, 3, 3).
 
     `edge_before` and `edge_after` are the edges that meet at each of `node`; at an end they are the same.
@@ -67,7 +67,7 @@ def drag(
     coefficient : Array
         ρ_f A C along t, m1 and m2 [kg/m], shape (n_drag, 3).
     direction : Array
-        From `lag_directions`.
+        From `node_directions`.
     flow : Array
         Velocity of the fluid [m/s], shape (3,).
     step_length : float

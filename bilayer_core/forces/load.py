@@ -14,8 +14,8 @@ ax(A) = (A₃₂ − A₂₃, A₁₃ − A₃₁, A₂₁ − A₁₂):
 (the same form as inertia in `forces.body`). For Q = exp([δ]×) the moment that acts is −∂V/∂φ = M − ½ M×δ + O(δ²), and
 δ is the angular acceleration times the square of the step: the error is of second order. V is work, not energy.
 
-A load that turns with what it acts on ("follower") takes its direction from the start of the step, as drag does, and
-is then one of these; that is of first order in the step.
+A load that turns with what it acts on ("follower") takes its direction from the configuration to which Newton moved
+last, as drag does, and is then one of these: the step ends with the direction that it has there.
 """
 
 from __future__ import annotations

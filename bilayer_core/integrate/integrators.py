@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from . import implicit_euler, implicit_midpoint, sdirk2
+from . import generalised_alpha, implicit_euler, implicit_midpoint, sdirk2, tr_bdf2
 from .method import Method
 
 INTEGRATORS: dict[str, Method] = {
-    module.METHOD.name: module.METHOD for module in (implicit_euler, sdirk2, implicit_midpoint)
+    module.METHOD.name: module.METHOD
+    for module in (implicit_euler, sdirk2, tr_bdf2, generalised_alpha, implicit_midpoint)
 }

@@ -1,4 +1,4 @@
-"""What an integrator is here: a diagonally implicit Runge–Kutta method with one diagonal coefficient γ.
+"""What an integrator is here: a diagonally implicit method, whose stages are minima of incremental potentials.
 
 For ẏ = f(t, y) over a step of length h, with y a position or a momentum,
 
@@ -7,15 +7,38 @@ For ẏ = f(t, y) over a step of length h, with y a position or a momentum,
 
 For q̇ = v, M v̇ = −∂V/∂q a stage is an implicit Euler step of length γ h from its *origin* (q̄, v̄):
 
-    q = q̄ + γ h v,   M v = M v̄ − γ h ∂V/∂q   ⇔   minimise ½ |q − q̃|²_M/(γ h)² + V(q),   q̃ = q̄ + γ h v̄
+    q = q̄ + γ h v,  M v = M v̄ − γ h ∂V/∂q   ⇔   minimise ½|q − q̃|²_M/(γ h)² + V(q),   q̃ = q̄ + γ h v̄,   v = (q − q̄)/(γ h)
 
 so every stage is the minimum of an incremental potential, and neither Newton nor contact knows which integrator runs.
 The slopes of earlier stages follow from their results; no force is evaluated for them.
+
+An integrator may also begin with the slopes fₙ at the start of the step, which the step before has left (`History`),
+and may advance momenta over a length γ′ h that is not that of positions: then γ γ′ stands for γ² in the potential.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class History:
+    """How a method uses slopes at the start of a step. Where they jump, a step of another method stands in.
+
+    Attributes
+    ----------
+    positions, momenta : tuple of float
+        Weights of h fₙ in the origin of each stage.
+    bend : float
+        Weight of h² q̈ₙ in the positions of every origin.
+    carry : float
+        α in (1 − α) fₙ₊₁ + α fₙ = what acts at the end; 0 if fₙ₊₁ is what acts there.
+    """
+
+    positions: tuple[float, ...]
+    momenta: tuple[float, ...]
+    bend: float = 0.0
+    carry: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -37,6 +60,10 @@ class Method:
         bⱼ; None if the last stage is the end of the step (stiffly accurate).
     about : str
         What it is good for, in a few words.
+    momentum_diagonal : float or None
+        γ′; None if it is γ.
+    history : History or None
+        None if a step starts from positions and velocities alone.
     """
 
     name: str
@@ -46,3 +73,5 @@ class Method:
     couplings: tuple[tuple[float, ...], ...]
     weights: tuple[float, ...] | None
     about: str
+    momentum_diagonal: float | None = None
+    history: History | None = None

@@ -118,9 +118,12 @@ class Simulator:
         )
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
-        self._state = initial_state(self.model)
+        self._state = self._initial_state()
         self._compile_time: float | None = None
         self._start_over()
+
+    def _initial_state(self) -> State:
+        return initial_state(self.model, INTEGRATORS[self.plan.integrator].history is not None)
 
     def _start_over(self) -> None:
         self.statistics = RunStatistics(com_max_height=float(self.com[2]))
@@ -389,7 +392,7 @@ class Simulator:
 
     def reset(self) -> None:
         """Go back to the start of the scene; stimuli set from outside are forgotten."""
-        self.load_state(initial_state(self.model).flat())
+        self.load_state(self._initial_state().flat())
 
     def summary(self) -> dict:
         """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for

@@ -6,6 +6,9 @@ Positions and momenta advance as `integrate.method` says. What is no vector need
   the stage, inertia prefers R̃ = exp(γ h ω̃) R̄ with I(R̃) ω̃ = L̄: without a moment, the angular momentum L stays what
   it was. Given the moment that acts at the end of the stage, L = L̄ + γ h × moment and ω = I(R)⁻¹ L. What ω differs by
   from the rotation's own log(R R̄ᵀ)/(γ h) is of second order.
+- What a body holds has the body's velocity, v + ω × r, not that of a chord of its arc, which differs at first order. So
+  its origin is where R̄ := R̃ − γ h ω × R̃ has it: (R − R̄)/(γ h) is dR/dt to second order. A prescribed body has its
+  own velocity, not that of a chord either: the same with its pose at the end of the stage and its rates.
 - The momentum of the fluid is no fixed multiple of a velocity. Where the end of a step lies beyond its last stage, both
   are extrapolated, and what they differ by at the end (second order in h) is kept in the state; the momentum counts.
 - The angle of an edge counts from the start of the stage, where its frame was last re-based (`StepContext.start`); its
@@ -19,7 +22,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..kinematics.rotation import rotation_matrix, rotation_vector
+from ..kinematics.rotation import rotation_matrix, rotation_vector, skew
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
@@ -65,7 +68,29 @@ class Point:
     rotation: Array
 
 
-VECTORS = tuple(part.name for part in fields(Point) if part.name != "rotation")
+POSITIONS = ("position", "body_position", "turn")
+MOMENTA = ("velocity", "spin", "body_velocity", "angular_momentum", "fluid_momentum")
+"""Parts of a `Point` that are vectors; velocities stand for momenta of a constant mass."""
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """Motion of prescribed bodies at the time of a stage.
+
+    Attributes
+    ----------
+    index : Array
+        Which bodies.
+    position, rotation : Array
+        Of all bodies [m], shapes (n_body, 3), (n_body, 3, 3).
+    rates : Array
+        Velocity [m/s] and angular velocity [rad/s] of all bodies, shape (n_body, 6).
+    """
+
+    index: Array
+    position: Array
+    rotation: Array
+    rates: Array
 
 
 def start_point(model: Model, state: State, start: Configuration) -> Point:
@@ -78,7 +103,7 @@ def start_point(model: Model, state: State, start: Configuration) -> Point:
         velocity=state.velocity.copy(),
         spin=state.spin.copy(),
         body_velocity=state.body_velocity[free],
-        angular_momentum=_times(_inertia(model, start.body_rotation), state.body_angular_velocity[free]),
+        angular_momentum=_times(inertia_tensors(model, start.body_rotation), state.body_angular_velocity[free]),
         fluid_momentum=momentum_of_fluid(model, start, state.velocity) + state.fluid_excess,
         rotation=state.body_rotation.copy(),
     )
@@ -86,15 +111,14 @@ def start_point(model: Model, state: State, start: Configuration) -> Point:
 
 def combine(first: Point, stages: Sequence[tuple[float, Point, Point]]) -> Point:
     """yₙ + Σ w (yⱼ − ȳⱼ) over (w, ȳⱼ, yⱼ); rotations likewise on their group."""
-    vectors = {name: getattr(first, name).copy() for name in VECTORS}
-    rotation = first.rotation.copy()
+    total = Point(**{part.name: getattr(first, part.name).copy() for part in fields(Point)})
     for weight, origin, end in stages:
-        for name in VECTORS:
-            vectors[name] += weight * (getattr(end, name) - getattr(origin, name))
-        for b in range(len(rotation)):
+        for name in (*POSITIONS, *MOMENTA):
+            getattr(total, name)[...] += weight * (getattr(end, name) - getattr(origin, name))
+        for b in range(len(total.rotation)):
             turn = rotation_vector(end.rotation[b] @ origin.rotation[b].T)
-            rotation[b] = rotation_matrix(weight * turn) @ rotation[b]
-    return Point(**vectors, rotation=rotation)
+            total.rotation[b] = rotation_matrix(weight * turn) @ total.rotation[b]
+    return total
 
 
 def predict(
@@ -105,8 +129,10 @@ def predict(
     length: float,
     eigenstrain: Array,
     load_factor: Array,
+    momentum_length: float | None = None,
+    prescribed: Prescribed | None = None,
 ) -> StepContext:
-    """Frozen data of a stage.
+    """Frozen data of a stage; puts the origin of what bodies hold to where it has their velocity.
 
     Parameters
     ----------
@@ -119,24 +145,34 @@ def predict(
         γ h [s].
     eigenstrain, load_factor : Array
         At the time of the stage.
+    momentum_length : float, optional
+        γ′ h [s], if it is another.
+    prescribed : Prescribed, optional
+        Without it, prescribed bodies are at rest.
     """
     free = model.bodies.body_of_free
-    origin_rotation = origin.rotation[free]
-    rotation = np.empty_like(origin_rotation)
-    for b in range(len(rotation)):
-        spin = _spin_without_moment(
-            model.bodies.second_moment[b], origin_rotation[b], origin.angular_momentum[b], length
-        )
-        rotation[b] = rotation_matrix(length * spin) @ origin_rotation[b]
+    rotation = np.empty((len(free), 3, 3))
+    origin_rotation = np.concatenate([origin.rotation, np.eye(3)[None]])
+    for place, b in enumerate(free):
+        inertia = model.bodies.second_moment[place], origin.rotation[b], origin.angular_momentum[place]
+        spin = _spin_without_moment(*inertia, length)
+        rotation[place] = rotation_matrix(length * spin) @ origin.rotation[b]
+        origin_rotation[b] = rotation[place] - length * skew(spin) @ rotation[place]
+    for b in prescribed.index if prescribed else ():
+        rates = prescribed.rates[b]
+        origin.body_position[b] = prescribed.position[b] - length * rates[:3]
+        origin_rotation[b] = prescribed.rotation[b] - length * skew(rates[3:]) @ prescribed.rotation[b]
+    for node, b, arm in zip(model.attached_node, model.attached_body, model.attached_position, strict=True):
+        origin.position[node] = origin.body_position[b] + origin_rotation[b] @ arm
     return StepContext(
         length=length,
         start=start,
         origin_position=origin.position,
         origin_turn=origin.turn - turned,
         origin_body_position=origin.body_position[free],
-        origin_body_rotation=origin_rotation,
+        origin_body_rotation=origin_rotation[free],
         origin_place=np.concatenate([origin.body_position, np.zeros((1, 3))]),
-        origin_rotation=np.concatenate([origin.rotation, np.eye(3)[None]]),
+        origin_rotation=origin_rotation,
         predicted_position=origin.position + length * origin.velocity,
         predicted_turn=origin.turn - turned + length * origin.spin,
         predicted_body_position=origin.body_position[free] + length * origin.body_velocity,
@@ -144,6 +180,7 @@ def predict(
         origin_fluid_momentum=origin.fluid_momentum,
         eigenstrain=eigenstrain,
         load_factor=load_factor,
+        length_of_momenta=momentum_length,
     )
 
 
@@ -153,7 +190,7 @@ def end_point(
     origin: Point,
     turned: Array,
     end: Configuration,
-    poses: tuple[Array, Array],
+    prescribed: Prescribed,
 ) -> Point:
     """The end of a stage that was solved.
 
@@ -162,15 +199,14 @@ def end_point(
     end : Configuration
     turned : Array
         As for `predict`.
-    poses : tuple of Array
-        Positions [m] and rotations of all bodies at the time of the stage, those of prescribed ones count, shapes
-        (n_body, 3), (n_body, 3, 3).
+    prescribed : Prescribed
+        At the time of the stage.
     """
     h, bodies = context.length, model.bodies
-    position, rotation = poses[0].copy(), poses[1].copy()
+    position, rotation = prescribed.position.copy(), prescribed.rotation.copy()
     position[bodies.body_of_free], rotation[bodies.body_of_free] = end.body_position, end.body_rotation
     velocity = (end.position - context.origin_position) / h
-    momentum = origin.angular_momentum + h * _moment_of_inertia(model, context, end)
+    momentum = origin.angular_momentum + context.momentum_length * _moment_of_inertia(model, context, end)
     return Point(
         position=end.position.copy(),
         body_position=position,
@@ -184,27 +220,29 @@ def end_point(
     )
 
 
-def write_state(model: Model, state: State, last: Point, end: Configuration, prescribed_motion: Array) -> None:
-    """Take the end of a step into the state: positions, frames, velocities; the last of prescribed bodies, shape
-    (n_body, 6) [m/s, rad/s].
+def write_state(model: Model, state: State, last: Point, end: Configuration, rates: Array) -> None:
+    """Take the end of a step into the state: positions, frames, velocities; `rates` are those of prescribed bodies,
+    shape (n_body, 6) [m/s, rad/s].
     """
-    free = model.bodies.body_of_free
+    free, held = model.bodies.body_of_free, model.attached_free < 0
     state.velocity[:] = last.velocity
+    of_body = rates[model.attached_body[held]]
+    state.velocity[model.attached_node[held]] = of_body[:, :3] + np.cross(of_body[:, 3:], end.arm[held])
     state.position[:] = end.position
     state.fluid_excess[:] = last.fluid_momentum - momentum_of_fluid(model, end, last.velocity)
     state.director1[:] = end.director1[: model.edge_count]
     state.spin[:] = last.spin
     state.twist[:] = end.joint_strain[:, 2]
-    state.body_velocity[:], state.body_angular_velocity[:] = prescribed_motion[:, :3], prescribed_motion[:, 3:]
+    state.body_velocity[:], state.body_angular_velocity[:] = rates[:, :3], rates[:, 3:]
     state.body_velocity[free] = last.body_velocity
     state.body_position[:], state.body_rotation[:] = last.body_position, last.rotation
-    inertia = _inertia(model, end.body_rotation)
+    inertia = inertia_tensors(model, end.body_rotation)
     for place, body in enumerate(free):
         state.body_angular_velocity[body] = np.linalg.solve(inertia[place], last.angular_momentum[place])
         state.body_rotation[body] = _orthonormal(end.body_rotation[place])
 
 
-def _inertia(model: Model, rotation: Array) -> Array:
+def inertia_tensors(model: Model, rotation: Array) -> Array:
     """Inertia tensors of free bodies in the world's axes [kg m²], shape (n_free, 3, 3)."""
     second = model.bodies.second_moment
     tensor = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
@@ -221,7 +259,7 @@ def _moment_of_inertia(model: Model, context: StepContext, end: Configuration) -
     """
     a = context.predicted_body_rotation @ model.bodies.second_moment @ end.body_rotation.transpose(0, 2, 1)
     axial = np.stack([a[:, 2, 1] - a[:, 1, 2], a[:, 0, 2] - a[:, 2, 0], a[:, 1, 0] - a[:, 0, 1]], axis=1)
-    return -axial / context.length**2
+    return -context.inertia_factor * axial
 
 
 def _spin_without_moment(second_moment: Array, rotation: Array, momentum: Array, length: float) -> Array:

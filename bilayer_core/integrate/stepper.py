@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import SimulationError
-from ..kinematics.rotation import rotation_vector
-from ..model.model import Model, scheduled_pose
+from ..model.model import Model, scheduled_motion
 from ..model.state import State
 from ..scene.schedule import value_before
 from ..scene.transduction import follow, free_strain
@@ -21,12 +20,18 @@ from ..solve.potential import IncrementalPotential
 from ..solve.terms.term import StepContext
 from .method import Method
 from .motion import momentary_context
-from .stages import Point, combine, end_point, predict, start_point, write_state
+from .sdirk2 import METHOD as SELF_STARTING
+from .slopes import keep_slopes, move_along, slopes_of
+from .stages import Point, Prescribed, combine, end_point, predict, start_point, write_state
 
 if TYPE_CHECKING:
     from .ledger import EnergyLedger
 
 Array = np.ndarray
+AT_ONCE = 1e-2
+"""Part of a step below which the lag of a layer makes no difference to a jump of its stimulus."""
+NO_JUMP = 1e-9
+"""Part of a channel's range below which a change at once is rounding."""
 
 
 @dataclass(frozen=True)
@@ -95,19 +100,18 @@ class Stepper:
         self._trial = Configuration(model)
         self._prescribed = np.flatnonzero(model.bodies.free_index[:-1] < 0)
         self._channels = list(model.scene.stimuli.values())
+        self._range = np.array([channel.maximum - channel.minimum for channel in self._channels])
         self.stimulus = np.zeros(len(self._channels))
         self.eigenstrain = np.zeros(model.edge_count)
         self.ledger: EnergyLedger | None = None
 
-    def body_poses(self, state: State, time: float) -> tuple[Array, Array]:
-        """Poses of all bodies: prescribed ones at `time`, free ones as they are: positions [m], shape (n_body, 3), and
-        rotations, shape (n_body, 3, 3).
-        """
-        bodies = self.model.bodies
+    def prescribed(self, state: State, time: float) -> Prescribed:
+        """Motion of prescribed bodies at `time`, of free ones as they are, without rates."""
         position, rotation = state.body_position.copy(), state.body_rotation.copy()
+        rates = np.zeros((len(position), 6))
         for index in self._prescribed:
-            position[index], rotation[index] = scheduled_pose(bodies, index, time)
-        return position, rotation
+            position[index], rotation[index], rates[index] = scheduled_motion(self.model.bodies, index, time)
+        return Prescribed(self._prescribed, position, rotation, rates)
 
     def stimulus_at(self, state: State, time: float, ended: float = 0.0) -> Array:
         """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's.
@@ -140,6 +144,7 @@ class Stepper:
         """Evaluate the potential at `end` with the velocities of the state."""
         self.potential.start_step(momentary_context(self.model, self.end, state, eigenstrain, load_factor))
         self.potential.evaluate(self.end, False)
+        self._touched = self._touching()
 
     def advance(self, state: State) -> StepReport:
         """One nominal step, in place.
@@ -188,61 +193,78 @@ class Stepper:
 
     def _attempt(self, state: State, h: float, time: float) -> NewtonReport:
         """Try one part of length `h` [s] that ends at `time` [s]; `state` changes only if it converged."""
-        model, method = self.model, self.method
+        model = self.model
         self._start.take_state(state)
         first = start_point(model, state, self._start)
         first_stimulus = self.stimulus_at(state, time - h)
-        turned, length = np.zeros(model.edge_count), method.diagonal * h
+        method = self._method_at(state, first_stimulus, time - h, h)
+        slopes = slopes_of(model, state, first) if method.history else None
+        turned = np.zeros(model.edge_count)
+        length, momentum_length = method.diagonal * h, (method.momentum_diagonal or method.diagonal) * h
         stages: list[tuple[Point, Point]] = []
         iterations = factorisations = backtracks = 0
         residual = 0.0
-        for node, couplings in zip(method.nodes, method.couplings, strict=True):
+        for number, (node, couplings) in enumerate(zip(method.nodes, method.couplings, strict=True)):
             weights = [coupling / method.diagonal for coupling in couplings]
             origin = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
+            if slopes is not None:
+                move_along(origin, slopes, method.history, number, h)
             drive = self._drive(state, first_stimulus, time - h, node * h)
-            context = predict(model, origin, self._start, turned, length, drive.eigenstrain, drive.load_factor)
-            poses = self.body_poses(state, time - (1.0 - node) * h)
-            report = self._solve(context, poses)
+            prescribed = self.prescribed(state, time - (1.0 - node) * h)
+            driven = drive.eigenstrain, drive.load_factor
+            context = predict(model, origin, self._start, turned, length, *driven, momentum_length, prescribed)
+            report = self._solve(context, prescribed)
             iterations += report.iterations
             factorisations += report.factorisations
             backtracks += report.backtracks
             if not report.converged:
                 return replace(report, iterations=iterations, factorisations=factorisations, backtracks=backtracks)
             residual = max(residual, report.residual)
-            stages.append((origin, end_point(model, context, origin, turned, self.end, poses)))
+            stages.append((origin, end_point(model, context, origin, turned, self.end, prescribed)))
             turned = stages[-1][1].turn
             if len(stages) < len(method.nodes):
                 self._start, self.end = self.end, self._start
                 self._start.turn[:] = 0.0
         report = NewtonReport(NewtonStatus.CONVERGED, iterations, factorisations, residual, backtracks)
         origin, last = stages[-1]
-        prescribed_motion = self._rates(origin, last, length)
         if method.weights is not None:
             weights = [weight / method.diagonal for weight in method.weights]
             last = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
             drive = self._drive(state, first_stimulus, time - h, h)
-            position, rotation = self.body_poses(state, time)
-            last.body_position[self._prescribed] = position[self._prescribed]
-            last.rotation[self._prescribed] = rotation[self._prescribed]
+            prescribed = self.prescribed(state, time)
+            last.body_position[prescribed.index] = prescribed.position[prescribed.index]
+            last.rotation[prescribed.index] = prescribed.rotation[prescribed.index]
             if not self._go_beyond(last, turned):
                 return replace(report, status=NewtonStatus.BEYOND, residual=math.inf)
-        write_state(model, state, last, self.end, prescribed_motion)
+        write_state(model, state, last, self.end, prescribed.rates)
         if method.weights is not None:
             self._look_at(state, drive.eigenstrain, drive.load_factor)
+        if self.method.history is not None:
+            keep_slopes(state, origin, last, momentum_length, method.history)
+            touching = self._touching()
+            state.kept[0] = np.array_equal(touching, self._touched)
+            self._touched = touching
         state.transduction[:] = drive.transduction
         self.stimulus, self.eigenstrain = drive.stimulus, drive.eigenstrain
         if self.ledger is not None:
             self.ledger.record(state, drive.eigenstrain, drive.load_factor, h)
         return report
 
-    def _rates(self, origin: Point, end: Point, length: float) -> Array:
-        """Velocity [m/s] and angular velocity [rad/s] of prescribed bodies over a stage, shape (n_body, 6)."""
-        rates = np.zeros((len(end.body_position), 6))
-        for b in self._prescribed:
-            rates[b, :3] = (end.body_position[b] - origin.body_position[b]) / length
-            if len(self.model.bodies.rotations[b]):
-                rates[b, 3:] = rotation_vector(end.rotation[b] @ origin.rotation[b].T) / length
-        return rates
+    def _touching(self) -> Array:
+        """Which carriers something pushed at the last evaluation, shape (n_carrier,)."""
+        return np.any(self.potential.carrier_gradient != 0.0, axis=1)
+
+    def _method_at(self, state: State, stimulus: Array, time: float, h: float) -> Method:
+        """The method for a step of length `h` [s] that begins at `time` [s]: one without history after a jump."""
+        if self.method.history is None:
+            return self.method
+        model = self.model
+        jumped = not state.kept[0] or not np.array_equal(self.load_factor(time), self.load_factor(time, h))
+        if len(state.transduction):
+            way = stimulus[model.law_channel] - state.transduction
+            lag = np.where(way > 0.0, model.law_rising, model.law_falling)
+            jumped |= bool(np.any((np.abs(way) > NO_JUMP * self._range[model.law_channel]) & (lag < AT_ONCE * h)))
+        return SELF_STARTING if jumped else self.method
 
     def _drive(self, state: State, first_stimulus: Array, begin: float, elapsed: float) -> _Drive:
         """What acts from outside `elapsed` [s] after `begin` [s], the start of a step."""
@@ -255,12 +277,10 @@ class Stepper:
         load_factor = self.load_factor(begin + elapsed, elapsed)
         return _Drive(stimulus, transduction, self.eigenstrain_of(transduction), load_factor)
 
-    def _solve(self, context: StepContext, poses: tuple[Array, Array]) -> NewtonReport:
-        """Solve a stage at whose end prescribed bodies have the given positions [m] and rotations; its result is
-        `end`.
-        """
+    def _solve(self, context: StepContext, prescribed: Prescribed) -> NewtonReport:
+        """Solve a stage; its result is `end`."""
         self.potential.start_step(context)
-        self._target.place_prescribed(*poses)
+        self._target.place_prescribed(prescribed.position, prescribed.rotation)
         report = self.solver.first_guess(context, self._target, self.end)
         if report is not None:
             return report

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rotation import rotation_matrix
+from ..kinematics.rotation import angular_velocity, rotation_matrix
 from ..scene.config import SceneConfig
 from .layout import Layout, ReadOnlyArrays
 from .rod_surfaces import RodSurfaces
@@ -220,24 +220,29 @@ class Model(ReadOnlyArrays):
         return self.bodies.free_index[self.wall_body]
 
 
-def between_keyframes(times: Array, values: Array, time: float) -> Array:
-    """Value of a schedule of vectors: cubic smoothstep between keyframes, constant outside them, shape (3,)."""
+def between_keyframes(times: Array, values: Array, time: float) -> tuple[Array, Array]:
+    """Value and rate of a schedule of vectors: cubic smoothstep between keyframes, constant outside them; (3,) each."""
     if len(times) == 0 or len(values) == 0:
-        return np.zeros(3)
+        return np.zeros(3), np.zeros(3)
     right = int(np.searchsorted(times, time, side="right"))
     if right == 0:
-        return values[0]
+        return values[0], np.zeros(3)
     if right == len(times):
-        return values[-1]
-    s = (time - times[right - 1]) / (times[right] - times[right - 1])
-    return values[right - 1] + s * s * (3.0 - 2.0 * s) * (values[right] - values[right - 1])
+        return values[-1], np.zeros(3)
+    duration, way = times[right] - times[right - 1], values[right] - values[right - 1]
+    s = (time - times[right - 1]) / duration
+    return values[right - 1] + s * s * (3.0 - 2.0 * s) * way, 6.0 * s * (1.0 - s) / duration * way
 
 
-def scheduled_pose(bodies: Bodies, index: int, time: float) -> tuple[Array, Array]:
-    """Position [m], shape (3,), and rotation of a prescribed body, shape (3, 3)."""
-    times = bodies.times[index]
-    position = bodies.start_position[index] + between_keyframes(times, bodies.displacements[index], time)
+def scheduled_motion(bodies: Bodies, index: int, time: float) -> tuple[Array, Array, Array]:
+    """Position [m], shape (3,), and rotation of a prescribed body, shape (3, 3), with velocity and angular velocity
+    [m/s, rad/s], shape (6,).
+    """
+    times, rates = bodies.times[index], np.zeros(6)
+    moved, rates[:3] = between_keyframes(times, bodies.displacements[index], time)
+    position = bodies.start_position[index] + moved
     if not len(bodies.rotations[index]):
-        return position, bodies.start_rotation[index]
-    turn = rotation_matrix(between_keyframes(times, bodies.rotations[index], time))
-    return position, turn @ bodies.start_rotation[index]
+        return position, bodies.start_rotation[index], rates
+    turn, rate = between_keyframes(times, bodies.rotations[index], time)
+    rates[3:] = angular_velocity(turn, rate)
+    return position, rotation_matrix(turn) @ bodies.start_rotation[index], rates

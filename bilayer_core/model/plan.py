@@ -13,7 +13,7 @@ from .validity import validity_warnings
 
 MODELS = ("two_rod",)
 DIMENSIONS = (3,)
-INTEGRATORS = ("implicit_euler", "sdirk2", "implicit_midpoint")
+INTEGRATORS = ("implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint")
 
 
 @dataclass(frozen=True)

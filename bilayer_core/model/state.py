@@ -34,6 +34,12 @@ class State:
     body_rotation: Array  # shape (n_body, 3, 3)
     body_velocity: Array  # [m/s], shape (n_body, 3)
     body_angular_velocity: Array  # [rad/s], shape (n_body, 3)
+    kept: Array  # 1 if the five parts below are what the last step left, shape (1,), or (0,) without a use for them
+    acceleration: Array  # of nodes [m/s²], shape (n_node, 3); like the others empty if the integrator has no history
+    spin_acceleration: Array  # of edges [rad/s²], shape (n_edge,)
+    body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
+    body_moment: Array  # on free bodies [N m], shape (n_free, 3)
+    fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
 
@@ -67,12 +73,13 @@ class State:
             start += array.size
 
 
-def initial_state(model: Model) -> State:
+def initial_state(model: Model, with_history: bool = False) -> State:
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
 
     Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
+    `with_history` makes room for what some integrators keep from step to step.
     """
-    bodies = model.bodies
+    bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
     channels = list(model.scene.stimuli.values())
     before = np.array([value_before(channel.schedule.value, 0.0, MOMENT) for channel in channels])
     return State(
@@ -82,12 +89,18 @@ def initial_state(model: Model) -> State:
         velocity=np.zeros((model.node_count, 3)),
         director1=model.start_director1[: model.edge_count].copy(),
         spin=np.zeros(model.edge_count),
-        fluid_excess=np.zeros((model.node_count if len(model.fluid_mass) else 0, 3)),
+        fluid_excess=np.zeros((in_fluid, 3)),
         twist=np.zeros(len(model.joint_a)),
         body_position=bodies.start_position.copy(),
         body_rotation=bodies.start_rotation.copy(),
         body_velocity=bodies.start_velocity.copy(),
         body_angular_velocity=bodies.start_angular_velocity.copy(),
+        kept=np.zeros(int(with_history)),
+        acceleration=np.zeros((with_history * model.node_count, 3)),
+        spin_acceleration=np.zeros(with_history * model.edge_count),
+        body_acceleration=np.zeros((with_history * model.free_count, 3)),
+        body_moment=np.zeros((with_history * model.free_count, 3)),
+        fluid_force=np.zeros((with_history * in_fluid, 3)),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels), np.nan),
     )

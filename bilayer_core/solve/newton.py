@@ -17,7 +17,7 @@ from enum import Enum
 import numpy as np
 
 from ..jit import kernel
-from ..kinematics.rotation import rotation_vector
+from ..kinematics.rotation import rotation_matrix, rotation_vector
 from ..model.carriers import carrier_names
 from ..model.model import Model
 from .configuration import Configuration
@@ -177,14 +177,17 @@ class NewtonSolver:
         NewtonReport or None
             A report if prescribed motion is blocked.
         """
-        start, bodies, motion = context.start, self._model.bodies, self._motion
+        model, start, motion = self._model, context.start, self._motion
+        free = model.bodies.body_of_free
         self._find_motion(start, target, self._prescribed)
-        motion[bodies.body_of_free, 3:] = 0.0
+        turn = np.zeros((model.free_count, 3))
+        for b in range(model.free_count):
+            turn[b] = rotation_vector(context.predicted_body_rotation[b] @ start.body_rotation[b].T)
         inertial = context.predicted_position - start.position
         body_inertial = context.predicted_body_position - start.body_position
         fraction = 1.0
         for retry in (0.5, 0.0, None):
-            motion[bodies.body_of_free, :3] = fraction * body_inertial
+            motion[free, :3], motion[free, 3:] = fraction * body_inertial, fraction * turn
             alpha, blocking = self.bound(start, fraction * inertial, motion)
             if alpha >= 1.0:
                 break
@@ -196,7 +199,8 @@ class NewtonSolver:
         guess.place[self._prescribed] = target.place[self._prescribed]
         guess.rotation[self._prescribed] = target.rotation[self._prescribed]
         guess.body_position[:] = start.body_position + fraction * body_inertial
-        guess.body_rotation[:] = start.body_rotation
+        for b in range(model.free_count):
+            guess.body_rotation[b] = rotation_matrix(fraction * turn[b]) @ start.body_rotation[b]
         guess.place_held()
         guess.carry_frames(start, guess.turn)
         guess.joint_strain[:, 2] = start.joint_strain[:, 2]

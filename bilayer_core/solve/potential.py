@@ -192,6 +192,5 @@ class IncrementalPotential:
         return self.matrix.newton_step(self.gradient, self.body_gradient)
 
     def diagonal_factor(self) -> float:
-        """Factor of the mass matrix in the Hessian: 1/h² + α/h [1/s²]."""
-        h = self.context.length
-        return 1.0 / h**2 + self.model.scene.damping.mass / h
+        """Factor of the mass matrix in the Hessian: that of inertia and α/(γ h) of damping [1/s²]."""
+        return self.context.inertia_factor + self.model.scene.damping.mass / self.context.length

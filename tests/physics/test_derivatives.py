@@ -95,7 +95,7 @@ class Problem:
         for b in range(len(origin.rotation)):
             origin.rotation[b] = rotation_matrix(1e-2 * rng.standard_normal(3)) @ origin.rotation[b]
         turned = 1e-2 * rng.standard_normal(model.edge_count)
-        context = predict(model, origin, start, turned, h, *drive)
+        context = predict(model, origin, start, turned, h, *drive, momentum_length=1.3 * h)
         self.potential = stepper.potential
         self.potential.start_step(context)
         size = model.layout.size

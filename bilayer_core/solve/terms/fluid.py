@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...forces.added_mass import added_mass, fluid_momentum
-from ...forces.drag import drag, lag_directions
+from ...forces.drag import drag, node_directions
 from ...model.model import Model
 from ..configuration import Configuration
 from .term import Accumulators, Kind, StepContext, Term
@@ -30,7 +30,7 @@ class Drag(Term):
 
     def follow(self, at: Configuration) -> bool:
         before, after = self.model.drag_edge.T
-        lag_directions(self.model.drag_node, before, after, at.tangent, at.director1, self._direction)
+        node_directions(self.model.drag_node, before, after, at.tangent, at.director1, self._direction)
         return True
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
@@ -85,6 +85,7 @@ class AddedMass(Term):
             context.origin_fluid_momentum,
             self._flow,
             context.length,
+            context.momentum_length,
             at.position,
             context.origin_position,
             at.turn,

@@ -19,7 +19,7 @@ class Inertia(Term):
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
         model, context, out, bodies = self.model, self.context, self.out, self.model.bodies
-        factor = 1.0 / context.length**2
+        factor = context.inertia_factor
         energy = node_spring(model.node_mass, factor, at.position, context.predicted_position, out.node)
         energy += angle_spring(model.spin_inertia, factor, at.turn, context.predicted_turn, out.edge)
         if model.free_count:

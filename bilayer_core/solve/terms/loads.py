@@ -1,10 +1,10 @@
-"""Forces and moments from outside; sizes and directions are frozen at the start of a step."""
+"""Forces and moments from outside. Those that turn take their directions from where Newton moved last."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...forces.drag import lag_directions
+from ...forces.drag import node_directions
 from ...forces.load import body_moment, point_force
 from ...model.model import Model, PointLoads
 from ..configuration import Configuration
@@ -57,10 +57,14 @@ class Followers(Loads):
 
     def start_step(self, context: StepContext) -> None:
         super().start_step(context)
-        start, shares = context.start, self._shares
-        lag_directions(shares.nodes.target, *self._edges, start.tangent, start.director1, self._direction)
-        self._on_nodes[:] = np.einsum("kac,ka->kc", self._direction, self._on_nodes)
-        self._on_bodies[:] = _turned(start, shares.bodies.target, self._on_bodies)
+        self.follow(context.start)
+
+    def follow(self, at: Configuration) -> bool:
+        factor, shares = self.context.load_factor, self._shares
+        node_directions(shares.nodes.target, *self._edges, at.tangent, at.director1, self._direction)
+        self._on_nodes[:] = np.einsum("kac,ka->kc", self._direction, shares.nodes.scaled(factor))
+        self._on_bodies[:] = _turned(at, shares.bodies.target, shares.bodies.scaled(factor))
+        return True
 
 
 class Moments(Term):
@@ -77,9 +81,13 @@ class Moments(Term):
 
     def start_step(self, context: StepContext) -> None:
         super().start_step(context)
-        following = self._following.scaled(context.load_factor)
         self._moment[: len(self._dead.target)] = self._dead.scaled(context.load_factor)
-        self._moment[len(self._dead.target) :] = _turned(context.start, self._following.target, following)
+        self.follow(context.start)
+
+    def follow(self, at: Configuration) -> bool:
+        following = self._following.scaled(self.context.load_factor)
+        self._moment[len(self._dead.target) :] = _turned(at, self._following.target, following)
+        return len(self._following.target) > 0
 
     def add(self, at: Configuration, with_hessian: bool) -> None:
         out = self.out
@@ -94,6 +102,6 @@ class Moments(Term):
         )
 
 
-def _turned(start: Configuration, body: Array, vector: Array) -> Array:
+def _turned(at: Configuration, body: Array, vector: Array) -> Array:
     """Vectors in the axes of free bodies as vectors in the world, shape (n, 3)."""
-    return np.einsum("kij,kj->ki", start.body_rotation[body], vector)
+    return np.einsum("kij,kj->ki", at.body_rotation[body], vector)

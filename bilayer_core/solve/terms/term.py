@@ -31,9 +31,9 @@ class StepContext:
     origin_turn : Array
         Of edges, counted from `start` [rad], shape (n_edge,).
     origin_body_position, origin_body_rotation : Array
-        Of free bodies, shapes (n_free, 3), (n_free, 3, 3).
+        Of free bodies, shapes (n_free, 3), (n_free, 3, 3); R̄ is no rotation but the matrix with dR/dt = (R − R̄)/length.
     origin_place, origin_rotation : Array
-        Of all bodies and last of the world, shapes (n_body + 1, 3), (n_body + 1, 3, 3).
+        Likewise of all bodies and last of the world, shapes (n_body + 1, 3), (n_body + 1, 3, 3).
     origin_fluid_momentum : Array
         P̄ of the fluid at nodes [N s], shape (n_node, 3); (0, 3) without added mass.
     predicted_position : Array
@@ -46,6 +46,8 @@ class StepContext:
         η of each edge at the time of the stage, shape (n_edge,).
     load_factor : Array
         Factor of each load of the scene there, shape (n_load,).
+    length_of_momenta : float or None
+        γ′ h [s], where p = p̄ + γ′ h × force for momenta; None if it is γ h.
     """
 
     length: float
@@ -63,6 +65,17 @@ class StepContext:
     predicted_body_rotation: Array
     eigenstrain: Array
     load_factor: Array
+    length_of_momenta: float | None = None
+
+    @property
+    def momentum_length(self) -> float:
+        """γ′ h [s]."""
+        return self.length_of_momenta or self.length
+
+    @property
+    def inertia_factor(self) -> float:
+        """Factor of the mass in the Hessian: 1/(γ γ′ h²) [1/s²]."""
+        return 1.0 / (self.length * self.momentum_length)
 
 
 class Accumulators:
