@@ -96,15 +96,15 @@ def flyer():
 def test_the_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_falls_at_the_integrators_order(
     description, quadrature, integrator
 ):
-    budgets = [run(description, 0.15, dt, integrator=integrator).budget() for dt in (5e-4, 2.5e-4)]
+    budgets = [run(description, 0.15, dt, integrator=integrator).budget() for dt in (1e-3, 2.5e-4)]
     residual = [abs(budget["residual"]) for budget in budgets]
     numerical = [budget["lost"]["numerical"] for budget in budgets]
     largest = budgets[1]["residual"] / budgets[1]["relative_residual"]
     assert residual[1] < 1e-5 * largest
-    assert math.log2(residual[0] / residual[1]) == pytest.approx(quadrature, abs=0.4)
+    assert math.log(residual[0] / residual[1], 4) == pytest.approx(quadrature, abs=0.4)
     order = INTEGRATORS[integrator].order
     assert abs(numerical[1]) < (0.05 if order == 1 else 5e-4) * largest
-    assert math.log2(numerical[0] / numerical[1]) == pytest.approx(order, abs=0.25)
+    assert math.log(numerical[0] / numerical[1], 4) == pytest.approx(order, abs=0.25)
 
 
 @pytest.mark.slow
