@@ -26,7 +26,7 @@ demo: $(STAMP)  ## Run the gripper: simulation node, controller, log, picture.
 	$(BIN)/python -m bilayer_sim_ros.demo
 
 test: $(STAMP)  ## Run every test, the slow ones as well.
-	$(BIN)/python -m pytest -m "" -n $(JOBS)
+	$(BIN)/python -m pytest -m "" -n $(JOBS) --dist worksteal
 
 lint: $(STAMP)  ## Check the code's style.
 	$(BIN)/ruff check .
