@@ -162,8 +162,9 @@ def predict(
         rates = prescribed.rates[b]
         origin.body_position[b] = prescribed.position[b] - length * rates[:3]
         origin_rotation[b] = prescribed.rotation[b] - length * skew(rates[3:]) @ prescribed.rotation[b]
-    for node, b, arm in zip(model.attached_node, model.attached_body, model.attached_position, strict=True):
-        origin.position[node] = origin.body_position[b] + origin_rotation[b] @ arm
+    held = model.attached_body
+    arms = np.einsum("kij,kj->ki", origin_rotation[held], model.attached_position)
+    origin.position[model.attached_node] = origin.body_position[held] + arms
     return StepContext(
         length=length,
         start=start,
@@ -227,7 +228,8 @@ def write_state(model: Model, state: State, last: Point, end: Configuration, rat
     free, held = model.bodies.body_of_free, model.attached_free < 0
     state.velocity[:] = last.velocity
     of_body = rates[model.attached_body[held]]
-    state.velocity[model.attached_node[held]] = of_body[:, :3] + np.cross(of_body[:, 3:], end.arm[held])
+    turning = np.cross(of_body[:, 3:], end.arm[held]) if of_body[:, 3:].any() else 0.0
+    state.velocity[model.attached_node[held]] = of_body[:, :3] + turning
     state.position[:] = end.position
     state.fluid_excess[:] = last.fluid_momentum - momentum_of_fluid(model, end, last.velocity)
     state.director1[:] = end.director1[: model.edge_count]
@@ -264,6 +266,8 @@ def _moment_of_inertia(model: Model, context: StepContext, end: Configuration) -
 
 def _spin_without_moment(second_moment: Array, rotation: Array, momentum: Array, length: float) -> Array:
     """ω̃ with I(exp(length ω̃) R̄) ω̃ = L̄ [rad/s], by iteration; at once for a ball."""
+    if not momentum.any():
+        return np.zeros(3)
     tensor = np.trace(second_moment) * np.eye(3) - second_moment
     turned, spin = rotation, np.zeros(3)
     for _ in range(SPIN_ITERATIONS):
