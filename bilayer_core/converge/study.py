@@ -128,9 +128,8 @@ def converge(
                     missing[name] = str(error)
                 if progress is not None:
                     progress(name)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)  # nothing is left unless one of them ended the study
     prescribed = [body.name for body in scene.bodies if body.motion.type == "prescribed"]
     names = list(quantities) or headline(found[BASE], prescribed)
     for name in quantities:

@@ -11,6 +11,7 @@ import os
 import queue
 import threading
 import time as clock
+from contextlib import ExitStack
 from pathlib import Path
 
 from bilayer_core.errors import InputError, SimulationError
@@ -165,7 +166,8 @@ class _LogFile:
         self._sequence = 0
         self._unflushed_since: float | None = None
         self._synced = clock.monotonic()
-        try:
+        with ExitStack() as undo:
+            undo.callback(self._file.close)
             used = {**versions(), "mcap": mcap.__version__}
             self._writer.start(profile="ros2", library=f"bilayer_sim_ros {used['bilayer_sim_ros']}")
             scene = description.scene_text.encode()
@@ -183,9 +185,7 @@ class _LogFile:
                 self._topics[spec.name] = self._writer.register_channel(spec.full_name(), "cdr", schemas[spec.type], {})
             self._writer.flush()
             self._sync()
-        except BaseException:
-            self._file.close()
-            raise
+            undo.pop_all()
 
     def write(self, item: Frame | tuple[str, float, float]) -> None:
         """Write the messages of a frame, or a stimulus."""

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time as clock
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TypeVar
 
@@ -126,12 +127,11 @@ class HeadlessViewer:
             preexec_fn=(lambda: libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)) if libc else None,
         )
         self.pid = self._process.pid
-        try:
+        with ExitStack() as undo:
+            undo.callback(self.__exit__, None, None, None)
             self._wait_for(port)
             self.client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
-        except BaseException:
-            self.__exit__(None, None, None)
-            raise
+            undo.pop_all()
         return self
 
     def __exit__(self, exception_type, exception, traceback) -> None:
