@@ -13,7 +13,8 @@ from typing import Protocol
 
 from bilayer_core.errors import InputError
 from bilayer_core.integrate.frame import Frame
-from bilayer_core.integrate.simulator import Simulator, Termination
+from bilayer_core.integrate.result import Termination
+from bilayer_core.integrate.simulator import Simulator
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.stimulus import StimulusInputs

@@ -123,7 +123,7 @@ def _finish(
     simulator: Simulator, duration: float, failure: SimulationError | None, options: dict[str, Any], quiet: bool
 ) -> None:
     """Write the last state and the summary, and tell the user what happened."""
-    from bilayer_core.integrate.simulator import Termination
+    from bilayer_core.integrate.result import Termination
 
     summary = {**simulator.summary(), "duration": duration}
     if failure is not None:

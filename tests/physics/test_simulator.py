@@ -9,7 +9,7 @@ from sample_scenes import GROUND, contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, PenetrationError, SceneError, SimulationError
-from bilayer_core.integrate.simulator import Termination
+from bilayer_core.integrate.result import Termination
 
 
 class Recorder:
