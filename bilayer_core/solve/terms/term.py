@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from enum import Enum
 
@@ -132,7 +133,7 @@ class Kind(Enum):
     EXTERNAL = "work of a load over the step; supplied from outside"
 
 
-class Term:
+class Term(ABC):
     """One line of the register: a summand of the potential, or several that a kernel computes together.
 
     Attributes
@@ -158,9 +159,9 @@ class Term:
         """Take from the configuration that Newton moved to what is held fixed until the next move; false if nothing."""
         return False
 
+    @abstractmethod
     def add(self, at: Configuration, with_hessian: bool) -> None:
         """Add the derivatives at a configuration to `out`, and write the energy [J] there under each of `names`."""
-        raise NotImplementedError
 
     def parts(self) -> tuple[Term, ...]:
         """Terms of one name each that have this one as their sum."""
