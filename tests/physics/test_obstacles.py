@@ -92,18 +92,18 @@ def test_a_solid_cylinder_rolls_down_a_slope_with_two_thirds_of_the_acceleration
     assert spin * 0.02 == pytest.approx(velocity(simulator)[0], rel=0.03)
 
 
-def test_a_ball_and_a_tumbling_box_collide_and_keep_momentum_and_angular_momentum():
+def test_a_ball_and_a_tumbling_box_collide_and_keep_their_momentum():
     block = body("block", (0.05, 0.005, 0.004), BOX, velocity=[-0.5, 0, 0], angular_velocity=[3.0, 5.0, 20.0])
     moving = ball((-0.02, 0, 0), velocity=[1.0, 0.1, 0])
     law = contact(barrier_distance=2e-4, coefficient=0.3, speed_threshold=1e-3)
-    simulator = alone([block, moving], contact=law, solver={"tolerance": 1e-9})
+    simulator = alone([block, moving], contact=law, solver={"tolerance": 1e-11})
     masses = np.array([0.02, 2.7e-3])
     simulator.run(0.1)
     frame = simulator.frame()
     assert frame.body_velocities[2, 0] < 0.5  # it was hit
     total = masses @ frame.body_velocities[1:]
     exchanged = 2.7e-3
-    assert np.abs(total - masses @ np.array([[-0.5, 0, 0], [1.0, 0.1, 0]])).max() < 1e-9 * exchanged * 10
+    assert np.abs(total - masses @ np.array([[-0.5, 0, 0], [1.0, 0.1, 0]])).max() < 1e-9 * exchanged
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.5])

@@ -2,26 +2,17 @@
 
 import numpy as np
 import pytest
+from strides import strides
 
 from bilayer_core import Simulator, load_scene
 
 pytestmark = pytest.mark.slow
-PERIOD = 2.4
-
-
-def strides(cycles, *changes):
-    """Displacement of the mass centre along x in each cycle [m], and the simulator."""
-    simulator = Simulator(load_scene("crawling_inchworm", changes))
-    found = [simulator.com[0]]
-    for _ in range(cycles):
-        simulator.run(PERIOD)
-        found.append(simulator.com[0])
-    return np.diff(found), simulator
+SCENE = "crawling_inchworm"
 
 
 @pytest.fixture(scope="module")
 def forward():
-    return strides(4)
+    return strides(SCENE, 4)
 
 
 def test_the_inchworm_has_the_papers_parameters(forward):
@@ -40,12 +31,12 @@ def test_every_cycle_moves_it_forward_and_by_the_same_from_the_second_on(forward
 
 
 def test_it_goes_the_other_way_when_its_friction_is_turned_round(forward):
-    moved, _ = strides(2, "contact.friction.forward=0.6", "contact.friction.backward=0.3")
+    moved, _ = strides(SCENE, 2, "contact.friction.forward=0.6", "contact.friction.backward=0.3")
     assert moved == pytest.approx(-forward[0][:2], rel=1e-3)
 
 
 def test_it_stays_where_it_is_when_friction_is_the_same_both_ways(forward):
-    moved, _ = strides(2, "contact.friction.forward=0.6")
+    moved, _ = strides(SCENE, 2, "contact.friction.forward=0.6")
     assert abs(moved[1]) < 0.02 * forward[0][1]
 
 
