@@ -8,7 +8,7 @@ from sample_scenes import fixed, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 
 SOFT = {"gel": {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0}}
-EXACT = {"tolerance": 1e-10}
+EXACT = {"newton_tolerance": 1e-10}
 
 
 def run(description, duration, dt, velocity=None, integrator="implicit_euler"):

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from bilayer_core.integrate.simulator import Simulator
     from bilayer_core.scene.config import SceneConfig
 
-SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
+SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator")
 OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 
 
@@ -28,7 +28,6 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--model", metavar="NAME", help="auto or two_rod.")
 @click.option("--dimension", metavar="D", help="auto or 3.")
 @click.option("--integrator", metavar="NAME", help="auto, implicit_euler, sdirk2 or implicit_midpoint.")
-@click.option("--tolerance", metavar="SPEED", help="Largest velocity correction that a step may leave.")
 @set_option
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")
 @click.option("--log-rate", metavar="HZ", help="Frames recorded per simulated second.")

@@ -70,7 +70,7 @@ class Simulator:
             self.model,
             INTEGRATORS[self.plan.integrator],
             self.dt,
-            solver.tolerance,
+            solver.newton_tolerance,
             solver.max_newton_iterations,
             solver.max_halvings,
         )
@@ -169,7 +169,7 @@ class Simulator:
             "dimension": str(self.plan.dimension),
             "integrator": self.plan.integrator,
             "dt": repr(self.dt),
-            "tolerance": repr(self.scene.solver.tolerance),
+            "newton_tolerance": repr(self.scene.solver.newton_tolerance),
             **observe.versions(),
         }
         return observe.describe(self.model, self._state, settings, scene_text(self.scene))

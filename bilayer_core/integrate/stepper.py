@@ -86,14 +86,14 @@ class Stepper:
     """
 
     def __init__(
-        self, model: Model, method: Method, dt: float, tolerance: float, max_iterations: int, max_halvings: int
+        self, model: Model, method: Method, dt: float, newton_tolerance: float, max_iterations: int, max_halvings: int
     ):
         self.model = model
         self.method = method
         self.dt = dt
         self.max_halvings = max_halvings
         self.potential = IncrementalPotential(model)
-        self.solver = NewtonSolver(model, self.potential, tolerance, max_iterations)
+        self.solver = NewtonSolver(model, self.potential, newton_tolerance, max_iterations)
         self._start = Configuration(model)
         self._target = Configuration(model)
         self.end = Configuration(model)
@@ -308,7 +308,7 @@ class Stepper:
     def _explain(self, report: NewtonReport, time: float, h: float) -> str:
         text = f"{report.status.value} in the step to t = {time:.6g} s, tried down to {h:.3g} s"
         if np.isfinite(report.residual):
-            tolerance = self.model.scene.solver.tolerance
+            tolerance = self.model.scene.solver.newton_tolerance
             text += f" (correction left {report.residual:.3g} m/s, allowed {tolerance:.3g} m/s, "
             text += f"{report.iterations} iterations)"
         return text + (f": {report.detail}" if report.detail else "")

@@ -39,7 +39,7 @@ def summarise(simulator: Simulator) -> dict:
         "wall_time": simulator.wall_time,
         "compile_time": simulator.compile(),
         "real_time_factor": simulated / cpu if cpu > 0.0 else None,
-        "converged": statistics.largest_residual <= simulator.scene.solver.tolerance,
+        "converged": statistics.largest_residual <= simulator.scene.solver.newton_tolerance,
         "largest_residual": statistics.largest_residual,
         "termination": simulator.termination,
         "terms": plan.terms,

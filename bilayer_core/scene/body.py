@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from bilayer_core.scene import checks
 from bilayer_core.scene.faults import refuse_all
 from bilayer_core.scene.part import Direction, Name, Part, Point
-from bilayer_core.scene.schedule import faults_of_times
+from bilayer_core.scene.schedule import faults_of_times, first_after
 from bilayer_core.scene.shape import RotationVector, Surface
 from bilayer_core.scene.units import (
     AngularSpeed,
@@ -65,6 +65,10 @@ class Prescribed(Part):
     """From the body's position, at each of the times; the first is zero."""
     rotations: list[RotationVector] = []
     """From the body's rotation at the start, about the axes of the world, at each of the times; the first is zero."""
+
+    def breakpoint_after(self, t: float) -> float:
+        """First of the times after `t` [s], infinity if there is none: there the acceleration jumps."""
+        return first_after(t, self.times)
 
     @property
     def moves(self) -> bool:

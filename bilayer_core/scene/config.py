@@ -168,13 +168,13 @@ class Solver(Part):
     """`two_rod`: each layer a rod of its own, bonded to the other."""
     dimension: Literal["auto", 3] = "auto"
     """Of space."""
-    integrator: Literal[
-        "auto", "implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"
-    ] = "auto"
+    integrator: Literal["auto", "implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"] = (
+        "auto"
+    )
     """How a step is taken in time; `auto` is the recommended one."""
     dt: PositiveTime = 1e-3
     """Time step."""
-    tolerance: PositiveSpeed = 1e-6
+    newton_tolerance: PositiveSpeed = 1e-6
     """Largest velocity correction that Newton may leave."""
     max_newton_iterations: whole(1) = 50
     """After which a step counts as failed and is halved."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import model_validator
@@ -55,3 +56,7 @@ class Load(Part):
     def factor(self, t: float) -> float:
         """What force and moment are multiplied with at time `t` [s]."""
         return 1.0 if self.schedule is None else self.schedule.value(t)
+
+    def breakpoint_after(self, t: float) -> float:
+        """First corner or jump of the factor after `t` [s], infinity if there is none."""
+        return math.inf if self.schedule is None else self.schedule.breakpoint_after(t)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Callable
 from typing import Annotated, Literal
@@ -26,6 +27,10 @@ class Hold(BaseModel):
     def value(self, t: float) -> float:
         """Value at time `t` [s], in the unit of the channel."""
         return self.held_value
+
+    def breakpoint_after(self, t: float) -> float:
+        """First corner or jump after `t` [s]: there is none, which is infinity."""
+        return math.inf
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
@@ -58,6 +63,10 @@ class Ramp(BaseModel):
         part = min(max((t - self.start) / (self.end - self.start), 0.0), 1.0)
         return (1.0 - part) * self.from_value + part * self.to_value
 
+    def breakpoint_after(self, t: float) -> float:
+        """First corner after `t` [s], infinity if there is none."""
+        return first_after(t, (self.start, self.end))
+
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
         return {("from",): self.from_value, ("to",): self.to_value}
@@ -89,6 +98,10 @@ class Table(BaseModel):
         before, after = self.times[right - 1], self.times[right]
         part = (t - before) / (after - before)
         return (1.0 - part) * self.values[right - 1] + part * self.values[right]
+
+    def breakpoint_after(self, t: float) -> float:
+        """First corner after `t` [s], infinity if there is none."""
+        return first_after(t, self.times)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
@@ -131,6 +144,21 @@ class Sequence(BaseModel):
             part = self.parts[-1]
         return part.schedule.value(min(max(elapsed - ROUNDING * total, 0.0), part.duration))
 
+    def breakpoint_after(self, t: float) -> float:
+        """First corner or jump after `t` [s], infinity if there is none: those of the parts, and where a part ends."""
+        if t < 0.0:
+            return 0.0
+        total = sum(part.duration for part in self.parts)
+        cycle = math.floor(t / total + ROUNDING) if self.repeat else 0
+        begin, early = cycle * total, ROUNDING * total
+        for part in self.parts:
+            end = begin + part.duration
+            if t < end - early:
+                inside = begin + part.schedule.breakpoint_after(t - begin + early)
+                return inside if inside < end - early else end
+            begin = end
+        return math.inf
+
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
         return {
@@ -167,6 +195,12 @@ def faults_of_times(times: list[float], key: tuple[str], values: list) -> list[F
     if len(times) != len(values):
         faults.append((key, f"{len(values)} entries", f"must be as many as `times`, {len(times)}"))
     return faults
+
+
+def first_after(t: float, times: list[float] | tuple[float, ...]) -> float:
+    """The first of increasing times after `t` [s], infinity if there is none."""
+    place = bisect_right(times, t)
+    return times[place] if place < len(times) else math.inf
 
 
 NEARLY = 1e-3

@@ -36,6 +36,11 @@ class Sine(BaseModel):
         turns = max(t - self.start, 0.0) / self.period
         return self.mean + self.amplitude * math.sin(2.0 * math.pi * math.fmod(turns, 1.0) + self.phase)
 
+    def breakpoint_after(self, t: float) -> float:
+        """The start, then every quarter of a period after `t` [s]: a longer step would not see the wave."""
+        quarter = self.period / 4.0
+        return self.start + quarter * max(math.floor((t - self.start) / quarter + ROUNDING) + 1.0, 0.0)
+
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
         return {
@@ -69,6 +74,18 @@ class _Pulses(BaseModel):
         up = self._part(elapsed)
         part = up - self._part(elapsed - width) if elapsed >= width else up
         return (1.0 - part) * self.low + part * self.high
+
+    def _breakpoint_after(self, t: float, width: float, last: float) -> float:
+        """First corner or jump after `t` [s] of pulses that begin to fall after `width` [s], infinity if none."""
+        cycle = max(math.floor((t - self.start) / self.period + ROUNDING), 0.0)
+        while cycle < last:
+            begin = self.start + cycle * self.period
+            for flank in (0.0, width):
+                for corner in (begin + flank, begin + flank + self.rise_time):
+                    if corner > t + ROUNDING * self.period:
+                        return corner
+            cycle += 1.0
+        return math.inf
 
     def _part(self, elapsed: float) -> float:
         """How far a change has got that began `elapsed` before."""
@@ -105,6 +122,10 @@ class Square(_Pulses):
         """Value at time `t` [s], in the unit of the channel."""
         return self._value(t, self.duty * self.period, math.inf)
 
+    def breakpoint_after(self, t: float) -> float:
+        """First corner or jump after `t` [s]."""
+        return self._breakpoint_after(t, self.duty * self.period, math.inf)
+
 
 class PulseTrain(_Pulses):
     """`count` pulses of `width`, one each period; `low` before, between and after them."""
@@ -125,3 +146,7 @@ class PulseTrain(_Pulses):
     def value(self, t: float) -> float:
         """Value at time `t` [s], in the unit of the channel."""
         return self._value(t, self.width, self.count)
+
+    def breakpoint_after(self, t: float) -> float:
+        """First corner or jump after `t` [s], infinity if there is none."""
+        return self._breakpoint_after(t, self.width, self.count)

@@ -119,7 +119,7 @@ def vibration(edges: int = 40, periods: int = 4, steps: int = 300) -> tuple[floa
     force = 3.0 * BENDING * 1e-3 / LENGTH**2
     load = {"name": "pull", "rod": "rod", "position": LENGTH, "force": [0, 0, -force]}
     load["schedule"] = {"type": "table", "times": [0.0, 1e-3 * dt], "values": [1.0, 0.0]}
-    solver = {"dt": dt, "tolerance": 1e-10, "integrator": "sdirk2"}
+    solver = {"dt": dt, "newton_tolerance": 1e-10, "integrator": "sdirk2"}
     simulator = Simulator(load_scene(beam(edges + 1, loads=[load], solver=solver)))
     simulator.solve_static()
     s = np.linspace(0.0, 1.0, edges + 1)

@@ -49,7 +49,7 @@ def _spin_lost(integrator: str, dt: float) -> float:
     """Change of angular momentum of a soft strip that spins about its normal at 20 rad/s for 50 ms, over its own."""
     ribbon = rod([layer(thickness=2e-3)], length=0.1, stations=11, start=(-0.05, 0, 0))
     gel = {"youngs_modulus": 1e5, "poisson_ratio": 0.5, "density": 1000.0}
-    solver = {"dt": dt, "integrator": integrator, "tolerance": 1e-11}
+    solver = {"dt": dt, "integrator": integrator, "newton_tolerance": 1e-11}
     simulator = Simulator(load_scene(scene([ribbon], materials={"gel": gel}, solver=solver)))
     let_go(simulator, np.cross([0, 0, 20.0], simulator.positions))
 
@@ -85,7 +85,7 @@ def order_in_time(integrator: str) -> tuple[float, float]:
                 "schedule": {"type": "sine", "mean": 1, "amplitude": 1, "period": 0.1, "phase": -0.5 * math.pi},
             }
         ],
-        solver={"tolerance": 1e-10, "integrator": integrator},
+        solver={"newton_tolerance": 1e-10, "integrator": integrator},
     )
     tips = []
     for dt in STEPS:

@@ -21,7 +21,14 @@ SUMMARY_KEYS = """
     wall_time compile_time real_time_factor converged termination terms com_start com_end com_max_height max_curvature
     mean_curvature tip_positions min_gap max_contact_force energy versions
 """.split()
-HOPELESS = ["--set", "solver.max_newton_iterations=1", "--set", "solver.max_halvings=0", "--tolerance", "1e-15"]
+HOPELESS = [
+    "--set",
+    "solver.max_newton_iterations=1",
+    "--set",
+    "solver.max_halvings=0",
+    "--set",
+    "solver.newton_tolerance=1e-15",
+]
 
 
 @pytest.fixture

@@ -72,7 +72,7 @@ def test_a_scene_that_cannot_go_on_ends_with_exit_code_3(capsys):
         "--set",
         "solver.max_halvings=0",
         "--set",
-        "solver.tolerance=1e-15",
+        "solver.newton_tolerance=1e-15",
     ]
     assert main(["converge", "cantilever", "--duration", "8 ms", *hopeless, "--quiet"]) == 3
     assert "stopped at t = 0 s" in capsys.readouterr().err

@@ -34,7 +34,7 @@ STIFF = {"youngs_modulus": 1e10, "poisson_ratio": 0.5, "density": 1000.0}
 def thrown(motion, spin, dt, duration, integrator="implicit_euler", material=STIFF, **fluid):
     """A free strip with the velocity of a rigid motion about its middle, before and after `duration`."""
     strip = rod(WHOLE, length=0.05, stations=11)
-    content = scene([strip], materials={"gel": material}, fluid=water(**fluid), solver={"tolerance": 1e-9})
+    content = scene([strip], materials={"gel": material}, fluid=water(**fluid), solver={"newton_tolerance": 1e-9})
     simulator = Simulator(load_scene(content), dt=dt, integrator=integrator)
     state = simulator._state
     state.velocity[:] = np.array(motion) + np.cross(spin, state.position - state.position.mean(axis=0))
@@ -138,7 +138,7 @@ def test_momentum_of_rods_and_fluid_together_is_conserved(integrator):
         [rod(bending, length=0.06, stations=13)],
         stimuli={"heat": {"schedule": {"type": "sine", "mean": 0.5, "amplitude": 0.5, "period": 0.1}}},
         fluid=water(),
-        solver={"tolerance": 1e-10},
+        solver={"newton_tolerance": 1e-10},
     )
     simulator = Simulator(load_scene(content), integrator=integrator)
     simulator._state.velocity[:] = (0.2, 0.05, 0.1)
@@ -222,7 +222,7 @@ def test_a_clamped_strip_swings_more_slowly_by_the_root_of_its_whole_mass():
             bodies=[fixed()],
             materials={"gel": material},
             fluid=fluid,
-            solver={"tolerance": 1e-9},
+            solver={"newton_tolerance": 1e-9},
         )
         simulator = Simulator(load_scene(content), dt=2e-3)
         s = beta * simulator.positions[:, 0] / length
@@ -263,4 +263,4 @@ def test_forces_of_the_fluid_act_along_the_directions_at_the_end_of_the_step(add
     potential, end = simulator._stepper.potential, simulator._stepper.end
     potential.follow(end)
     potential.evaluate(end, False)
-    assert simulator._stepper.solver.speed(*potential.newton_step()) < simulator.scene.solver.tolerance
+    assert simulator._stepper.solver.speed(*potential.newton_step()) < simulator.scene.solver.newton_tolerance

@@ -17,7 +17,7 @@ def free(name, position, mass=1e-3, inertia=1e-8, **more):
 
 @pytest.mark.parametrize("layers", [[layer(thickness=2e-3)], [layer("bottom"), layer("top")]])
 def test_a_junction_in_the_middle_of_a_cantilever_changes_nothing(layers):
-    settings = {"gravity": [0, 2.0, -9.81], "materials": SOFT, "solver": {"dt": 1.0, "tolerance": 1e-11}}
+    settings = {"gravity": [0, 2.0, -9.81], "materials": SOFT, "solver": {"dt": 1.0, "newton_tolerance": 1e-11}}
     whole = Simulator(
         load_scene(scene([rod(layers, length=0.08, stations=81, clamp_start="wall")], bodies=[fixed()], **settings))
     )

@@ -43,7 +43,7 @@ def test_a_curved_rod_starts_on_its_circle_without_stress_and_stays(layers, towa
 
 def test_a_straight_layer_with_natural_curvature_relaxes_to_the_curved_one():
     straight = rod([layer(natural_curvature=1.0 / RADIUS)], length=RADIUS * ANGLE, stations=31, clamp_start="wall")
-    relaxed = Simulator(load_scene(scene([straight], bodies=[fixed()], solver={"dt": 1.0, "tolerance": 1e-11})))
+    relaxed = Simulator(load_scene(scene([straight], bodies=[fixed()], solver={"dt": 1.0, "newton_tolerance": 1e-11})))
     relaxed.run(20.0)
     curved = Simulator(load_scene(scene([arc([layer()])], bodies=[fixed()])))
     assert relaxed.positions[-1] == pytest.approx(curved.positions[-1], abs=2e-4 * RADIUS)
@@ -53,7 +53,9 @@ def test_growth_of_the_outer_layer_closes_an_arc_as_it_bends_a_straight_strip():
     stimuli = {"heat": {"schedule": {"type": "ramp", "start": 0, "end": 5, "from": 0, "to": 1}}}
     growing = [layer("outer", eigenstrain={"stimulus": "heat", "gain": 0.01}), layer("inner")]
     simulator = Simulator(
-        load_scene(scene([arc(growing)], bodies=[fixed()], stimuli=stimuli, solver={"dt": 1.0, "tolerance": 1e-11}))
+        load_scene(
+            scene([arc(growing)], bodies=[fixed()], stimuli=stimuli, solver={"dt": 1.0, "newton_tolerance": 1e-11})
+        )
     )
     before = simulator.curvatures[15]
     simulator.run(20.0)

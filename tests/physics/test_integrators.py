@@ -14,7 +14,7 @@ HISTORY = [name for name, method in INTEGRATORS.items() if method.history is not
 SECOND_ORDER = [name for name, method in INTEGRATORS.items() if method.order == 2]
 DAMPED = [name for name in INTEGRATORS if name != "implicit_midpoint"]
 SOFT = {"gel": {"youngs_modulus": 1e4, "poisson_ratio": 0.5, "density": 1000.0}}
-EXACT = {"tolerance": 1e-10}
+EXACT = {"newton_tolerance": 1e-10}
 
 
 def sine(period):

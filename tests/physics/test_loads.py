@@ -46,7 +46,7 @@ def test_a_mass_at_the_tip_slows_the_vibration_of_a_strip_as_the_formula_says():
         bodies=[fixed()],
         loads=[released],
         masses=[{"name": "tip", "rod": "rod", "position": LENGTH, "mass": tip}],
-        solver={"dt": 2e-3, "tolerance": 1e-9},
+        solver={"dt": 2e-3, "newton_tolerance": 1e-9},
         damping={"mass": 3.0},
     )
     simulator = Simulator(load_scene(swinging))
@@ -106,7 +106,7 @@ def flyer(inertia=(3e-5, 3e-5, 3e-5), **motion):
 def in_space(body=None, dt=1e-3, **load):
     """A body without weight, and a load on it."""
     load = {"name": "push", "body": "ball", **load}
-    solver = {"dt": dt, "tolerance": 1e-10}
+    solver = {"dt": dt, "newton_tolerance": 1e-10}
     return scene([FAR], bodies=[fixed(position=(0, 0, 5)), body or flyer()], loads=[load], solver=solver)
 
 

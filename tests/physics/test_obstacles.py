@@ -96,7 +96,7 @@ def test_a_ball_and_a_tumbling_box_collide_and_keep_their_momentum():
     block = body("block", (0.05, 0.005, 0.004), BOX, velocity=[-0.5, 0, 0], angular_velocity=[3.0, 5.0, 20.0])
     moving = ball((-0.02, 0, 0), velocity=[1.0, 0.1, 0])
     law = contact(barrier_distance=2e-4, coefficient=0.3, speed_threshold=1e-3)
-    simulator = alone([block, moving], contact=law, solver={"tolerance": 1e-11})
+    simulator = alone([block, moving], contact=law, solver={"newton_tolerance": 1e-11})
     masses = np.array([0.02, 2.7e-3])
     simulator.run(0.1)
     frame = simulator.frame()

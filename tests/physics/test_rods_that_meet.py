@@ -97,7 +97,9 @@ def test_a_bilayer_that_curls_up_closes_on_itself_and_does_not_pass_through_itse
 def test_ribbons_that_collide_in_flight_keep_their_momentum_and_slow_down_by_friction():
     lower = rod([layer("bottom"), layer("top")], stations=12, length=0.05, name="lower")
     upper = rod([layer()], stations=9, length=0.04, start=(0.003, 0, 4e-3), name="upper")
-    flight = scene([lower, upper], contact=contact(coefficient=0.5, speed_threshold=1e-2), solver={"tolerance": 1e-10})
+    flight = scene(
+        [lower, upper], contact=contact(coefficient=0.5, speed_threshold=1e-2), solver={"newton_tolerance": 1e-10}
+    )
     simulator = Simulator(load_scene(flight))
     nodes = simulator.model.strands[-1].first_node
     simulator._state.velocity[nodes:] = [0.3, 0.1, -0.5]

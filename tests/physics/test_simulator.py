@@ -130,7 +130,7 @@ def test_an_interrupted_run_tells_its_observers(simulator):
 
 def test_a_solver_that_cannot_go_on_says_what_and_when_and_keeps_the_last_state():
     hopeless = everything()
-    hopeless["solver"] = {"max_newton_iterations": 1, "max_halvings": 1, "tolerance": 1e-15}
+    hopeless["solver"] = {"max_newton_iterations": 1, "max_halvings": 1, "newton_tolerance": 1e-15}
     simulator = Simulator(load_scene(hopeless))
     before = simulator.save_state()
     recorder = Recorder(100.0)

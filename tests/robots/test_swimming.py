@@ -79,7 +79,7 @@ def test_it_sinks_with_every_stroke_when_its_arms_beat_upwards(swimming):
 
 
 def test_without_a_fluid_nothing_moves_its_mass_centre():
-    simulator = Simulator(load_scene("swimming", [*ONE_ARM, "fluid=null", "solver.tolerance=1e-9"]))
+    simulator = Simulator(load_scene("swimming", [*ONE_ARM, "fluid=null", "solver.newton_tolerance=1e-9"]))
     start, largest = height(simulator), 0.0
     for _ in range(60):
         simulator.step()
