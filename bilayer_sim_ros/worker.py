@@ -25,7 +25,7 @@ SHORTEST_WAIT = 0.01
 SCHEDULE = math.nan
 # Real time between two status reports, and between two showings of a paused frame [s].
 STATUS_PERIOD = 1.0
-# Output times are compared in output periods; step times are multiples of dt up to rounding.
+# Output times are compared in output periods; times of steps have rounding.
 PERIOD_ROUNDING = 1e-6
 
 
@@ -209,7 +209,7 @@ class SimulationWorker:
 
     def _begin(self) -> None:
         """Start a run at the simulator's present state, and hand out its first frame."""
-        self._steps = 0
+        self._begun = self._simulator.time
         self._pacer.restart(self._simulator.time)
         self._status = Status(self._simulator.time, self._paused)
         self._status_since = time.monotonic()
@@ -249,21 +249,20 @@ class SimulationWorker:
             self._simulator.set_stimulus(channel, value)
             self._recording.log_stimulus(channel, SCHEDULE if value is None else value, start)
         report = self._simulator.step()
-        self._steps += 1
         self._frame_is_out = False
         status = self._status
         status.steps += 1
         status.substeps += report.substeps
         status.iterations += report.iterations
         status.residual = max(status.residual, report.residual)
-        frame_is_due = self._periods(self._steps) > self._periods(self._steps - 1)
+        frame_is_due = self._periods(self._simulator.time) > self._periods(start)
         if frame_is_due:
             self._hand_out()
         return frame_is_due
 
-    def _periods(self, steps: int) -> int:
-        """Output periods completed after `steps` steps."""
-        return math.floor(steps * self._simulator.dt * self._rate + PERIOD_ROUNDING)
+    def _periods(self, time: float) -> int:
+        """Output periods of this run that are complete at a time [s]."""
+        return math.floor((time - self._begun) * self._rate + PERIOD_ROUNDING)
 
     def _hand_out(self) -> None:
         """Show the present frame to all who look."""

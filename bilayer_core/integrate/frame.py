@@ -121,7 +121,7 @@ class Frame:
     time : float
         Simulated time [s].
     step : int
-        Number of nominal steps done.
+        Number of steps done.
     positions, velocities : ndarray
         Of every node [m, m/s], shape (node_count, 3).
     directors : ndarray

@@ -35,7 +35,7 @@ class Schedule:
         self._simulator = simulator
         self._count = [0] * len(self._observers)
         self._origin = simulator.time
-        self._last_seen = [-1] * len(self._observers)
+        self._last_seen: list[float | None] = [None] * len(self._observers)
 
     def start(self) -> None:
         if self._observers:
@@ -56,16 +56,15 @@ class Schedule:
         frame = self._simulator.frame()
         for i in which:
             self._observers[i].observe(frame)
-            self._last_seen[i] = frame.step
+            self._last_seen[i] = frame.time
 
     def finish(self, complete: bool, termination: str) -> None:
         """Show the last frame to whom it is missing, and close all, whatever goes wrong with one of them."""
         if not self._observers:
             return
-        step = round(self._simulator.time / self._simulator.dt)
         with ExitStack() as closing:
             for observer in reversed(self._observers):
                 closing.callback(observer.close, complete, termination)
-            missing = [i for i, seen in enumerate(self._last_seen) if seen not in (-1, step)]
+            missing = [i for i, seen in enumerate(self._last_seen) if seen not in (None, self._simulator.time)]
             if missing:
                 self._show(missing)

@@ -99,7 +99,7 @@ class Simulator:
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return float(self._state.step[0]) * self.dt
+        return float(self._state.time[0])
 
     @property
     def positions(self) -> Array:

@@ -97,7 +97,7 @@ class _Search:
     def __init__(self, stepper: Stepper, state: State, tolerance: float | None):
         model = stepper.model
         self.stepper, self.model, self.potential = stepper, model, stepper.potential
-        self.time = float(state.step[0]) * stepper.dt
+        self.time = float(state.time[0])
         self.size = max(rod.path.length for rod in model.scene.rods)
         self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
         self.stimulus = stepper.stimulus_at(state, self.time)

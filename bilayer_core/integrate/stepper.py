@@ -134,7 +134,7 @@ class Stepper:
 
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
-        time = float(state.step[0]) * self.dt
+        time = float(state.time[0])
         self.end.take_state(state)
         self.stimulus = self.stimulus_at(state, time)
         self.eigenstrain = self.eigenstrain_of(state.transduction)
@@ -160,13 +160,15 @@ class Stepper:
         if self.ledger is not None:
             self.ledger.mark()
         kept = State(**{name: array.copy() for name, array in vars(state).items()})
+        begin, count = float(state.time[0]), float(state.step[0])
+        on_grid = begin == count * self.dt  # not so after steps of another length
         level = int(state.halvings[0])
         done = substeps = rejected = iterations = factorisations = 0
         residual = 0.0
         while done < parts:
             size = parts >> level
             fraction = (done + size) / parts
-            time = (float(state.step[0]) + fraction) * self.dt
+            time = (count + fraction) * self.dt if on_grid else begin + fraction * self.dt
             report = self._attempt(state, self.dt * size / parts, time)
             iterations += report.iterations
             factorisations += report.factorisations
@@ -183,13 +185,12 @@ class Stepper:
                     getattr(state, name)[...] = array
                 if self.ledger is not None:
                     self.ledger.roll_back()
-                raise SimulationError(
-                    self._explain(report, time, self.dt * size / parts), float(kept.step[0]) * self.dt
-                )
+                raise SimulationError(self._explain(report, time, self.dt * size / parts), begin)
             level += 1
+        state.time[0] = time
         state.step += 1.0
         state.halvings[0] = level
-        return StepReport(float(state.step[0]) * self.dt, substeps, rejected, iterations, factorisations, residual)
+        return StepReport(time, substeps, rejected, iterations, factorisations, residual)
 
     def _attempt(self, state: State, h: float, time: float) -> NewtonReport:
         """Try one part of length `h` [s] that ends at `time` [s]; `state` changes only if it converged."""

@@ -19,10 +19,11 @@ MOMENT = 1e-3
 class State:
     """What is carried from step to step.
 
-    ``save`` and ``restore`` copy it bit for bit; time is an integer number of nominal steps, so that it does not drift.
+    `flat` and `set_flat` copy it bit for bit.
     """
 
-    step: Array  # nominal steps done, shape (1,)
+    time: Array  # simulated time [s], shape (1,); with fixed steps their number times dt, so that it does not drift
+    step: Array  # steps done, shape (1,)
     halvings: Array  # present refinement of the step: dt/2^halvings, shape (1,)
     position: Array  # of nodes [m], shape (n_node, 3)
     velocity: Array  # [m/s], shape (n_node, 3)
@@ -83,6 +84,7 @@ def initial_state(model: Model, with_history: bool = False) -> State:
     channels = list(model.scene.stimuli.values())
     before = np.array([value_before(channel.schedule.value, 0.0, MOMENT) for channel in channels])
     return State(
+        time=np.zeros(1),
         step=np.zeros(1),
         halvings=np.zeros(1),
         position=model.start_position.copy(),

@@ -64,6 +64,8 @@ def _read(path: Path) -> tuple[tuple, np.ndarray]:
 def _difference(saved: dict[str, tuple[int, ...]], description: Description) -> str:
     """The first part that is not the same."""
     for name, shape in description.state_layout:
-        if saved.get(name) != shape:
-            return f"{name} has shape {saved.get(name)}, in {description.scene_name} it has {shape}"
+        if name not in saved:
+            return f"it lacks {name}, which this version of the program needs; run its scene again"
+        if saved[name] != shape:
+            return f"{name} has shape {saved[name]}, in {description.scene_name} it has {shape}"
     return "it has more parts"
