@@ -6,7 +6,8 @@ edge space (`motion`), and η the eigenstrain:
     work of a conservative force   W = −∫ g·dq, straight from qₙ to qₙ₊₁      by Simpson's rule: −ΔE to fourth order
     work of a barrier              the same, on halves where it must be
     work of a dissipative force    W = ½ h (Pₙ + Pₙ₊₁),  P = −g·v             second order, and never above zero
-    work of the stimulus           W = ∫ s·dη, along the same way,  s = ∂E/∂η = −EA (ε − η) |ē|
+    work of the stimulus           W = ∫ s·dη, along the same way,  s = ∂E/∂η = −EA (ε − η) |ē|, and likewise of
+                                   natural curvatures κ̄₁ that follow it, ∂E/∂κ̄₁ = −k₁ (κ₁ − κ̄₁)
     work of prescribed bodies      what moves held nodes and surfaces against all these forces, and their kinetic energy
 
 Energies E and the kinetic energy T come from states alone, works from gradients alone, so that two sums measure
@@ -42,7 +43,7 @@ from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.potential import IncrementalPotential
 from ..solve.terms.fluid import survey_fluid
-from ..solve.terms.term import Kind
+from ..solve.terms.term import Kind, RestStrains
 from .motion import Gradient, Motion, displacement, momentary_context, of_prescribed, velocity
 from .observe import kinetic_energy
 from .quadrature import simpson
@@ -75,9 +76,9 @@ class _Instant:
     imposed_kinetic: float
     fluid: _Fluid | None
     velocity: Array  # of nodes [m/s], shape (n_node, 3)
-    eigenstrain: Array
+    rest: RestStrains
     load_factor: Array
-    stimulus: Array  # ∂E/∂η of each edge [J], shape (n_edge,)
+    resistance: tuple[Array, Array]  # ∂E/∂η of edges [J], ∂E/∂κ̄₁ of joints [N m], shapes (n_edge,), (bend_count,)
     energy: dict[str, float]
     gradient: dict[str, Gradient]
     power: dict[str, tuple[float, float]]
@@ -98,9 +99,9 @@ class EnergyLedger:
         self._kinds: dict[str, Kind] = {}
         self._first: _Instant | None = None
 
-    def begin(self, state: State, eigenstrain: Array, load_factor: Array) -> None:
-        """Start from zero at a state, with the eigenstrain and the factors of loads there."""
-        self._first = self._last = self._look(state, eigenstrain, load_factor)
+    def begin(self, state: State, rest: RestStrains, load_factor: Array) -> None:
+        """Start from zero at a state, with the rest strains and the factors of loads there."""
+        self._first = self._last = self._look(state, rest, load_factor)
         self._work: dict[str, float] = defaultdict(float)  # of each force [J]
         self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
         self._stimulus = 0.0
@@ -115,14 +116,14 @@ class EnergyLedger:
         self._last, work, imposed, self._stimulus = self._marked
         self._work, self._imposed = work.copy(), imposed.copy()
 
-    def record(self, state: State, eigenstrain: Array, load_factor: Array, h: float) -> None:
+    def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
         """Add the works of a step of length `h` [s] that has just been accepted."""
-        before, after = self._last, self._look(state, eigenstrain, load_factor)
+        before, after = self._last, self._look(state, rest, load_factor)
         moved = displacement(self._model, before.at, after.at)
         imposed = of_prescribed(self._model, moved)
         way = _Way(self._model, before, state, moved)
-        strain = 0.5 * (before.eigenstrain + after.eigenstrain)
-        middle = self._look_at(way.at(0.5), way.state, strain, 0.5 * (before.load_factor + load_factor))
+        halfway = before.rest.halfway_to(rest)
+        middle = self._look_at(way.at(0.5), way.state, halfway, 0.5 * (before.load_factor + load_factor))
         for name, gradient in after.gradient.items():
             three = before.gradient[name], middle.gradient[name], gradient
             rates = [np.array([motion.work(each) for motion in (moved, imposed)]) for each in three]
@@ -137,8 +138,10 @@ class EnergyLedger:
                 sums[name] += 0.5 * h * (start + end)
         if after.fluid is not None:
             self._imposed["fluid"] += self._work_of_fluid(before, after, imposed)
-        rise = after.eigenstrain - before.eigenstrain
-        self._stimulus += float((before.stimulus + 4.0 * middle.stimulus + after.stimulus) @ rise) / 6.0
+        bends = slice(self._model.bend_count)
+        rises = after.rest.edge - before.rest.edge, after.rest.joint[bends, 0] - before.rest.joint[bends, 0]
+        for rise, *three in zip(rises, before.resistance, middle.resistance, after.resistance, strict=True):
+            self._stimulus += float((three[0] + 4.0 * three[1] + three[2]) @ rise) / 6.0
         self._last = after
 
     def budget(self) -> dict:
@@ -211,16 +214,16 @@ class EnergyLedger:
         carried = float(momentum.sum(axis=0) @ np.array(model.scene.fluid.velocity))
         return _Fluid(relative + carried, momentum, shape_gradient)
 
-    def _look(self, state: State, eigenstrain: Array, load_factor: Array) -> _Instant:
+    def _look(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
         at = Configuration(self._model)
         at.take_state(state)
-        return self._look_at(at, state, eigenstrain, load_factor)
+        return self._look_at(at, state, rest, load_factor)
 
-    def _look_at(self, at: Configuration, state: State, eigenstrain: Array, load_factor: Array) -> _Instant:
+    def _look_at(self, at: Configuration, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
         model, potential = self._model, self._potential
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
-        potential.start_step(momentary_context(model, at, state, eigenstrain, load_factor))
+        potential.start_step(momentary_context(model, at, state, rest, load_factor))
         energy, gradient, power = {}, {}, {}
         for term, name, value in potential.one_by_one(at):
             self._kinds[name] = term.kind
@@ -229,20 +232,30 @@ class EnergyLedger:
             else:
                 energy[name] = value
                 gradient[name] = Gradient.copy_of(potential.accumulators)
-        strain = at.length[: model.edge_count] / model.rest_length - 1.0 - eigenstrain
         return _Instant(
             at=at,
             kinetic=kinetic_energy(model, state),
             fluid=self._look_at_fluid(at, state),
             velocity=state.velocity.copy(),
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
-            eigenstrain=eigenstrain.copy(),
+            rest=rest,
             load_factor=load_factor.copy(),
-            stimulus=-model.axial_stiffness * strain * model.rest_length,
+            resistance=_resistance(model, at, rest),
             energy=energy,
             gradient=gradient,
             power=power,
         )
+
+
+def _resistance(model: Model, at: Configuration, rest: RestStrains) -> tuple[Array, Array]:
+    """Derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
+    strain = at.length[: model.edge_count] / model.rest_length - 1.0
+    bend = at.joint_strain[:, 0] - rest.joint[:, 0]
+    of_edges = np.concatenate([strain, np.zeros(model.wall_count)])
+    coupled = np.stack([model.joint_a, model.joint_b], axis=1)[model.coupled_joint]
+    bend[model.coupled_joint] -= np.einsum("ki,ki->k", model.strain_coupling, of_edges[coupled])
+    moment = model.joint_stiffness[:, 0] * bend
+    return -model.axial_stiffness * (strain - rest.edge) * model.rest_length, -moment[: model.bend_count]
 
 
 class _Way:

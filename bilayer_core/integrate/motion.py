@@ -10,7 +10,7 @@ from ..kinematics.rotation import rotation_matrix, rotation_vector
 from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
-from ..solve.terms.term import Accumulators, StepContext
+from ..solve.terms.term import Accumulators, RestStrains, StepContext
 
 Array = np.ndarray
 PARTS = ("node", "edge", "pair", "body", "carrier", "contact")
@@ -89,7 +89,7 @@ def velocity(model: Model, at: Configuration, state: State) -> Motion:
 
 
 def momentary_context(
-    model: Model, at: Configuration, state: State, eigenstrain: Array, load_factor: Array
+    model: Model, at: Configuration, state: State, rest: RestStrains, load_factor: Array
 ) -> StepContext:
     """A step so short that nothing changes in it but what moves: forces at a state, with its velocities.
 
@@ -115,7 +115,7 @@ def momentary_context(
         predicted_turn=at.turn,
         predicted_body_position=at.body_position,
         predicted_body_rotation=at.body_rotation,
-        eigenstrain=eigenstrain,
+        rest=rest,
         load_factor=load_factor,
     )
 

@@ -64,7 +64,7 @@ class Simulator:
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         self.scene = scene
         self.dt = scene.solver.dt if dt is None else float(dt)
-        self.model = build_model(scene)
+        self.model = build_model(scene, self.plan.model)
         solver = scene.solver
         self._stepper = Stepper(
             self.model,
@@ -91,7 +91,7 @@ class Simulator:
 
     def _begin_budget(self) -> None:
         if self._ledger is not None:
-            self._ledger.begin(self._state, self._stepper.eigenstrain, self._stepper.load_factor(self.time))
+            self._ledger.begin(self._state, self._stepper.rest_strains, self._stepper.load_factor(self.time))
             self._stepper.ledger = self._ledger
 
     # what the scene looks like now

@@ -27,7 +27,7 @@ from ..model.model import Model
 from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.terms.fluid import momentum_of_fluid
-from ..solve.terms.term import StepContext
+from ..solve.terms.term import RestStrains, StepContext
 
 Array = np.ndarray
 SPIN_ITERATIONS = 50
@@ -127,7 +127,7 @@ def predict(
     start: Configuration,
     turned: Array,
     length: float,
-    eigenstrain: Array,
+    rest: RestStrains,
     load_factor: Array,
     momentum_length: float | None = None,
     prescribed: Prescribed | None = None,
@@ -143,8 +143,9 @@ def predict(
         Turn of edges from the start of the step to `start` [rad], shape (n_edge,).
     length : float
         γ h [s].
-    eigenstrain, load_factor : Array
-        At the time of the stage.
+    rest : RestStrains
+    load_factor : Array
+        Like `rest` at the time of the stage.
     momentum_length : float, optional
         γ′ h [s], if it is another.
     prescribed : Prescribed, optional
@@ -179,7 +180,7 @@ def predict(
         predicted_body_position=origin.body_position[free] + length * origin.body_velocity,
         predicted_body_rotation=rotation,
         origin_fluid_momentum=origin.fluid_momentum,
-        eigenstrain=eigenstrain,
+        rest=rest,
         load_factor=load_factor,
         length_of_momenta=momentum_length,
     )

@@ -102,7 +102,7 @@ class _Search:
         self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
         self.stimulus = stepper.stimulus_at(state, self.time)
         self.transduction = self.stimulus[model.law_channel] if len(state.transduction) else state.transduction
-        self.eigenstrain = stepper.eigenstrain_of(self.transduction)
+        self.rest = stepper.rest_strains_of(self.transduction)
         self.load_factor = stepper.load_factor(self.time)
         self.start, self.end, self.trial = (Configuration(model) for _ in range(3))
         for configuration in (self.start, self.end, self.trial):
@@ -168,7 +168,7 @@ class _Search:
             predicted_turn=at.turn,
             predicted_body_position=at.body_position,
             predicted_body_rotation=at.body_rotation,
-            eigenstrain=self.eigenstrain,
+            rest=self.rest,
             load_factor=self.load_factor,
         )
 

@@ -24,7 +24,10 @@ def largest_row(rows):
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:
     """Mass centre of the rods [m], shape (3,)."""
-    return model.node_mass @ state.position / model.node_mass.sum()
+    moment = model.node_mass @ state.position
+    if len(model.mass_moment):
+        moment += model.mass_moment @ state.director1
+    return moment / model.node_mass.sum()
 
 
 @dataclass

@@ -17,7 +17,7 @@ from ..scene.transduction import follow, free_strain
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonSolver, NewtonStatus
 from ..solve.potential import IncrementalPotential
-from ..solve.terms.term import StepContext
+from ..solve.terms.term import RestStrains, StepContext
 from .method import Method
 from .motion import momentary_context
 from .sdirk2 import METHOD as SELF_STARTING
@@ -60,11 +60,11 @@ class StepReport:
 
 @dataclass(frozen=True)
 class _Drive:
-    """Values of stimuli, what the laws made of them, eigenstrain of edges and factors of loads at one time."""
+    """Values of stimuli, what the laws made of them, rest strains and factors of loads at one time."""
 
     stimulus: Array
     transduction: Array
-    eigenstrain: Array
+    rest: RestStrains
     load_factor: Array
 
 
@@ -102,7 +102,7 @@ class Stepper:
         self._channels = list(model.scene.stimuli.values())
         self._range = np.array([channel.maximum - channel.minimum for channel in self._channels])
         self.stimulus = np.zeros(len(self._channels))
-        self.eigenstrain = np.zeros(model.edge_count)
+        self.rest_strains = RestStrains(model.rest_strain, model.joint_rest)
         self.ledger: EnergyLedger | None = None
 
     def prescribed(self, state: State, time: float) -> Prescribed:
@@ -121,12 +121,18 @@ class Stepper:
         scheduled = [_value(channel.schedule.value, time, ended) for channel in self._channels]
         return np.where(np.isnan(state.override), np.array(scheduled, dtype=float), state.override)
 
-    def eigenstrain_of(self, transduction: Array) -> Array:
-        """Eigenstrain of each edge from the filtered stimuli, shape (n_edge,)."""
+    def rest_strains_of(self, transduction: Array) -> RestStrains:
+        """Strains without stress from the filtered stimuli."""
         model = self.model
         strain = free_strain(transduction, model.law_gain, model.law_reference, model.law_saturation)
-        total = np.bincount(model.driven_edge, strain[model.driven_law], model.edge_count)
-        return total.astype(float, copy=False)  # whole numbers if nothing is driven
+        grown = np.bincount(model.driven_edge, model.driven_weight * strain[model.driven_law], model.edge_count)
+        joint = model.joint_rest
+        if len(model.driven_joint):
+            bent = model.driven_joint_weight * strain[model.driven_joint_law]
+            joint = joint.copy()
+            joint[:, 0] += np.bincount(model.driven_joint, bent, len(joint))
+            joint.flags.writeable = False
+        return RestStrains(model.rest_strain + grown, joint)
 
     def load_factor(self, time: float, ended: float = 0.0) -> Array:
         """Factor of each load at `time`, at the end of a step of length `ended` [s], shape (n_load,)."""
@@ -137,12 +143,12 @@ class Stepper:
         time = float(state.time[0])
         self.end.take_state(state)
         self.stimulus = self.stimulus_at(state, time)
-        self.eigenstrain = self.eigenstrain_of(state.transduction)
-        self._look_at(state, self.eigenstrain, self.load_factor(time))
+        self.rest_strains = self.rest_strains_of(state.transduction)
+        self._look_at(state, self.rest_strains, self.load_factor(time))
 
-    def _look_at(self, state: State, eigenstrain: Array, load_factor: Array) -> None:
+    def _look_at(self, state: State, rest: RestStrains, load_factor: Array) -> None:
         """Evaluate the potential at `end` with the velocities of the state."""
-        self.potential.start_step(momentary_context(self.model, self.end, state, eigenstrain, load_factor))
+        self.potential.start_step(momentary_context(self.model, self.end, state, rest, load_factor))
         self.potential.evaluate(self.end, False)
         self._touched = self._touching()
 
@@ -212,7 +218,7 @@ class Stepper:
                 move_along(origin, slopes, method.history, number, h)
             drive = self._drive(state, first_stimulus, time - h, node * h)
             prescribed = self.prescribed(state, time - (1.0 - node) * h)
-            driven = drive.eigenstrain, drive.load_factor
+            driven = drive.rest, drive.load_factor
             context = predict(model, origin, self._start, turned, length, *driven, momentum_length, prescribed)
             report = self._solve(context, prescribed)
             iterations += report.iterations
@@ -239,16 +245,16 @@ class Stepper:
                 return replace(report, status=NewtonStatus.BEYOND, residual=math.inf)
         write_state(model, state, last, self.end, prescribed.rates)
         if method.weights is not None:
-            self._look_at(state, drive.eigenstrain, drive.load_factor)
+            self._look_at(state, drive.rest, drive.load_factor)
         if self.method.history is not None:
             keep_slopes(state, origin, last, momentum_length, method.history)
             touching = self._touching()
             state.kept[0] = np.array_equal(touching, self._touched)
             self._touched = touching
         state.transduction[:] = drive.transduction
-        self.stimulus, self.eigenstrain = drive.stimulus, drive.eigenstrain
+        self.stimulus, self.rest_strains = drive.stimulus, drive.rest
         if self.ledger is not None:
-            self.ledger.record(state, drive.eigenstrain, drive.load_factor, h)
+            self.ledger.record(state, drive.rest, drive.load_factor, h)
         return report
 
     def _touching(self) -> Array:
@@ -276,7 +282,7 @@ class Stepper:
             ends = first_stimulus[model.law_channel], stimulus[model.law_channel]
             transduction = follow(transduction, *ends, model.law_rising, model.law_falling, elapsed)
         load_factor = self.load_factor(begin + elapsed, elapsed)
-        return _Drive(stimulus, transduction, self.eigenstrain_of(transduction), load_factor)
+        return _Drive(stimulus, transduction, self.rest_strains_of(transduction), load_factor)
 
     def _solve(self, context: StepContext, prescribed: Prescribed) -> NewtonReport:
         """Solve a stage; its result is `end`."""

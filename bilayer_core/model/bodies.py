@@ -8,8 +8,8 @@ from ..kinematics.rotation import rotation_matrix
 from ..scene.body import Body, Free, Prescribed
 from ..scene.config import SceneConfig
 from .model import Bodies
-from .rods import Collected
 from .shapes import Shape, shape_of
+from .strands import Collected
 
 
 def build_bodies(scene: SceneConfig, found: Collected) -> Bodies:

@@ -7,15 +7,20 @@ import numpy as np
 from ..scene.config import SceneConfig
 from .bodies import build_bodies
 from .carriers import build_contact, refuse_penetration
+from .laminate import add_laminate
 from .layout import number_unknowns
 from .model import Model
 from .points import add_point_masses, build_loads
 from .rod_surfaces import build_rod_surfaces, refuse_meeting_rods
-from .rods import Collected, add_rod, turn_of_copy
+from .rods import add_bonded_rods
+from .strands import Collected, turn_of_copy
+
+ADD_ROD = {"two_rod": add_bonded_rods, "laminate": add_laminate}
+"""How each model turns a rod into strands."""
 
 
-def build_model(scene: SceneConfig) -> Model:
-    """Arrays of the two-rod model of `scene`.
+def build_model(scene: SceneConfig, model: str = "two_rod") -> Model:
+    """Arrays of one of the models, `ADD_ROD`, of `scene`.
 
     Raises
     ------
@@ -26,7 +31,7 @@ def build_model(scene: SceneConfig) -> Model:
     body_index = {body.name: index for index, body in enumerate(scene.bodies)}
     for rod in scene.rods:
         for copy, name in enumerate(rod.copies):
-            add_rod(found, scene, rod, name, turn_of_copy(rod, copy), body_index)
+            ADD_ROD[model](found, scene, rod, name, turn_of_copy(rod, copy), body_index)
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found)
@@ -39,7 +44,8 @@ def build_model(scene: SceneConfig) -> Model:
         return np.concatenate([found.column(name, dtype, width), found.column(bond_joints + name, dtype, width)])
 
     laws = np.array(found.laws, dtype=float).reshape(-1, 6)
-    model = Model(
+    mass_moment = found.column("mass_moment")
+    arrays = Model(
         scene=scene,
         strands=tuple(found.strands),
         layout=number_unknowns(found.rods, found.node_count, edge_count, found.column("attached_node", np.int64)),
@@ -66,13 +72,19 @@ def build_model(scene: SceneConfig) -> Model:
         drag_coefficient=found.column("drag_coefficient", width=3),
         fluid_mass=found.column("fluid_mass", width=3),
         node_mass=found.column("node_mass"),
+        mass_moment=mass_moment if mass_moment.any() else mass_moment[:0],
         spin_inertia=found.column("spin_inertia"),
         half_width=found.column("half_width"),
         edge_node=found.column("edge_node", np.int64),
         rest_length=found.column("rest_length"),
         axial_stiffness=found.column("axial_stiffness"),
+        rest_strain=found.column("rest_strain"),
         driven_edge=found.column("driven_edge", np.int64),
         driven_law=found.column("driven_law", np.int64),
+        driven_weight=found.column("driven_weight"),
+        driven_joint=found.column("driven_joint", np.int64),
+        driven_joint_law=found.column("driven_joint_law", np.int64),
+        driven_joint_weight=found.column("driven_joint_weight"),
         law_channel=laws[:, 0].astype(np.int64),
         law_rising=laws[:, 1],
         law_falling=laws[:, 2],
@@ -85,14 +97,16 @@ def build_model(scene: SceneConfig) -> Model:
         joint_rest=joined("joint_rest", width=3),
         joint_node=joined("joint_node", np.int64),
         voronoi_length=found.column("voronoi_length"),
+        coupled_joint=found.column("coupled_joint", np.int64),
+        strain_coupling=found.column("strain_coupling", width=2),
         pair_top=found.column("bond_joint_a", np.int64),
         pair_bottom=found.column("bond_joint_b", np.int64),
         pair_stiffness=found.column("pair_stiffness"),
         pair_rest=found.column("pair_rest", width=3),
     )
-    refuse_penetration(model)
-    refuse_meeting_rods(model)
-    return model
+    refuse_penetration(arrays)
+    refuse_meeting_rods(arrays)
+    return arrays
 
 
 def _resolve_walls(edges: np.ndarray, edge_count: int) -> np.ndarray:

@@ -10,8 +10,8 @@ from ..errors import PenetrationError
 from ..scene.config import SceneConfig
 from .model import Bodies, Carriers, Model, StrandArrays, Surfaces
 from .parties import RODS, Party, parties, points_meet, shapes_meet
-from .rods import Collected
 from .shapes import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
+from .strands import Collected
 
 
 @dataclass(frozen=True)

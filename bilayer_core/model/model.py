@@ -17,16 +17,18 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class StrandArrays(ReadOnlyArrays):
-    """One layer of one rod: where its nodes and edges stand."""
+    """One layer of one rod, or all of them: where its nodes and edges stand."""
 
     name: str
     rod: str
     layer: str
+    first_station: int
     first_node: int
     node_count: int
     first_edge: int
     width: Array  # at its nodes [m], shape (node_count,)
     thickness: Array  # likewise
+    offset: Array  # of the middle between its faces from its nodes, along m1 [m], likewise
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Carriers(ReadOnlyArrays):
     """
 
     weight: Array  # Δl of the barrier [m], shape (n_carrier,)
-    radius: Array  # half thickness, offset, or radius [m], shape (n_carrier,)
+    radius: Array  # distance of the farther face, offset, or radius [m], shape (n_carrier,)
     friction: Array  # coefficients forward, backward and sideways, shape (n_carrier, 3)
     node_edges: Array  # edges before and after each node, the same at an end, shape (n_node, 2)
     node_axis: Array  # which direction counts as forward: 0 t, 1 m1, 2 m2, shape (n_node,)
@@ -155,14 +157,20 @@ class Model(ReadOnlyArrays):
     fluid_mass: Array  # added along m1, m2 [kg] and against spin [kg m²], shape (n_edge, 3); (0, 3) without
 
     node_mass: Array  # with point masses [kg], shape (n_node,)
+    mass_moment: Array  # mass × its height along m1 of each edge [kg m], shape (n_edge,); (0,) if all of it is at nodes
     spin_inertia: Array  # of edges about their tangent [kg m²], shape (n_edge,)
     half_width: Array  # of each edge [m], shape (n_edge,)
 
     edge_node: Array  # first node of each edge, shape (n_edge,)
     rest_length: Array  # [m], shape (n_edge,)
     axial_stiffness: Array  # EA [N], shape (n_edge,)
+    rest_strain: Array  # of edges without stimuli, shape (n_edge,)
     driven_edge: Array  # edges that follow a law, once for each law, shape (n_driven,)
     driven_law: Array  # the law that each of them follows, shape (n_driven,)
+    driven_weight: Array  # its part of the law's eigenstrain, shape (n_driven,)
+    driven_joint: Array  # joints whose κ̄₁ follows a law, once for each law, shape (n_driven_joint,)
+    driven_joint_law: Array  # likewise
+    driven_joint_weight: Array  # κ̄₁ per eigenstrain of the law [rad], likewise
     law_channel: Array  # stimulus channel of each law, shape (n_law,)
     law_rising: Array  # time constant for a rising stimulus [s], shape (n_law,)
     law_falling: Array  # and for a falling one
@@ -173,9 +181,11 @@ class Model(ReadOnlyArrays):
     joint_a: Array  # first edge of each joint, shape (n_joint,)
     joint_b: Array  # second edge
     joint_stiffness: Array  # k₁ k₂ k₃ [N m], shape (n_joint, 3)
-    joint_rest: Array  # κ̄₁ κ̄₂ ψ̄ [rad], shape (n_joint, 3)
+    joint_rest: Array  # κ̄₁ κ̄₂ ψ̄ without stimuli [rad], shape (n_joint, 3)
     joint_node: Array  # node at which a bend acts, −1 for bonds, shape (n_joint,)
     voronoi_length: Array  # of bends and clamps [m], shape (bend_count,)
+    coupled_joint: Array  # joints whose κ̄₁ depends on the strains of their edges, shape (n_coupled,)
+    strain_coupling: Array  # b of either edge, 0 for a wall [rad], shape (n_coupled, 2)
 
     pair_top: Array  # paired edges, shape (n_pair,)
     pair_bottom: Array

@@ -9,18 +9,21 @@ import numpy as np
 from ..scene.config import SceneConfig
 from ..scene.rod import Rod
 from .model import Bodies, LoadShares, PointLoads
-from .rods import Collected
 from .section import outline
+from .strands import Collected, Span
 
 
 def add_point_masses(scene: SceneConfig, found: Collected) -> None:
-    """Add point masses to the masses of nodes [kg]."""
-    node_mass = found.column("node_mass")
+    """Add point masses to the masses of nodes [kg], and their heights over these to the moments of mass [kg m]."""
+    node_mass, moment = found.column("node_mass"), found.column("mass_moment")
+    node_edges = found.column("node_edges", np.int64, 2)
     for point in scene.masses:
-        for rod, spans in _copies(scene, found, point.rod):
+        for rod, spans, height in _copies(scene, found, point.rod):
             nodes, shares = _shares(rod, spans, point.position)
             np.add.at(node_mass, nodes, point.mass * shares)
-    found.columns["node_mass"] = [node_mass]
+            if height:
+                np.add.at(moment, node_edges[nodes].T, 0.5 * height * point.mass * shares)
+    found.columns["node_mass"], found.columns["mass_moment"] = [node_mass], [moment]
 
 
 def build_loads(scene: SceneConfig, found: Collected, bodies: Bodies, frame: str) -> PointLoads:
@@ -34,7 +37,7 @@ def build_loads(scene: SceneConfig, found: Collected, bodies: Bodies, frame: str
             forces += [(free, index, load.force)] if any(load.force) else []
             moments += [(free, index, load.moment)] if any(load.moment) else []
             continue
-        for rod, spans in _copies(scene, found, load.rod):
+        for rod, spans, _ in _copies(scene, found, load.rod):
             parts = zip(*_shares(rod, spans, load.position), strict=True)
             nodes += [(node, index, share * np.array(load.force)) for node, share in parts]
     return PointLoads(*(_load_shares(parts) for parts in (nodes, forces, moments)))
@@ -47,22 +50,22 @@ def _load_shares(parts: list[tuple[int, int, np.ndarray]]) -> LoadShares:
     )
 
 
-def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[Rod, list[tuple[int, int, int, int]]]]:
-    """Rods of a name, or the copies of a pattern, each with its layers (first and last station, first node, edge)."""
-    spans = iter(found.rods)
+def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[Rod, list[Span], float]]:
+    """Rods of a name, or the copies of a pattern, each with its strands and the height of its path over these [m]."""
+    spans = iter(zip(found.rods, found.path_height, strict=True))
     for rod in scene.rods:
         for copy in rod.copies:
             own = next(spans)
             if name in (copy, rod.name):
-                yield rod, own
+                yield rod, *own
 
 
-def _shares(rod: Rod, spans: list[tuple[int, int, int, int]], position: float) -> tuple[np.ndarray, np.ndarray]:
+def _shares(rod: Rod, spans: list[Span], position: float) -> tuple[np.ndarray, np.ndarray]:
     """Nodes next to a place on the path, and the part of a force or of a mass that each takes.
 
     Between stations the parts are linear in the position; where two layers cover a station, the path is their
-    interface, and each takes a part in proportion to the other's thickness. Force, moment and mass centre are thus
-    those of a point on the path.
+    interface, and each strand takes a part in proportion to the other's thickness. Force, moment and mass centre are
+    thus those of a point on the path; a single strand for both layers takes all, at its own height.
     """
     along = min(position / rod.edge_length, rod.stations - 1.0)
     before = min(int(along), rod.stations - 2)
@@ -70,7 +73,7 @@ def _shares(rod: Rod, spans: list[tuple[int, int, int, int]], position: float) -
     for station, part in ((before, before + 1.0 - along), (before + 1, along - before)):
         if part == 0.0:
             continue
-        thickness = outline(rod, np.array([station]))[1][:, 0]
+        thickness = outline(rod, np.array([station]))[1][:, 0] if len(spans) > 1 else np.ones(1)
         covering = np.flatnonzero(thickness)
         for k in covering:
             first, _, first_node, _ = spans[k]

@@ -18,7 +18,7 @@ from .validity import EdgeFigures
 
 if TYPE_CHECKING:
     from .model import Model
-    from .rods import Collected
+    from .strands import Collected
 
 Array = np.ndarray
 FEW_EDGES = 2  # that a point is away from the nearest edge of its own rod that it sees, at least
@@ -29,7 +29,7 @@ class RodSurfaces(ReadOnlyArrays):
     """Points of rods that can meet, and the segments that they face.
 
     The points of an edge divide it evenly, its first node among them (and its last at the end of a strand), no farther
-    apart than half its layer's thickness: no other rod fits between them, whatever the mesh. A point stands for the
+    apart than the strand's radius: no other rod fits between them, whatever the mesh. A point stands for the
     length between the middles to its neighbours, at the ends for half of it.
 
     A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of
@@ -40,7 +40,7 @@ class RodSurfaces(ReadOnlyArrays):
     edge_rod: Array  # expanded rod of each edge, shape (n_edge,)
     edge_first: Array  # whether the edge is the first of its strand, shape (n_edge,)
     edge_arc: Array  # from and to along the path of its rod [m], shape (n_edge, 2)
-    edge_radius: Array  # half its layer's largest thickness [m], shape (n_edge,)
+    edge_radius: Array  # largest radius of its strand's nodes [m], shape (n_edge,)
     first_point: Array  # of each edge, shape (n_edge + 1,)
     point_edge: Array  # shape (n_point,)
     point_fraction: Array  # place on its edge, 0 … 1, shape (n_point,)
@@ -76,17 +76,16 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         for rod in rods
     ]
     parts: dict[str, list[Array]] = {}
+    node_radius = found.column("node_radius")
     for strand in found.strands:
         number = names.index(strand.rod)
         rod = rods[number]
-        layer = next(layer for layer in rod.layers if layer.name == strand.layer)
-        start, _ = rod.covered_stations(layer)
         length = found.column("rest_length")[strand.first_edge : strand.first_edge + strand.node_count - 1]
-        radius = 0.5 * float(strand.thickness.max())
+        radius = float(node_radius[strand.first_node : strand.first_node + strand.node_count].max())
         per_edge = max(1, math.ceil(float(length.max()) / radius * (1.0 - 1e-9)))
         if not meets[number].any():
             per_edge = 0
-        for name, values in _strand_points(rod.edge_length, start, length, per_edge).items():
+        for name, values in _strand_points(rod.edge_length, strand.first_station, length, per_edge).items():
             parts.setdefault(name, []).append(values)
         edges = len(length)
         parts.setdefault("edge_rod", []).append(np.full(edges, number))

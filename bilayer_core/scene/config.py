@@ -164,8 +164,8 @@ class Coupling(Part):
 class Solver(Part):
     """How the equations are solved."""
 
-    model: Literal["auto", "two_rod"] = "auto"
-    """`two_rod`: each layer a rod of its own, bonded to the other."""
+    model: Literal["auto", "two_rod", "laminate"] = "auto"
+    """`two_rod`: each layer a rod of its own, bonded to the other; `laminate`: one curve for both, bonded exactly."""
     dimension: Literal["auto", 3] = "auto"
     """Of space."""
     integrator: Literal["auto", "implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"] = (

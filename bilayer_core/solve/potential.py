@@ -14,7 +14,7 @@ from .assembly import expand_gradient
 from .clamps import hand_gradient_to_bodies
 from .configuration import Configuration
 from .terms.contact import Barrier, Friction
-from .terms.elastic import BendingAndTwisting, Bond, Stretching
+from .terms.elastic import BendingAndTwisting, BendingOffAxis, Bond, Stretching
 from .terms.fluid import AddedMass, Drag
 from .terms.inertial import Damping, Gravity, Inertia
 from .terms.loads import Followers, Loads, Moments
@@ -61,7 +61,8 @@ class IncrementalPotential:
         self.near = self._barrier.near if self._barrier else None
         self._of_rods_and_bodies = self._needed(
             (Stretching, True),
-            (BendingAndTwisting, True),
+            (BendingAndTwisting, len(model.coupled_joint) == 0),
+            (BendingOffAxis, len(model.coupled_joint) > 0),
             (Bond, len(model.pair_top) > 0),
             (Inertia, True),
             (Damping, model.scene.damping.mass > 0.0),

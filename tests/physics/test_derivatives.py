@@ -68,8 +68,8 @@ class Problem:
     Unknowns that are angles are multiplied with a length, so that all entries are of one kind.
     """
 
-    def __init__(self, scene, force, h, rng, noise=2e-4):
-        model = FORCES[force](build_model(load_scene(scene)))
+    def __init__(self, scene, force, h, rng, noise=2e-4, model="two_rod"):
+        model = FORCES[force](build_model(load_scene(scene), model))
         stepper = Stepper(model, INTEGRATORS["implicit_euler"], h, 1e-6, 50, 0)
         state = initial_state(model)
         rest = Configuration(model)
@@ -88,7 +88,7 @@ class Problem:
             state.body_angular_velocity[body] = rng.standard_normal(3)
         start = Configuration(model)
         start.take_state(state)
-        drive = stepper.eigenstrain_of(np.full(len(model.law_gain), 0.7)), stepper.load_factor(0.03)
+        drive = stepper.rest_strains_of(np.full(len(model.law_gain), 0.7)), stepper.load_factor(0.03)
         origin = start_point(model, state, start)  # of a later stage: not where that is solved from
         origin.position[:] += 1e-5 * rng.standard_normal(origin.position.shape)
         origin.body_position[:] += 1e-5 * rng.standard_normal(origin.body_position.shape)
@@ -156,7 +156,7 @@ class Problem:
         return np.array(gradient), np.array(rows)
 
 
-def of_everything(force, hub, seed):
+def of_everything(force, hub, seed, model="two_rod"):
     """One force, or all, of the scene that has every one."""
     scene = everything()
     scene["bodies"][0]["motion"] = HUBS[hub]
@@ -171,7 +171,7 @@ def of_everything(force, hub, seed):
         else:
             scene["bodies"] = [{**scene["bodies"][0], "contact_points": []}]
             scene["loads"] = []
-    return Problem(scene, force, h, np.random.default_rng(seed))
+    return Problem(scene, force, h, np.random.default_rng(seed), model=model)
 
 
 def check(problem):
@@ -201,6 +201,15 @@ def test_gradient_and_hessian_agree_with_differences(force, hub, seed):
         assert problem.coupling > 0.0
     if force == "loads":
         assert {"loads", "followers", "moments"} <= problem.potential.terms.keys()
+
+
+@pytest.mark.parametrize("hub", HUBS)
+@pytest.mark.parametrize("force", ["stretching", "bending", "twisting", "everything"])
+def test_derivatives_of_a_laminate_off_its_neutral_axis_agree_with_differences(force, hub):
+    problem = of_everything(force, hub, 0, "laminate")
+    slopes = problem.model.strain_coupling  # arms begin and end with one layer
+    assert len(slopes) == 6 and np.abs(slopes).max() > 0.5
+    check(problem)
 
 
 SHAPES = {

@@ -15,6 +15,7 @@ from bilayer_core.model.build import build_model
 from bilayer_core.model.section import bond, rectangle
 from bilayer_core.model.state import initial_state
 from bilayer_core.solve.configuration import Configuration
+from bilayer_core.solve.terms.term import RestStrains
 
 ELASTIC = ("stretching", "bending", "twisting", "bond")
 
@@ -31,7 +32,7 @@ def at_rest(scene_dict):
     state = initial_state(model)
     start = Configuration(model)
     start.take_state(state)
-    undriven = np.zeros(model.edge_count), np.zeros(0)
+    undriven = RestStrains(model.rest_strain, model.joint_rest), np.zeros(0)
     still = momentary_context(model, start, state, *undriven)
     stepper.potential.start_step(replace(still, length=1e3))  # so long that inertia does not count
     return model, stepper.potential, start

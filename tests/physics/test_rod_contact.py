@@ -16,6 +16,7 @@ from bilayer_core.model.rod_surfaces import NearPairs
 from bilayer_core.model.state import initial_state
 from bilayer_core.solve.configuration import Configuration
 from bilayer_core.solve.rod_contact import RodContact
+from bilayer_core.solve.terms.term import RestStrains
 
 D_HAT = 1e-3
 
@@ -209,7 +210,7 @@ def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hu
     state.position[under.first_node : under.first_node + under.node_count, 2] += 0.9e-3 - 0.3e-3
     start.take_state(state)
     start.carry_frames(start, np.zeros(model.edge_count))
-    undriven = np.zeros(model.edge_count), np.zeros(0)
+    undriven = RestStrains(model.rest_strain, model.joint_rest), np.zeros(0)
     origin, turned = start_point(model, state, start), np.zeros(model.edge_count)
     stepper.potential.start_step(predict(model, origin, start, turned, 1e-5, *undriven))
     potential, size = stepper.potential, model.layout.size

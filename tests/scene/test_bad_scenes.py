@@ -163,7 +163,7 @@ def test_a_fault_is_told_with_its_place_the_value_found_and_what_is_allowed(path
     ("path", "value", "fault"),
     [
         ("gravity", [0, 0], "gravity[2]: is missing; must be an acceleration [m/s^2], such as -9.81"),
-        ("solver", {"model": "two_rods"}, "solver.model: found \"two_rods\"; must be 'auto' or 'two_rod'"),
+        ("solver", {"model": "two_rods"}, "solver.model: found \"two_rods\"; must be 'auto', 'two_rod' or 'laminate'"),
         ("rods.arm.name", DELETE, "rods[0].name: is missing; must be text"),
         ("rods.arm.name", "a/b", 'rods.a/b.name: found "a/b"; must be a name: letters, digits and single underscores'),
         (

@@ -16,9 +16,10 @@ from bilayer_core import Simulator, load_scene
 ribbons = [rod([layer()], name="a"), rod([layer(), layer("top")], name="b", start=(0, 0, 2.3e-3))]
 touching = scene(ribbons, contact=contact(coefficient=0.5), gravity=[0, 0, -10])
 for description in (everything(), everything(stations=7), scene([rod([layer()])]), touching):
-    simulator = Simulator(load_scene(description), budget=True)
-    simulator.run(0.005)
-    simulator.frame()
+    for model in ("two_rod", "laminate"):
+        simulator = Simulator(load_scene(description), model=model, budget=True)
+        simulator.run(0.005)
+        simulator.frame()
 Simulator(load_scene(scene([rod([layer(), layer("top")])]))).solve_static()
 
 used = {}

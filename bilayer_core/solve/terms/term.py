@@ -16,6 +16,31 @@ Array = np.ndarray
 
 
 @dataclass(frozen=True)
+class RestStrains:
+    """Strains without stress, as stimuli set them.
+
+    Attributes
+    ----------
+    edge : Array
+        η of each edge, shape (n_edge,).
+    joint : Array
+        κ̄₁ κ̄₂ ψ̄ of each joint [rad], shape (n_joint, 3), read-only; where `Model.coupled_joint` says so κ̄₁ is that
+        at ε = 0.
+    """
+
+    edge: Array
+    joint: Array
+
+    def halfway_to(self, other: RestStrains) -> RestStrains:
+        """The mean of both."""
+        joint = self.joint
+        if other.joint is not joint:
+            joint = 0.5 * (joint + other.joint)
+            joint.flags.writeable = False
+        return RestStrains(0.5 * (self.edge + other.edge), joint)
+
+
+@dataclass(frozen=True)
 class StepContext:
     """What is frozen over a stage of a step: it reads as an implicit Euler step from an origin (`integrate.method`).
 
@@ -43,8 +68,8 @@ class StepContext:
         Turn of edges that inertia prefers, counted from `start` [rad], shape (n_edge,).
     predicted_body_position, predicted_body_rotation : Array
         X̃ [m] and R̃ of free bodies, shapes (n_free, 3), (n_free, 3, 3).
-    eigenstrain : Array
-        η of each edge at the time of the stage, shape (n_edge,).
+    rest : RestStrains
+        At the time of the stage.
     load_factor : Array
         Factor of each load of the scene there, shape (n_load,).
     length_of_momenta : float or None
@@ -64,7 +89,7 @@ class StepContext:
     predicted_turn: Array
     predicted_body_position: Array
     predicted_body_rotation: Array
-    eigenstrain: Array
+    rest: RestStrains
     load_factor: Array
     length_of_momenta: float | None = None
 

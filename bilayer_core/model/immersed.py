@@ -1,0 +1,62 @@
+"""Drag and added mass of rods: those of the whole section, shared by its strands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..scene.config import Fluid
+from ..scene.rod import Rod
+from .section import outline
+from .strands import Collected, Span
+
+Array = np.ndarray
+
+
+def add_fluid(found: Collected, fluid: Fluid | None, rod: Rod, spans: list[Span]) -> None:
+    """Add what a fluid does to a rod with one strand for each layer, or one for all."""
+    if fluid is None:
+        return
+    _add_drag(found, fluid, rod, spans)
+    if fluid.added_mass is not None:
+        _add_added_mass(found, fluid, rod, spans)
+
+
+def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:
+    """Thickness of the section [m], shape (n_place,), and the part of each strand, that of its layer in it, shape
+    (n_strand, n_place).
+    """
+    thickness = layers.sum(axis=0)
+    return thickness, layers / thickness if len(spans) == len(layers) else np.ones((1, len(thickness)))
+
+
+def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[Span]) -> None:
+    """Drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts at
+    the middle.
+    """
+    length = np.full(rod.stations, rod.edge_length)
+    length[[0, -1]] *= 0.5
+    width, layers = outline(rod, np.arange(rod.stations))
+    thickness, shares = _shares(spans, layers)
+    whole = np.stack([fluid.drag_along * width, fluid.drag_across * width, fluid.drag_across * thickness], axis=1)
+    for (first, last, first_node, first_edge), own in zip(spans, shares, strict=True):
+        station = np.arange(last - first + 1)
+        covered = slice(first, last + 1)
+        share = fluid.density * length[covered] * own[covered]
+        edges = np.stack([np.maximum(station - 1, 0), np.minimum(station, last - first - 1)], axis=1)
+        found.add(
+            drag_node=first_node + station,
+            drag_edge=first_edge + edges,
+            drag_coefficient=share[:, None] * whole[covered],
+        )
+
+
+def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, spans: list[Span]) -> None:
+    """Added mass of the whole section along each edge, shared by its layers in proportion to their thickness."""
+    width, layers = outline(rod, np.arange(rod.stations - 1) + 0.5)
+    thickness, shares = _shares(spans, layers)
+    per_area, law = 0.25 * np.pi * fluid.density * rod.edge_length, fluid.added_mass
+    through, sideways = law.through * width**2, law.sideways * thickness**2
+    turning = law.turning * (width**2 - thickness**2) ** 2 / 32.0
+    whole = per_area * np.stack([through, sideways, turning], axis=1)
+    for (first, last, _, _), own in zip(spans, shares, strict=True):
+        found.add(fluid_mass=(own[:, None] * whole)[first:last])

@@ -1,0 +1,172 @@
+"""One curve for both layers of a rod: where it lies, and what it carries (`laminate_section` has the derivation)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene.config import SceneConfig
+from ..scene.profile import values_at
+from ..scene.rod import Layer, Rod
+from .immersed import add_fluid
+from .laminate_section import LayerHalves, WholeSection, layer_halves, side
+from .model import StrandArrays
+from .section import Section, outline, sections
+from .strands import Collected, StrandElements, Turn, add_strand, strand_shape
+from .validity import Figure
+
+Array = np.ndarray
+NAME = "laminate"
+UNEVEN = 0.1
+"""Part by which the distances of the two faces from the curve may differ without a warning."""
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A layer at the middle of edges; shapes (n_edge,)."""
+
+    section: Section
+    present: Array
+    length: Array  # of its middle at the start [m]
+    height: Array  # of its middle over the path [m]
+
+    @property
+    def mass(self) -> Array:
+        """[kg]"""
+        return self.present * self.section.mass * self.length
+
+    def spin_inertia(self, axis: float) -> Array:
+        """About the curve [kg m²]."""
+        return self.present * self.length * self.section.spin_inertia + self.mass * (self.height - axis) ** 2
+
+
+def add_laminate(
+    found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Turn, body_index: dict[str, int]
+) -> None:
+    """Add one copy of a rod: a strand with the stiffness and mass of its layers, and their drag."""
+    layers = _placed(scene, rod)
+    axis = _axis(layers)
+    shape = strand_shape(rod, np.full(rod.stations, axis), 0, rod.stations - 1, turn)
+    halves = [
+        layer_halves(scene, rod, place, axis, shape, layer.length / shape.lengths, layer.present)
+        for place, layer in enumerate(layers)
+    ]
+    whole = WholeSection(scene, rod, halves, shape)
+    low, high = _faces(rod, axis)
+    strand_name = rod.layers[0].name if len(rod.layers) == 1 else NAME
+    strand = StrandArrays(
+        name=f"{name}/{strand_name}",
+        rod=name,
+        layer=strand_name,
+        first_station=0,
+        first_node=found.node_count,
+        node_count=rod.stations,
+        first_edge=found.edge_count,
+        width=values_at(rod.width, rod.edge_length * np.arange(rod.stations)),
+        thickness=high - low,
+        offset=0.5 * (high + low),
+    )
+    elements = StrandElements(
+        edge_mass=sum(layer.mass for layer in layers),
+        spin_inertia=sum(layer.spin_inertia(axis) for layer in layers),
+        half_width=0.5 * layers[0].section.width,
+        axial_stiffness=whole.axial_stiffness,
+        rest_strain=whole.rest_strain,
+        joint_stiffness=whole.joint_stiffness,
+        joint_rest=whole.joint_rest,
+        node_radius=np.maximum(high, -low),
+    )
+    found.add(mass_moment=sum(layer.mass * (layer.height - axis) for layer in layers))
+    found.rods.append([(0, rod.stations - 1, strand.first_node, strand.first_edge)])
+    found.path_height.append(-axis)
+    joints = add_strand(found, scene, rod, strand, shape, elements, body_index)
+    coupling = whole.strain_coupling()
+    coupled = coupling.any(axis=1) & (joints >= 0)
+    found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
+    for layer, half in zip(rod.layers, halves, strict=True):
+        _add_eigenstrain(found, scene, rod, layer, whole, half, strand.first_edge, joints)
+    add_fluid(found, scene.fluid, rod, found.rods[-1])
+
+
+def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
+    nodes, edges = np.arange(rod.stations), np.arange(rod.stations - 1)
+    layers = []
+    for place, layer in enumerate(rod.layers):
+        first, last = rod.covered_stations(layer)
+        height = side(rod, place) * values_at(layer.thickness, rod.edge_length * nodes)
+        section = sections(rod, layer, scene.materials[layer.material], edges + 0.5)
+        layers.append(
+            _Placed(
+                section,
+                (first <= edges) & (edges < last),
+                strand_shape(rod, height, 0, rod.stations - 1, lambda vectors, about=False: vectors).lengths,
+                side(rod, place) * section.thickness,
+            )
+        )
+    return layers
+
+
+def _axis(layers: list[_Placed]) -> float:
+    """Height over the path [m] of the neutral axis where most edges have the same layers, mean over these.
+
+    B = 0 there: Σ (EA/λ) (y − y₀) = 0 with λ in proportion to the layers' lengths, whatever y₀ is.
+    """
+    present = np.array([layer.present for layer in layers])
+    kinds, kind, count = np.unique(present, axis=1, return_inverse=True, return_counts=True)
+    prevailing = max(range(len(count)), key=lambda k: (count[k], kinds[:, k].sum()))
+    there = kind.reshape(-1) == prevailing
+    weight = [(layer.present * layer.section.axial_stiffness / layer.length)[there] for layer in layers]
+    moment = sum(np.vdot(w, layer.height[there]) for w, layer in zip(weight, layers, strict=True))
+    return float(moment / np.sum(weight))
+
+
+def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
+    """Heights of the two faces over the curve at each node [m]."""
+    _, layers = outline(rod, np.arange(rod.stations))
+    if len(layers) == 1:
+        return -0.5 * layers[0] - axis, 0.5 * layers[0] - axis
+    return -layers[0] - axis, layers[1] - axis
+
+
+def uneven_faces(scene: SceneConfig) -> Iterator[Figure]:
+    """Rods whose contact counts from a face that is not where the nearer one is."""
+    for rod in scene.rods:
+        low, high = _faces(rod, _axis(_placed(scene, rod)))
+        difference = np.abs(high + low)
+        if np.any(difference > UNEVEN * np.maximum(high, -low)):
+            near, far = np.minimum(high, -low).min(), np.maximum(high, -low).max()
+            yield Figure(
+                f"rods.{rod.name}",
+                "faces are",
+                f"{1e3 * near:.3g} to {1e3 * far:.3g} mm from the laminate's curve",
+                f"equal within {100 * UNEVEN:g} %",
+                "contact counts from the farther one on both sides: the nearer feels surfaces up to "
+                f"{1e3 * difference.max():.3g} mm too early",
+            )
+
+
+def _add_eigenstrain(
+    found: Collected,
+    scene: SceneConfig,
+    rod: Rod,
+    layer: Layer,
+    whole: WholeSection,
+    half: LayerHalves,
+    first_edge: int,
+    joints: Array,
+) -> None:
+    """The rest strains of edges and joints that follow the laws of a layer."""
+    for law in layer.eigenstrain:
+        number, edges = found.law(scene, law), np.array(rod.driven_edges(layer, law))
+        of_edges, of_nodes = whole.driven(half, edges)
+        bent = np.flatnonzero((of_nodes != 0.0) & (joints >= 0))
+        found.add(
+            driven_edge=first_edge + edges,
+            driven_law=np.full(len(edges), number),
+            driven_weight=of_edges[edges],
+            driven_joint=joints[bent],
+            driven_joint_law=np.full(len(bent), number),
+            driven_joint_weight=of_nodes[bent],
+        )

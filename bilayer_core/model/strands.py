@@ -1,0 +1,232 @@
+"""Strands: chains of nodes, edges and joints, whatever they stand for, and the place where rods are collected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..kinematics.path import circle, rest_strains, spiral, straight
+from ..kinematics.rotation import rotation_matrix
+from ..scene.config import SceneConfig
+from ..scene.eigenstrain import Eigenstrain
+from ..scene.rod import ArcPath, Rod, SpiralPath
+from .model import StrandArrays
+
+Array = np.ndarray
+Span = tuple[int, int, int, int]
+"""First and last station, first node, first edge of a strand."""
+
+
+@dataclass
+class Collected:
+    """What grows while rods are added one after the other."""
+
+    strands: list[StrandArrays] = field(default_factory=list)
+    rods: list[list[Span]] = field(default_factory=list)
+    path_height: list[float] = field(default_factory=list)
+    """Of the path of each rod over its only strand [m]; 0 where two strands lie on either side of it."""
+    columns: dict[str, list] = field(default_factory=dict)
+    laws: list[tuple[float, ...]] = field(default_factory=list)
+    """Channel, time constants rising and falling, gain, reference, saturation of each eigenstrain law."""
+    node_count: int = 0
+    edge_count: int = 0
+    joint_count: int = 0
+
+    def add(self, **values) -> None:
+        for name, value in values.items():
+            self.columns.setdefault(name, []).append(np.atleast_1d(value))
+
+    def column(self, name: str, dtype=float, width: int | None = None) -> Array:
+        parts = self.columns.get(name)
+        if not parts:
+            array = np.zeros((0,) if width is None else (0, width), dtype)
+        else:
+            array = np.concatenate(parts).astype(dtype)
+        return np.ascontiguousarray(array)
+
+    def law(self, scene: SceneConfig, law: Eigenstrain) -> int:
+        """Number of an eigenstrain law; equal laws are one."""
+        numbers = (list(scene.stimuli).index(law.stimulus), *law.lags, law.gain, law.reference, law.limit)
+        if numbers not in self.laws:
+            self.laws.append(numbers)
+        return self.laws.index(numbers)
+
+
+Turn = Callable[..., Array]
+
+
+def turn_of_copy(rod: Rod, copy: int) -> Turn:
+    """Function that turns directions of a rod, or points with ``about=True``, to those of one of its copies."""
+    if rod.pattern is None:
+        return lambda vectors, about=False: vectors
+    turn = rotation_matrix(2.0 * np.pi * copy / rod.pattern.count * np.array(rod.pattern.axis))
+    turn[np.abs(turn) < 1e-15] = 0.0  # quarter turns are exact
+    center = np.array(rod.pattern.center)
+
+    def apply(vectors: Array, about: bool = False) -> Array:
+        return (vectors - center) @ turn.T + center if about else vectors @ turn.T
+
+    return apply
+
+
+@dataclass(frozen=True)
+class StrandShape:
+    """A strand at the start: its nodes [m], the lengths [m] and frames of its edges, and the frames of the path at its
+    two ends.
+    """
+
+    positions: Array  # shape (n_node, 3)
+    lengths: Array  # shape (n_edge,)
+    tangents: Array  # shape (n_edge, 3)
+    normals: Array  # likewise
+    end_tangents: Array  # shape (2, 3)
+    end_normals: Array  # likewise
+
+    @property
+    def voronoi(self) -> Array:
+        """Half the lengths of the edges at each node [m], shape (n_node,)."""
+        return halves_to_nodes(self.lengths)
+
+    def strains(self) -> Array:
+        """κ₁ κ₂ ψ [rad] at each node: between the edges at it, at the ends between path and edge, shape (n_node, 3)."""
+        tangents = np.concatenate([self.end_tangents[:1], self.tangents, self.end_tangents[1:]])
+        normals = np.concatenate([self.end_normals[:1], self.normals, self.end_normals[1:]])
+        return rest_strains(tangents[:-1], normals[:-1], tangents[1:], normals[1:])
+
+
+def strand_shape(rod: Rod, height: Array, first: int, last: int, turn: Turn) -> StrandShape:
+    """Shape of the strand that lies `height` [m] over the path at the stations from first to last."""
+    frame = (np.array(rod.path.start), np.array(rod.path.direction), np.array(rod.normal))
+
+    def along(stations: Array) -> tuple[Array, Array, Array]:
+        arc = rod.edge_length * stations
+        if isinstance(rod.path, SpiralPath):
+            side = 1.0 if rod.path.toward == "normal" else -1.0
+            return spiral(*frame, rod.path.start_radius, rod.path.growth, side, rod.path.angle_at(arc))
+        if isinstance(rod.path, ArcPath):
+            return circle(*frame, rod.path.curvature, arc)
+        return straight(*frame, arc)
+
+    points, tangents, normals = along(np.arange(first, last + 1))
+    _, _, middle_normals = along(np.arange(first, last) + 0.5)
+    positions = turn(points + height[:, None] * normals, about=True)
+    edges = np.diff(positions, axis=0)
+    lengths = np.linalg.norm(edges, axis=1)
+    edge_tangents = edges / lengths[:, None]
+    ends = [0, -1]
+    slopes = (height[[1, -1]] - height[[0, -2]]) / rod.edge_length  # of a layer whose thickness varies
+    end_tangents = tangents[ends] + slopes[:, None] * normals[ends]
+    end_tangents = turn(end_tangents / np.linalg.norm(end_tangents, axis=1, keepdims=True))
+    return StrandShape(
+        positions,
+        lengths,
+        edge_tangents,
+        _across(turn(middle_normals), edge_tangents),
+        end_tangents,
+        _across(turn(normals[ends]), end_tangents),
+    )
+
+
+def _across(normals: Array, tangents: Array) -> Array:
+    """Normals made perpendicular to tangents, unit, shape (n, 3)."""
+    normals = normals - np.einsum("ij,ij->i", normals, tangents)[:, None] * tangents
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+@dataclass(frozen=True)
+class StrandElements:
+    """Inertia and stiffness of a strand's edges, and of its joints as if there was one at every node."""
+
+    edge_mass: Array  # [kg], shape (n_edge,)
+    spin_inertia: Array  # [kg m²], shape (n_edge,)
+    half_width: Array  # [m], shape (n_edge,)
+    axial_stiffness: Array  # EA [N], shape (n_edge,)
+    rest_strain: Array  # without stimuli, shape (n_edge,)
+    joint_stiffness: Array  # k₁ k₂ k₃ [N m], shape (n_node, 3)
+    joint_rest: Array  # κ̄₁ κ̄₂ ψ̄ [rad] without stimuli, shape (n_node, 3)
+    node_radius: Array  # from which contact counts [m], shape (n_node,)
+
+
+def add_strand(
+    found: Collected,
+    scene: SceneConfig,
+    rod: Rod,
+    strand: StrandArrays,
+    shape: StrandShape,
+    elements: StrandElements,
+    body_index: dict[str, int],
+) -> Array:
+    """Add a strand: joints at inner nodes, and where a body holds an end of the rod that the strand reaches.
+
+    Returns
+    -------
+    ndarray
+        The joint of each node, −1 for free ends, shape (n_node,).
+    """
+    nodes, edges = strand.node_count, strand.node_count - 1
+    first_edge, first_node = strand.first_edge, strand.first_node
+    voronoi, index = shape.voronoi, np.arange(nodes)
+    found.strands.append(strand)
+    found.add(
+        position=shape.positions,
+        tangent=shape.tangents,
+        director1=shape.normals,
+        node_mass=halves_to_nodes(elements.edge_mass),
+        node_weight=voronoi,
+        node_radius=elements.node_radius,
+        node_edges=first_edge + np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1),
+        node_axis=np.full(nodes, ["path", "normal", "across"].index(rod.friction_axis)),
+        spin_inertia=elements.spin_inertia,
+        half_width=elements.half_width,
+        edge_node=first_node + np.arange(edges),
+        rest_length=shape.lengths,
+        axial_stiffness=elements.axial_stiffness,
+        rest_strain=elements.rest_strain,
+    )
+    joints = np.full(nodes, -1)
+    inner = np.arange(1, nodes - 1)
+
+    def add_joints(at: Array, first: Array, second: Array) -> None:
+        joints[at] = found.joint_count + np.arange(len(at))
+        found.joint_count += len(at)
+        found.add(
+            joint_a=first,
+            joint_b=second,
+            joint_stiffness=elements.joint_stiffness[at],
+            joint_rest=elements.joint_rest[at],
+            joint_node=first_node + at,
+            voronoi_length=voronoi[at],
+        )
+
+    add_joints(inner, first_edge + inner - 1, first_edge + inner)
+    last = strand.first_station + nodes - 1
+    reaches = ((rod.clamp_start, strand.first_station == 0, 0), (rod.clamp_end, last == rod.stations - 1, -1))
+    for clamp, reached, end in reaches:
+        if clamp is None or not reached:
+            continue
+        body = body_index[clamp]
+        own = rotation_matrix(np.array(scene.bodies[body].rotation))  # columns: axes of the body's frame
+        wall = -1 - sum(len(part) for part in found.columns.get("wall_tangent", []))
+        node = end % nodes
+        pair = (wall, first_edge) if end == 0 else (first_edge + edges - 1, wall)
+        found.add(
+            wall_tangent=shape.end_tangents[[end]] @ own,
+            wall_director1=shape.end_normals[[end]] @ own,
+            attached_node=first_node + node,
+            attached_body=body,
+            attached_position=(shape.positions[end] - np.array(scene.bodies[body].position))[None] @ own,
+        )
+        add_joints(np.array([node]), *(np.array([edge]) for edge in pair))
+    found.node_count += nodes
+    found.edge_count += edges
+    return joints
+
+
+def halves_to_nodes(of_edges: Array) -> Array:
+    """What edges have, half of it at each of their nodes, shape (n_edge + 1,)."""
+    of_nodes = np.zeros(len(of_edges) + 1)
+    of_nodes[:-1] += 0.5 * of_edges
+    of_nodes[1:] += 0.5 * of_edges
+    return of_nodes

@@ -1,0 +1,219 @@
+"""One curve for both layers: against closed forms, the planar beam, and two bonded rods."""
+
+import numpy as np
+import pytest
+from sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, scene
+
+import bilayer_core.model.laminate as laminate
+from bilayer_core import Simulator, load_scene
+from bilayer_core.beam2d.scene import beam_of, set_stimuli
+from bilayer_core.model.build import build_model
+from bilayer_core.model.plan import leanest_model, make_plan
+from bilayer_core.validate.bending import PAIRS, THICKNESS, strip
+from bilayer_core.validate.references import timoshenko
+
+HEAT = {"heat": {"schedule": {"type": "hold", "value": 1}}}
+
+
+def settled(content, model="laminate", **more):
+    simulator = Simulator(load_scene(content), model=model, **more)
+    simulator.solve_static()
+    return simulator
+
+
+def growing(gain=0.05, **more):
+    return layer("top", eigenstrain={"stimulus": "heat", "gain": gain}, **more)
+
+
+@pytest.mark.parametrize(("m", "n"), PAIRS)
+def test_every_node_has_timoshenkos_curvature(m, n):
+    chi = settled(strip(m, n, 0.05)).curvatures
+    assert -chi * THICKNESS / 0.05 == pytest.approx(np.full(len(chi), timoshenko(m, n)), rel=1e-10)
+
+
+@pytest.mark.parametrize("height", [-1e-3, 0.3e-3])
+def test_wherever_the_curve_lies_every_node_has_the_same_curvature_and_the_faces_the_same_place(height, monkeypatch):
+    content = strip(2.0, 0.5, 0.05)
+    on_axis = settled(content)
+    monkeypatch.setattr(laminate, "_axis", lambda *_: height)
+    beside = settled(content)
+    assert len(on_axis.model.coupled_joint) == 0 < len(beside.model.coupled_joint)
+    assert beside.curvatures == pytest.approx(on_axis.curvatures, rel=1e-9)
+
+    strands = [simulator.description.strands[0] for simulator in (on_axis, beside)]
+    assert strands[0].thickness == pytest.approx(strands[1].thickness)
+    ends = [
+        simulator.positions[-1] + strand.offset[-1] * simulator.frame().directors[-1]
+        for simulator, strand in zip((on_axis, beside), strands, strict=True)
+    ]
+    turn = 0.5 * 0.05 / 40 * abs(on_axis.curvatures[0])  # from the last edge to the end of the arc
+    apart = abs(strands[0].offset[-1] - strands[1].offset[-1])
+    assert np.linalg.norm(ends[0] - ends[1]) < 1.05 * turn * apart
+
+
+def test_a_strip_under_its_weight_agrees_with_the_planar_beam_of_appendix_a():
+    content = strip(2.0, 0.5, 0.01) | {"gravity": [0, 0, -9.81]}
+    differences = []
+    for stations in (21, 41):
+        content["rods"][0]["stations"] = stations
+        config = load_scene(content)
+        beam = beam_of(config)
+        set_stimuli(beam, config, {"heat": 1.0})
+        beam.solve_static()
+        simulator = settled(content)
+        normal = simulator.frame().directors[-1, [0, 2]]
+        interface = simulator.positions[-1, [0, 2]] + simulator.model.strands[0].offset[-1] * normal
+        bottom, top = (part["thickness"] for part in content["rods"][0]["layers"])
+        interface += 0.5 * (bottom - top) * normal
+        differences.append(np.abs(interface - beam.position[-1]).max())
+    assert differences[1] < 0.5 * differences[0] < 1e-5
+
+
+def test_a_layer_that_covers_a_part_bends_that_part_alone_by_its_whole_length_as_two_rods_come_to_do():
+    part = [0.03, 0.05]
+
+    def strip_of(stations):
+        short = growing(0.02, interval=part)
+        rods = [rod([layer("bottom"), short], stations=stations, clamp_start="wall")]
+        return scene(rods, bodies=[fixed()], stimuli=HEAT)
+
+    simulator = settled(strip_of(51))
+    assert 0 < len(simulator.model.coupled_joint) < 15  # the curve is that of the long, single part
+    chi = simulator.curvatures
+    assert chi[16:25] == pytest.approx(np.full(9, -1.5 * 0.02 / 2e-3), rel=1e-9)
+    assert np.abs(np.delete(chi, range(15, 26))).max() < 1e-7  # where Newton's method ends
+    lengths = simulator.model.voronoi_length
+    turned = chi[simulator.model.joint_node] @ lengths
+    assert turned == pytest.approx(-1.5 * 0.02 / 2e-3 * (part[1] - part[0]), rel=1e-9)
+    missing = []
+    for stations in (51, 101):  # two rods have no bending element in the last half edges of a layer
+        tangent = np.diff(settled(strip_of(stations), "two_rod").positions[:stations], axis=0)[-1]
+        missing.append(1.0 - np.arctan2(tangent[2], tangent[0]) / turned)
+    assert missing[0] < 0.1 and missing[1] == pytest.approx(0.5 * missing[0], rel=0.1)
+
+
+def test_the_elastic_energy_has_no_direction_that_costs_nothing_but_rigid_motions():
+    content = scene([rod([layer("bottom"), growing(0.02, interval=[0.02, 0.06])], stations=21)], stimuli=HEAT)
+    simulator = settled(content)
+    assert simulator.solve_static().stable
+    stepper = simulator._stepper
+    matrix, model = stepper.potential.matrix, simulator.model
+    band, _, _ = matrix.assemble(0.0, stepper.end, stepper.potential.edge_gradient, np.zeros((0, 3)))
+    size, width = model.layout.size, model.layout.half_bandwidth
+    hessian = np.zeros((size, size))
+    for j in range(size):
+        for r in range(min(width, size - 1 - j) + 1):
+            hessian[j + r, j] = hessian[j, j + r] = band[j, r]
+    scale = np.ones(size)
+    scale[model.layout.edge] = 1 / 5e-3
+    values = np.linalg.eigvalsh(hessian * np.outer(scale, scale))
+    assert np.count_nonzero(values < 1e-7 * values[-1]) == 6
+
+
+def test_a_curved_strip_starts_without_stress_and_changes_its_curvature_as_two_rods_do():
+    def arch(gain):
+        strip_of = rod([layer("bottom"), growing(gain, thickness=2e-3)], stations=41, clamp_start="wall")
+        arc = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.02, "angle": 2.0}
+        return scene([strip_of | {"path": arc}], bodies=[fixed()], stimuli=HEAT)
+
+    still = Simulator(load_scene(arch(0.0)), model="laminate")
+    start = still.positions.copy()
+    still.run(0.01)
+    assert np.abs(still.positions - start).max() < 1e-12
+    one, two = (settled(arch(0.02), model).curvatures for model in ("laminate", "two_rod"))
+    # per length of either curve: that of the bottom layer is 4 % shorter than the laminate's
+    along = np.linalg.norm(np.diff(still.positions, axis=0), axis=1).sum() / 0.04
+    bottom = 1.0 + 0.5e-3 / 0.02
+    assert one[20] * along == pytest.approx(two[20] * bottom, rel=2e-3)
+
+
+def test_natural_curvature_and_twist_are_the_means_of_the_layers_weighted_with_their_stiffness():
+    layers = [layer("bottom", natural_curvature=12.0, natural_twist=6.0), layer("top", material="stiff")]
+    content = scene(
+        [rod(layers, torsion="layers", clamp_start="wall")],
+        bodies=[fixed()],
+        materials={"gel": GEL, "stiff": {**GEL, "youngs_modulus": 3e8}},
+    )
+    simulator = settled(content)
+    # about the axis at y₀ = ±1/4 mm: D = Σ EI + EA z², with E = 1 : 3
+    bending = sum(e * (1 / 12 + z**2) for e, z in ((1.0, 0.75), (3.0, 0.25)))
+    assert simulator.curvatures == pytest.approx(np.full(21, 12.0 / 12 / bending), rel=1e-9)
+    joints = simulator._stepper.end.joint_strain[:, 2] / simulator.model.voronoi_length
+    assert joints == pytest.approx(np.full(20, 6.0 / 4.0), rel=1e-9)
+
+
+def test_mass_and_its_centre_are_those_of_two_rods_point_masses_included():
+    content = everything()
+    one, two = (Simulator(load_scene(content), model=model) for model in ("laminate", "two_rod"))
+    assert one.model.node_mass.sum() == pytest.approx(two.model.node_mass.sum(), rel=1e-12)
+    assert one.com == pytest.approx(two.com, abs=1e-12)
+    assert one.model.unknowns < 0.7 * two.model.unknowns
+
+
+def test_budget_of_a_driven_laminate_off_its_axis_closes():
+    content = scene(
+        [rod([layer("bottom"), growing(0.02, interval=[0.02, 0.06])], stations=21, clamp_start="wall")],
+        bodies=[fixed()],
+        stimuli={"heat": {"schedule": {"type": "ramp", "start": 0, "end": 0.05, "from": 0, "to": 1}}},
+    )
+    residuals = []
+    for dt in (1e-3, 5e-4):
+        simulator = Simulator(load_scene(content), model="laminate", integrator="sdirk2", dt=dt, budget=True)
+        simulator.run(0.06)
+        residuals.append(abs(simulator.budget()["relative_residual"]))
+    assert residuals[1] < 0.3 * residuals[0] < 1e-3
+    assert simulator.budget()["supplied"]["stimulus"] > 0.0
+
+
+def test_a_saved_state_goes_on_bit_for_bit_and_is_not_that_of_two_rods():
+    config = load_scene(everything())
+    simulator = Simulator(config, model="laminate")
+    simulator.run(0.01)
+    snapshot = simulator.save_state()
+    simulator.run(0.01)
+    again = Simulator(config, model="laminate")
+    again.load_state(snapshot)
+    again.run(0.01)
+    assert np.array_equal(again.save_state(), simulator.save_state(), equal_nan=True)
+    with pytest.raises(Exception, match="saved state: has"):
+        Simulator(config).load_state(snapshot)
+
+
+def test_contact_counts_from_the_outer_face():
+    content = scene([rod([layer("bottom"), layer("top", thickness=3e-3, interval=[0.02, 0.1])], stations=21)])
+    model = build_model(load_scene(content), "laminate")
+    (strand,) = model.strands
+    low, high = (strand.offset + side * strand.thickness for side in (-0.5, 0.5))
+    assert model.carriers.radius == pytest.approx(np.maximum(high, -low))
+    faces = model.start_position[:, 2] + np.array([low, high])
+    assert faces[0] == pytest.approx(np.full(21, -1e-3))
+    assert faces[1] == pytest.approx(np.where(np.arange(21) < 4, 0.0, 3e-3))
+
+
+def test_the_leanest_model_is_the_laminate_unless_the_scene_asks_for_what_only_two_rods_have():
+    plain = scene([rod([layer("bottom"), layer("top")])])
+    assert leanest_model(load_scene(plain))[0] == "laminate"
+    soft = leanest_model(load_scene(plain | {"coupling": {"bending": 3.0}}))
+    assert soft[0] == "two_rod" and "coupling" in soft[1]
+    twisted = scene([rod([layer("bottom"), layer("top", natural_twist=3.0)], torsion="layers")])
+    assert leanest_model(load_scene(twisted))[0] == "two_rod"
+    twisted["rods"][0]["torsion"] = "laminate"
+    assert leanest_model(load_scene(twisted))[0] == "laminate"
+
+
+def test_the_plan_says_that_there_is_no_bond():
+    plan = make_plan(load_scene(strip(1.0, 1.0, 0.01)), model="laminate")
+    assert (plan.model, plan.terms["bond"]) == ("laminate", "skipped: one curve carries both layers")
+
+
+def test_uneven_faces_are_told_where_something_can_touch():
+    content = scene(
+        [rod([layer("bottom"), layer("top", interval=[0.02, 0.1])], start=(0, 0, 0.01))],
+        obstacles=[GROUND],
+        contact=contact(),
+    )
+    told = " ".join(make_plan(load_scene(content), model="laminate").warnings)
+    assert "rods.rod: faces are 0 to 1 mm from the laminate's curve" in told
+    assert "too early" not in " ".join(make_plan(load_scene(content)).warnings)
+    even = content | {"rods": [rod([layer("bottom"), layer("top")], start=(0, 0, 0.01))]}
+    assert "too early" not in " ".join(make_plan(load_scene(even), model="laminate").warnings)
