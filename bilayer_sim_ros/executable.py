@@ -68,9 +68,7 @@ def _parse(executable: str, table: Sequence[NodeParameter], arguments: list[str]
     return parser.parse_args(arguments)
 
 
-def _run_node(
-    name: str, table: Sequence[NodeParameter], work: Work, stop: threading.Event, argv: list[str]
-) -> None:
+def _run_node(name: str, table: Sequence[NodeParameter], work: Work, stop: threading.Event, argv: list[str]) -> None:
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:

@@ -23,9 +23,7 @@ def message_class(ros_type: str) -> type:
 
 def quality_of_service(spec: TopicSpec) -> QoSProfile:
     """Reliable and volatile, with the topic's depth."""
-    return QoSProfile(
-        depth=spec.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
-    )
+    return QoSProfile(depth=spec.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 
 
 class FramePublisher:

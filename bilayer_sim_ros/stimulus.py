@@ -33,9 +33,7 @@ class Channel:
     def accept(self, value: float) -> float:
         """`value` as a float; InputError when it is not finite or out of range."""
         if not (math.isfinite(value) and self.minimum <= value <= self.maximum):
-            raise InputError(
-                f"stimulus '{self.name}' is {value:g}; allowed is {self.minimum:g} to {self.maximum:g}"
-            )
+            raise InputError(f"stimulus '{self.name}' is {value:g}; allowed is {self.minimum:g} to {self.maximum:g}")
         return float(value)
 
 

@@ -41,6 +41,7 @@ def description() -> Description:
                     edges=slice(index * (NODES - 1), (index + 1) * (NODES - 1)),
                     width=np.full(NODES, WIDTH),
                     thickness=np.full(NODES, THICKNESS),
+                    offset=np.zeros(NODES),
                 )
             )
     node_count = len(strands) * NODES + 1

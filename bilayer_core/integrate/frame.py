@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Strand:
-    """One layer of one rod: a chain of nodes joined by edges, in order of arc length.
+    """One layer of one rod, or all of them: a chain of nodes joined by edges, in order of arc length.
 
     Attributes
     ----------
@@ -21,6 +21,8 @@ class Strand:
         Where its nodes and edges stand in the arrays of a `Frame`; ``edges`` has one element less.
     width, thickness : ndarray
         Of the cross-section at each node [m], shape (nodes,).
+    offset : ndarray
+        Of the middle of the cross-section from the node, along m1 [m], shape (nodes,).
     """
 
     name: str
@@ -30,6 +32,7 @@ class Strand:
     edges: slice
     width: np.ndarray
     thickness: np.ndarray
+    offset: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -46,6 +46,7 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
             slice(s.first_edge, s.first_edge + s.node_count - 1),
             s.width,
             s.thickness,
+            s.offset,
         )
         for s in model.strands
     )

@@ -38,6 +38,7 @@ def from_text(attributes: dict[str, str], scene_text: str) -> Description:
             **{name: strand[name] for name in ("name", "rod", "layer")},
             **{name: slice(*strand[name]) for name in ("nodes", "edges")},
             **{name: np.array(strand[name]) for name in ("width", "thickness")},
+            offset=np.array(strand.get("offset", np.zeros(len(strand["width"])))),  # older logs have none
         )
         for strand in values["strands"]
     )

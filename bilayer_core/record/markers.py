@@ -138,8 +138,8 @@ class MarkerEncoder:
         nodes = self._nodes
         nodes.update(frame)
         half = self._half_width * nodes.widths
-        np.subtract(nodes.positions, half, out=self._bars[:, 0])
-        np.add(nodes.positions, half, out=self._bars[:, 1])
+        np.subtract(nodes.middles, half, out=self._bars[:, 0])
+        np.add(nodes.middles, half, out=self._bars[:, 1])
         steps = nodes.positions[1:] - nodes.positions[:-1]
         lengths = np.sqrt(np.einsum("ij,ij->i", steps, steps))
         colours = strain_colours(frame.strain[nodes.order], STRAIN_LIMIT)[:, None, :]

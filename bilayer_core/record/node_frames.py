@@ -10,10 +10,13 @@ from bilayer_core.kinematics.vector import combine, cross, dot, row, scaled
 
 
 @kernel
-def _frames_at_nodes(positions, directors, edge_before, edge_after, start_node, quaternions_out, widths_out):
+def _frames_at_nodes(
+    positions, directors, edge_before, edge_after, start_node, offset, quaternions_out, widths_out, middles_out
+):
     """Frame of each node: m3 the mean tangent of its edges, m1 their mean director made normal to it, m2 = m3 × m1.
 
-    The quaternion x y z w is that of the matrix with columns m1, m2, m3, by the largest of its components.
+    The quaternion x y z w is that of the matrix with columns m1, m2, m3, by the largest of its components. The middle
+    of the section is `offset` along m1 from the node.
     """
     for node in range(positions.shape[0]):
         before, after = edge_before[node], edge_after[node]
@@ -36,6 +39,8 @@ def _frames_at_nodes(positions, directors, edge_before, edge_after, start_node, 
         quaternions_out[node, 2] = scale * z
         quaternions_out[node, 3] = scale * w
         widths_out[node, 0], widths_out[node, 1], widths_out[node, 2] = m2
+        for c in range(3):
+            middles_out[node, c] = positions[node, c] + offset[node] * m1[c]
 
 
 @kernel
@@ -65,9 +70,9 @@ class NodeFrames:
         Index in a `Frame` of each node in this order, shape (nodes,).
     ranges : tuple of slice
         Where each strand stands in this order.
-    positions, quaternions, widths : ndarray
-        Of the frame last given to `update`: position [m], x y z w of the frame m1 m2 m3, and the axis m2;
-        shapes (nodes, 3), (nodes, 4), (nodes, 3).
+    positions, quaternions, widths, middles : ndarray
+        Of the frame last given to `update`: position [m], x y z w of the frame m1 m2 m3, the axis m2, and the middle of
+        the section [m]; shapes (nodes, 3), (nodes, 4), (nodes, 3), (nodes, 3).
     """
 
     def __init__(self, description: Description):
@@ -91,10 +96,12 @@ class NodeFrames:
         self.positions = np.empty((node_count, 3))
         self.quaternions = np.empty((node_count, 4))
         self.widths = np.empty((node_count, 3))
+        self.middles = np.empty((node_count, 3))
+        self._offset = np.concatenate([strand.offset for strand in description.strands])
         self._frame: Frame | None = None
 
     def update(self, frame: Frame) -> None:
-        """Compute `positions`, `quaternions` and `widths` of `frame`, once for several calls with the same one."""
+        """Compute all of these for `frame`, once for several calls with the same one."""
         if frame is self._frame:
             return
         np.take(frame.positions, self.order, axis=0, out=self.positions)
@@ -105,7 +112,9 @@ class NodeFrames:
             self._edge_before,
             self._edge_after,
             self._start_node,
+            self._offset,
             self.quaternions,
             self.widths,
+            self.middles,
         )
         self._frame = frame

@@ -40,10 +40,12 @@ def ribbon_vertices(strand: Strand, positions: np.ndarray, material_frames: np.n
     ndarray
         [m], shape (times, nodes, CORNERS, 3), float32.
     """
-    thickness = 0.5 * strand.thickness[:, None] * rotated(material_frames, 0)
+    normal = rotated(material_frames, 0)
+    thickness = 0.5 * strand.thickness[:, None] * normal
     width = 0.5 * strand.width[:, None] * rotated(material_frames, 1)
     corners = np.einsum("c,tni->tnci", _CORNERS[:, 0], thickness) + np.einsum("c,tni->tnci", _CORNERS[:, 1], width)
-    return (positions[:, :, None] + corners).astype(np.float32)
+    middles = positions + strand.offset[:, None] * normal
+    return (middles[:, :, None] + corners).astype(np.float32)
 
 
 def ribbon_triangles(nodes: int) -> np.ndarray:

@@ -54,6 +54,18 @@ def test_markers_show_the_width_at_each_node(typestore):
     assert np.linalg.norm(bars[:, 1] - bars[:, 0], axis=1) == pytest.approx(widths)
 
 
+def test_markers_are_in_the_middle_of_the_section_where_nodes_are_not(typestore):
+    def bars(offset):
+        strands = tuple(replace(s, offset=np.full(synthetic_run.NODES, offset)) for s in DESCRIPTION.strands)
+        data = FrameEncoder(replace(DESCRIPTION, strands=strands)).encode("markers", synthetic_run.frame(0.0))
+        markers = {m.ns: m for m in typestore.deserialize_cdr(data, TOPICS["markers"].type).markers}
+        return np.array([(p.x, p.y, p.z) for p in markers[f"strands/{strands[0].name}"].points])
+
+    moved = bars(2e-3) - bars(0.0)
+    assert moved[0] == pytest.approx([0.0, 0.0, 2e-3], abs=1e-6)  # along m1: up, as long as the arms are flat
+    assert np.linalg.norm(moved, axis=1) == pytest.approx(np.full(len(moved), 2e-3))
+
+
 @pytest.mark.parametrize("name", TOPICS)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_message_has_the_bytes_that_rosbags_writes(name, seed, encoder, typestore):

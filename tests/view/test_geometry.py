@@ -47,6 +47,21 @@ def test_a_tapered_ribbon_is_drawn_with_its_taper():
     assert volume == pytest.approx(6e-3 * synthetic_run.THICKNESS * 0.06, rel=1e-6)
 
 
+def test_a_ribbon_whose_nodes_are_not_in_its_middle_is_drawn_where_its_faces_are():
+    nodes = synthetic_run.NODES
+    strand = replace(
+        synthetic_run.description().strands[0],
+        thickness=np.linspace(2e-3, 1e-3, nodes),
+        offset=np.linspace(0.0, -0.5e-3, nodes),
+    )
+    line = np.zeros((1, nodes, 3))
+    line[0, :, 2] = np.linspace(0, 0.06, nodes)
+    frames = np.tile([0.0, 0.0, 0.0, 1.0], (1, nodes, 1))  # m1 along x
+    vertices = geometry.ribbon_vertices(strand, line, frames)[0]
+    assert vertices[:, :, 0].min(axis=1) == pytest.approx(np.full(nodes, -1e-3))
+    assert vertices[:, :, 0].max(axis=1) == pytest.approx(np.linspace(1e-3, 0.0, nodes), abs=1e-9)
+
+
 TILTED = (0.0, 0.6, 0.0, 0.8)
 
 
