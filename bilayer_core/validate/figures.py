@@ -1,17 +1,22 @@
-"""Figures 3 and 4 of the paper from the cases; matplotlib is needed here and nowhere else."""
+"""Figures 3 and 4 of the paper, and how two rods come near the laminate, from the cases; matplotlib is needed here and
+nowhere else.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from . import bending, helix
+from ..scene.config import Coupling
+from . import bending, helix, laminate
 from .case import Case
 from .references import bonded_helix, timoshenko, timoshenko_as_printed
+from .torsion import MESHES
 
 INK, BLUE, ORANGE, GREY = "#222222", "#1f77b4", "#d95f02", "#999999"
 DPI = 150
@@ -92,6 +97,32 @@ def helix_figure(path: Path) -> None:
     _save(figure, path)
 
 
+def laminate_figure(path: Path) -> None:
+    """How far two bonded rods are from the laminate, against the stiffness of their bond."""
+    figure, axis = _figure(1, 1, (6.4, 4.2))
+    curves = {f"grows by a wave, {edges} edges": partial(laminate.wave, edges) for edges in MESHES}
+    for (label, compute), shade in zip(curves.items(), ("#9ecae1", "#4292c6", "#08519c"), strict=True):
+        axis.plot(laminate.MULTIPLES, _apart(compute), "o-", color=shade, markersize=5, label=label)
+    uniform = f"grows uniformly, {laminate.EDGES} edges"
+    axis.plot(laminate.MULTIPLES, _apart(laminate.uniform), "s-", color=ORANGE, markersize=5, label=uniform)
+    axis.axvline(Coupling().translation, color=GREY, linestyle=":")
+    axis.annotate("default", (Coupling().translation, 0.3), (5, 0), textcoords="offset points", color=GREY, fontsize=9)
+    axis.set(
+        xscale="log",
+        yscale="log",
+        ylim=(1e-7, 1.0),
+        xlabel="stiffness of the bond, as a multiple of the section's own",
+        ylabel="relative difference of curvature",
+    )
+    axis.grid(color="0.9")
+    axis.legend(frameon=False, fontsize=9, loc="lower left")
+    _save(figure, path)
+
+
+def _apart(compute: Callable[[float | None], float]) -> list[float]:
+    return [abs(compute(multiple) / compute(None) - 1.0) for multiple in laminate.MULTIPLES]
+
+
 def _axis(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Axes of a helix as columns, the last along it, the first towards the middle of its points; a point on it."""
     center, step = len(points) // 2, len(points) // 6
@@ -136,5 +167,9 @@ def _save(figure, path: Path) -> None:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-FIGURES = (("bending", "fig3.png", bending_figure), ("helix", "fig4.png", helix_figure))
+FIGURES = (
+    ("bending", "fig3.png", bending_figure),
+    ("helix", "fig4.png", helix_figure),
+    ("laminate", "two_rods.png", laminate_figure),
+)
 """Family, file name and function of each figure."""

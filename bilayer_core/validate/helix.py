@@ -27,20 +27,22 @@ def strip(torsion: str, curvature: float, twist: float, stations: int, length: f
     return scene([ribbon], bodies=[fixed()])
 
 
-def equilibrium(torsion: str, curvature: float, twist: float, stations: int, length: float) -> tuple[Array, Array]:
+def equilibrium(
+    torsion: str, curvature: float, twist: float, stations: int, length: float, model: str = "two_rod"
+) -> tuple[Array, Array]:
     """Points midway between the layers [m], shape (stations, 3), and the bottom layer's m2 there, likewise."""
-    simulator = Simulator(load_scene(strip(torsion, curvature, twist, stations, length)))
+    simulator = Simulator(load_scene(strip(torsion, curvature, twist, stations, length)), model=model)
     simulator.solve_static()
-    bottom, top = simulator.positions.reshape(2, stations, 3)
-    across = np.cross(np.diff(bottom, axis=0), simulator.frame().directors[: stations - 1])
+    strands = simulator.positions.reshape(-1, stations, 3)
+    across = np.cross(np.diff(strands[0], axis=0), simulator.frame().directors[: stations - 1])
     across = np.concatenate([across[:1], 0.5 * (across[:-1] + across[1:]), across[-1:]])
-    return 0.5 * (bottom + top), across / np.linalg.norm(across, axis=1, keepdims=True)
+    return strands.mean(axis=0), across / np.linalg.norm(across, axis=1, keepdims=True)
 
 
 @cache
-def middle_curve(torsion: str, curvature: float, twist: float) -> Array:
+def middle_curve(torsion: str, curvature: float, twist: float, model: str = "two_rod") -> Array:
     """Points midway between the layers of the strip that is measured [m], shape (STATIONS, 3)."""
-    return equilibrium(torsion, curvature, twist, STATIONS, LENGTH)[0]
+    return equilibrium(torsion, curvature, twist, STATIONS, LENGTH, model)[0]
 
 
 def screw(points: Array) -> tuple[float, float]:
@@ -54,10 +56,10 @@ def screw(points: Array) -> tuple[float, float]:
     return np.linalg.norm(b) / (2.0 * abs(np.sin(angle / 2.0))), 2.0 * np.pi * abs(advance / angle)
 
 
-def measured(torsion: str, curvature: float, twist: float) -> tuple[float, float]:
+def measured(torsion: str, curvature: float, twist: float, model: str = "two_rod") -> tuple[float, float]:
     """Radius and pitch [m] in the middle of the strip."""
     center = STATIONS // 2
-    return screw(middle_curve(torsion, curvature, twist)[center - 8 : center + 9 : 5])
+    return screw(middle_curve(torsion, curvature, twist, model)[center - 8 : center + 9 : 5])
 
 
 def _case(torsion: str, curvature: float, twist: float, index: int) -> Case:

@@ -35,11 +35,11 @@ def twisted_strip(torsion: str, edges: int, moment: float) -> dict:
     )
 
 
-def torsional_stiffness(torsion: str, edges: int) -> tuple[float, float]:
+def torsional_stiffness(torsion: str, edges: int, model: str = "two_rod") -> tuple[float, float]:
     """Moment over twist per length in the middle half of the strip, away from what clamps do, and GJ [N m²]."""
     declared = strip_torsion((SHEAR_MODULUS, SHEAR_MODULUS), THICKNESS, 0.01)[torsion]
     moment = TWIST * declared
-    simulator = Simulator(load_scene(twisted_strip(torsion, edges, moment)))
+    simulator = Simulator(load_scene(twisted_strip(torsion, edges, moment)), model=model)
     simulator.solve_static()
     directors = simulator.frame().directors[:edges]
     first, last = edges // 4, 3 * edges // 4
@@ -51,18 +51,22 @@ def torsional_stiffness(torsion: str, edges: int) -> tuple[float, float]:
 def _curvature_of_uniform_growth(edges: int) -> np.ndarray:
     """χ of both layers at inner nodes away from the ends [1/m], shape (2, n)."""
     layers = [layer("bottom"), layer("top", eigenstrain={"stimulus": "heat", "gain": WAVE})]
-    return _curvatures(layers, edges)[:, edges // 4 : 3 * edges // 4]
+    return curvatures(layers, edges)[:, edges // 4 : 3 * edges // 4]
 
 
-def _curvatures(layers: list[dict], edges: int) -> np.ndarray:
+def curvatures(
+    layers: list[dict], edges: int, model: str = "two_rod", coupling: dict[str, float] | None = None
+) -> np.ndarray:
+    """χ of each strand of a clamped strip in equilibrium [1/m], shape (n_strand, edges + 1)."""
     config = scene(
         [rod(layers, LENGTH, edges + 1, clamp_start="wall")],
         bodies=[fixed()],
         stimuli={"heat": {"schedule": {"type": "hold", "value": 1}}},
+        coupling=coupling or {},
     )
-    simulator = Simulator(load_scene(config))
+    simulator = Simulator(load_scene(config), model=model)
     simulator.solve_static()
-    return simulator.curvatures.reshape(2, edges + 1)
+    return simulator.curvatures.reshape(-1, edges + 1)
 
 
 def zigzag(edges: int) -> tuple[float, float]:
@@ -89,10 +93,11 @@ def amplitude(chi: np.ndarray, strain: np.ndarray) -> float:
     return -(chi[middle] @ at_nodes[middle]) / (at_nodes[middle] @ at_nodes[middle]) * 2e-3
 
 
-def wave_curvature(edges: int) -> tuple[float, float]:
+def wave_curvature(edges: int, model: str = "two_rod", coupling: dict[str, float] | None = None) -> tuple[float, float]:
     """κH/η where growth is a wave along the strip, and Timoshenko's."""
     layers, strain = wave_strip(edges)
-    return amplitude(_curvatures(layers, edges)[:, 1:-1].mean(axis=0), strain), timoshenko(1.0, 1.0)
+    chi = curvatures(layers, edges, model, coupling)[:, 1:-1].mean(axis=0)
+    return amplitude(chi, strain), timoshenko(1.0, 1.0)
 
 
 CASES = [
