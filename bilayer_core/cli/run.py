@@ -26,7 +26,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--duration", type=Duration(), help="Simulated time of this run; default: to the end of the scene.")
 @click.option("--dt", metavar="TIME", help="Time step.")
 @click.option("--model", metavar="NAME", help="auto, two_rod or laminate.")
-@click.option("--dimension", metavar="D", help="auto or 3.")
+@click.option("--dimension", metavar="D", help="auto, 2 or 3.")
 @click.option("--integrator", metavar="NAME", help="auto, implicit_euler, sdirk2 or implicit_midpoint.")
 @set_option
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")

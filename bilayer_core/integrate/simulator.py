@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError, SimulationError
 from ..model.build import build_model
 from ..model.plan import make_plan
-from ..model.state import State, initial_state
+from ..model.state import State, initial_state, refuse_out_of_plane
 from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observe
@@ -64,7 +64,7 @@ class Simulator:
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         self.scene = scene
         self.dt = scene.solver.dt if dt is None else float(dt)
-        self.model = build_model(scene, self.plan.model)
+        self.model = build_model(scene, self.plan.model, self.plan.dimension)
         solver = scene.solver
         self._stepper = Stepper(
             self.model,
@@ -342,6 +342,9 @@ class Simulator:
         InputError
             If it does not fit; nothing is changed then.
         """
+        loaded = self._initial_state()
+        loaded.set_flat(snapshot)
+        refuse_out_of_plane(self.model, loaded)
         self._state.set_flat(snapshot)
         self.compile()
         self._stepper.rest(self._state)

@@ -41,6 +41,28 @@ def edge_geometry(position, edge_node, length_out, tangent_out):
 
 
 @kernel
+def planar_frames(position, edge_node, normal, side, length_out, tangent_out, director1_out, director2_out):
+    """Length [m] and material frame of every edge of rods in a plane: m1 = σ normal × t, m2 = σ normal.
+
+    Parameters are those of `edge_geometry`, the unit normal of the plane, shape (3,), and σ = ±1 of each edge.
+    """
+    n0, n1, n2 = normal[0], normal[1], normal[2]
+    for k in range(edge_node.shape[0]):
+        i = edge_node[k]
+        x = position[i + 1, 0] - position[i, 0]
+        y = position[i + 1, 1] - position[i, 1]
+        z = position[i + 1, 2] - position[i, 2]
+        length = math.sqrt(x * x + y * y + z * z)
+        t0, t1, t2, s = x / length, y / length, z / length, side[k]
+        length_out[k] = length
+        tangent_out[k, 0], tangent_out[k, 1], tangent_out[k, 2] = t0, t1, t2
+        director1_out[k, 0] = s * (n1 * t2 - n2 * t1)
+        director1_out[k, 1] = s * (n2 * t0 - n0 * t2)
+        director1_out[k, 2] = s * (n0 * t1 - n1 * t0)
+        director2_out[k, 0], director2_out[k, 1], director2_out[k, 2] = s * n0, s * n1, s * n2
+
+
+@kernel
 def transport_directors(count, tangent, director1, director2, angle, new_tangent, director1_out, director2_out):
     """Carry material frames to new tangents and turn them about these.
 

@@ -8,21 +8,24 @@ from ..kinematics.rotation import rotation_matrix
 from ..scene.body import Body, Free, Prescribed
 from ..scene.config import SceneConfig
 from .model import Bodies
+from .plane import Plane
 from .shapes import Shape, shape_of
 from .strands import Collected
 
 
-def build_bodies(scene: SceneConfig, found: Collected) -> Bodies:
+def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = None) -> Bodies:
+    """Bodies of a scene; free ones move in `plane` alone if one is given."""
+    motions = np.eye(6) if plane is None else plane.motions
     free = [index for index, body in enumerate(scene.bodies) if not isinstance(body.motion, Prescribed)]
     count = len(scene.bodies)
     velocity, angular_velocity = np.zeros((count, 3)), np.zeros((count, 3))
     freedom = []
     for place, index in enumerate(free):
         motion = scene.bodies[index].motion
-        allowed = np.zeros((6 * len(free), 6 if isinstance(motion, Free) else 1))
+        allowed = np.zeros((6 * len(free), motions.shape[1] if isinstance(motion, Free) else 1))
         if isinstance(motion, Free):
             velocity[index], angular_velocity[index] = motion.velocity, motion.angular_velocity
-            allowed[6 * place : 6 * place + 6] = np.eye(6)
+            allowed[6 * place : 6 * place + 6] = motions
         else:
             velocity[index] = motion.speed * np.array(motion.axis)
             allowed[6 * place : 6 * place + 3, 0] = motion.axis

@@ -9,7 +9,9 @@ from .bodies import build_bodies
 from .carriers import build_contact, refuse_penetration
 from .laminate import add_laminate
 from .layout import number_unknowns
-from .model import Model
+from .model import Bodies, Model
+from .planarity import require_plane
+from .plane import InPlane, Plane
 from .points import add_point_masses, build_loads
 from .rod_surfaces import build_rod_surfaces, refuse_meeting_rods
 from .rods import add_bonded_rods
@@ -19,14 +21,17 @@ ADD_ROD = {"two_rod": add_bonded_rods, "laminate": add_laminate}
 """How each model turns a rod into strands."""
 
 
-def build_model(scene: SceneConfig, model: str = "two_rod") -> Model:
-    """Arrays of one of the models, `ADD_ROD`, of `scene`.
+def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) -> Model:
+    """Arrays of one of the models, `ADD_ROD`, of `scene`, in space or, with dimension 2, in its plane.
 
     Raises
     ------
+    SceneError
+        If the scene does not stay in a plane.
     PenetrationError
         If a node or a body starts behind a surface, or touching it; the message says which and by how much.
     """
+    plane = require_plane(scene) if dimension == 2 else None
     found = Collected()
     body_index = {body.name: index for index, body in enumerate(scene.bodies)}
     for rod in scene.rods:
@@ -34,7 +39,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod") -> Model:
             ADD_ROD[model](found, scene, rod, name, turn_of_copy(rod, copy), body_index)
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
-    bodies = build_bodies(scene, found)
+    bodies = build_bodies(scene, found, plane)
     carriers, surfaces = build_contact(scene, found, bodies)
     walls = found.column("wall_tangent", width=3)
     wall_a = _resolve_walls(found.column("joint_a", np.int64), edge_count)
@@ -43,12 +48,17 @@ def build_model(scene: SceneConfig, model: str = "two_rod") -> Model:
     def joined(name: str, dtype=float, width: int | None = None) -> np.ndarray:
         return np.concatenate([found.column(name, dtype, width), found.column(bond_joints + name, dtype, width)])
 
+    attached = found.column("attached_node", np.int64)
+    numbered = found.rods, found.node_count, edge_count, attached
     laws = np.array(found.laws, dtype=float).reshape(-1, 6)
     mass_moment = found.column("mass_moment")
     arrays = Model(
         scene=scene,
         strands=tuple(found.strands),
-        layout=number_unknowns(found.rods, found.node_count, edge_count, found.column("attached_node", np.int64)),
+        layout=number_unknowns(*numbered),
+        plane=None
+        if plane is None
+        else InPlane(plane.axes, plane.normal, _sides(plane, found, bodies), number_unknowns(*numbered, dimension=2)),
         bodies=bodies,
         carriers=carriers,
         surfaces=surfaces,
@@ -62,7 +72,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod") -> Model:
         start_position=found.column("position", width=3),
         start_director1=np.concatenate([found.column("director1", width=3), found.column("wall_director1", width=3)]),
         wall_tangent=walls,
-        attached_node=found.column("attached_node", np.int64),
+        attached_node=attached,
         attached_body=found.column("attached_body", np.int64),
         attached_position=found.column("attached_position", width=3),
         wall_body=found.column("attached_body", np.int64),
@@ -107,6 +117,17 @@ def build_model(scene: SceneConfig, model: str = "two_rod") -> Model:
     refuse_penetration(arrays)
     refuse_meeting_rods(arrays)
     return arrays
+
+
+def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
+    """Sign σ of m1 = σ normal × t of edges and walls, shape (n_edge + n_wall,)."""
+    turn = bodies.start_rotation[found.column("attached_body", np.int64)]
+    walls = [np.einsum("kij,kj->ki", turn, found.column(f"wall_{name}", width=3)) for name in ("tangent", "director1")]
+    tangent, director1 = (
+        np.concatenate([found.column(name, width=3), of_walls])
+        for name, of_walls in zip(("tangent", "director1"), walls, strict=True)
+    )
+    return np.sign(np.einsum("ki,ki->k", director1, np.cross(plane.normal, tangent)))
 
 
 def _resolve_walls(edges: np.ndarray, edge_count: int) -> np.ndarray:

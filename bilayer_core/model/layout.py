@@ -3,6 +3,7 @@
 Along each rod, station by station: positions of the layers present, then the angles of their edges that start there.
 Rods follow each other.
 Elements span three stations of one layer, or two stations of both, which bounds the half-bandwidth.
+In a plane (`model.plane`) a node has two unknowns and an edge none.
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 HALF_BANDWIDTH = {
-    1: 10,
-    2: 18,
-}  # by number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
+    3: {1: 10, 2: 18},
+    2: {1: 5, 2: 9},
+}  # by dimension and number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
 
 
 class ReadOnlyArrays:
@@ -37,10 +38,12 @@ class Layout(ReadOnlyArrays):
         Unknowns of nodes and edges.
     half_bandwidth : int
         Largest difference of two coupled unknowns; a compile-time constant of the solver.
+    dimension : int
+        Unknowns of a node: 3, or 2 in a plane.
     node : ndarray
-        First of the three unknowns of each node, shape (n_node,).
+        First unknown of each node, shape (n_node,).
     edge : ndarray
-        Unknown of each edge's angle, shape (n_edge,).
+        Unknown of each edge's angle, shape (n_edge,); (0,) in a plane.
     attached : ndarray
         First unknown of each node that a body holds, shape (n_attached,).
     attached_of_unknown : ndarray
@@ -49,6 +52,7 @@ class Layout(ReadOnlyArrays):
 
     size: int
     half_bandwidth: int
+    dimension: int
     node: np.ndarray
     edge: np.ndarray
     attached: np.ndarray
@@ -56,23 +60,31 @@ class Layout(ReadOnlyArrays):
 
 
 def number_unknowns(
-    rods: list[list[tuple[int, int, int, int]]], node_count: int, edge_count: int, attached_node: np.ndarray
+    rods: list[list[tuple[int, int, int, int]]],
+    node_count: int,
+    edge_count: int,
+    attached_node: np.ndarray,
+    dimension: int = 3,
 ) -> Layout:
     """Number the unknowns of rods, each a list of layers (first station, last station, first node, first edge)."""
+    turns = dimension == 3
     node = np.full(node_count, -1, dtype=np.int64)
-    edge = np.full(edge_count, -1, dtype=np.int64)
+    edge = np.full(edge_count if turns else 0, -1, dtype=np.int64)
     size = 0
     for layers in rods:
         for station in range(min(layer[0] for layer in layers), max(layer[1] for layer in layers) + 1):
             for first, last, first_node, _ in layers:
                 if first <= station <= last:
                     node[first_node + station - first] = size
-                    size += 3
-            for first, last, _, first_edge in layers:
+                    size += dimension
+            for first, last, _, first_edge in layers if turns else ():
                 if first <= station < last:
                     edge[first_edge + station - first] = size
                     size += 1
     attached = node[attached_node]
     attached_of_unknown = np.full(size, -1, dtype=np.int64)
-    attached_of_unknown[(attached[:, None] + np.arange(3)).ravel()] = np.repeat(np.arange(len(attached)), 3)
-    return Layout(size, HALF_BANDWIDTH[max(len(layers) for layers in rods)], node, edge, attached, attached_of_unknown)
+    attached_of_unknown[(attached[:, None] + np.arange(dimension)).ravel()] = np.repeat(
+        np.arange(len(attached)), dimension
+    )
+    half_bandwidth = HALF_BANDWIDTH[dimension][max(len(layers) for layers in rods)]
+    return Layout(size, half_bandwidth, dimension, node, edge, attached, attached_of_unknown)

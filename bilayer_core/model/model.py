@@ -9,10 +9,13 @@ import numpy as np
 from ..kinematics.rotation import angular_velocity, rotation_matrix
 from ..scene.config import SceneConfig
 from .layout import Layout, ReadOnlyArrays
+from .plane import InPlane
 from .rod_surfaces import RodSurfaces
 from .shapes import Shape
 
 Array = np.ndarray
+AXES = np.eye(3)
+AXES.flags.writeable = False  # as a model's arrays
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,7 @@ class Model(ReadOnlyArrays):
     scene: SceneConfig
     strands: tuple[StrandArrays, ...]
     layout: Layout
+    plane: InPlane | None  # None in three dimensions
     bodies: Bodies
     carriers: Carriers
     surfaces: Surfaces
@@ -217,7 +221,18 @@ class Model(ReadOnlyArrays):
         """Unknowns that are solved for: those of nodes and edges without the attached ones, and the freedom of
         bodies.
         """
-        return self.layout.size - 3 * len(self.attached_node) + self.bodies.freedom.shape[1]
+        solved = self.solved_layout
+        return solved.size - solved.dimension * len(self.attached_node) + self.bodies.freedom.shape[1]
+
+    @property
+    def directions(self) -> Array:
+        """Along which a node's unknowns in the matrix are, shape (3, 3), or (2, 3) in a plane."""
+        return AXES if self.plane is None else self.plane.axes
+
+    @property
+    def solved_layout(self) -> Layout:
+        """Order of the unknowns in the matrix."""
+        return self.layout if self.plane is None else self.plane.layout
 
     @property
     def attached_free(self) -> Array:

@@ -11,10 +11,11 @@ from ..scene.profile import extremes
 from .laminate import uneven_faces
 from .meeting import Meeting, meetings, passing_warnings
 from .parties import contact_pairs
+from .planarity import find_plane, require_plane
 from .validity import validity_warnings
 
 MODELS = ("two_rod", "laminate")
-DIMENSIONS = (3,)
+DIMENSIONS = (3, 2)  # the first is what `auto` takes, until it asks `best_dimension`
 INTEGRATORS = ("implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint")
 
 
@@ -61,12 +62,14 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         reasons, "dimension", dimension, scene.solver.dimension, DIMENSIONS, "positions and frames"
     )
     chosen_integrator = _choose(reasons, "integrator", integrator, scene.solver.integrator, INTEGRATORS, "the paper's")
+    if chosen_dimension == 2:
+        reasons["dimension"] += f": all stays in {require_plane(scene)}"
     return Plan(
         chosen_model,
         chosen_dimension,
         chosen_integrator,
         reasons,
-        _terms(scene, chosen_model),
+        _terms(scene, chosen_model, chosen_dimension),
         _contact_pairs(scene),
         (*validity_warnings(scene), *passing_warnings(scene), *_warnings_of(chosen_model, scene)),
     )
@@ -90,6 +93,12 @@ def leanest_model(scene: SceneConfig) -> tuple[str, str]:
     return "laminate", "one curve carries both layers: half the unknowns, no stiff bond"
 
 
+def best_dimension(scene: SceneConfig) -> tuple[int, str]:
+    """2 where the scene stays in a plane, otherwise 3, and why."""
+    plane, reason = find_plane(scene)
+    return (3 if plane is None else 2), reason
+
+
 def _choose(reasons: dict[str, str], key: str, asked, of_scene, allowed: tuple, default_reason: str):
     value, origin = (asked, "asked for") if asked != "auto" else (of_scene, "set by the scene")
     if value == "auto":
@@ -101,7 +110,7 @@ def _choose(reasons: dict[str, str], key: str, asked, of_scene, allowed: tuple, 
     return next(candidate for candidate in allowed if str(candidate) == str(value))
 
 
-def _terms(scene: SceneConfig, model: str) -> dict[str, str]:
+def _terms(scene: SceneConfig, model: str, dimension: int) -> dict[str, str]:
     def state(needed: bool, reason: str) -> str:
         return "active" if needed else f"skipped: {reason}"
 
@@ -117,7 +126,7 @@ def _terms(scene: SceneConfig, model: str) -> dict[str, str]:
     return {
         "stretching": "active",
         "bending": "active",
-        "twisting": "active",
+        "twisting": state(dimension == 3, "nothing twists in a plane"),
         "bond": bond or state(any(len(rod.layers) == 2 for rod in scene.rods), "no rod has two layers"),
         "eigenstrain": state(driven, "no layer follows a stimulus"),
         "inertia": "active",

@@ -74,6 +74,35 @@ class State:
             start += array.size
 
 
+OUT_OF_PLANE = 1e-9
+"""Component along the normal of a plane, of the largest there is, that is rounding."""
+
+
+def refuse_out_of_plane(model: Model, state: State) -> None:
+    """Raise InputError if a state is none of a model of dimension 2."""
+    plane = model.plane
+    if plane is None:
+        return
+    free, turned = model.bodies.body_of_free, state.body_rotation @ model.bodies.start_rotation.transpose(0, 2, 1)
+    spins = state.body_angular_velocity
+    leaving = {
+        "position": (state.position - model.start_position) @ plane.normal,
+        "velocity": state.velocity @ plane.normal,
+        "director1": state.director1 @ plane.normal,
+        "spin": state.spin,
+        "body_position": (state.body_position - model.bodies.start_position) @ plane.normal,
+        "body_velocity": state.body_velocity @ plane.normal,
+        "body_rotation": turned[free] @ plane.normal - plane.normal,
+        "body_angular_velocity": spins - np.outer(spins @ plane.normal, plane.normal),
+    }
+    for name, component in leaving.items():
+        largest = np.abs(component).max(initial=0.0)
+        if largest > OUT_OF_PLANE * max(1.0, np.abs(getattr(state, name)).max(initial=0.0)):
+            raise InputError(
+                f"saved state: {name} leaves the plane of the scene by {largest:.3g}; allowed with dimension 3"
+            )
+
+
 def initial_state(model: Model, with_history: bool = False) -> State:
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
 

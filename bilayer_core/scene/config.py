@@ -166,8 +166,8 @@ class Solver(Part):
 
     model: Literal["auto", "two_rod", "laminate"] = "auto"
     """`two_rod`: each layer a rod of its own, bonded to the other; `laminate`: one curve for both, bonded exactly."""
-    dimension: Literal["auto", 3] = "auto"
-    """Of space."""
+    dimension: Literal["auto", 2, 3] = "auto"
+    """Of space: 2 is faster, where all stays in a plane; `auto` is 3."""
     integrator: Literal["auto", "implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"] = (
         "auto"
     )

@@ -200,10 +200,10 @@ def expand_pairs(
 
 
 @kernel
-def hold_unknowns(held, half_bandwidth, band_out):
-    """Replace the rows and columns of three unknowns from each of `held` by those of the identity."""
+def hold_unknowns(held, dimension, half_bandwidth, band_out):
+    """Replace the rows and columns of `dimension` unknowns from each of `held` by those of the identity."""
     for k in range(held.shape[0]):
-        for j in range(held[k], held[k] + 3):
+        for j in range(held[k], held[k] + dimension):
             for r in range(1, half_bandwidth + 1):
                 band_out[j, r] = 0.0
                 if j >= r:

@@ -30,15 +30,12 @@ def _turning(base, arm, k, g0, g1, g2, body_hessian):
 
 
 @kernel
-def _arm_jacobian(arm, k, c, n):
-    """Entry (c, n) of ∂x/∂(X, φ) = [I, −[ρ]×]."""
+def arm_jacobian(axes, arm, k, c, n):
+    """Entry (c, n) of ∂(a_c·x)/∂(X, φ) = [a_cᵀ, (ρ × a_c)ᵀ] for the direction a_c of an unknown."""
     if n < 3:
-        return 1.0 if n == c else 0.0
-    if n - 3 == c:
-        return 0.0
-    # −[ρ]×: row c, column n − 3
-    third = 3 - c - (n - 3)
-    return arm[k, third] if (n - 3 - c + 3) % 3 == 1 else -arm[k, third]
+        return axes[c, n]
+    i, j = (n - 2) % 3, (n - 1) % 3
+    return arm[k, i] * axes[c, j] - arm[k, j] * axes[c, i]
 
 
 @kernel
@@ -83,6 +80,7 @@ def hand_gradient_to_bodies(
 
 @kernel
 def hand_nodes_to_bodies(
+    axes,
     attached_unknown,
     attached_free,
     attached_of_unknown,
@@ -94,12 +92,15 @@ def hand_nodes_to_bodies(
     border_out,
     body_hessian_out,
 ):
-    """Add what the band holds of attached nodes to the border U and to D; the band is not changed."""
+    """Add what the band holds of attached nodes to the border U and to D; the band is not changed.
+
+    `axes` are the directions of a node's unknowns, shape (3, 3), or (2, 3) in a plane.
+    """
     for k in range(attached_unknown.shape[0]):
         a, f = attached_unknown[k], attached_free[k]
         if f < 0:
             continue
-        for c in range(3):
+        for c in range(axes.shape[0]):
             column = a + c
             for i in range(max(0, column - half_bandwidth), min(size, column + half_bandwidth + 1)):
                 value = band[column, i - column] if i >= column else band[i, column - i]
@@ -108,28 +109,29 @@ def hand_nodes_to_bodies(
                 other = attached_of_unknown[i]
                 if other < 0:
                     for n in range(6):
-                        border_out[i, 6 * f + n] += value * _arm_jacobian(arm, k, c, n)
+                        border_out[i, 6 * f + n] += value * arm_jacobian(axes, arm, k, c, n)
                 elif attached_free[other] >= 0:
                     own, row = i - attached_unknown[other], 6 * attached_free[other]
                     for m in range(6):
-                        left = value * _arm_jacobian(arm, other, own, m)
+                        left = value * arm_jacobian(axes, arm, other, own, m)
                         for n in range(6):
-                            body_hessian_out[row + m, 6 * f + n] += left * _arm_jacobian(arm, k, c, n)
+                            body_hessian_out[row + m, 6 * f + n] += left * arm_jacobian(axes, arm, k, c, n)
         _turning(
             6 * f, arm, k, attached_gradient[k, 0], attached_gradient[k, 1], attached_gradient[k, 2], body_hessian_out
         )
 
 
 @kernel
-def _wall_jacobian(tangent, w, m, n):
+def _wall_jacobian(axes, tangent, w, m, n):
     """Entry (m, n) of ∂(e, θ)/∂φ = [−[t]×; tᵀ]."""
     if m == 3:
         return tangent[w, n]
-    return _arm_jacobian(tangent, w, m, 3 + n)
+    return arm_jacobian(axes, tangent, w, m, 3 + n)
 
 
 @kernel
 def hand_walls_to_bodies(
+    axes,
     wall_free,
     wall_joint,
     joint_a,
@@ -161,7 +163,7 @@ def hand_walls_to_bodies(
                 for p in range(4):
                     for q in range(4):
                         h = edge_hessian[w, p, q] if p <= q else edge_hessian[w, q, p]
-                        total += _wall_jacobian(tangent, w, p, m) * h * _wall_jacobian(tangent, w, q, n)
+                        total += _wall_jacobian(axes, tangent, w, p, m) * h * _wall_jacobian(axes, tangent, w, q, n)
                 body_hessian_out[base + m, base + n] += total
         _turning(6 * f, tangent, w, edge_gradient[w, 0], edge_gradient[w, 1], edge_gradient[w, 2], body_hessian_out)
         wall_first = joint_a[x] == w
@@ -171,7 +173,7 @@ def hand_walls_to_bodies(
                 total = 0.0
                 for p in range(4):
                     h = cross_hessian[x, p, q] if wall_first else cross_hessian[x, q, p]
-                    total += _wall_jacobian(tangent, w, p, m) * h
+                    total += _wall_jacobian(axes, tangent, w, p, m) * h
                 if q == 3:
                     border_out[edge_unknown[edge], base + m] += total
                     continue
@@ -184,6 +186,6 @@ def hand_walls_to_bodies(
                     elif attached_free[other] >= 0:
                         own, row = unknown - attached_unknown[other], 6 * attached_free[other]
                         for n in range(6):
-                            value = signed * _arm_jacobian(arm, other, own, n)
+                            value = signed * arm_jacobian(axes, arm, other, own, n)
                             body_hessian_out[row + n, base + m] += value
                             body_hessian_out[base + m, row + n] += value

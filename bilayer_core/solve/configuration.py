@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..jit import kernel
-from ..kinematics.frames import edge_geometry, transport_directors
+from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
 from ..kinematics.rotation import rotation_matrix
 from ..model.model import Model
 from ..model.state import State
@@ -190,8 +190,14 @@ class Configuration:
         self.carry_frames(base, self._angle)
 
     def carry_frames(self, base: Configuration, angle: Array) -> None:
-        """Frames of `base`, carried to the present positions and turned by `angle` [rad]."""
-        model = self._model
+        """Frames of `base`, carried to the present positions and turned by `angle` [rad]; in a plane they are those of
+        the positions alone.
+        """
+        model, plane = self._model, self._model.plane
+        if plane is not None:
+            own = (self.length, self.tangent, self.director1, self.director2)
+            planar_frames(self.position, model.edge_node, plane.normal, plane.side, *own)
+            return
         edge_geometry(self.position, model.edge_node, self.length, self.tangent)
         transport_directors(
             model.edge_count,

@@ -43,39 +43,34 @@ def zeros_in_one(shapes: dict[str, tuple[int, ...]]) -> tuple[Array, list[Array]
 
 
 @kernel
-def _add_links(links, link_node, link_body, link_hessian, node_unknown, border_out):
-    """Add the blocks between nodes and free bodies to the border."""
+def _add_links(axes, links, link_node, link_body, link_hessian, node_unknown, border_out):
+    """Add the blocks between nodes, whose unknowns are along `axes`, and free bodies to the border."""
     for k in range(links):
         row, column = node_unknown[link_node[k]], 6 * link_body[k]
-        for m in range(3):
-            for n in range(6):
-                border_out[row + m, column + n] += link_hessian[k, m, n]
+        for m in range(axes.shape[0]):
+            for c in range(3):
+                along = axes[m, c]
+                if along != 0.0:
+                    for n in range(6):
+                        border_out[row + m, column + n] += along * link_hessian[k, c, n]
 
 
 class NewtonMatrix:
     """Second derivatives in edge space, filled by the forces, and the factorised matrix of the unknowns."""
 
     def __init__(self, model: Model, has_node_blocks: bool):
-        self._model = model
+        self._model, self._layout = model, model.solved_layout
         self.rods = RodContact(model) if model.rod_surfaces is not None else None
         self._rod_border = RodBorder(model) if self.rods else None
         self._has_node_blocks = has_node_blocks
-        edges = model.edge_count + model.wall_count
-        pairs = len(model.pair_top)
-        size, b = model.layout.size, model.layout.half_bandwidth
-        node_blocks = model.node_count if has_node_blocks else 0
-        shapes = {
-            "edge_hessian": (edges, 4, 4),
-            "cross_hessian": (len(model.joint_a), 4, 4),
-            "pair_hessian": (pairs, 3, 3),
-            "top_hessian": (pairs, 3, 4),
-            "bottom_hessian": (pairs, 3, 4),
-            "node_hessian": (node_blocks, 3, 3),
+        size, b = self._layout.size, self._layout.half_bandwidth
+        shapes = self._shapes() | {
+            "node_hessian": (model.node_count if has_node_blocks else 0, 3, 3),
             "body_hessian": (6 * model.free_count, 6 * model.free_count),
         }
         self._second_derivatives, parts = zeros_in_one(shapes)
-        self.edge_hessian, self.cross_hessian, self.pair_hessian, self.top_hessian, self.bottom_hessian = parts[:5]
-        self.node_hessian, self.body_hessian = parts[5:]
+        for name, part in zip(shapes, parts, strict=True):
+            setattr(self, name, part)
         self.links = 0  # blocks between nodes and free bodies: the node, the free body, and ∂²/∂x ∂(X, φ) of each
         self.link_node = np.zeros(0, dtype=np.int64)
         self.link_body = np.zeros(0, dtype=np.int64)
@@ -87,7 +82,7 @@ class NewtonMatrix:
         self._border_free = np.zeros((size + b, model.bodies.freedom.shape[1]))
         self._border_solution = np.zeros_like(self._border_free)
         self._corner = np.zeros_like(self.body_hessian)
-        self._held_unknowns = (model.layout.attached[:, None] + np.arange(3)).ravel()
+        self._held_unknowns = (self._layout.attached[:, None] + np.arange(self._layout.dimension)).ravel()
         self._body_masses = np.concatenate(
             [np.repeat([m, np.trace(j)], 3) for m, j in zip(model.bodies.mass, model.bodies.second_moment, strict=True)]
             or [np.zeros(0)]
@@ -97,6 +92,17 @@ class NewtonMatrix:
         self._wide, self._wide_solution = self._border_free, self._border_solution
         self._coupled = False
         self.shift, self.simplified = 0.0, 0
+
+    def _shapes(self) -> dict[str, tuple[int, ...]]:
+        """Names and shapes of second derivatives in edge space."""
+        edges, pairs = self._model.edge_count + self._model.wall_count, len(self._model.pair_top)
+        return {
+            "edge_hessian": (edges, 4, 4),
+            "cross_hessian": (len(self._model.joint_a), 4, 4),
+            "pair_hessian": (pairs, 3, 3),
+            "top_hessian": (pairs, 3, 4),
+            "bottom_hessian": (pairs, 3, 4),
+        }
 
     def clear(self) -> None:
         """Set all second derivatives to zero."""
@@ -141,8 +147,8 @@ class NewtonMatrix:
         """A as a band (see `solve.band`), U and D; parameters as for `factorise`. Attached nodes are rows of the
         identity.
         """
-        model, layout = self._model, self._model.layout
-        self._assemble_band(factor)
+        model, layout = self._model, self._layout
+        self._assemble_band(factor, at)
         if self.rods:
             self._rod_border.add_to_band([self.rods.contacts, self.rods.sliding], self.simplified, self._band)
         self._border.fill(0.0)
@@ -151,13 +157,14 @@ class NewtonMatrix:
         if model.free_count:
             if self.links:
                 self._coupled = True
-                _add_links(self.links, self.link_node, self.link_body, self.link_hessian, layout.node, self._border)
+                links = (self.links, self.link_node, self.link_body, self.link_hessian)
+                _add_links(model.directions, *links, layout.node, self._border)
             if (model.attached_free >= 0).any():
                 self._add_clamps(at, edge_gradient, attached_gradient)
-        hold_unknowns(layout.attached, layout.half_bandwidth, self._band)
+        hold_unknowns(layout.attached, layout.dimension, layout.half_bandwidth, self._band)
         return self._band, self._border[: layout.size], self._corner
 
-    def _assemble_band(self, factor: float) -> None:
+    def _assemble_band(self, factor: float, at: Configuration) -> None:
         model, layout, band = self._model, self._model.layout, self._band
         band.fill(0.0)
         expand_edges(
@@ -189,18 +196,19 @@ class NewtonMatrix:
 
     def _add_clamps(self, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> None:
         """Rows of nodes attached to free bodies, from the band and the border, and clamps' elements: into U and D."""
-        model, layout = self._model, self._model.layout
+        model, layout, d = self._model, self._layout, self._layout.dimension
         self._coupled = True
         if self.rods:
             self._rod_border.add_to_bodies(at.arm, self._border, self._corner)
         for k in np.flatnonzero(model.attached_free >= 0):
-            free, rows = model.attached_free[k], slice(layout.attached[k], layout.attached[k] + 3)
-            block = np.hstack([np.eye(3), -skew(at.arm[k])]).T @ self._border[rows]
+            free, rows = model.attached_free[k], slice(layout.attached[k], layout.attached[k] + d)
+            block = (model.directions @ np.hstack([np.eye(3), -skew(at.arm[k])])).T @ self._border[rows]
             own = slice(6 * free, 6 * free + 6)
             self._corner[own] += block
             self._corner[:, own] += block.T
         attached = (layout.attached, model.attached_free)
         hand_nodes_to_bodies(
+            model.directions,
             *attached,
             layout.attached_of_unknown,
             at.arm,
@@ -211,7 +219,13 @@ class NewtonMatrix:
             self._border,
             self._corner,
         )
+        self._add_walls(at, edge_gradient)
+
+    def _add_walls(self, at: Configuration, edge_gradient: Array) -> None:
+        """What clamps' elements couple to the rotation of free bodies, into U and D."""
+        model, layout = self._model, self._layout
         hand_walls_to_bodies(
+            model.directions,
             model.wall_free,
             model.wall_joint,
             model.joint_a,
@@ -221,7 +235,8 @@ class NewtonMatrix:
             layout.node,
             layout.edge,
             layout.attached_of_unknown,
-            *attached,
+            layout.attached,
+            model.attached_free,
             at.arm,
             at.tangent,
             edge_gradient,
@@ -233,7 +248,7 @@ class NewtonMatrix:
 
     def _factorise(self, factor: float) -> bool:
         schur = self._take_border(self.shift * factor)
-        if self._factor(self._band, self._model.layout.size) >= 0:
+        if self._factor(self._band, self._layout.size) >= 0:
             return False
         if schur is None:
             return True
@@ -275,7 +290,7 @@ class NewtonMatrix:
         """D − Uᵀ A⁻¹ U in place of D, given the factorised band."""
         if not self._coupled:
             return
-        size = self._model.layout.size
+        size = self._layout.size
         self._wide_solution[:] = self._wide
         self._solve_border(self._band, size, self._wide_solution)
         if len(self._leaving):
@@ -290,7 +305,7 @@ class NewtonMatrix:
         """
         self.assemble(factor, at, edge_gradient, attached_gradient)
         schur = self._take_border(factor)
-        count = int(signed_factor(self._model.layout.half_bandwidth)(self._band, self._model.layout.size))
+        count = int(signed_factor(self._layout.half_bandwidth)(self._band, self._layout.size))
         if schur is not None:
             self._eliminate_band(schur)
             count += int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
@@ -298,7 +313,7 @@ class NewtonMatrix:
 
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
         """Minus the inverse matrix times the gradient: of rods, shape (size,), and of bodies, shape (n_free, 6)."""
-        size = self._model.layout.size
+        size = self._layout.size
         right, leaving = self._right, self._leaving
         np.negative(gradient, out=right[:size])
         right[size:] = 0.0

@@ -18,6 +18,7 @@ from .terms.elastic import BendingAndTwisting, BendingOffAxis, Bond, Stretching
 from .terms.fluid import AddedMass, Drag
 from .terms.inertial import Damping, Gravity, Inertia
 from .terms.loads import Followers, Loads, Moments
+from .terms.planar import PlanarElasticity
 from .terms.rod_contact import RodBarrier, RodFriction
 from .terms.term import Accumulators, Kind, StepContext, Term
 
@@ -40,6 +41,7 @@ class IncrementalPotential:
         has_surfaces, has_rods = model.meets_surfaces, model.rod_surfaces is not None
         self.has_contact = has_surfaces or has_rods
         has_drag, has_added_mass = len(model.drag_node) > 0, len(model.fluid_mass) > 0
+        in_plane = model.plane is not None
         has_node_blocks = self.has_contact or has_drag or has_added_mass
 
         self.gradient = np.zeros(model.layout.size)
@@ -60,10 +62,11 @@ class IncrementalPotential:
         self._barrier = Barrier(model, self.accumulators) if has_surfaces else None
         self.near = self._barrier.near if self._barrier else None
         self._of_rods_and_bodies = self._needed(
-            (Stretching, True),
-            (BendingAndTwisting, len(model.coupled_joint) == 0),
-            (BendingOffAxis, len(model.coupled_joint) > 0),
-            (Bond, len(model.pair_top) > 0),
+            (Stretching, not in_plane),
+            (BendingAndTwisting, not in_plane and len(model.coupled_joint) == 0),
+            (BendingOffAxis, not in_plane and len(model.coupled_joint) > 0),
+            (Bond, not in_plane and len(model.pair_top) > 0),
+            (PlanarElasticity, in_plane),
             (Inertia, True),
             (Damping, model.scene.damping.mass > 0.0),
             (Gravity, any(model.scene.gravity)),

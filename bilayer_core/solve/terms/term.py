@@ -11,6 +11,7 @@ import numpy as np
 from ...model.model import Model
 from ..configuration import Configuration
 from ..newton_matrix import NewtonMatrix, zeros_in_one
+from ..planar_matrix import PlanarMatrix
 
 Array = np.ndarray
 
@@ -134,7 +135,7 @@ class Accumulators:
         self.carrier = np.zeros((len(model.carriers.weight), 3))
         self.energy: dict[str, float] = {}
         self.contact = np.zeros((len(model.bodies.names) + 1, 6))
-        self.matrix = NewtonMatrix(model, has_node_blocks)
+        self.matrix = (NewtonMatrix if model.plane is None else PlanarMatrix)(model, has_node_blocks)
 
     def clear(self, with_hessian: bool) -> None:
         """Forget energies and first derivatives, those of contact apart, and second ones on request."""

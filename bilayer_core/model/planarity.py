@@ -1,0 +1,203 @@
+"""Whether all that happens in a scene stays in one plane, and if not, what leaves it.
+
+A scene stays in a plane if it is its own mirror image there: its rods lie in the plane with their width across it, what
+acts on them and how they move lies in it, surfaces and free bodies are symmetric about it. Then nothing pushes out of
+it. A surface may also be unsymmetric but run on along the normal as far as anything can touch it.
+(In space a rod may buckle out of the plane; in two dimensions it cannot.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..errors import SceneError
+from ..kinematics.rotation import rotation_matrix
+from ..scene.body import Body, Free, Guided, Prescribed
+from ..scene.config import SceneConfig
+from ..scene.profile import extremes
+from ..scene.rod import Rod
+from .plane import Plane
+from .shapes import Shape, obstacle_pose, shape_of
+from .strands import turn_of_copy
+
+Array = np.ndarray
+ROUNDING = 1e-9
+"""Of directions, and of positions as multiples of the longest rod: no further from a plane than typed numbers are."""
+
+
+def find_plane(scene: SceneConfig) -> tuple[Plane | None, str]:
+    """The plane of a scene and why it stays in it, or None and what leaves the plane of its first rod."""
+    plane = _plane_of(scene.rods[0])
+    offence = next(_Survey(scene, plane).offences(), None)
+    return (plane, f"all stays in {plane}") if offence is None else (None, offence)
+
+
+def require_plane(scene: SceneConfig) -> Plane:
+    """The plane of a scene.
+
+    Raises
+    ------
+    SceneError
+        If it does not stay in one.
+    """
+    plane, reason = find_plane(scene)
+    if plane is None:
+        raise SceneError(f"{scene.name}: solver.dimension: found 2, but {reason}; for this scene it must be 'auto' or 3")
+    return plane
+
+
+def _plane_of(rod: Rod) -> Plane:
+    """Plane of the path and normal of a rod."""
+    p, q = np.array(rod.path.direction), np.array(rod.normal)
+    normal = np.cross(p, q)
+    axis = int(np.argmax(np.abs(normal)))
+    if np.all(np.abs(np.delete(normal, axis)) < ROUNDING):
+        axes = np.delete(np.eye(3), axis, axis=0)
+    else:
+        q = np.cross(normal / np.linalg.norm(normal), p)
+        axes = np.stack([p, q / np.linalg.norm(q)])
+    return Plane(np.array(rod.path.start), axes)
+
+
+class _Survey:
+    def __init__(self, scene: SceneConfig, plane: Plane):
+        self._scene, self._plane, self._normal = scene, plane, plane.normal
+        self._size = max(rod.path.length for rod in scene.rods)
+        self._reach = max(
+            (abs(self._height(self._place(body, p.position))) for body in scene.bodies for p in body.contact_points),
+            default=0.0,
+        )
+        self._free_surface = any(isinstance(body.motion, Free) and body.surface for body in scene.bodies)
+
+    def _height(self, point) -> float:
+        """Of a point over the plane [m]."""
+        return float(self._normal @ (np.array(point) - self._plane.point))
+
+    def _lies_in(self, *vectors) -> bool:
+        """Whether vectors are directions in the plane, or zero."""
+        return all(abs(self._normal @ np.array(v)) <= ROUNDING * np.linalg.norm(v) for v in vectors)
+
+    def _is_on(self, *points) -> bool:
+        return all(abs(self._height(point)) <= ROUNDING * self._size for point in points)
+
+    def _along_normal(self, *vectors) -> bool:
+        """Whether vectors are parallel to the normal, or zero."""
+        return all(np.linalg.norm(np.cross(v, self._normal)) <= ROUNDING * np.linalg.norm(v) for v in vectors)
+
+    def _place(self, body: Body, point) -> Array:
+        """Where a point of a body's frame is at the start [m]."""
+        return np.array(body.position) + rotation_matrix(np.array(body.rotation)) @ np.array(point)
+
+    def offences(self) -> Iterator[str]:
+        """What leaves the plane, each as a sentence."""
+        scene, plane = self._scene, self._plane
+        for what in self._vectors():
+            yield f"{what} leaves {plane}"
+        for rod in scene.rods:
+            for layer in rod.layers:
+                if any(extremes(layer.natural_twist)):
+                    yield f"rods.{rod.name}.layers.{layer.name}.natural_twist turns the rod out of {plane}"
+        for body in scene.bodies:
+            if self._carries_points(body) and not self._mirrored(self._points(body)):
+                yield f"the points by which bodies.{body.name} touches are not symmetric about {plane}"
+            if body.surface is not None:
+                shape, turn = shape_of(body.surface), rotation_matrix(np.array(body.rotation))
+                if not self._fits(shape, np.array(body.position), turn, isinstance(body.motion, Free)):
+                    yield f"bodies.{body.name}.surface is not symmetric about {plane}"
+        for obstacle in scene.obstacles:
+            if not self._fits(shape_of(obstacle), *obstacle_pose(obstacle)):
+                yield f"obstacles.{obstacle.name} is not symmetric about {plane}"
+
+    def _vectors(self) -> Iterator[str]:
+        """Keys of rods, directions and motions that leave the plane."""
+        scene = self._scene
+        for rod in scene.rods:
+            for copy, name in enumerate(rod.copies):
+                turn = turn_of_copy(rod, copy)
+                start = turn(np.array(rod.path.start), about=True)
+                directions = turn(np.array(rod.path.direction)), turn(np.array(rod.normal))
+                if not (self._is_on(start) and self._lies_in(*directions)):
+                    yield f"rods.{name}"
+        if not self._lies_in(scene.gravity):
+            yield "gravity"
+        if scene.fluid is not None and not self._lies_in(scene.fluid.velocity):
+            yield "fluid.velocity"
+        for body in scene.bodies:
+            yield from (f"bodies.{body.name}.{key}" for key in self._motions(body))
+        for load in scene.loads:
+            force, moment = self._of_load(load)
+            if not self._lies_in(force):
+                yield f"loads.{load.name}.force"
+            if not self._along_normal(moment):
+                yield f"loads.{load.name}.moment"
+
+    def _motions(self, body: Body) -> Iterator[str]:
+        """Keys of a body's motion that leave the plane."""
+        motion = body.motion
+        if isinstance(motion, Prescribed):
+            if not self._lies_in(*motion.displacements):
+                yield "motion.displacements"
+            if not self._along_normal(*motion.rotations):
+                yield "motion.rotations"
+        elif isinstance(motion, Guided):
+            if not self._lies_in(motion.axis):
+                yield "motion.axis"
+        else:
+            if not self._is_on(body.position):
+                yield "position"
+            if not self._lies_in(motion.velocity):
+                yield "motion.velocity"
+            if not self._along_normal(motion.angular_velocity):
+                yield "motion.angular_velocity"
+            turn = rotation_matrix(np.array(body.rotation))
+            inertia = shape_of(body.surface).inertia(motion.mass) if motion.inertia is None else np.diag(motion.inertia)
+            if not self._along_normal(turn @ inertia @ turn.T @ self._normal):
+                yield "motion.inertia, of which no principal axis is along its normal,"
+
+    def _of_load(self, load) -> tuple[Array, Array]:
+        """Force and moment of a load in the world's axes at the start, but that of a rod in the axes of the first."""
+        force, moment = np.array(load.force), np.array(load.moment)
+        if load.frame == "world":
+            return force, moment
+        if load.body is not None:
+            body = next(body for body in self._scene.bodies if body.name == load.body)
+            turn = rotation_matrix(np.array(body.rotation))
+            return turn @ force, turn @ moment
+        return force[2] * self._normal, moment  # along path × normal, which is ± the plane's
+
+    def _carries_points(self, body: Body) -> bool:
+        """Whether forces on its points could turn a free body out of the plane: it, or one whose surface they meet."""
+        return isinstance(body.motion, Free) or self._free_surface
+
+    def _points(self, body: Body) -> Array:
+        """Places of its contact points and those of its surface, with radius and length [m], shape (·, 5)."""
+        points = [(*self._place(body, p.position), p.offset, p.length) for p in body.contact_points]
+        if body.surface is not None:
+            of_surface, radius, length = shape_of(body.surface).points()
+            points += [(*self._place(body, point), radius, length) for point in of_surface]
+        return np.array(points).reshape(-1, 5)
+
+    def _mirrored(self, points: Array) -> bool:
+        """Whether points are their own mirror image."""
+        image = points.copy()
+        image[:, :3] -= 2.0 * np.outer((points[:, :3] - self._plane.point) @ self._normal, self._normal)
+        apart = np.abs(points[:, None] - image[None]).max(axis=2, initial=0.0)
+        return bool(np.all(apart.min(axis=1, initial=np.inf) <= ROUNDING * self._size)) if len(points) else True
+
+    def _fits(self, shape: Shape, position: Array, turn: Array, free: bool = False) -> bool:
+        """Whether a surface is symmetric about the plane, or runs on along the normal wherever it can be touched."""
+        axes = turn @ shape.turn
+        if shape.kind == "plane":
+            return self._lies_in(axes[:, 2])
+        if shape.kind == "sphere":
+            return self._is_on(position)
+        along = next((k for k in range(3) if self._along_normal(axes[:, k])), None)
+        if shape.kind == "cylinder" and along != 2:
+            return self._is_on(position) and self._lies_in(axes[:, 2])
+        if along is None:
+            return False
+        if free or self._free_surface:
+            return self._is_on(position)
+        return self._is_on(position) or abs(self._height(position)) + self._reach <= shape.core[along]

@@ -1,0 +1,71 @@
+"""The plane in which a model of dimension 2 moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .layout import Layout, ReadOnlyArrays
+
+Array = np.ndarray
+COORDINATES = "xyz"
+
+
+@dataclass(frozen=True)
+class Plane(ReadOnlyArrays):
+    """A plane in the world.
+
+    Attributes
+    ----------
+    point : Array
+        One of its points [m], shape (3,).
+    axes : Array
+        p and q, two orthonormal directions in it, shape (2, 3); axes of the world where it is parallel to two of them.
+    """
+
+    point: Array
+    axes: Array
+
+    @property
+    def normal(self) -> Array:
+        """p × q, shape (3,)."""
+        return np.cross(self.axes[0], self.axes[1])
+
+    @property
+    def motions(self) -> Array:
+        """Motions (X, φ) of a body that stay in it, one a column, orthonormal, shape (6, 3)."""
+        motions = np.zeros((6, 3))
+        motions[:3, :2], motions[3:, 2] = self.axes.T, self.normal
+        return motions
+
+    def __str__(self) -> str:
+        axis = np.flatnonzero(np.abs(self.normal) == 1.0)
+        if len(axis):
+            offset = self.point[axis[0]]
+            return f"the plane {COORDINATES[axis[0]]} = {offset:.6g}{' m' if offset else ''}"
+        normal, point = (", ".join(f"{value:.6g}" for value in vector) for vector in (self.normal, self.point))
+        return f"the plane with normal ({normal}) through ({point}) m"
+
+
+@dataclass(frozen=True)
+class InPlane(ReadOnlyArrays):
+    """What the arrays of a model of dimension 2 have in addition.
+
+    Unknowns in space, of which a step of Newton's method is one vector, keep the order of `Model.layout`; those that
+    are solved for are in that of `layout`.
+
+    Attributes
+    ----------
+    axes, normal : Array
+        Of the plane, shapes (2, 3), (3,).
+    side : Array
+        σ of every edge and wall: m1 = σ normal × t, m2 = σ normal, shape (n_edge + n_wall,).
+    layout : Layout
+        Two unknowns a node, none an edge.
+    """
+
+    axes: Array
+    normal: Array
+    side: Array
+    layout: Layout
