@@ -105,6 +105,9 @@ SIM_NODE = (
     NodeParameter("model", "auto", "auto, or a model's name"),
     NodeParameter("dimension", "auto", "auto, 2 or 3"),
     NodeParameter("dt", 0.0, "time step [s]; 0 = as the scene says", 0.0),
+    NodeParameter(
+        "tolerance", 0.0, "largest error of an adaptive step over the longest rod; 0 = as the scene says", 0.0
+    ),
 )
 
 RAMP_CONTROLLER = (

@@ -36,7 +36,11 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
     recording = Recording(parameters["log"], rerun_path, rate, scene.output.marker_rate)
     simulator = Simulator(
-        scene, model=parameters["model"], dimension=parameters["dimension"], dt=parameters["dt"] or None
+        scene,
+        model=parameters["model"],
+        dimension=parameters["dimension"],
+        dt=parameters["dt"] or None,
+        tolerance=parameters["tolerance"] or None,
     )
     node.get_logger().info("compiling, the first start on a machine may take a minute ...")
     seconds = simulator.compile()

@@ -13,6 +13,7 @@ from typing import Protocol
 
 from bilayer_core.errors import InputError
 from bilayer_core.integrate.frame import Frame
+from bilayer_core.integrate.observer import TIME_ROUNDING
 from bilayer_core.integrate.result import Termination
 from bilayer_core.integrate.simulator import Simulator
 from bilayer_sim_ros.pacing import Pacer
@@ -52,7 +53,7 @@ class Status:
     real_time_factor : float
         Simulated seconds per second.
     steps, substeps, iterations : int
-        Nominal steps, steps actually taken, and Newton iterations.
+        Steps, the parts in which they were taken, and Newton iterations.
     residual : float
         Largest velocity correction left at the end of a step [m/s].
     """
@@ -217,7 +218,8 @@ class SimulationWorker:
         self._hand_out()
 
     def _is_over(self) -> bool:
-        return self._simulator.time > self._duration - 0.5 * self._simulator.dt
+        left = self._duration - self._simulator.time
+        return left < (0.5 if self._simulator.tolerance is None else TIME_ROUNDING) * self._simulator.dt
 
     def _serve_requests(self) -> None:
         """Wait until the next step is due (or, when paused, the next status), and do what is asked meanwhile."""
@@ -248,7 +250,7 @@ class SimulationWorker:
         for channel, value in self._inputs.changes(start).items():
             self._simulator.set_stimulus(channel, value)
             self._recording.log_stimulus(channel, SCHEDULE if value is None else value, start)
-        report = self._simulator.step()
+        report = self._simulator.step(until=self._next_stop())
         self._frame_is_out = False
         status = self._status
         status.steps += 1
@@ -259,6 +261,11 @@ class SimulationWorker:
         if frame_is_due:
             self._hand_out()
         return frame_is_due
+
+    def _next_stop(self) -> float:
+        """When a frame is due, or the run ends [s]: where adaptive steps end at the latest."""
+        due = self._begun + (self._periods(self._simulator.time) + 1) / self._rate
+        return due if due < self._duration - TIME_ROUNDING * self._simulator.dt else self._duration
 
     def _periods(self, time: float) -> int:
         """Output periods of this run that are complete at a time [s]."""

@@ -53,6 +53,8 @@ def _report(simulator) -> dict[str, Any]:
         "nodes": model.node_count + model.point_count,
         "dof": model.unknowns,
         "dt": simulator.dt,
+        "tolerance": simulator.tolerance,
+        "max_step": None if simulator.tolerance is None else simulator.max_step,
         "duration": scene.duration,
         "terms": plan.terms,
         "contact_pairs": list(plan.contact_pairs),
@@ -112,8 +114,7 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
     for key in ("model", "dimension", "integrator"):
         yield from _block(key, [f"{report[key]} ({report['reasons'][key]})"])
     yield from _block("size", [f"{report['nodes']} nodes, {report['dof']} unknowns"])
-    steps = round(report["duration"] / report["dt"])
-    yield from _block("time", [f"{report['duration']:g} s in {steps} steps of {1e3 * report['dt']:g} ms"])
+    yield from _block("time", [_steps(report)])
     yield from _forces(report["terms"])
     yield "contact pairs"
     yield from (f"  {pair}" for pair in report["contact_pairs"] or ["none"])
@@ -127,6 +128,17 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         yield from _block("WARNING", [text])
     count = len(report["warnings"])
     yield f"no faults, {count or 'no'} warning{'' if count == 1 else 's'}"
+
+
+def _steps(report: dict[str, Any]) -> str:
+    """How long steps are."""
+    duration, dt = report["duration"], report["dt"]
+    if report["tolerance"] is None:
+        return f"{duration:g} s in {round(duration / dt)} steps of {1e3 * dt:g} ms"
+    return (
+        f"{duration:g} s in steps with an error of at most {report['tolerance']:g} of the longest rod, the first "
+        f"{1e3 * dt:g} ms long, none longer than {1e3 * report['max_step']:g} ms"
+    )
 
 
 def _block(name: str, lines: list[str]) -> Iterator[str]:

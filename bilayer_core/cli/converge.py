@@ -50,7 +50,9 @@ def converge(
 
     with notice_of_compilation(quiet):
         found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
-    click.echo(f"{config.name}: {found.integrator}, step {1e3 * config.solver.dt:g} ms")
+    solver = config.solver
+    steps = f"step {1e3 * solver.dt:g} ms" if solver.tolerance is None else f"tolerance {solver.tolerance:g}"
+    click.echo(f"{config.name}: {found.integrator}, {steps}")
     _print_table(found.rows)
     for name, reason in found.missing.items():
         click.echo(f"  {name}: {reason}")

@@ -17,9 +17,7 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
         Names of the bodies whose motion is a result and not prescribed.
     """
     factor = summary["real_time_factor"]
-    halved = f", {summary['rejected_steps']} halved" if summary["rejected_steps"] else ""
-    steps = f"{summary['simulated']:g} s in {summary['steps']} steps{halved}"
-    yield f"{summary['scene']}: {summary['termination']}, {steps}"
+    yield f"{summary['scene']}: {summary['termination']}, {summary['simulated']:g} s in {summary['steps']} steps"
     size = f"{summary['nodes']} nodes, {summary['dof']} unknowns"
     yield f"  {'model':22}{summary['model']}, {summary['integrator']}, {size}"
     yield f"  {'CPU time':22}{summary['cpu_time']:.3g} s" + (f", real-time factor {factor:.3g}" if factor else "")
@@ -28,6 +26,10 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     yield f"  {'Newton iterations':22}{iterations}{each}"
     refused = f", {summary['rejected_steps']} attempts refused" if summary["rejected_steps"] else ""
     yield f"  {'steps':22}{summary['steps']}{refused}; correction left at most {summary['largest_residual']:.1g} m/s"
+    if summary["tolerance"] is not None and summary["steps"]:
+        lengths = ", ".join(f"{name} {1e3 * length:.3g} ms" for name, length in summary["step_length"].items())
+        refused = f"{summary['inaccurate_steps']} attempts refused for their error"
+        yield f"  {'tolerance':22}{summary['tolerance']:g} of the longest rod; {lengths}; {refused}"
     yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m"
     if summary["min_gap"] is not None:
         yield f"  {'smallest gap':22}{1e3 * summary['min_gap']:.4g} mm"

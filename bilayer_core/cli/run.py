@@ -17,17 +17,18 @@ if TYPE_CHECKING:
     from bilayer_core.integrate.simulator import Simulator
     from bilayer_core.scene.config import SceneConfig
 
-SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator")
+SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
 OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 
 
 @click.command(cls=Verb)
 @scene_argument
 @click.option("--duration", type=Duration(), help="Simulated time of this run; default: to the end of the scene.")
-@click.option("--dt", metavar="TIME", help="Time step.")
+@click.option("--dt", metavar="TIME", help="Time step; the first one if steps are adaptive.")
 @click.option("--model", metavar="NAME", help="auto, two_rod or laminate.")
 @click.option("--dimension", metavar="D", help="auto, 2 or 3.")
-@click.option("--integrator", metavar="NAME", help="auto, implicit_euler, sdirk2 or implicit_midpoint.")
+@click.option("--integrator", metavar="NAME", help="auto, or a name from docs/scene_keys.md (solver).")
+@click.option("--tolerance", metavar="X", help="Adaptive steps, each with at most this error over the longest rod.")
 @set_option
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")
 @click.option("--log-rate", metavar="HZ", help="Frames recorded per simulated second.")

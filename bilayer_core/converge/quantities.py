@@ -47,16 +47,19 @@ def measure(simulator: Simulator, duration: float, progress: Callable[[float], N
     com, tip_start = simulator.com, simulator.positions[list(tips.values())]
     heights, touched, take_off = [com[2]], False, None
     times = [simulator.time]
-    for _ in range(max(1, round(duration / simulator.dt))):
-        simulator.step()
-        times.append(simulator.time)
+
+    def look(time: float) -> None:
+        nonlocal touched, take_off
+        times.append(time)
         heights.append(simulator.com[2])
         touches = bool(simulator.contact_forces.any())
         if touched and not touches:
-            take_off = simulator.time
+            take_off = time
         touched = touches
         if progress is not None:
-            progress(simulator.time)
+            progress(time)
+
+    simulator.run(duration, progress=look)
     summary = simulator.summary()
     found = _by_axis("com", simulator.com - com)
     rise, when = _peak(np.array(times), np.array(heights))
@@ -128,8 +131,11 @@ def _peak(times: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
     top = int(heights.argmax())
     rise, when = heights[top] - heights[0], times[top]
     if 0 < top < len(heights) - 1:
-        before, after = heights[top - 1] - heights[top], heights[top + 1] - heights[top]
-        offset = 0.5 * (before - after) / (before + after) if before + after < 0.0 else 0.0
-        rise -= 0.25 * (before - after) * offset
-        when += offset * (times[top + 1] - times[top])
+        before, after = times[top] - times[top - 1], times[top + 1] - times[top]
+        up, down = (heights[top] - heights[top - 1]) / before, (heights[top + 1] - heights[top]) / after
+        bend = (down - up) / (before + after)
+        if bend < 0.0:
+            slope = (up * after + down * before) / (before + after)
+            rise -= 0.25 * slope**2 / bend
+            when -= 0.5 * slope / bend
     return float(rise), float(when)

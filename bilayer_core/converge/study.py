@@ -1,4 +1,7 @@
-"""The runs of a convergence study: a scene as it is, at twice and half its time step, with half and twice its edges."""
+"""The runs of a convergence study: a scene as it is, at twice and half its time step, with half and twice its edges.
+
+Adaptive steps are halved and doubled by their tolerance: their length goes as its (p + 1)-th root at order p.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +13,10 @@ from multiprocessing import get_context
 from bilayer_core.converge.order import Estimate, estimate
 from bilayer_core.converge.quantities import check_names, headline, measure
 from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.integrate.integrators import INTEGRATORS
 from bilayer_core.integrate.simulator import Simulator
-from bilayer_core.scene.config import SceneConfig
+from bilayer_core.model.plan import make_plan
+from bilayer_core.scene.config import LARGEST_TOLERANCE, SceneConfig
 from bilayer_core.scene.loader import load_scene, parse_scene, scene_text
 
 BASE = "the scene as it is"
@@ -23,11 +28,11 @@ LEAST_EDGES = 2
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a study: its name, its overrides, its step [s] and its edges relative to the scene's own."""
+    """One run of a study: its name, its overrides, its steps and its edges relative to the scene's own."""
 
     name: str
     overrides: tuple[str, ...]
-    dt: float
+    step: float
     edges: float
 
 
@@ -66,18 +71,28 @@ class Study:
 
 def planned_runs(scene: SceneConfig) -> list[Run]:
     """The five runs; the edges of every rod are halved or doubled."""
-    dt, edges = scene.solver.dt, {rod.name: rod.stations - 1 for rod in scene.rods}
+    edges = {rod.name: rod.stations - 1 for rod in scene.rods}
     halved = {name: max(LEAST_EDGES, round(count / 2)) for name, count in edges.items()}
     doubled = {name: 2 * count for name, count in edges.items()}
     total = sum(edges.values())
-    runs = [Run(BASE, (), dt, 1.0)]
-    runs += [
-        Run(name, (f"solver.dt={size!r}",), size, 1.0) for name, size in ((COARSER_STEP, 2 * dt), (FINER_STEP, dt / 2))
-    ]
+    runs = [Run(BASE, (), 1.0, 1.0)]
+    runs += [Run(name, _with_steps(scene, part), part, 1.0) for name, part in ((COARSER_STEP, 2.0), (FINER_STEP, 0.5))]
     for name, counts in ((COARSER_MESH, halved), (FINER_MESH, doubled)):
         overrides = tuple(f"rods.{rod}.stations={count + 1}" for rod, count in counts.items())
-        runs.append(Run(name, overrides, dt, sum(counts.values()) / total))
+        runs.append(Run(name, overrides, 1.0, sum(counts.values()) / total))
     return runs
+
+
+def _with_steps(scene: SceneConfig, part: float) -> tuple[str, ...]:
+    """Overrides with which steps are `part` as long."""
+    solver = scene.solver
+    first = f"solver.dt={part * solver.dt!r}"
+    if solver.tolerance is None:
+        return (first,)
+    order = INTEGRATORS[make_plan(scene).integrator].order
+    tolerance = min(part ** (order + 1) * solver.tolerance, LARGEST_TOLERANCE)
+    longest = part * (solver.max_step or 1.0 / scene.output.rate)
+    return first, f"solver.tolerance={tolerance!r}", f"solver.max_step={longest!r}"
 
 
 def converge(
@@ -159,6 +174,6 @@ def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run]) ->
     return Row(
         name,
         values,
-        judge(COARSER_STEP, FINER_STEP, lambda run: run.dt),
+        judge(COARSER_STEP, FINER_STEP, lambda run: run.step),
         judge(COARSER_MESH, FINER_MESH, lambda run: 1.0 / run.edges),
     )

@@ -154,7 +154,7 @@ class Frame:
     residual : float
         Largest velocity correction left in the last step [m/s].
     substeps : int
-        Parts of steps taken since the start of the run; more than nominal steps where these were halved.
+        Parts of steps taken since the start of the run; more than steps where fixed ones were halved.
     cpu_time : float
         CPU seconds of the stepping thread up to here [s].
     state : ndarray

@@ -1,6 +1,7 @@
 """Implicit Euler, the paper's integrator (eq. 29): order 1, strongly dissipative.
 
 q = qₙ + h v,   M v = M vₙ − h ∂V/∂q
+local error of positions: ½ h² q̈
 """
 
 from __future__ import annotations
@@ -15,4 +16,5 @@ METHOD = Method(
     couplings=((),),
     weights=None,
     about="the paper's; first order, damps all vibrations",
+    estimate=1.0,
 )

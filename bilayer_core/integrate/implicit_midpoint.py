@@ -4,7 +4,8 @@
 
 It keeps linear and angular momentum, and the energy of a vibration up to bounded oscillation. The end lies beyond the
 stage: where that would cross a surface the step is refused and halved. Nothing damps a contact either: what comes to
-rest on a surface goes on trembling there. For motion without contact, and for holding other methods against.
+rest on a surface goes on trembling there. Its steps are fixed: lengths that vary would spoil what it keeps. For motion
+without contact, and for holding other methods against.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ class _Instant:
 class EnergyLedger:
     """Sums works since `begin`, from `record` after every accepted part of a step.
 
-    `mark` and `roll_back` serve a nominal step that fails after some of its parts were accepted.
+    `mark` and `roll_back` serve a step that is not accepted after all, or after some of its parts were.
     """
 
     def __init__(self, model: Model):

@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from .simulator import Simulator
 
 
+TIME_ROUNDING = 1e-9
+"""Part of a step by which a time may be off and is still the time at which somebody is due."""
+
+
 class Observer(Protocol):
     """Something that looks at a run `rate` times in each simulated second."""
 
@@ -35,6 +39,7 @@ class Schedule:
         self._simulator = simulator
         self._count = [0] * len(self._observers)
         self._origin = simulator.time
+        self._rounding = TIME_ROUNDING * simulator.dt
         self._last_seen: list[float | None] = [None] * len(self._observers)
 
     def start(self) -> None:
@@ -44,8 +49,16 @@ class Schedule:
                 observer.start(description)
             self._show(range(len(self._observers)))
 
+    def next_stop(self, end: float) -> float:
+        """When the next observer is due [s], but not after `end` [s]."""
+        due = min(
+            (self._origin + (count + 1) / of.rate for count, of in zip(self._count, self._observers, strict=True)),
+            default=end,
+        )
+        return due if due < end - self._rounding else end
+
     def observe_due(self) -> None:
-        elapsed = self._simulator.time - self._origin + 1e-9 * self._simulator.dt
+        elapsed = self._simulator.time - self._origin + self._rounding
         due = [i for i, observer in enumerate(self._observers) if elapsed >= (self._count[i] + 1) / observer.rate]
         if due:
             for i in due:

@@ -30,7 +30,7 @@ class RunResult:
     simulated : float
         Simulated time of this run [s].
     steps : int
-        Nominal steps of this run.
+        Of this run.
     cpu_time, wall_time : float
         CPU seconds of the stepping thread and elapsed seconds, without compilation.
     """

@@ -4,14 +4,14 @@
 
 It starts from positions and velocities alone: a jump of a stimulus or a new contact at the beginning of a step leaves
 nothing behind. A stiff vibration (a contact) is gone after one step, as with implicit Euler; a slow one is damped at
-third order in h.
+third order in h. Positions have the local error (3 γ² − 2 γ³ − 1/6) h³ q⃛.
 """
 
 from __future__ import annotations
 
 import math
 
-from .method import Method
+from .method import Method, estimate_of
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 
@@ -23,4 +23,5 @@ METHOD = Method(
     couplings=((), (1.0 - GAMMA,)),
     weights=None,
     about="second order, damps only what is too fast for the step",
+    estimate=estimate_of(3.0 * GAMMA**2 - 2.0 * GAMMA**3 - 1.0 / 6.0),
 )

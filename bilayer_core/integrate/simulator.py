@@ -15,6 +15,7 @@ from ..model.state import State, initial_state, refuse_out_of_plane
 from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observe
+from .adaptive import AdaptiveStepper
 from .frame import Description, Frame
 from .integrators import INTEGRATORS
 from .ledger import EnergyLedger
@@ -38,6 +39,8 @@ class Simulator:
         Override the scene's; ``"auto"`` keeps them.
     dt : float, optional
         Overrides the scene's step [s].
+    tolerance : float, optional
+        Overrides the scene's: the largest error of a step, relative to the longest rod. With one, steps are adaptive.
     budget : bool
         Keep the energy budget of the run (`budget`), in two to three times the time.
 
@@ -57,23 +60,26 @@ class Simulator:
         dimension="auto",
         integrator="auto",
         dt: float | None = None,
+        tolerance: float | None = None,
         budget: bool = False,
     ):
         if dt is not None and not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt: {dt} is not a time step; allowed is a positive number of seconds")
+        if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+            raise InputError(f"tolerance: {tolerance} is not allowed; it must be a positive part of the longest rod")
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         self.scene = scene
         self.dt = scene.solver.dt if dt is None else float(dt)
         self.model = build_model(scene, self.plan.model, self.plan.dimension)
         solver = scene.solver
-        self._stepper = Stepper(
-            self.model,
-            INTEGRATORS[self.plan.integrator],
-            self.dt,
-            solver.newton_tolerance,
-            solver.max_newton_iterations,
-            solver.max_halvings,
-        )
+        self.tolerance = solver.tolerance if tolerance is None else float(tolerance)
+        self.max_step = 1.0 / scene.output.rate if solver.max_step is None else solver.max_step
+        method = INTEGRATORS[self.plan.integrator]
+        newton = solver.newton_tolerance, solver.max_newton_iterations, solver.max_halvings
+        if self.tolerance is None:
+            self._stepper = Stepper(self.model, method, self.dt, *newton)
+        else:
+            self._stepper = AdaptiveStepper(self.model, method, self.dt, *newton, self.tolerance, self.max_step)
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = self._initial_state()
@@ -169,6 +175,7 @@ class Simulator:
             "dimension": str(self.plan.dimension),
             "integrator": self.plan.integrator,
             "dt": repr(self.dt),
+            "tolerance": "none" if self.tolerance is None else repr(self.tolerance),
             "newton_tolerance": repr(self.scene.solver.newton_tolerance),
             **observe.versions(),
         }
@@ -195,7 +202,7 @@ class Simulator:
             raise InputError(f"stimulus {channel!r}: no such channel; the scene {self.scene.name!r} has: {known}")
         index = list(self.scene.stimuli).index(channel)
         if value is None:
-            self._state.override[index] = math.nan
+            self._override(index, math.nan)
             return
         allowed = self.scene.stimuli[channel]
         if not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
@@ -203,7 +210,13 @@ class Simulator:
                 f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
                 f"to {allowed.maximum:g} (unit {allowed.unit})"
             )
-        self._state.override[index] = float(value)
+        self._override(index, float(value))
+
+    def _override(self, channel: int, value: float) -> None:
+        override = self._state.override
+        if not np.array_equal(override[channel], value, equal_nan=True):
+            self._stepper.restart(self._state)
+        override[channel] = value
 
     def compile(self) -> float:
         """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took.
@@ -214,9 +227,8 @@ class Simulator:
             begin = clock.thread_time()
             self._compile_time = 0.0
             self._stepper.rest(self._state)
-            trial = State(**{name: array.copy() for name, array in vars(self._state).items()})
             try:
-                self._stepper.advance(trial)
+                self._stepper.advance(self._state.copy())
             except SimulationError:
                 pass  # the first step of the run meets it again and reports it
             largest_row(self._state.position)
@@ -225,18 +237,23 @@ class Simulator:
             self._compile_time = clock.thread_time() - begin
         return self._compile_time
 
-    def step(self) -> StepReport:
-        """Advance by one nominal step.
+    def step(self, until: float = math.inf) -> StepReport:
+        """Advance by one step.
+
+        Parameters
+        ----------
+        until : float
+            Simulated time [s] at which an adaptive step ends at the latest; a fixed one is as long as ever.
 
         Raises
         ------
         SimulationError
-            If it cannot be made; the state is that of the last nominal step.
+            If it cannot be made; the state is that of the last step.
         """
         self.compile()
         begin, wall = clock.thread_time(), clock.perf_counter()
         try:
-            report = self._stepper.advance(self._state)
+            report = self._stepper.advance(self._state, until)
         except SimulationError:
             self._stepper.rest(self._state)
             self.termination = Termination.FAILED.value
@@ -256,6 +273,8 @@ class Simulator:
     ) -> RunResult:
         """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
 
+        Fixed steps end within half a step of it. Adaptive ones end exactly there, and wherever an observer is to look.
+
         Parameters
         ----------
         duration : float, optional
@@ -274,21 +293,24 @@ class Simulator:
         left = self.scene.duration - self.time if duration is None else duration
         if not (math.isfinite(left) and left >= 0.0):
             raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
-        steps = int(round(left / self.dt))
+        adaptive = self.tolerance is not None
+        steps = math.inf if adaptive else int(round(left / self.dt))
         if left > 0.0 and steps == 0:
             raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
         self.compile()
         begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
+        end = begin + left if adaptive else math.inf
         termination = Termination.INTERRUPTED
         schedule = Schedule(observers, self)
         try:
             schedule.start()
-            for done in range(1, steps + 1):
-                self.step()
+            while done < steps and self.time < end:
+                self.step(schedule.next_stop(end))
+                done += 1
                 schedule.observe_due()
                 if progress is not None:
                     progress(self.time)
-                if stop is not None and done < steps and stop():
+                if stop is not None and done < steps and self.time < end and stop():
                     break
             else:
                 termination = Termination.COMPLETED

@@ -203,6 +203,7 @@ class _Search:
         state.twist[:] = shape.joint_strain[:, 2]
         state.transduction[:] = self.transduction
         state.kept.fill(0.0)
+        self.stepper.restart(state)
         free = model.bodies.body_of_free
         state.body_position[free] = shape.body_position
         state.body_rotation[free] = shape.body_rotation

@@ -41,7 +41,7 @@ class BodyContact:
 
 @dataclass
 class RunStatistics:
-    """Counts, extremes and first contacts, from `update` after every nominal step.
+    """Counts, extremes and first contacts, from `update` after every step.
 
     Times in s, lengths in m, forces in N, residuals in m/s.
     """
@@ -49,6 +49,9 @@ class RunStatistics:
     steps: int = 0
     substeps: int = 0
     rejected: int = 0
+    inaccurate: int = 0
+    shortest: float = math.inf
+    longest: float = 0.0
     iterations: int = 0
     factorisations: int = 0
     largest_residual: float = 0.0
@@ -59,11 +62,13 @@ class RunStatistics:
     bodies: dict[str, BodyContact] = field(default_factory=dict)
 
     def update(self, report: StepReport, stepper: Stepper, state: State) -> None:
-        """Take in one nominal step."""
+        """Take in one step."""
         model, potential = stepper.model, stepper.potential
         self.steps += 1
         self.substeps += report.substeps
         self.rejected += report.rejected
+        self.inaccurate += report.inaccurate
+        self.shortest, self.longest = min(self.shortest, report.length), max(self.longest, report.length)
         self.iterations += report.iterations
         self.factorisations += report.factorisations
         self.last_residual = report.residual

@@ -1,4 +1,4 @@
-"""One nominal step: as few equal parts as Newton needs, each accepted only if it converged."""
+"""Fixed steps: each in as few equal parts as Newton needs, each part accepted only if it converged."""
 
 from __future__ import annotations
 
@@ -36,26 +36,32 @@ NO_JUMP = 1e-9
 
 @dataclass(frozen=True)
 class StepReport:
-    """How a nominal step went.
+    """How a step went.
 
     Attributes
     ----------
     time : float
         At its end [s].
+    length : float
+        [s].
     substeps, rejected : int
-        Parts accepted, and attempts that failed.
+        Parts accepted, and attempts that were not.
     iterations, factorisations : int
         Newton corrections and factorised Hessians, failed attempts included.
     residual : float
         Largest speed of a correction left [m/s].
+    inaccurate : int
+        Attempts that were not accepted because of their error.
     """
 
     time: float
+    length: float
     substeps: int
     rejected: int
     iterations: int
     factorisations: int
     residual: float
+    inaccurate: int = 0
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ def _value(value: Callable[[float], float], time: float, ended: float) -> float:
 
 
 class Stepper:
-    """Advances a `State` by nominal steps dt, halving where Newton fails and doubling again where it succeeds.
+    """Advances a `State` by fixed steps dt, halving where Newton fails and doubling again where it succeeds.
 
     Attributes
     ----------
@@ -81,6 +87,8 @@ class Stepper:
         The last accepted configuration.
     stimulus : Array
         Value of each channel over the last step.
+    used : Method
+        The method of the last attempt, which after a jump is not `method`.
     ledger : EnergyLedger or None
         What keeps the energy budget, if anything does.
     """
@@ -89,7 +97,7 @@ class Stepper:
         self, model: Model, method: Method, dt: float, newton_tolerance: float, max_iterations: int, max_halvings: int
     ):
         self.model = model
-        self.method = method
+        self.method = self.used = method
         self.dt = dt
         self.max_halvings = max_halvings
         self.potential = IncrementalPotential(model)
@@ -152,20 +160,21 @@ class Stepper:
         self.potential.evaluate(self.end, False)
         self._touched = self._touching()
 
-    def advance(self, state: State) -> StepReport:
-        """One nominal step, in place.
+    def restart(self, state: State) -> None:
+        """Something has jumped: fixed steps go on as they are."""
+
+    def advance(self, state: State, until: float = math.inf) -> StepReport:
+        """One step dt, in place, wherever it ends.
 
         Raises
         ------
         SimulationError
-            If the smallest part does not converge either. `state` is then that of the last accepted part whose end is
-            a nominal step:
-            nothing is changed.
+            If the smallest part does not converge either; nothing is changed then.
         """
         parts = 2**self.max_halvings
         if self.ledger is not None:
             self.ledger.mark()
-        kept = State(**{name: array.copy() for name, array in vars(state).items()})
+        kept = state.copy()
         begin, count = float(state.time[0]), float(state.step[0])
         on_grid = begin == count * self.dt  # not so after steps of another length
         level = int(state.halvings[0])
@@ -187,8 +196,7 @@ class Stepper:
                 continue
             rejected += 1
             if level == self.max_halvings:
-                for name, array in vars(kept).items():
-                    getattr(state, name)[...] = array
+                state.take(kept)
                 if self.ledger is not None:
                     self.ledger.roll_back()
                 raise SimulationError(self._explain(report, time, self.dt * size / parts), begin)
@@ -196,7 +204,7 @@ class Stepper:
         state.time[0] = time
         state.step += 1.0
         state.halvings[0] = level
-        return StepReport(time, substeps, rejected, iterations, factorisations, residual)
+        return StepReport(time, self.dt, substeps, rejected, iterations, factorisations, residual)
 
     def _attempt(self, state: State, h: float, time: float) -> NewtonReport:
         """Try one part of length `h` [s] that ends at `time` [s]; `state` changes only if it converged."""
@@ -204,7 +212,7 @@ class Stepper:
         self._start.take_state(state)
         first = start_point(model, state, self._start)
         first_stimulus = self.stimulus_at(state, time - h)
-        method = self._method_at(state, first_stimulus, time - h, h)
+        method = self.used = self._method_at(state, first_stimulus, time - h, h)
         slopes = slopes_of(model, state, first) if method.history else None
         turned = np.zeros(model.edge_count)
         length, momentum_length = method.diagonal * h, (method.momentum_diagonal or method.diagonal) * h

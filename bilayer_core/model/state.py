@@ -24,7 +24,9 @@ class State:
 
     time: Array  # simulated time [s], shape (1,); with fixed steps their number times dt, so that it does not drift
     step: Array  # steps done, shape (1,)
-    halvings: Array  # present refinement of the step: dt/2^halvings, shape (1,)
+    halvings: Array  # present refinement of a fixed step: dt/2^halvings, shape (1,)
+    next_step: Array  # length of the next adaptive step [s], 0 at the start, shape (1,)
+    last_error: Array  # error of the last adaptive step as a part of the tolerance, 0 if there is none, shape (1,)
     position: Array  # of nodes [m], shape (n_node, 3)
     velocity: Array  # [m/s], shape (n_node, 3)
     director1: Array  # material director m1 of edges, unit, shape (n_edge, 3)
@@ -43,6 +45,15 @@ class State:
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
+
+    def copy(self) -> State:
+        """A state of its own with the same values."""
+        return State(**{part.name: getattr(self, part.name).copy() for part in fields(self)})
+
+    def take(self, other: State) -> None:
+        """Take all values of another state of the same model."""
+        for part in fields(self):
+            getattr(self, part.name)[...] = getattr(other, part.name)
 
     def flat(self) -> Array:
         """All parts in order, as one array of float64."""
@@ -116,6 +127,8 @@ def initial_state(model: Model, with_history: bool = False) -> State:
         time=np.zeros(1),
         step=np.zeros(1),
         halvings=np.zeros(1),
+        next_step=np.zeros(1),
+        last_error=np.zeros(1),
         position=model.start_position.copy(),
         velocity=np.zeros((model.node_count, 3)),
         director1=model.start_director1[: model.edge_count].copy(),

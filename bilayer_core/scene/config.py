@@ -31,6 +31,14 @@ from bilayer_core.scene.units import (
     whole,
 )
 
+LARGEST_TOLERANCE = 0.1
+ErrorTolerance = real(
+    "a part of the longest rod (the speed that Newton may leave is `newton_tolerance`)",
+    "1",
+    "1e-4",
+    above=0.0,
+    at_most=LARGEST_TOLERANCE,
+)
 PoissonRatio = real("Poisson's ratio", "1", "0.5", above=-1.0, at_most=0.5)
 
 
@@ -173,13 +181,17 @@ class Solver(Part):
     )
     """How a step is taken in time; `auto` is the recommended one."""
     dt: PositiveTime = 1e-3
-    """Time step."""
+    """Time step; with `tolerance` the first one, and the first after a jump of a stimulus or a load."""
+    tolerance: ErrorTolerance | None = None
+    """Largest error of a step: displacement over the length of the longest rod. Without it, steps are fixed."""
+    max_step: PositiveTime | None = None
+    """Longest step with `tolerance`; by default a period of `output.rate`."""
     newton_tolerance: PositiveSpeed = 1e-6
     """Largest velocity correction that Newton may leave."""
     max_newton_iterations: whole(1) = 50
-    """After which a step counts as failed and is halved."""
+    """After which a step counts as failed and is shortened."""
     max_halvings: whole(0) = 10
-    """Of a step that fails; when the smallest one fails as well, the run stops and says why."""
+    """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why."""
 
 
 class Output(Part):

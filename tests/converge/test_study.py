@@ -1,6 +1,7 @@
 """`bilayer converge`: five runs, orders, error bars."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
 from bilayer_core.converge.quantities import measure
-from bilayer_core.converge.study import BASE, COARSER_MESH, planned_runs
+from bilayer_core.converge.study import BASE, COARSER_MESH, COARSER_STEP, FINER_STEP, planned_runs
 
 SMALL = ["--set", "rods.strip.stations=11", "--set", "solver.dt=4 ms"]
 
@@ -51,6 +52,21 @@ def test_edges_are_halved_and_doubled():
     runs = {run.name: run for run in planned_runs(scene)}
     assert runs[COARSER_MESH].overrides == ("rods.strip.stations=25",)
     assert runs[COARSER_MESH].edges == pytest.approx(24 / 49)
+
+
+def test_adaptive_steps_are_halved_and_doubled_by_their_tolerance(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    changes = ["solver.integrator=sdirk2", "solver.tolerance=1e-5", "rods.strip.stations=11"]
+    adaptive = [word for change in changes for word in ("--set", change)]
+    scene = load_scene("cantilever", changes)
+    runs = {run.name: run for run in planned_runs(scene)}
+    coarser = load_scene("cantilever", [*changes, *runs[COARSER_STEP].overrides]).solver
+    assert (coarser.dt, coarser.tolerance, coarser.max_step) == pytest.approx((2e-3, 8e-5, 0.04))
+    asked = ["--quantity", "tip.strip/gel.z", "--duration", "0.1", "--json", "study.json", "--quiet"]
+    assert main(["converge", "cantilever", *adaptive, *asked]) == 0
+    assert "cantilever: sdirk2, tolerance 1e-05" in capsys.readouterr().out
+    tip = json.loads(Path("study.json").read_text())["quantities"][0]["values"]
+    assert abs(tip[FINER_STEP] - tip[BASE]) < 0.5 * abs(tip[BASE] - tip[COARSER_STEP])
 
 
 def test_an_unknown_figure_is_refused_before_any_run(capsys):

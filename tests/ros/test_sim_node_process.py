@@ -8,7 +8,7 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosgraph_msgs.msg import Clock
 
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.record.log_reader import read_info, read_log
 
 FAST = {"scene": "bending", "real_time_factor": 0}
 
@@ -50,6 +50,15 @@ def test_a_rerun_recording_is_written_when_the_run_ends(start, domain, tmp_path)
     node = start("sim_node", domain, FAST | {"rerun": recording, "duration": 0.1})
     assert node.wait() == 0, node.output
     assert recording.stat().st_size > 10_000
+
+
+def test_adaptive_steps_end_at_output_times_and_at_the_duration(start, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    node = start("sim_node", domain, FAST | {"log": log, "rate": 30.0, "duration": 0.5, "tolerance": 1e-3})
+    assert node.wait() == 0, node.output
+    times = read_log(log).times
+    assert times == pytest.approx([k / 30.0 for k in range(16)], abs=1e-9)  # logs count nanoseconds
+    assert read_info(log).complete and read_info(log).settings["tolerance"] == "0.001"
 
 
 def test_a_simulation_that_cannot_go_on_ends_with_3_and_a_log_up_to_its_last_step(start, domain, root, tmp_path):

@@ -20,6 +20,7 @@ for description in (everything(), everything(stations=7), scene([rod([layer()])]
         simulator = Simulator(load_scene(description), model=model, budget=True)
         simulator.run(0.005)
         simulator.frame()
+        Simulator(load_scene(description), model=model, tolerance=1e-3).run(0.005)
 Simulator(load_scene(scene([rod([layer(), layer("top")])]))).solve_static()
 
 used = {}

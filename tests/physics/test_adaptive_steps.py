@@ -1,0 +1,313 @@
+"""Adaptive steps: their error, where they end, what refused ones leave, and how they go on."""
+
+import math
+
+import numpy as np
+import pytest
+from moving_scenes import EXACT, PROBLEMS, cantilever, driven, part, with_parts
+from sample_scenes import GROUND, ball, contact, everything, fixed, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.errors import InputError, SceneError, SimulationError
+from bilayer_core.integrate.breakpoints import Breakpoints
+from bilayer_core.integrate.error_estimate import ErrorEstimate
+from bilayer_core.integrate.integrators import INTEGRATORS
+from bilayer_core.integrate.step_control import LARGEST_GROWTH, StepControl
+from bilayer_core.record.memory import MemoryRecorder
+
+ADAPTIVE = [name for name, method in INTEGRATORS.items() if method.estimate is not None]
+
+
+def simulate(description, duration=None, **settings):
+    simulator = Simulator(load_scene(description), **settings)
+    if duration:
+        simulator.run(duration)
+    return simulator
+
+
+def falling(obstacles=(GROUND,), **solver):
+    """A ball 28 mm above the ground, with a distant strip because a scene must have one."""
+    strip = rod([layer()], start=(1, 0, 1), length=0.05, stations=3, clamp_start="wall")
+    return scene(
+        [strip],
+        gravity=[0, 0, -9.81],
+        bodies=[fixed("wall", (1, 0, 1)), ball((0, 0, 0.05))],
+        obstacles=list(obstacles),
+        contact=contact(barrier_distance=1e-3),
+        solver={"newton_tolerance": 1e-9, **solver},
+    )
+
+
+# the error
+
+
+@pytest.mark.parametrize("integrator", ADAPTIVE)
+@pytest.mark.parametrize("problem", ["cantilever", "driven bilayer", "jet"])
+def test_the_estimate_is_the_local_error_of_a_step(problem, integrator):
+    description, h = PROBLEMS[problem][0], 5e-4
+    start = simulate(description, 0.03, dt=h, integrator=integrator)
+    exact = Simulator(load_scene(description), dt=h / 32, integrator="tr_bdf2")
+    with_parts(exact, **{name: part(start, name) for name in ("position", "velocity", "director1", "spin", "twist")})
+    with_parts(exact, **{name: part(start, name) for name in ("time", "transduction", "body_position")})
+    before = start._state.copy()
+    start.step()
+    exact.run(h)
+    estimate = ErrorEstimate(start.model)
+    found = INTEGRATORS[integrator].estimate * estimate.deviation(before, start._state, h)
+    # with the same velocities at both ends, D is the difference of the two ends
+    apart = exact._state.copy()
+    apart.velocity[:], apart.spin[:] = 0.0, 0.0
+    other = start._state.copy()
+    other.velocity[:], other.spin[:] = 0.0, 0.0
+    assert found == pytest.approx(estimate.deviation(apart, other, h), rel=0.2)
+
+
+@pytest.mark.parametrize("integrator", ADAPTIVE)
+def test_the_error_of_a_run_falls_with_the_tolerance_at_the_order_of_the_integrator(integrator):
+    description = {**PROBLEMS["jet"][0], "solver": {**EXACT, "max_step": 0.02}}
+    exact = simulate(description, 0.1, dt=5e-5, integrator="tr_bdf2")
+    errors, steps = [], []
+    tolerances = (1e-5, 1e-6, 1e-7)
+    for tolerance in tolerances:
+        run = simulate(description, 0.1, dt=1e-4, tolerance=tolerance, integrator=integrator)
+        errors.append(np.linalg.norm(run.positions - exact.positions))
+        steps.append(run.statistics.steps)
+    order = INTEGRATORS[integrator].order
+    assert math.log(errors[0] / errors[2]) / math.log(steps[2] / steps[0]) == pytest.approx(order, abs=0.35)
+    slope = math.log(errors[0] / errors[2]) / math.log(tolerances[0] / tolerances[2])
+    assert slope == pytest.approx(order / (order + 1), abs=0.12)
+
+
+def test_the_estimate_does_not_depend_on_the_mesh():
+    found = []
+    for stations in (9, 33):
+        strip = rod([layer(thickness=4e-3)], length=0.03, stations=stations, clamp_start="wall")
+        simulator = simulate({**cantilever(), "rods": [strip]}, 0.02, dt=5e-4, integrator="sdirk2")
+        before = simulator._state.copy()
+        simulator.step()
+        found.append(ErrorEstimate(simulator.model).deviation(before, simulator._state, 5e-4))
+    assert found[1] == pytest.approx(found[0], rel=0.1)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_euler", "sdirk2", "generalised_alpha"])
+def test_a_ball_bounces_ever_nearer_to_where_it_fell_from(integrator):
+    """The barrier is elastic: what lacks is the integrator's loss, in the impact most of all."""
+    losses = []
+    for tolerance in (1e-4, 1e-5) if integrator == "implicit_euler" else (1e-4, 1e-5, 1e-6):
+        simulator, heights = Simulator(load_scene(falling()), tolerance=tolerance, integrator=integrator), []
+        simulator.run(
+            0.2, progress=lambda time, of=simulator, to=heights: to.append((time, of.bodies["ball"].position))
+        )
+        # at 0.152 s it would be at its highest again; its energy there, gravity's potential being 0 on top
+        top = max(place[2] for time, place in heights if time > 0.1)
+        losses.append((0.05 - top) / 0.029)
+    limit = {"implicit_euler": 0.4, "sdirk2": 2e-3, "generalised_alpha": 6e-3}[integrator]
+    assert losses == sorted(losses, reverse=True) and -1e-3 < losses[-1] < limit
+    assert simulator.statistics.longest > 20.0 * simulator.statistics.shortest
+
+
+def test_what_lies_on_a_barrier_does_not_hold_steps_up():
+    strip = rod([layer(thickness=2e-3)], length=0.04, stations=9, start=(0, 0, 2e-3))
+    law = contact(coefficient=0.3, barrier_distance=2e-4)
+    dropped = scene([strip], gravity=[0.5, 0, -9.81], obstacles=[GROUND], contact=law)
+    simulator = simulate(dropped, 0.5, tolerance=1e-5, integrator="sdirk2")
+    assert np.abs(simulator.velocities).max() < 1e-4
+    assert part(simulator, "next_step")[0] == pytest.approx(simulator.max_step)
+
+
+# where steps end
+
+
+def test_a_pulse_of_a_millisecond_is_never_missed():
+    pulse = {"type": "pulse_train", "low": 0, "high": 1, "period": 1.0, "width": "1 ms", "start": 0.4567, "count": 1}
+    kick = {"name": "kick", "body": "ball", "force": [0.1, 0, 0], "schedule": pulse}
+    description = {**falling([]), "gravity": [0, 0, 0], "loads": [kick], "contact": contact()}
+    for integrator in ADAPTIVE:
+        simulator = simulate(description, 1.0, tolerance=1e-2, integrator=integrator)
+        speed = simulator.frame().body_velocities[1, 0]
+        assert speed == pytest.approx(0.1 * 1e-3 / 2.7e-3, rel=1e-9)
+        assert simulator.statistics.steps < 150
+
+
+def test_steps_end_on_every_breakpoint_and_are_short_after_a_jump():
+    description = driven()
+    square = {"type": "square", "low": 0, "high": 1, "period": 0.07, "start": 0.0123}
+    description["stimuli"]["heat"]["schedule"] = square
+    simulator = Simulator(load_scene(description), tolerance=1e-3, dt=1e-3, integrator="sdirk2")
+    times, reports = [0.0], []
+    while simulator.time < 0.2:
+        reports.append(simulator.step(until=0.2))
+        times.append(simulator.time)
+    breaks, points, t = Breakpoints(simulator.scene), [], 0.0
+    while (t := breaks.after(t + 1e-9, np.array([math.nan]))) < 0.2:
+        points.append(t)
+    assert len(points) == 6 and set(points) <= set(times) and times[-1] == 0.2
+    after = [reports[times.index(point)].length for point in points]
+    assert max(after) < 1.001e-3 < max(report.length for report in reports)
+
+
+def test_a_channel_set_from_outside_no_longer_stops_steps_and_setting_it_is_a_jump():
+    description = driven()
+    description["stimuli"]["heat"]["schedule"] = {"type": "square", "low": 0, "high": 1, "period": 2e-3}
+    simulator = Simulator(load_scene(description), tolerance=1e-3, dt=5e-4, integrator="sdirk2")
+    simulator.set_stimulus("heat", 0.3)
+    simulator.run(0.3)
+    assert simulator.statistics.longest > 2e-3
+    simulator.set_stimulus("heat", 0.3)
+    assert part(simulator, "next_step")[0] > 5e-4
+    simulator.set_stimulus("heat", 0.9)
+    assert simulator.step().length == pytest.approx(5e-4)
+
+
+def test_observers_see_exact_times_and_the_run_ends_exactly():
+    fast, slow = MemoryRecorder(rate=50.0), MemoryRecorder(rate=7.0)
+    simulator = Simulator(load_scene(driven()), tolerance=1e-3, integrator="sdirk2")
+    simulator.run(0.5, observers=[fast, slow])
+    assert [frame.time for frame in fast.frames] == [k / 50.0 for k in range(26)]
+    assert [frame.time for frame in slow.frames] == [*(k / 7.0 for k in range(4)), 0.5]
+    assert simulator.time == 0.5
+    simulator.run(0.123)
+    assert simulator.time == 0.5 + 0.123
+
+
+def test_a_step_does_not_pass_until_and_until_must_lie_ahead():
+    simulator = Simulator(load_scene(driven()), tolerance=1e-3, integrator="sdirk2")
+    report = simulator.step(until=3e-4)
+    assert (report.time, report.length, simulator.time) == (3e-4, 3e-4, 3e-4)
+    with pytest.raises(InputError, match=r"until: 0\.0003 is not allowed; it must be later than the present time"):
+        simulator.step(until=3e-4)
+
+
+# what steps leave
+
+
+@pytest.mark.parametrize("integrator", ADAPTIVE)
+def test_a_refused_step_leaves_nothing(integrator):
+    description = driven(added_mass=True)
+    description["loads"] = cantilever()["loads"]
+    settings = {"tolerance": 1e-5, "integrator": integrator, "budget": True}
+    first, second = (Simulator(load_scene(description), **settings) for _ in range(2))
+    for simulator in (first, second):
+        simulator.run(0.02)
+    with_parts(first, next_step=0.02)
+    report = first.step()
+    assert report.inaccurate > 0 and report.length < 0.02
+    with_parts(second, next_step=report.length)
+    assert second.step().rejected == 0
+    for name in ("time", "step", "position", "velocity", "director1", "kept", "acceleration", "transduction"):
+        np.testing.assert_array_equal(part(second, name), part(first, name))
+    assert second.budget() == first.budget()
+
+
+@pytest.mark.parametrize("integrator", ADAPTIVE)
+def test_a_run_goes_on_bit_for_bit_from_a_state_between_two_outputs(integrator):
+    description = driven(added_mass=True)
+    description["obstacles"] = [{**GROUND, "point": [0, 0, -2.5e-3]}]
+    description["contact"] = {**contact(coefficient=0.3, barrier_distance=1e-4), "stiffness": 1e4}
+    description["loads"] = cantilever()["loads"]
+    first, second = (Simulator(load_scene(description), tolerance=1e-4, integrator=integrator) for _ in range(2))
+    while first.time < 0.0283:
+        first.step(until=0.06)
+    snapshot = first.save_state()
+    while first.time < 0.06:
+        first.step(until=0.06)
+    second.load_state(snapshot)
+    while second.time < 0.06:
+        second.step(until=0.06)
+    assert first.statistics.max_contact_force > 0.0
+    np.testing.assert_array_equal(second.save_state(), first.save_state())
+
+
+def test_the_energy_budget_closes_over_adaptive_steps():
+    simulator = simulate(driven(), 0.1, dt=0.02, tolerance=1e-5, integrator="sdirk2", budget=True)
+    assert simulator.statistics.inaccurate > 0
+    assert abs(simulator.budget()["relative_residual"]) < 1e-3
+
+
+def test_a_step_in_which_newton_fails_is_shortened_and_the_run_goes_on():
+    kicked = {**cantilever(), "solver": {**EXACT, "dt": 2e-2, "max_newton_iterations": 6}}
+    kicked["loads"][0]["schedule"] = {"type": "hold", "value": 3.0}
+    simulator = Simulator(load_scene(kicked), tolerance=0.1, integrator="sdirk2")
+    reports = [simulator.step(until=0.1)]
+    while simulator.time < 0.1:
+        reports.append(simulator.step(until=0.1))
+    assert reports[0].rejected > reports[0].inaccurate and reports[0].length < 2e-2
+    assert simulator.statistics.largest_residual <= EXACT["newton_tolerance"]
+
+
+# refusals
+
+
+def test_newton_that_never_converges_stops_the_run_and_keeps_the_state():
+    hopeless = {**everything(), "solver": {"max_newton_iterations": 1, "max_halvings": 3, "newton_tolerance": 1e-15}}
+    simulator = Simulator(load_scene(hopeless), tolerance=1e-3)
+    before = simulator.save_state()
+    with pytest.raises(SimulationError, match=r"stopped at t = 0 s: .*tried down to 0\.000125 s \(correction left"):
+        simulator.run(0.05)
+    np.testing.assert_array_equal(simulator.save_state(), before)
+
+
+def test_a_tolerance_that_no_step_meets_stops_the_run_and_is_named():
+    kicked = {**driven(), "solver": {"max_halvings": 1, "dt": 2e-3}}
+    kicked["loads"] = [{"name": "kick", "rod": "rod", "position": 0.03, "force": [0, 0, 1e-2]}]
+    simulator = Simulator(load_scene(kicked), tolerance=1e-9, integrator="sdirk2")
+    before = simulator.save_state()
+    told = r"tried down to 0\.001 s, stays above the tolerance \(.* of the longest rod, allowed 1e-09\)"
+    with pytest.raises(SimulationError, match=told):
+        simulator.run(0.05)
+    np.testing.assert_array_equal(simulator.save_state(), before)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-4, math.nan, math.inf])
+def test_a_tolerance_that_is_none_is_refused(tolerance):
+    with pytest.raises(InputError, match="tolerance: .* is not allowed; it must be a positive part of the longest rod"):
+        Simulator(load_scene(driven()), tolerance=tolerance)
+
+
+def test_implicit_midpoint_has_no_adaptive_steps():
+    with pytest.raises(InputError, match="not allowed with the integrator implicit_midpoint, which has no estimate"):
+        Simulator(load_scene(driven()), tolerance=1e-4, integrator="implicit_midpoint")
+
+
+@pytest.mark.parametrize(
+    ("solver", "fault"),
+    [
+        ({"tolerance": "1e-6 m/s"}, "(the speed that Newton may leave is `newton_tolerance`) above 0 and at most 0.1"),
+        ({"tolerance": 0.2}, "solver.tolerance: found 0.2; must be a part of the longest rod"),
+        ({"tolerance": 1e-3, "max_step": 0}, "solver.max_step: found 0; must be a time [s] above 0"),
+    ],
+)
+def test_bad_values_of_a_scene_are_refused(solver, fault):
+    with pytest.raises(SceneError) as refused:
+        load_scene({**driven(), "solver": solver})
+    assert fault in str(refused.value)
+
+
+# the controller itself
+
+
+def test_steps_settle_at_the_tolerance_where_the_error_goes_with_a_power_of_their_length():
+    for order in (1, 2):
+        control, h, before, lengths = StepControl(order, 1.0), 1e-4, 0.0, []
+        for _ in range(40):
+            error = (h / 1e-2) ** (order + 1)
+            while error > 1.0:
+                h = control.after_rejection(h, error)
+                error = (h / 1e-2) ** (order + 1)
+            lengths.append(h)
+            h, before = control.after_success(h, error, before, 3.0, False), error
+        assert lengths[-1] == pytest.approx(lengths[-2], rel=1e-3)
+        assert 0.7e-2 < lengths[-1] < 1e-2
+
+
+def test_steps_neither_grow_too_fast_nor_beyond_the_largest_nor_where_newton_works_hard():
+    control = StepControl(2, 5e-3)
+    assert control.after_success(1e-3, 1e-9, 0.0, 3.0, False) == pytest.approx(LARGEST_GROWTH * 1e-3)
+    assert control.after_success(4e-3, 1e-9, 0.0, 3.0, False) == 5e-3
+    assert control.after_success(1e-3, 1e-9, 0.0, 3.0, True) == 1e-3
+    assert control.after_success(1e-3, 1e-9, 0.0, 60.0, False) == 0.5e-3
+
+
+@pytest.mark.parametrize(("left", "length"), [(1.04, 1.04), (0.3, 0.3), (1.5, 0.75), (2.5, 1.0)])
+def test_steps_come_to_an_end_without_a_short_last_one(left, length):
+    assert StepControl.fit(1.0, left) == pytest.approx(length)
