@@ -12,7 +12,7 @@ from ..errors import InputError, SimulationError
 from ..model.build import build_model
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
-from ..scene.config import SceneConfig
+from ..scene.config import LARGEST_TOLERANCE, SceneConfig
 from ..scene.loader import scene_text
 from . import observe
 from .adaptive import AdaptiveStepper
@@ -65,8 +65,9 @@ class Simulator:
     ):
         if dt is not None and not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"dt: {dt} is not a time step; allowed is a positive number of seconds")
-        if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
-            raise InputError(f"tolerance: {tolerance} is not allowed; it must be a positive part of the longest rod")
+        if tolerance is not None and not 0.0 < tolerance <= LARGEST_TOLERANCE:
+            allowed = f"a part of the longest rod above 0 and at most {LARGEST_TOLERANCE:g}"
+            raise InputError(f"tolerance: {tolerance} is not allowed; it must be {allowed}")
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         self.scene = scene
         self.dt = scene.solver.dt if dt is None else float(dt)

@@ -46,7 +46,7 @@ def read_saved_state(path: str | Path, description: Description) -> np.ndarray:
     else:
         saved, state = _read(path)
     if saved != description.state_layout:
-        raise InputError(f"{path}: holds a state of another scene: {_difference(dict(saved), description)}")
+        raise InputError(f"{path}: holds a state {_difference(dict(saved), description)}")
     return state
 
 
@@ -62,10 +62,10 @@ def _read(path: Path) -> tuple[tuple, np.ndarray]:
 
 
 def _difference(saved: dict[str, tuple[int, ...]], description: Description) -> str:
-    """The first part that is not the same."""
+    """What the state is instead, by the first part that is not the same."""
     for name, shape in description.state_layout:
         if name not in saved:
-            return f"it lacks {name}, which this version of the program needs; run its scene again"
+            return f"without {name!r}, of another version of this program; run its scene again"
         if saved[name] != shape:
-            return f"{name} has shape {saved[name]}, in {description.scene_name} it has {shape}"
-    return "it has more parts"
+            return f"of another scene: {name} has shape {saved[name]}, in {description.scene_name} it has {shape}"
+    return "with more parts, of another version of this program; run its scene again"

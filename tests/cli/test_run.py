@@ -104,6 +104,17 @@ def test_a_state_of_another_scene_is_refused(here, capsys):
     assert "state.npz: holds a state of another scene: position has shape (51, 3)" in capsys.readouterr().err
 
 
+def test_a_state_of_a_version_without_its_time_is_refused(here, capsys):
+    assert main(["run", "cantilever", "--duration", "0.001", "--quiet", "--save-state", "state.npz"]) == 0
+    with np.load("state.npz") as saved:
+        layout, state, scene = json.loads(str(saved["layout"])), saved["state"], saved["scene"]
+    assert layout[0] == ["time", [1]]
+    np.savez("old.npz", state=state[1:], layout=np.array(json.dumps(layout[1:])), scene=scene)
+    assert main(["run", "cantilever", "--from-state", "old.npz"]) == 2
+    told = "old.npz: holds a state without 'time', of another version of this program; run its scene again"
+    assert told in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 broken", b"text\n"])
 def test_a_file_that_is_no_state_is_refused(here, capsys, content):
     (here / "state.npz").write_bytes(content)
