@@ -63,6 +63,7 @@ setup(
     maintainer_email="maintainers@bilayer-sim.example",
     python_requires=">=3.11",
     packages=find_packages(include=["bilayer_core*", "bilayer_sim_ros*"]),
+    package_data={"bilayer_core.bench": ["references.json"]},
     data_files=data_files,
     zip_safe=False,
     install_requires=[
@@ -82,7 +83,7 @@ setup(
         "viewer": ["rerun-sdk>=0.41,<0.42", "pillow>=10.1"],
         "plot": ["matplotlib>=3.8"],
         "sweep": ["dask>=2024.8", "distributed>=2024.8"],
-        "bench": ["matplotlib>=3.8", "mujoco>=3.3", "pyelastica>=0.3.2"],
+        "bench": ["matplotlib>=3.8", "mujoco>=4.0", "pyelastica>=1.0"],
         "test": [
             "hypothesis>=6.100",
             "jsonschema>=4.20",

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import click
 
+from bilayer_core.cli.bench import bench
 from bilayer_core.cli.check import check
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.logs import info, view
@@ -41,7 +42,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, new, schema, check, run, converge, validate, info, view, render):
+for verb in (scenes, new, schema, check, run, converge, validate, bench, info, view, render):
     program.add_command(verb)
 
 

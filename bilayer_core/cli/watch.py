@@ -100,3 +100,31 @@ def progress_bar(name: str, begin: float, end: float, quiet: bool) -> Iterator[C
                 bar.update(task, completed=time - begin, time=time, factor=(time - begin) / (now - started))
 
         yield show
+
+
+@contextmanager
+def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """A bar on stderr over many measurements. Yields the function that takes what is done next.
+
+    Parameters
+    ----------
+    total : int
+        How often it will be called.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield lambda text: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}")
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task, begun = bar.add_task("", total=total), 0
+
+        def show(text: str) -> None:
+            nonlocal begun
+            bar.update(task, completed=begun, description=text)
+            begun += 1
+
+        yield show
+        bar.update(task, completed=total, description="done")

@@ -62,7 +62,7 @@ def measure(simulator: Simulator, duration: float, progress: Callable[[float], N
     simulator.run(duration, progress=look)
     summary = simulator.summary()
     found = _by_axis("com", simulator.com - com)
-    rise, when = _peak(np.array(times), np.array(heights))
+    rise, when = peak(np.array(times), np.array(heights))
     if rise > 0.0:
         found |= {"com.rise": rise, "com.rise_time": when}
     if take_off is not None and not touched:
@@ -126,7 +126,7 @@ def _tips(simulator: Simulator) -> dict[str, int]:
     return {s.name: s.first_node + s.node_count - 1 for s in simulator.model.strands}
 
 
-def _peak(times: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
+def peak(times: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
     """Rise of the highest point over the first [m] and its time [s], from the parabola through its neighbours."""
     top = int(heights.argmax())
     rise, when = heights[top] - heights[0], times[top]

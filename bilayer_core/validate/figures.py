@@ -53,7 +53,7 @@ def draw(cases: Iterable[Case], directory: Path) -> list[Path]:
 
 def bending_figure(path: Path) -> None:
     """Fig. 3: normalised curvature against ratios of modulus and of thickness."""
-    figure, axes = _figure(1, 2, (9.0, 3.8))
+    figure, axes = figure_of(1, 2, (9.0, 3.8))
     fine = np.logspace(-1.0, 1.0, 200)
     for axis, (sweep, ratios), label in zip(
         axes, bending.SWEEPS.items(), ("modulus ratio m = E₂/E₁", "thickness ratio n = h₂/h₁"), strict=True
@@ -69,12 +69,12 @@ def bending_figure(path: Path) -> None:
         axis.set(xscale="log", xlabel=label, ylabel="κh/η", ylim=(0.0, 1.6))
         axis.grid(color="0.9")
     axes[0].legend(frameon=False, fontsize=8, loc="lower center")
-    _save(figure, path)
+    save(figure, path)
 
 
 def helix_figure(path: Path) -> None:
     """Fig. 4: ribbons of a turn and a half as computed, and helices of least energy."""
-    figure, axes = _figure(2, 3, (9.0, 6.4), projection="3d")
+    figure, axes = figure_of(2, 3, (9.0, 6.4), projection="3d")
     for row, torsion in zip(axes, helix.TILT, strict=True):
         for axis, natural in zip(row, helix.NATURAL, strict=True):
             radius, pitch = bonded_helix(*natural, helix.TILT[torsion])
@@ -94,7 +94,7 @@ def helix_figure(path: Path) -> None:
             axis.tick_params(labelsize=6)
             axis.locator_params(nbins=4)
     figure.suptitle("ribbons: two bonded rods; lines: helices of least energy [mm]", fontsize=9)
-    _save(figure, path)
+    save(figure, path)
 
 
 def laminate_figure(path: Path) -> None:
@@ -150,8 +150,8 @@ def _ideal_helix(points: np.ndarray, radius: float, pitch: float) -> np.ndarray:
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), z])
 
 
-def _figure(rows: int, columns: int, size: tuple[float, float], **axes):
-    """A figure without a window, and its axes."""
+def figure_of(rows: int, columns: int, size: tuple[float, float], **axes):
+    """A figure of `size` [in] without a window, and its axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -160,7 +160,7 @@ def _figure(rows: int, columns: int, size: tuple[float, float], **axes):
     return figure, figure.subplots(rows, columns, subplot_kw=axes)
 
 
-def _save(figure, path: Path) -> None:
+def save(figure, path: Path) -> None:
     try:
         figure.savefig(path, dpi=DPI)
     except OSError as error:

@@ -29,7 +29,8 @@ ALLOWED = {
     "converge": NUMERICS,
     "beam2d": {"errors", "scene", "model"},
     "validate": NUMERICS | {"beam2d"},
-    "cli": NUMERICS | {"record", "view", "converge", "validate"},
+    "bench": NUMERICS | {"converge", "validate"},
+    "cli": NUMERICS | {"record", "view", "converge", "validate", "bench"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
 FACES = {"__init__": NUMERICS, "__main__": {"cli"}}

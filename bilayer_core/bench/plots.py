@@ -1,0 +1,122 @@
+"""The results as pictures; matplotlib is needed here and nowhere else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from ..validate.figures import figure_of, save
+from . import pareto, scaling, tables, work_precision
+from .configurations import Family
+from .problems import PROBLEMS, Problem
+from .references import read_file
+
+COLOURS = {
+    "implicit_euler": "#d62728",
+    "sdirk2": "#1f77b4",
+    "tr_bdf2": "#2ca02c",
+    "generalised_alpha": "#9467bd",
+    "implicit_midpoint": "#ff7f0e",
+}
+MARKS = {("two_rod", 3): "o", ("two_rod", 2): "s", ("laminate", 3): "^", ("laminate", 2): "D"}
+SERIES = ("#1f77b4", "#2ca02c", "#17becf", "#9467bd", "#d62728", "#ff7f0e", "#8c564b", "#e377c2")
+INK, GREY, GOLD = "#222222", "#888888", "#f2b705"
+WIDE = (9.6, 5.4)
+TEXT = {"font.size": 12, "axes.titlesize": 14, "axes.labelsize": 13, "legend.fontsize": 10.5}
+
+
+def draw(content: dict, directory: Path) -> list[Path]:
+    """Draw all that there are records for; return the files written."""
+    from matplotlib import rc_context
+
+    paths = []
+    with rc_context(TEXT):
+        for problem in PROBLEMS:
+            runs = [run for run in content[work_precision.PART] if run["problem"] == problem.name]
+            if pareto.done(runs):
+                paths.append(directory / f"work_precision_{problem.name}.png")
+                work_precision_figure(problem, runs, tables.recommendation(content), paths[-1])
+        if content["cantilever"]:
+            paths.append(directory / "cantilever.png")
+            cantilever_figure(content, paths[-1])
+        if content[scaling.PART]:
+            paths.append(directory / "scaling.png")
+            scaling_figure(content[scaling.PART], paths[-1])
+    return paths
+
+
+def work_precision_figure(problem: Problem, runs: list[dict], chosen: Family | None, path: Path) -> None:
+    """Error against CPU time of all runs of a problem."""
+    figure, axis = figure_of(1, 1, WIDE)
+    runs = [run for run in pareto.done(runs) if run["error"] > 0.0]
+    for family in dict.fromkeys(map(Family.of, runs)):
+        points = np.array([(r["cpu_time"], r["error"]) for r in runs if Family.of(r) == family]).T
+        mark, colour = MARKS[family.model, family.dimension], COLOURS[family.integrator]
+        axis.plot(*points, mark, color=colour, markersize=7, alpha=0.8, markeredgewidth=0.0, label=family.label)
+    best = [runs[i] for i in pareto.front([(run["cpu_time"], run["error"]) for run in runs])]
+    axis.plot(*_columns(best), color=INK, linewidth=1.6, zorder=1, label="Pareto front")
+    ours = [run for run in runs if chosen is not None and Family.of(run) == chosen]
+    if ours:
+        style = {"markersize": 13, "markerfacecolor": "none", "markeredgecolor": GOLD, "markeredgewidth": 2.2}
+        axis.plot(*_columns(ours), "o", **style, label="recommended default")
+    axis.axhline(pareto.AIM, color=GREY, linewidth=1.0, linestyle="--")
+    bar = max(read_file()[problem.name][model]["bar"] for model in {run["model"] for run in runs})
+    low = 0.5 * min(min(run["error"] for run in runs), bar)
+    axis.axhspan(low, bar, color="0.9", zorder=0, label="within the reference's error bar")
+    axis.set(xscale="log", yscale="log", xlabel="CPU time [s]", ylabel=problem.measure.error_label)
+    axis.set_title(problem.title)
+    axis.set_ylim(bottom=low)
+    axis.grid(color="0.88", which="major")
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside right upper", frameon=False)
+    save(figure, path)
+
+
+def cantilever_figure(content: dict, path: Path) -> None:
+    """Pareto fronts of all tools on the common cantilever."""
+    figure, axis = figure_of(1, 1, WIDE)
+    for (label, runs), colour in zip(tables.cantilever_series(content).items(), SERIES, strict=False):
+        runs = [run for run in pareto.done(runs) if run["error"] < 1.0]
+        if not runs:
+            continue
+        best = [runs[i] for i in pareto.front([(run["cpu_time"], run["error"]) for run in runs])]
+        ours = label.startswith("this")
+        axis.plot(*_columns(runs), "o", color=colour, alpha=0.25, markersize=5, markeredgewidth=0.0)
+        line = "-" if ours else "--"
+        axis.plot(*_columns(best), line, marker="o", color=colour, linewidth=2.4 if ours else 1.8, label=_folded(label))
+    axis.set(xscale="log", yscale="log", xlabel="CPU time of 1 s [s]")
+    axis.set_ylabel("rms error of the tip over 0.5 s / length")
+    axis.set_title("Common cantilever: 100 × 10 × 2 mm, 1 MPa, released from straight")
+    axis.grid(color="0.88", which="major")
+    figure.legend(*axis.get_legend_handles_labels(), loc="outside right upper", frameon=False)
+    save(figure, path)
+
+
+def scaling_figure(records: list[dict], path: Path) -> None:
+    """CPU time of a step against nodes, with slopes."""
+    figure, axis = figure_of(1, 1, WIDE)
+    for ((model, dimension), slope), colour in zip(scaling.slopes(records).items(), SERIES, strict=False):
+        points = [r for r in records if (r["model"], r["dimension"]) == (model, dimension)]
+        nodes, times = np.array([(r["nodes"], 1e3 * r["cpu_time"]) for r in points]).T
+        mark = MARKS[model, dimension]
+        axis.plot(nodes, times, mark + "-", color=colour, label=f"{model} {dimension}-D: slope {slope:.2f}")
+    nodes = np.array(sorted({record["nodes"] for record in records}))
+    least = min(1e3 * record["cpu_time"] for record in records)
+    axis.plot(nodes, 0.7 * least * nodes / nodes[0], color=GREY, linestyle="--", label="proportional to nodes")
+    axis.set(xscale="log", yscale="log", xlabel="nodes along the strip", ylabel="CPU time of a step [ms]")
+    axis.set_xticks(nodes, [str(n) for n in nodes], minor=False)
+    axis.minorticks_off()
+    axis.set_title(f"Bilayer that bends, {scaling.INTEGRATOR}, steps of {1e3 * scaling.DT:g} ms")
+    axis.grid(color="0.88")
+    axis.legend(frameon=False)
+    save(figure, path)
+
+
+def _columns(runs: list[dict]) -> np.ndarray:
+    return np.array([(run["cpu_time"], run["error"]) for run in runs]).T
+
+
+def _folded(label: str) -> str:
+    """A legend's entry on two lines."""
+    head, _, tail = label.rpartition(", ")
+    return f"{head},\n{tail}"

@@ -1,0 +1,101 @@
+"""The verb ``bench``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from bilayer_core.cli.options import Verb
+from bilayer_core.cli.watch import count_bar
+from bilayer_core.errors import InputError
+
+DEFAULT_DIRECTORY = "runs/bench"
+
+
+@click.command(cls=Verb)
+@click.option("--quick", is_flag=True, help="Fewer problems, meshes and steps: under 3 minutes.")
+@click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
+@click.option("--only", multiple=True, metavar="NAME", help="A problem, or peers, scaling or start; may be repeated.")
+@click.option("--list", "listing", is_flag=True, help="Say what there is, and measure nothing.")
+@click.option("--resume", is_flag=True, help="Go on with what is in DIR, on the same machine with the same versions.")
+@click.option("--force", is_flag=True, help="Replace what is in DIR.")
+@click.option("--references", is_flag=True, help="Compute converged references of the problems and store them.")
+@click.option("--quiet", is_flag=True, help="No progress.")
+def bench(
+    quick: bool,
+    out: str,
+    only: tuple[str, ...],
+    listing: bool,
+    resume: bool,
+    force: bool,
+    references: bool,
+    quiet: bool,
+) -> None:
+    """Measure run time against error: models, integrators, steps and meshes, and other programs beside them.
+
+    Writes DIR/bench.json, and tables (csv, Markdown) and plots (png) beside it. CPU times are those of one thread,
+    without compilation; other work on the machine disturbs them, so its load is recorded.
+    """
+    from bilayer_core.bench import run
+    from bilayer_core.bench.results import Results
+    from bilayer_core.validate.figures import check_matplotlib
+
+    chosen = run.chosen_names(only, quick)
+    if listing:
+        _list(chosen)
+        return
+    if references:
+        _make_references(run.chosen_problems(chosen))
+        return
+    check_matplotlib()
+    directory = _directory(out)
+    results = Results(directory, quick, resume, force)
+    with count_bar(run.count(chosen, quick), quiet) as show:
+        skipped = run.measure(chosen, results, quick, show)
+    for line in skipped:
+        click.echo(line)
+    for path in run.write(results, directory):
+        click.echo(f"wrote {path}")
+    _conclude(results.content)
+
+
+def _list(chosen: list[str]) -> None:
+    from bilayer_core.bench.problems import PROBLEMS
+
+    titles = {problem.name: problem.title for problem in PROBLEMS} | {
+        "peers": "The cantilever by programs that install from PyPI",
+        "scaling": "CPU time of a step against nodes",
+        "start": "First step of a new process, kernels compiled and from the cache",
+    }
+    for name in chosen:
+        click.echo(f"{name:12}{titles[name]}")
+
+
+def _make_references(problems: list) -> None:
+    from bilayer_core.bench import references
+    from bilayer_core.bench.configurations import shapes
+
+    for problem in problems:
+        for model in dict.fromkeys(model for model, _ in shapes(problem.config())):
+            entry = references.make(problem, model, lambda text: click.echo(f"  {text}", err=True))
+            checks = ", ".join(f"{name} {difference:.1e} away" for name, difference in entry["checks"].items())
+            click.echo(f"{problem.name}, {model}: order {entry['order']}, error bar {entry['bar']:.1e}; {checks}")
+    click.echo(f"wrote {references.FILE}")
+
+
+def _conclude(content: dict) -> None:
+    if content["recommended"]:
+        choice = content["recommended"]
+        click.echo(f"recommended: {choice['model']} {choice['dimension']}-D, {choice['integrator']}")
+    for name, slope in content["slopes"].items():
+        click.echo(f"scaling of {name}: slope {slope:.2f}")
+
+
+def _directory(out: str) -> Path:
+    directory = Path(out)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out: {out}: cannot be made a directory: {error.strerror or error}") from error
+    return directory
