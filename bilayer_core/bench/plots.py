@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,7 @@ def work_precision_figure(problem: Problem, runs: list[dict], chosen: Family | N
     for family in dict.fromkeys(map(Family.of, runs)):
         points = np.array([(r["cpu_time"], r["error"]) for r in runs if Family.of(r) == family]).T
         mark, colour = MARKS[family.model, family.dimension], COLOURS[family.integrator]
-        axis.plot(*points, mark, color=colour, markersize=7, alpha=0.8, markeredgewidth=0.0, label=family.label)
+        axis.plot(*points, mark, color=colour, markersize=7, alpha=0.8, markeredgewidth=0.0)
     best = [runs[i] for i in pareto.front([(run["cpu_time"], run["error"]) for run in runs])]
     axis.plot(*_columns(best), color=INK, linewidth=1.6, zorder=1, label="Pareto front")
     ours = [run for run in runs if chosen is not None and Family.of(run) == chosen]
@@ -68,8 +69,24 @@ def work_precision_figure(problem: Problem, runs: list[dict], chosen: Family | N
     axis.set_title(problem.title)
     axis.set_ylim(bottom=low)
     axis.grid(color="0.88", which="major")
-    figure.legend(*axis.get_legend_handles_labels(), loc="outside right upper", frameon=False)
+    keys = [*_keys(map(Family.of, runs)), *axis.get_legend_handles_labels()[0]]
+    figure.legend(handles=keys, loc="outside right upper", frameon=False)
     save(figure, path)
+
+
+def _keys(families: Iterable[Family]) -> list:
+    """Entries of a legend: a colour for each integrator, a mark for each model and dimension."""
+    from matplotlib.lines import Line2D
+
+    families = list(dict.fromkeys(families))
+    integrators = dict.fromkeys(family.integrator for family in families)
+    shapes = dict.fromkeys((family.model, family.dimension) for family in families)
+    colours = [Line2D([], [], color=COLOURS[name], linewidth=6, label=name) for name in integrators]
+    marks = [
+        Line2D([], [], color=INK, marker=MARKS[shape], linestyle="none", label=f"{shape[0]} {shape[1]}-D")
+        for shape in shapes
+    ]
+    return colours + marks
 
 
 def cantilever_figure(content: dict, path: Path) -> None:

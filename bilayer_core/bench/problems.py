@@ -33,6 +33,8 @@ class Problem:
     measure : Trajectory or Headline
     levels : tuple of (int, tuple of float)
         Meshes (stations) with the steps [s] that are tried on each, coarse to fine.
+    quick_levels : tuple of (int, tuple of float)
+        Those of a quick benchmark; none: the problem is not part of it.
     reference_levels : tuple of (int, float)
         Stations and steps [s] of the runs whose limit is the reference: edges doubled and steps halved from each to
         the next. Where a layer ends within the rod, a station of each of these meshes stands there: otherwise its
@@ -51,6 +53,7 @@ class Problem:
     levels: tuple[tuple[int, tuple[float, ...]], ...]
     reference_levels: tuple[tuple[int, float], ...]
     second: str = "generalised_alpha"
+    quick_levels: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
     def config(self, stations: int | None = None, *more: str) -> SceneConfig:
         """The scene, with a mesh."""
@@ -58,11 +61,9 @@ class Problem:
         return load_scene(self.scene, [*self.changes, *mesh, *more])
 
     def configurations(self, family: Family, quick: bool) -> list[Configuration]:
-        """Runs of a family, the cheapest first; a quick benchmark takes the coarsest mesh and its first steps."""
-        if quick:
-            stations, steps = self.levels[0]
-            return [Configuration(family, stations, dt) for dt in steps[:2]]
-        return [Configuration(family, stations, dt) for stations, steps in self.levels for dt in steps]
+        """Runs of a family, the cheapest first."""
+        levels = self.quick_levels if quick else self.levels
+        return [Configuration(family, stations, dt) for stations, steps in levels for dt in steps]
 
 
 def halved(stations: int, dt: float, count: int) -> tuple[tuple[int, float], ...]:
@@ -97,7 +98,8 @@ PROBLEMS = (
             (41, (4e-3, 2e-3, 1e-3, 5e-4)),
             (81, (1e-3, 5e-4)),
         ),
-        reference_levels=halved(51, 5e-4, 4),
+        reference_levels=halved(51, 5e-4, 3),
+        quick_levels=((21, (4e-3,)), (41, (4e-3, 2e-3))),
     ),
     Problem(
         "snap",
@@ -112,7 +114,8 @@ PROBLEMS = (
             (21, (4e-3, 2e-3, 1e-3, 5e-4)),
             (41, (2e-3, 1e-3, 5e-4, 2.5e-4)),
         ),
-        reference_levels=halved(21, 5e-4, 4),
+        reference_levels=halved(21, 5e-4, 3),
+        quick_levels=((11, (2e-3,)), (21, (2e-3, 1e-3))),
     ),
     Problem(
         "helix",
@@ -146,6 +149,7 @@ PROBLEMS = (
         Headline("the stride", "mm", 1e3, advance("com", 0, STRIDE, 2 * STRIDE), 100.0),
         levels=((40, (16e-3, 8e-3, 4e-3)), (80, (16e-3, 8e-3, 4e-3, 2e-3)), (159, (4e-3,))),
         reference_levels=halved(80, 4e-3, 3),
+        quick_levels=((80, (16e-3,)),),
     ),
     Problem(
         "jumping",

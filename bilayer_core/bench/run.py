@@ -12,8 +12,6 @@ from .problems import PROBLEMS, Problem
 from .results import Results
 
 PEERS, SCALING, START = "peers", "scaling", "start"
-QUICK_PROBLEMS = ("cantilever", "snap", "crawling")
-"""Of a quick benchmark: one without contact, one of a bilayer, one with contact."""
 
 
 def names() -> list[str]:
@@ -35,7 +33,8 @@ def chosen_names(only: Sequence[str], quick: bool) -> list[str]:
             raise InputError(f"--only {name}: no such part{suggestion(name, known)}; there are {', '.join(known)}")
     if only:
         return [name for name in known if name in only]
-    return [name for name in known if not quick or name in (*QUICK_PROBLEMS, PEERS, SCALING, START)]
+    long = {problem.name for problem in PROBLEMS if not problem.quick_levels} if quick else set()
+    return [name for name in known if name not in long]
 
 
 def chosen_problems(chosen: Sequence[str]) -> list[Problem]:
