@@ -5,12 +5,13 @@ Models, dimensions and integrators are those that the simulator has; what a scen
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields
 from itertools import product
 
 from ..errors import SceneError
-from ..model.plan import DIMENSIONS, INTEGRATORS, MODELS, make_plan
+from ..integrate.integrators import INTEGRATORS
+from ..model.plan import DIMENSIONS, MODELS, make_plan
 from ..scene.config import SceneConfig
 
 FREE_MOTION = "implicit_midpoint"
@@ -24,16 +25,17 @@ class Family:
     model: str
     dimension: int
     integrator: str
+    adaptive: bool = False
 
     @property
     def label(self) -> str:
         """For tables and legends."""
-        return f"{self.model} {self.dimension}-D, {self.integrator}"
+        return f"{self.model} {self.dimension}-D, {self.integrator}{', adaptive' if self.adaptive else ''}"
 
     @classmethod
     def of(cls, record: dict) -> Family:
         """That of a recorded run."""
-        return cls(record["model"], record["dimension"], record["integrator"])
+        return cls(*(record[field.name] for field in fields(cls)))
 
 
 @dataclass(frozen=True)
@@ -45,31 +47,46 @@ class Configuration:
     family : Family
     stations : int
         Of the rod whose mesh is varied.
-    dt : float
-        Step [s].
+    step : float
+        Length of fixed steps [s]; of adaptive ones their tolerance, in lengths of the longest rod.
     """
 
     family: Family
     stations: int
-    dt: float
+    step: float
+
+    @property
+    def dt(self) -> float | None:
+        """Length of fixed steps [s]."""
+        return None if self.family.adaptive else self.step
+
+    @property
+    def tolerance(self) -> float | None:
+        """Of adaptive steps."""
+        return self.step if self.family.adaptive else None
 
     def identity(self) -> dict[str, object]:
         """As it stands in records."""
-        return {**vars(self.family), "stations": self.stations, "dt": self.dt}
+        return {**vars(self.family), "stations": self.stations, "dt": self.dt, "tolerance": self.tolerance}
 
 
 def shapes(scene: SceneConfig) -> Iterator[tuple[str, int]]:
     """Models and dimensions in which a scene can be simulated."""
     for model, dimension in product(MODELS, DIMENSIONS):
-        if refusal(scene, Family(model, dimension, INTEGRATORS[0])) is None:
+        if refusal(scene, Family(model, dimension, next(iter(INTEGRATORS)))) is None:
             yield model, dimension
 
 
-def families(scene: SceneConfig, integrators: tuple[str, ...] = INTEGRATORS) -> list[Family]:
+def families(scene: SceneConfig, integrators: Iterable[str] = tuple(INTEGRATORS)) -> list[Family]:
     """All families that a scene accepts; with contact or a fluid without the integrator that is not made for it."""
     free = scene.contact is None and scene.fluid is None
     fit = [name for name in integrators if free or name != FREE_MOTION]
-    return [Family(*shape, name) for shape in shapes(scene) for name in fit]
+    return [
+        Family(*shape, name, adaptive)
+        for shape in shapes(scene)
+        for name in fit
+        for adaptive in ((False,) if INTEGRATORS[name].estimate is None else (False, True))
+    ]
 
 
 def refusal(scene: SceneConfig, family: Family) -> str | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import SceneError, SimulationError
+from ..integrate.result import Termination
 from ..integrate.simulator import Simulator
 from .configurations import Configuration
 from .problems import Problem
@@ -17,7 +18,7 @@ Array = np.ndarray
 SHORT = 0.5
 """Runs shorter than this [s of CPU] are repeated, and the fastest counts."""
 REPEATS = 3
-LONGEST = 60.0
+LONGEST = 40.0
 """A run that has taken this much CPU [s] is ended: it is not one that anybody would choose."""
 
 
@@ -71,15 +72,17 @@ def simulator_of(problem: Problem, configuration: Configuration) -> Simulator:
     family = configuration.family
     config = problem.config(configuration.stations)
     choice = {"model": family.model, "dimension": family.dimension, "integrator": family.integrator}
-    return Simulator(config, dt=configuration.dt, **choice)
+    return Simulator(config, dt=configuration.dt, tolerance=configuration.tolerance, **choice)
 
 
 def _run(problem: Problem, configuration: Configuration, longest: float) -> Run:
     simulator = simulator_of(problem, configuration)
     simulator.compile()
-    track = Track(problem.measure.rate(configuration.dt))
-    load = os.getloadavg()[0]
-    simulator.run(problem.duration, observers=[track], stop=lambda: simulator.cpu_time > longest)
+    track, load = Track(simulator), os.getloadavg()[0]
+    for end in sorted({*problem.measure.stops, problem.duration}):
+        result = simulator.run(end - simulator.time, stop=lambda: simulator.cpu_time > longest, progress=track.look)
+        if result.termination is Termination.INTERRUPTED:
+            break
     statistics = simulator.statistics
     cost = {
         "cpu_time": simulator.cpu_time,

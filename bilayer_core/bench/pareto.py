@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 from .configurations import Family
 
@@ -71,10 +72,10 @@ def scores(by_problem: Mapping[str, Mapping[Family, float]]) -> dict[Family, flo
 
 
 def _stand_in(family: Family, costs: Mapping[Family, float]) -> Family | None:
-    """The family itself, or that of the same model and integrator in the other dimension that a scene accepts."""
+    """The family itself, or that the same in the other dimension that a scene accepts."""
     if family in costs:
         return family
-    return next((f for f in costs if (f.model, f.integrator) == (family.model, family.integrator)), None)
+    return next((f for f in costs if replace(f, dimension=family.dimension) == family), None)
 
 
 def recommended(runs: Sequence[dict]) -> Family | None:

@@ -54,7 +54,8 @@ def work_precision_figure(problem: Problem, runs: list[dict], chosen: Family | N
     for family in dict.fromkeys(map(Family.of, runs)):
         points = np.array([(r["cpu_time"], r["error"]) for r in runs if Family.of(r) == family]).T
         mark, colour = MARKS[family.model, family.dimension], COLOURS[family.integrator]
-        axis.plot(*points, mark, color=colour, markersize=7, alpha=0.8, markeredgewidth=0.0)
+        face = "none" if family.adaptive else colour
+        axis.plot(*points, mark, color=colour, markersize=7, alpha=0.8, markerfacecolor=face)
     best = [runs[i] for i in pareto.front([(run["cpu_time"], run["error"]) for run in runs])]
     axis.plot(*_columns(best), color=INK, linewidth=1.6, zorder=1, label="Pareto front")
     ours = [run for run in runs if chosen is not None and Family.of(run) == chosen]
@@ -86,7 +87,8 @@ def _keys(families: Iterable[Family]) -> list:
         Line2D([], [], color=INK, marker=MARKS[shape], linestyle="none", label=f"{shape[0]} {shape[1]}-D")
         for shape in shapes
     ]
-    return colours + marks
+    hollow = Line2D([], [], color=INK, marker="o", linestyle="none", markerfacecolor="none", label="adaptive steps")
+    return [*colours, *marks, *([hollow] if any(family.adaptive for family in families) else [])]
 
 
 def cantilever_figure(content: dict, path: Path) -> None:

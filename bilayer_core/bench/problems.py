@@ -8,11 +8,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import InputError
+from ..integrate.integrators import INTEGRATORS
 from ..scene.config import SceneConfig
 from ..scene.faults import suggestion
 from ..scene.loader import load_scene
 from .configurations import Configuration, Family
 from .track import Headline, Measure, Trajectory, advance, rise
+
+TOLERANCES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
+TOLERANCES_OF_A_MESH = 3
+QUICK_TOLERANCES = (1e-4,)
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,9 @@ class Problem:
     measure : Trajectory or Headline
     levels : tuple of (int, tuple of float)
         Meshes (stations) with the steps [s] that are tried on each, coarse to fine.
+    tolerances : tuple of float
+        Of adaptive steps; each finer mesh begins with the next of them.
+    integrators : tuple of str
     quick_levels : tuple of (int, tuple of float)
         Those of a quick benchmark; none: the problem is not part of it.
     reference_levels : tuple of (int, float)
@@ -53,6 +61,8 @@ class Problem:
     levels: tuple[tuple[int, tuple[float, ...]], ...]
     reference_levels: tuple[tuple[int, float], ...]
     second: str = "generalised_alpha"
+    tolerances: tuple[float, ...] = TOLERANCES
+    integrators: tuple[str, ...] = tuple(INTEGRATORS)
     quick_levels: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
     def config(self, stations: int | None = None, *more: str) -> SceneConfig:
@@ -63,7 +73,12 @@ class Problem:
     def configurations(self, family: Family, quick: bool) -> list[Configuration]:
         """Runs of a family, the cheapest first."""
         levels = self.quick_levels if quick else self.levels
-        return [Configuration(family, stations, dt) for stations, steps in levels for dt in steps]
+        found = []
+        for number, (stations, steps) in enumerate(levels):
+            if family.adaptive:
+                steps = QUICK_TOLERANCES if quick else self.tolerances[number : number + TOLERANCES_OF_A_MESH]
+            found += [Configuration(family, stations, step) for step in steps]
+        return found
 
 
 def halved(stations: int, dt: float, count: int) -> tuple[tuple[int, float], ...]:
@@ -81,6 +96,9 @@ FAST_GRIP = (
 )
 ONE_ARM = ("rods.arm.pattern.count=1", "bodies.hub.motion.mass=0.11875 g")
 """An eighth of the swimmer moves as the whole (tests/robots/test_swimming.py)."""
+OF_ROBOTS = ("implicit_euler", "sdirk2", "generalised_alpha")
+"""Integrators tried on robots: the paper's, and of those of second order one of two stages and one of a single one."""
+ROBOT_TOLERANCES = (1e-3, 2e-4, 5e-5)
 STRIDE, STROKE = 2.4, 0.6  # periods [s]
 
 PROBLEMS = (
@@ -138,6 +156,8 @@ PROBLEMS = (
         Trajectory("tip", until=3.5, spacing=2e-2, length=0.0539),
         levels=((25, (4e-3, 2e-3)), (50, (4e-3, 2e-3, 1e-3)), (99, (2e-3,))),
         reference_levels=halved(50, 4e-3, 3),
+        integrators=OF_ROBOTS,
+        tolerances=ROBOT_TOLERANCES,
     ),
     Problem(
         "crawling",
@@ -146,9 +166,11 @@ PROBLEMS = (
         (),
         "body",
         2 * STRIDE,
-        Headline("the stride", "mm", 1e3, advance("com", 0, STRIDE, 2 * STRIDE), 100.0),
+        Headline("the stride", "mm", 1e3, advance("com", 0, STRIDE, 2 * STRIDE), (STRIDE,)),
         levels=((40, (16e-3, 8e-3, 4e-3)), (80, (16e-3, 8e-3, 4e-3, 2e-3)), (159, (4e-3,))),
         reference_levels=halved(80, 4e-3, 3),
+        integrators=OF_ROBOTS,
+        tolerances=ROBOT_TOLERANCES,
         quick_levels=((80, (16e-3,)),),
     ),
     Problem(
@@ -158,9 +180,11 @@ PROBLEMS = (
         (),
         "loop",
         1.3,
-        Headline("the rise", "mm", 1e3, rise, 500.0),
+        Headline("the rise", "mm", 1e3, rise),
         levels=((26, (2e-3, 1e-3)), (51, (2e-3, 1e-3, 5e-4)), (101, (5e-4,))),
         reference_levels=halved(26, 1e-3, 3),
+        integrators=OF_ROBOTS,
+        tolerances=ROBOT_TOLERANCES,
     ),
     Problem(
         "swimming",
@@ -169,9 +193,11 @@ PROBLEMS = (
         ONE_ARM,
         "arm",
         2 * STROKE,
-        Headline("the stroke", "mm", 1e3, advance("com", 2, STROKE, 2 * STROKE), 100.0),
+        Headline("the stroke", "mm", 1e3, advance("com", 2, STROKE, 2 * STROKE), (STROKE,)),
         levels=((20, (10e-3, 4e-3, 2e-3)), (40, (10e-3, 4e-3, 2e-3, 1e-3)), (79, (4e-3, 2e-3))),
         reference_levels=halved(40, 2e-3, 3),
+        integrators=OF_ROBOTS,
+        tolerances=ROBOT_TOLERANCES,
     ),
 )
 

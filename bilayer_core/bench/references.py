@@ -88,6 +88,7 @@ def fingerprint(problem: Problem) -> str:
     scene = read_yaml(read_scene_file(path), str(path))
     scene.pop("solver", None)
     measure = {key: value for key, value in vars(problem.measure).items() if not callable(value)}
+    measure.pop("stops", None)
     content = [scene, problem.changes, problem.duration, measure]
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:16]
 

@@ -9,55 +9,47 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..converge.quantities import peak
-from ..integrate.frame import Description, Frame
+from ..integrate.simulator import Simulator
 
 Array = np.ndarray
 
 
 class Track:
-    """An observer that keeps the way of a few points.
+    """The ways of a few points, step by step.
 
     Parameters
     ----------
-    rate : float
-        Times a simulated second.
+    simulator : Simulator
+        At its start; `look` is called after each of its steps.
 
     Attributes
     ----------
-    times : Array
-        [s], shape (n_time,), after the run.
-    points : dict of str to Array
-        Ways of ``tip`` (last node of the first strand), ``com`` (mass centre of the robot) and of each body by its
-        name [m], shape (n_time, 3).
+    times : list of float
+        [s]
+    points : dict of str to list of Array
+        Places of ``tip`` (last node of the first strand), ``com`` (mass centre of the robot) and of each body by its
+        name [m], shape (3,) each.
     """
 
-    def __init__(self, rate: float):
-        self.rate = rate
-        self._times: list[float] = []
-        self._ways: dict[str, list[Array]] = {}
+    def __init__(self, simulator: Simulator):
+        self._simulator = simulator
+        first = simulator.model.strands[0]
+        self._tip = first.first_node + first.node_count - 1
+        self.times: list[float] = []
+        self.points: dict[str, list[Array]] = {name: [] for name in ("tip", "com", *simulator.bodies)}
+        self.look(simulator.time)
 
-    def start(self, description: Description) -> None:
-        """Note which node is the tip, and the bodies' names."""
-        self._tip = description.strands[0].nodes.stop - 1
-        self._bodies = [body.name for body in description.bodies]
-        self._ways = {name: [] for name in ("tip", "com", *self._bodies)}
-
-    def observe(self, frame: Frame) -> None:
-        """Keep one instant."""
-        self._times.append(frame.time)
-        self._ways["tip"].append(frame.positions[self._tip])
-        self._ways["com"].append(frame.com)
-        for name, position in zip(self._bodies, frame.body_positions, strict=True):
-            self._ways[name].append(position)
-
-    def close(self, complete: bool, termination: str = "") -> None:
-        """Make arrays of it."""
-        self.times = np.array(self._times)
-        self.points = {name: np.array(way) for name, way in self._ways.items()}
+    def look(self, time: float) -> None:
+        """Keep where the points are now."""
+        self.times.append(time)
+        self.points["tip"].append(self._simulator.positions[self._tip])
+        self.points["com"].append(self._simulator.com)
+        for name, body in self._simulator.bodies.items():
+            self.points[name].append(body.position)
 
     def at(self, point: str, time: float) -> Array:
-        """Place of a point at the recorded instant nearest to `time` [m], shape (3,)."""
-        return self.points[point][int(np.abs(self.times - time).argmin())]
+        """Place of a point at the end of the step nearest to `time` [m], shape (3,)."""
+        return self.points[point][int(np.abs(np.array(self.times) - time).argmin())]
 
 
 @dataclass(frozen=True)
@@ -87,14 +79,15 @@ class Trajectory:
         name = {"com": "mass centre"}.get(self.point, self.point)
         return f"rms error of the {name} over {self.until:g} s / length of the rod"
 
-    def rate(self, dt: float) -> float:
-        """How often a run with this step is looked at [1/s]."""
-        return 1.0 / max(dt, self.spacing)
+    @property
+    def stops(self) -> tuple[float, ...]:
+        """Times at which a step must end [s]."""
+        return (self.until,)
 
     def values(self, track: Track) -> Array:
         """Times [s] and places [m] that count, shape (n_time, 4)."""
-        counted = track.times <= self.until * (1.0 + 1e-9)
-        return np.column_stack([track.times, track.points[self.point]])[counted]
+        way = np.column_stack([track.times, track.points[self.point]])
+        return way[way[:, 0] <= self.until * (1.0 + 1e-9)]
 
     def error(self, found: Array, reference: Array) -> float:
         """Of `values` against those of a reference."""
@@ -112,24 +105,20 @@ class Headline:
         From SI to the unit.
     figure : callable
         Takes a `Track`, returns the number in SI units.
-    sampling : float
-        Instants looked at in a simulated second [1/s].
+    stops : tuple of float
+        Times at which a step must end [s].
     """
 
     name: str
     unit: str
     factor: float
     figure: Callable[[Track], float]
-    sampling: float
+    stops: tuple[float, ...] = ()
 
     @property
     def error_label(self) -> str:
         """What the error is, in words."""
         return f"relative error of {self.name}"
-
-    def rate(self, dt: float) -> float:
-        """How often a run with this step is looked at [1/s]."""
-        return min(self.sampling, 1.0 / dt)
 
     def values(self, track: Track) -> Array:
         """The number, shape (1, 1)."""
@@ -145,13 +134,15 @@ Measure = Trajectory | Headline
 
 def rms_distance(found: Array, reference: Array) -> float:
     """Root mean square over `found`'s times of the distance between ways [m]; columns: time [s], coordinates [m]."""
-    way = CubicSpline(reference[:, 0], reference[:, 1:])(found[:, 0])
-    return float(np.sqrt(np.mean(np.sum((found[:, 1:] - way) ** 2, axis=1))))
+    times = found[:, 0]
+    way = CubicSpline(reference[:, 0], reference[:, 1:])(times)
+    squares = np.sum((found[:, 1:] - way) ** 2, axis=1)
+    return float(np.sqrt(np.trapezoid(squares, times) / np.ptp(times)))
 
 
 def rise(track: Track) -> float:
     """How far the mass centre rose above its start at most [m]."""
-    return peak(track.times, track.points["com"][:, 2])[0]
+    return peak(np.array(track.times), np.array(track.points["com"])[:, 2])[0]
 
 
 def advance(point: str, axis: int, begin: float, end: float) -> Callable[[Track], float]:

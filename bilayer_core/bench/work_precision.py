@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from ..model.plan import INTEGRATORS
 from . import measuring, references
 from .configurations import Configuration, families
-from .problems import Problem
+from .problems import OF_ROBOTS, Problem
 from .results import Results
 
 PART = "work_precision"
-QUICK_INTEGRATORS = ("implicit_euler", "sdirk2", "generalised_alpha")
-"""Of a quick benchmark: the paper's, and of those of second order one of two stages and one of a single one."""
 
 
 def plan(problems: Iterable[Problem], quick: bool) -> list[tuple[Problem, Configuration]]:
     """All runs, problem by problem."""
-    integrators = QUICK_INTEGRATORS if quick else INTEGRATORS
     return [
         (problem, configuration)
         for problem in problems
-        for family in families(problem.config(), integrators)
+        for family in families(problem.config(), OF_ROBOTS if quick else problem.integrators)
         for configuration in problem.configurations(family, quick)
     ]
 

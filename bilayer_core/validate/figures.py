@@ -99,7 +99,7 @@ def helix_figure(path: Path) -> None:
 
 def laminate_figure(path: Path) -> None:
     """How far two bonded rods are from the laminate, against the stiffness of their bond."""
-    figure, axis = _figure(1, 1, (6.4, 4.2))
+    figure, axis = figure_of(1, 1, (6.4, 4.2))
     curves = {f"grows by a wave, {edges} edges": partial(laminate.wave, edges) for edges in MESHES}
     for (label, compute), shade in zip(curves.items(), ("#9ecae1", "#4292c6", "#08519c"), strict=True):
         axis.plot(laminate.MULTIPLES, _apart(compute), "o-", color=shade, markersize=5, label=label)
@@ -116,7 +116,7 @@ def laminate_figure(path: Path) -> None:
     )
     axis.grid(color="0.9")
     axis.legend(frameon=False, fontsize=9, loc="lower left")
-    _save(figure, path)
+    save(figure, path)
 
 
 def _apart(compute: Callable[[float | None], float]) -> list[float]:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from bilayer_core import Simulator, load_scene
 from bilayer_core.bench import pareto, scaling
 from bilayer_core.bench.configurations import Family
 from bilayer_core.bench.independent import SplineRod
@@ -59,12 +60,24 @@ def test_the_distance_of_two_ways_is_their_root_mean_square():
     assert rms_distance(exact, way) < 1e-9  # the reference between its instants
 
 
-def test_a_trajectory_counts_until_its_end_alone():
-    track = Track(1.0)
-    track.times = np.array([0.0, 0.5, 1.0])
-    track.points = {"tip": np.array([[1.0, 0, 0], [1.0, 0, 0], [7.0, 0, 0]])}
-    measure = Trajectory("tip", until=0.5, spacing=0.5, length=2.0)
-    assert measure.values(track).shape == (2, 4)
+def test_a_trajectory_counts_until_its_end_alone_whatever_the_steps():
+    simulator = Simulator(load_scene("cantilever", ["rods.strip.stations=6"]), tolerance=1e-4)
+    track = Track(simulator)
+    measure = Trajectory("tip", until=0.011, spacing=1e-3, length=0.1)
+    for end in (*measure.stops, 0.02):
+        simulator.run(end - simulator.time, progress=track.look)
+    found = measure.values(track)
+    assert found[0, 0] == 0.0 and found[-1, 0] == pytest.approx(0.011, abs=1e-12)
+    assert len(found) < len(track.times)
+    np.testing.assert_array_equal(track.at("tip", 1.0), simulator.positions[5])
+
+
+def test_each_instant_of_a_way_weighs_as_its_time():
+    times = np.array([0.0, 0.1, 0.2, 0.3, 1.0])
+    way = np.column_stack([times, np.zeros((5, 3))])
+    found = way + np.array([0.0, 1.0, 0.0, 0.0])
+    found[:4, 1] = 0.0
+    assert rms_distance(found, way) == pytest.approx(math.sqrt(0.5 * 0.7))
 
 
 def test_the_slope_of_times_that_grow_with_a_power_is_the_power():

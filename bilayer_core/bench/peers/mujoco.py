@@ -36,7 +36,7 @@ def simulate(beam: Cantilever, case: Case) -> Answer:
         count=case.elements + 1,
         h=h,
         middle=case.start(beam) + 0.5 * case.elements * h,
-        radius=0.1 * h,
+        radius=0.5 * beam.thickness,
         mass=beam.density * beam.area * h * (case.elements + 1),
         young=beam.youngs_modulus,
         poisson=POISSON,
