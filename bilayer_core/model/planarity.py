@@ -44,7 +44,9 @@ def require_plane(scene: SceneConfig) -> Plane:
     """
     plane, reason = find_plane(scene)
     if plane is None:
-        raise SceneError(f"{scene.name}: solver.dimension: found 2, but {reason}; for this scene it must be 'auto' or 3")
+        raise SceneError(
+            f"{scene.name}: solver.dimension: found 2, but {reason}; for this scene it must be 'auto' or 3"
+        )
     return plane
 
 

@@ -39,9 +39,9 @@ def elastica_tip() -> tuple[float, float]:
 
 
 @cache
-def cantilever_tip(edges: int) -> tuple[float, float]:
+def cantilever_tip(edges: int, dimension: int = 3) -> tuple[float, float]:
     """The same from rods."""
-    simulator = Simulator(load_scene(beam(edges + 1, (0.0, 0.0, -GRAVITY))))
+    simulator = Simulator(load_scene(beam(edges + 1, (0.0, 0.0, -GRAVITY))), dimension=dimension)
     simulator.solve_static()
     return tuple(simulator.positions[-1, [0, 2]])
 
@@ -57,29 +57,29 @@ def order_in_space() -> tuple[float, float]:
     return math.log2(coarse / fine), 2.0
 
 
-def _critical(answer: float, description: Callable[[float], dict]) -> tuple[float, float]:
+def _critical(answer: float, description: Callable[[float], dict], dimension: int) -> tuple[float, float]:
     """Multiple of `answer` at which a straight column becomes unstable, by bisection, and 1."""
     low, high = BRACKET
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        simulator = Simulator(load_scene(description(middle * answer)))
+        simulator = Simulator(load_scene(description(middle * answer)), dimension=dimension)
         low, high = (middle, high) if simulator.solve_static().stable else (low, middle)
     return 0.5 * (low + high), 1.0
 
 
-def eulers_load() -> tuple[float, float]:
+def eulers_load(dimension: int = 3) -> tuple[float, float]:
     """End load at which a column with one free end buckles, over Euler's."""
 
     def pressed(load: float) -> dict:
         return beam(101, loads=[{"name": "press", "rod": "rod", "position": LENGTH, "force": [-load, 0, 0]}])
 
-    return _critical(EULER_FREE_END * BENDING / LENGTH**2, pressed)
+    return _critical(EULER_FREE_END * BENDING / LENGTH**2, pressed, dimension)
 
 
-def greenhills_weight() -> tuple[float, float]:
+def greenhills_weight(dimension: int = 3) -> tuple[float, float]:
     """Weight at which an upright column buckles, over Greenhill's."""
     mass = DENSITY * WIDTH * THICKNESS
-    return _critical(GREENHILL * BENDING / LENGTH**3 / mass, lambda g: beam(101, (-g, 0.0, 0.0)))
+    return _critical(GREENHILL * BENDING / LENGTH**3 / mass, lambda g: beam(101, (-g, 0.0, 0.0)), dimension)
 
 
 PAIRS = {
@@ -108,7 +108,7 @@ def bonded_tip(pair: str, edges: int = 80) -> tuple[float, float]:
     return 1e3 * (before - simulator.positions[edges, 2]), 1e3 * expected
 
 
-def vibration(edges: int = 40, periods: int = 4, steps: int = 300) -> tuple[float, float]:
+def vibration(edges: int = 40, periods: int = 4, steps: int = 300, dimension: int = 3) -> tuple[float, float]:
     """Frequency of a cantilever that is let go, from crossings of its slowest mode's amplitude, and ω/2π [Hz].
 
     Integrated by `sdirk2` with `steps` a period; the pull at the tip ends with the first step.
@@ -120,7 +120,7 @@ def vibration(edges: int = 40, periods: int = 4, steps: int = 300) -> tuple[floa
     load = {"name": "pull", "rod": "rod", "position": LENGTH, "force": [0, 0, -force]}
     load["schedule"] = {"type": "table", "times": [0.0, 1e-3 * dt], "values": [1.0, 0.0]}
     solver = {"dt": dt, "newton_tolerance": 1e-10, "integrator": "sdirk2"}
-    simulator = Simulator(load_scene(beam(edges + 1, loads=[load], solver=solver)))
+    simulator = Simulator(load_scene(beam(edges + 1, loads=[load], solver=solver)), dimension=dimension)
     simulator.solve_static()
     s = np.linspace(0.0, 1.0, edges + 1)
     shape = simulator.model.node_mass * cantilever_mode(s)
@@ -143,12 +143,12 @@ def cantilever_mode(s: np.ndarray) -> np.ndarray:
     return 0.5 * (np.cosh(k * s) - np.cos(k * s) - ratio * (np.sinh(k * s) - np.sin(k * s)))
 
 
-_ELASTICA = "extensible elastica under its own weight, by collocation"
+ELASTICA = "extensible elastica under its own weight, by collocation"
 CASES = [
     *(
         Case(
             f"beams/cantilever tip {axis}/{MESHES[-1]} edges",
-            _ELASTICA,
+            ELASTICA,
             1e-4,
             lambda k=k: (1e3 * cantilever_tip(MESHES[-1])[k], 1e3 * elastica_tip()[k]),
             "mm",

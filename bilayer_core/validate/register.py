@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable
 from fnmatch import fnmatch
 
 from ..errors import InputError
-from . import beams, bending, contacts, fluid, helix, laminate, loads, motion, profiles, torsion
+from . import beams, bending, contacts, fluid, helix, laminate, loads, motion, plane, profiles, torsion
 from .case import Case, Result
 
-FAMILIES = (bending, helix, torsion, laminate, beams, loads, profiles, contacts, motion, fluid)
+FAMILIES = (bending, helix, torsion, laminate, beams, plane, loads, profiles, contacts, motion, fluid)
 CASES = tuple(case for family in FAMILIES for case in family.CASES)
 
 

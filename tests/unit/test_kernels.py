@@ -10,6 +10,7 @@ from pathlib import Path
 SURVEY = """
 import importlib, json, pkgutil
 from numba.core.registry import CPUDispatcher
+from planar_scenes import AHEAD, everything_in_plane
 from sample_scenes import contact, everything, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 
@@ -21,6 +22,9 @@ for description in (everything(), everything(stations=7), scene([rod([layer()])]
         simulator.run(0.005)
         simulator.frame()
         Simulator(load_scene(description), model=model, tolerance=1e-3).run(0.005)
+for description in (everything_in_plane(AHEAD["oblique"]), scene([rod([layer()])]), touching):
+    for model in ("two_rod", "laminate"):
+        Simulator(load_scene(description), model=model, dimension=2, budget=True).run(0.005)
 Simulator(load_scene(scene([rod([layer(), layer("top")])]))).solve_static()
 
 used = {}

@@ -1,0 +1,65 @@
+"""Dimension 2: cases of the other families that stay in a plane, with two unknowns a node."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..integrate.simulator import Simulator
+from ..scene.loader import load_scene
+from . import beams, bending
+from .case import Case
+from .references import timoshenko
+
+DIMENSION = 2
+RATIOS = (5.0, 0.5)
+"""Of modulus and thickness: neither layer is in the middle."""
+STRAIN = 0.05
+LIMITS = {"two_rod": 0.01, "laminate": 1e-9}
+
+
+def curvature(model: str) -> tuple[float, float]:
+    """κH/η of the node in the middle, and Timoshenko's."""
+    simulator = Simulator(load_scene(bending.strip(*RATIOS, STRAIN)), model=model, dimension=DIMENSION)
+    simulator.solve_static()
+    middle = simulator.curvatures[bending.STATIONS // 2]
+    return float(-middle * bending.THICKNESS / STRAIN), timoshenko(*RATIOS)
+
+
+def tip() -> tuple[float, float]:
+    """Distance of the heavy cantilever's tip from where it should be, over its length, and 0."""
+    found = beams.cantilever_tip(beams.MESHES[-1], DIMENSION)
+    return float(np.linalg.norm(np.subtract(found, beams.elastica_tip())) / beams.LENGTH), 0.0
+
+
+CASES = [
+    *(
+        Case(
+            f"plane/{model}, m = {RATIOS[0]:g}, n = {RATIOS[1]:g}",
+            "Timoshenko's bilayer (1925), formula corrected",
+            limit,
+            lambda model=model: curvature(model),
+        )
+        for model, limit in LIMITS.items()
+    ),
+    Case(f"plane/cantilever tip/{beams.MESHES[-1]} edges", beams.ELASTICA, 1e-4, tip, scale=1.0),
+    Case(
+        "plane/Euler's load",
+        "π² EI/4L², by the stability of the straight column",
+        0.01,
+        lambda: beams.eulers_load(DIMENSION),
+    ),
+    Case(
+        "plane/Greenhill's weight",
+        "q L³ = 7.837 EI, by the stability of the column",
+        0.01,
+        lambda: beams.greenhills_weight(DIMENSION),
+    ),
+    Case(
+        "plane/vibration",
+        "1.875² √(EI/ρA)/2πL²",
+        0.005,
+        lambda: beams.vibration(dimension=DIMENSION),
+        "Hz",
+        long=True,
+    ),
+]
