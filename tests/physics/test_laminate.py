@@ -35,7 +35,7 @@ def test_every_node_has_timoshenkos_curvature(m, n):
 def test_wherever_the_curve_lies_every_node_has_the_same_curvature_and_the_faces_the_same_place(height, monkeypatch):
     content = strip(2.0, 0.5, 0.05)
     on_axis = settled(content)
-    monkeypatch.setattr(laminate, "_axis", lambda *_: height)
+    monkeypatch.setattr(laminate, "_axis", lambda _: height)
     beside = settled(content)
     assert len(on_axis.model.coupled_joint) == 0 < len(beside.model.coupled_joint)
     assert beside.curvatures == pytest.approx(on_axis.curvatures, rel=1e-9)
