@@ -106,6 +106,20 @@ def test_a_ball_bounces_ever_nearer_to_where_it_fell_from(integrator):
     assert simulator.statistics.longest > 20.0 * simulator.statistics.shortest
 
 
+def test_a_loop_that_lands_comes_nearer_to_its_motion_as_the_tolerance_falls():
+    """The jumper, dropped: it lands at 0.7 m/s, is flattened and springs back."""
+    dropped = load_scene("jumping", ["rods.loop.path.start=[8.1 mm, 0, 78.6 mm]"])
+    ends = []
+    for tolerance in (1e-3, 1e-5, 1e-6):
+        simulator = Simulator(dropped, model="laminate", integrator="sdirk2", tolerance=tolerance)
+        simulator.run(0.12)
+        assert simulator.statistics.max_contact_force > 0.1  # [N], many times a node's weight
+        ends.append(simulator.positions)
+    coarse, fine = (np.sqrt(np.square(end - ends[2]).sum(axis=1).mean()) for end in ends[:2])
+    assert fine < 0.3 * coarse
+    assert fine < 5e-3 * dropped.rods[0].path.length
+
+
 def test_what_lies_on_a_barrier_does_not_hold_steps_up():
     strip = rod([layer(thickness=2e-3)], length=0.04, stations=9, start=(0, 0, 2e-3))
     law = contact(coefficient=0.3, barrier_distance=2e-4)
