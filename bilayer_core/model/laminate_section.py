@@ -8,8 +8,8 @@ Energy of a section. The curve lies at a constant height over the path. A layer 
 
     A = Σ EA/λ,   B = Σ z EA/λ,   D = Σ (EI₁ + z² EA)/λ,   N = Σ EA η,   M = Σ z EA η,   M̄ = Σ EI₁ (χ̄ − χ₀/λ)
 
-and ½ Σ(EI₂/λ) ξ² + ½ GJ (τ − τ̄)² with GJ = Σ GJ_l/λ + k_φ c² (`section.bond`: what a bond that does not shear adds)
-and GJ τ̄ = Σ GJ_l τ̄_l. Reported energies leave the constant out: no shape can release it.
+and ½ Σ(EI₂/λ) ξ² + ½ GJ (τ − τ̄)² with GJ = Σ GJ_l/λ + k_φ c²/λ (`section.bond`: what a bond that does not shear adds,
+with the mean λ) and GJ τ̄ = Σ GJ_l τ̄_l. Reported energies leave the constant out: no shape can release it.
 
 Elements. An edge has one strain ε; each of its halves has a section and a curvature of its own. What a joint sees is
 the angle κ₁ of the two halves (one, at a clamp) that meet there, the sum of their ℓ χ. Minimised over how they share
@@ -59,6 +59,7 @@ class LayerHalves:
     contributes is 0 where it is not.
     """
 
+    ratio: Array  # λ
     axial: Array  # EA [N]
     stretch: Array  # EA/λ
     bend: Array  # EI₁/λ [N m²]
@@ -90,6 +91,7 @@ def layer_halves(
         natural = ratio * values_at(layer.natural_curvature, along).reshape(-1, 2)
         moment = bend * (natural - np.stack([start[:-1], start[1:]], axis=1))
     return LayerHalves(
+        ratio=np.repeat(ratio, 2, axis=1),
         axial=halves(section.axial_stiffness),
         stretch=halves(section.axial_stiffness) / ratio,
         bend=bend,
@@ -102,14 +104,15 @@ def layer_halves(
 
 
 def _bond_twist(scene: SceneConfig, rod: Rod, halves: list[LayerHalves]) -> Array | float:
-    """k_φ c² where both layers are [N m²], shape (n_edge, 2)."""
+    """k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_edge, 2)."""
     if len(halves) == 1:
         return 0.0
     stations = (np.arange(rod.stations - 1)[:, None] + [0.25, 0.75]).ravel()
     bottom, top = (sections(rod, layer, scene.materials[layer.material], stations) for layer in rod.layers)
     law = bond(bottom, top, scene.coupling, rod.torsion)
-    stiffness = law.tilt * (0.5 * (bottom.thickness + top.thickness)) ** 2
-    return stiffness.reshape(-1, 2) * (halves[0].axial > 0.0) * (halves[1].axial > 0.0)
+    stiffness = (law.tilt * (0.5 * (bottom.thickness + top.thickness)) ** 2).reshape(-1, 2)
+    bonded = (halves[0].axial > 0.0) & (halves[1].axial > 0.0)
+    return bonded * stiffness / (0.5 * (halves[0].ratio + halves[1].ratio))
 
 
 class WholeSection:

@@ -51,6 +51,18 @@ def test_wherever_the_curve_lies_every_node_has_the_same_curvature_and_the_faces
     assert np.linalg.norm(ends[0] - ends[1]) < 1.05 * turn * apart
 
 
+@pytest.mark.parametrize("natural_curvature", [None, 10.0])
+def test_wherever_the_curve_of_an_arch_lies_its_joints_have_the_same_angles(natural_curvature, monkeypatch):
+    layers = [layer("bottom", natural_curvature=natural_curvature), growing(0.02, thickness=2e-3, natural_twist=3.0)]
+    arc = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.02, "angle": 2.0}
+    content = scene([rod(layers, stations=41, clamp_start="wall") | {"path": arc}], bodies=[fixed()], stimuli=HEAT)
+    on_axis = settled(content)._stepper.end.joint_strain
+    monkeypatch.setattr(laminate, "_axis", lambda _: -1e-3)
+    beside = settled(content)._stepper.end.joint_strain
+    limits = np.array([2e-6, 1e-12, 1e-12])  # nodes are on the offset arc, not at the corners of the offset polygon
+    assert np.all(np.abs(beside - on_axis).max(axis=0) < limits * np.abs(on_axis).max())
+
+
 def test_a_strip_under_its_weight_agrees_with_the_planar_beam_of_appendix_a():
     content = strip(2.0, 0.5, 0.01) | {"gravity": [0, 0, -9.81]}
     differences = []
