@@ -58,7 +58,13 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         layout=number_unknowns(*numbered),
         plane=None
         if plane is None
-        else InPlane(plane.axes, plane.normal, _sides(plane, found, bodies), number_unknowns(*numbered, dimension=2)),
+        else InPlane(
+            axes=plane.axes,
+            normal=plane.normal,
+            side=_sides(plane, found, bodies),
+            joint_after=_joints_after(wall_a, wall_b, edge_count),
+            layout=number_unknowns(*numbered, dimension=2),
+        ),
         bodies=bodies,
         carriers=carriers,
         surfaces=surfaces,
@@ -128,6 +134,14 @@ def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
         for name, of_walls in zip(("tangent", "director1"), walls, strict=True)
     )
     return np.sign(np.einsum("ki,ki->k", director1, np.cross(plane.normal, tangent)))
+
+
+def _joints_after(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int) -> np.ndarray:
+    """The joint between each edge and the next one of its strand, −1 without one, shape (n_edge,)."""
+    joints = np.full(edge_count, -1, dtype=np.int64)
+    inner = np.flatnonzero((joint_a < edge_count) & (joint_b < edge_count))
+    joints[joint_a[inner]] = inner
+    return joints
 
 
 def _resolve_walls(edges: np.ndarray, edge_count: int) -> np.ndarray:

@@ -61,6 +61,8 @@ class InPlane(ReadOnlyArrays):
         Of the plane, shapes (2, 3), (3,).
     side : Array
         σ of every edge and wall: m1 = σ normal × t, m2 = σ normal, shape (n_edge + n_wall,).
+    joint_after : Array
+        Joint between each edge and the next one, −1 at the end of a strand, shape (n_edge,).
     layout : Layout
         Two unknowns a node, none an edge.
     """
@@ -68,4 +70,5 @@ class InPlane(ReadOnlyArrays):
     axes: Array
     normal: Array
     side: Array
+    joint_after: Array
     layout: Layout

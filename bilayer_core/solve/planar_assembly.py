@@ -17,27 +17,42 @@ from ..jit import kernel
 
 
 @kernel
-def _add_own_block(band, d, pp, pq, qq):
-    """Add a symmetric block of one node."""
-    band[d, 0] += pp
-    band[d, 1] += pq
-    band[d + 1, 0] += qq
+def _node_block(axes, node_hessian, mass, i):
+    """Block (pp, pq, qq) of a node by itself: its mass, and what acts on it in space, by an upper triangle."""
+    if node_hessian.shape[0] == 0:
+        return mass, 0.0, mass
+    h00, h01, h02 = node_hessian[i, 0, 0], node_hessian[i, 0, 1], node_hessian[i, 0, 2]
+    h11, h12, h22 = node_hessian[i, 1, 1], node_hessian[i, 1, 2], node_hessian[i, 2, 2]
+    p0, p1, p2 = axes[0, 0], axes[0, 1], axes[0, 2]
+    q0, q1, q2 = axes[1, 0], axes[1, 1], axes[1, 2]
+    v0, v1, v2 = h00 * p0 + h01 * p1 + h02 * p2, h01 * p0 + h11 * p1 + h12 * p2, h02 * p0 + h12 * p1 + h22 * p2
+    w0, w1, w2 = h00 * q0 + h01 * q1 + h02 * q2, h01 * q0 + h11 * q1 + h12 * q2, h02 * q0 + h12 * q1 + h22 * q2
+    return mass + p0 * v0 + p1 * v1 + p2 * v2, q0 * v0 + q1 * v1 + q2 * v2, mass + q0 * w0 + q1 * w1 + q2 * w2
 
 
 @kernel
-def _add_block(band, row, column, pp, pq, qp, qq):
-    """Add a block of two nodes, row > column: rows p, q of the first, columns p, q of the second."""
+def _put_own_block(band, d, pp, pq, qq):
+    """Write a symmetric block of one node."""
+    band[d, 0] = pp
+    band[d, 1] = pq
+    band[d + 1, 0] = qq
+
+
+@kernel
+def _put_block(band, row, column, pp, pq, qp, qq):
+    """Write a block of two nodes, row > column: rows p, q of the first, columns p, q of the second."""
     r = row - column
-    band[column, r] += pp
-    band[column + 1, r - 1] += pq
-    band[column, r + 1] += qp
-    band[column + 1, r] += qq
+    band[column, r] = pp
+    band[column + 1, r - 1] = pq
+    band[column, r + 1] = qp
+    band[column + 1, r] = qq
 
 
 @kernel
 def expand_in_plane(
     axes,
     edge_node,
+    joint_after,
     node_unknown,
     node_mass,
     factor,
@@ -45,58 +60,64 @@ def expand_in_plane(
     frame,
     polar_gradient,
     polar_hessian,
-    bend_count,
-    joint_a,
-    joint_b,
     cross_hessian,
     node_hessian,
     band_out,
 ):
-    """Add factor × mass, blocks of single nodes if there are any, edges and bends to the band; clamps' own directions
-    have no place in it.
+    """Write factor × mass, blocks of single nodes if there are any, edges and bends into a band of zeros; clamps' own
+    directions have no place in it.
+
+    In one pass along each strand, so that each entry is written once: with H the block of an edge and C, of rows e_a
+    and columns e_b, that of the joint at a node i between the edges a (before) and b,
+
+        (i, i)     H_a + H_b − C − Cᵀ
+        (i + 1, i) −H_b + Cᵀ + C′ᵀ       with C′ of the next joint
+        (i + 2, i) −C′ᵀ
+
+    `joint_after` is the joint between each edge and the next, −1 at the end of a strand, shape (n_edge,).
     """
-    edge_count = edge_node.shape[0]
-    for i in range(node_unknown.shape[0]):
-        mass = factor * node_mass[i]
-        _add_own_block(band_out, node_unknown[i], mass, 0.0, mass)
-    for i in range(node_hessian.shape[0]):
-        h00, h01, h02 = node_hessian[i, 0, 0], node_hessian[i, 0, 1], node_hessian[i, 0, 2]
-        h11, h12, h22 = node_hessian[i, 1, 1], node_hessian[i, 1, 2], node_hessian[i, 2, 2]
-        p0, p1, p2 = axes[0, 0], axes[0, 1], axes[0, 2]
-        q0, q1, q2 = axes[1, 0], axes[1, 1], axes[1, 2]
-        v0, v1, v2 = h00 * p0 + h01 * p1 + h02 * p2, h01 * p0 + h11 * p1 + h12 * p2, h02 * p0 + h12 * p1 + h22 * p2
-        w0, w1, w2 = h00 * q0 + h01 * q1 + h02 * q2, h01 * q0 + h11 * q1 + h12 * q2, h02 * q0 + h12 * q1 + h22 * q2
-        pp, pq, qq = p0 * v0 + p1 * v1 + p2 * v2, q0 * v0 + q1 * v1 + q2 * v2, q0 * w0 + q1 * w1 + q2 * w2
-        _add_own_block(band_out, node_unknown[i], pp, pq, qq)
-    for k in range(edge_count):
+    before_pp = before_pq = before_qq = 0.0  # of the edge before
+    pp = pq = qp = qq = 0.0  # of the joint with it
+    for k in range(edge_node.shape[0]):
+        i, joint = edge_node[k], joint_after[k]
         tp, tq, mp, mq = frame[k, 0], frame[k, 1], frame[k, 2], frame[k, 3]
         s = polar_hessian[k, 0]
         x = polar_hessian[k, 1] - polar_gradient[k, 1] / length[k]
         w = polar_hessian[k, 2] + polar_gradient[k, 0] * length[k]
-        pp = s * tp * tp + 2.0 * x * tp * mp + w * mp * mp
-        pq = s * tp * tq + x * (tp * mq + mp * tq) + w * mp * mq
-        qq = s * tq * tq + 2.0 * x * tq * mq + w * mq * mq
-        d0, d1 = node_unknown[edge_node[k]], node_unknown[edge_node[k] + 1]
-        _add_own_block(band_out, d0, pp, pq, qq)
-        _add_own_block(band_out, d1, pp, pq, qq)
-        _add_block(band_out, d1, d0, -pp, -pq, -pq, -qq)
-    for k in range(bend_count):
-        a, b = joint_a[k], joint_b[k]
-        if a >= edge_count or b >= edge_count:
-            continue
-        s, x_ab, x_ba, w = cross_hessian[k, 0], cross_hessian[k, 1], cross_hessian[k, 2], cross_hessian[k, 3]
-        # rows e_a, columns e_b
-        tp, tq, mp, mq = frame[b, 0], frame[b, 1], frame[b, 2], frame[b, 3]
-        up, uq = s * frame[a, 0] + x_ba * frame[a, 2], s * frame[a, 1] + x_ba * frame[a, 3]
-        vp, vq = x_ab * frame[a, 0] + w * frame[a, 2], x_ab * frame[a, 1] + w * frame[a, 3]
-        pp, pq = up * tp + vp * mp, up * tq + vp * mq
-        qp, qq = uq * tp + vq * mp, uq * tq + vq * mq
-        i = edge_node[a]
-        d0, d1, d2 = node_unknown[i], node_unknown[i + 1], node_unknown[i + 2]
-        _add_block(band_out, d1, d0, pp, qp, pq, qq)
-        _add_block(band_out, d2, d0, -pp, -qp, -pq, -qq)
-        _add_own_block(band_out, d1, -2.0 * pp, -pq - qp, -2.0 * qq)
-        _add_block(band_out, d2, d1, pp, qp, pq, qq)
+        edge_pp = s * tp * tp + 2.0 * x * tp * mp + w * mp * mp
+        edge_pq = s * tp * tq + x * (tp * mq + mp * tq) + w * mp * mq
+        edge_qq = s * tq * tq + 2.0 * x * tq * mq + w * mq * mq
+        next_pp = next_pq = next_qp = next_qq = 0.0
+        if joint >= 0:
+            s, x_ab = cross_hessian[joint, 0], cross_hessian[joint, 1]
+            x_ba, w = cross_hessian[joint, 2], cross_hessian[joint, 3]
+            up, uq, vp, vq = s * tp + x_ba * mp, s * tq + x_ba * mq, x_ab * tp + w * mp, x_ab * tq + w * mq
+            bp, bq, np, nq = frame[k + 1, 0], frame[k + 1, 1], frame[k + 1, 2], frame[k + 1, 3]
+            next_pp, next_pq = up * bp + vp * np, up * bq + vp * nq
+            next_qp, next_qq = uq * bp + vq * np, uq * bq + vq * nq
+        own_pp, own_pq, own_qq = _node_block(axes, node_hessian, factor * node_mass[i], i)
+        own_pp += before_pp + edge_pp - 2.0 * pp
+        own_pq += before_pq + edge_pq - pq - qp
+        own_qq += before_qq + edge_qq - 2.0 * qq
+        d0, d1 = node_unknown[i], node_unknown[i + 1]
+        _put_own_block(band_out, d0, own_pp, own_pq, own_qq)
+        _put_block(
+            band_out,
+            d1,
+            d0,
+            pp + next_pp - edge_pp,
+            qp + next_qp - edge_pq,
+            pq + next_pq - edge_pq,
+            qq + next_qq - edge_qq,
+        )
+        if joint >= 0:
+            _put_block(band_out, node_unknown[i + 2], d0, -next_pp, -next_qp, -next_pq, -next_qq)
+            before_pp, before_pq, before_qq = edge_pp, edge_pq, edge_qq
+        else:
+            own_pp, own_pq, own_qq = _node_block(axes, node_hessian, factor * node_mass[i + 1], i + 1)
+            _put_own_block(band_out, d1, own_pp + edge_pp, own_pq + edge_pq, own_qq + edge_qq)
+            before_pp = before_pq = before_qq = 0.0
+        pp, pq, qp, qq = next_pp, next_pq, next_qp, next_qq
 
 
 @kernel

@@ -109,6 +109,7 @@ class PlanarMatrix(NewtonMatrix):
         expand_in_plane(
             model.directions,
             model.edge_node,
+            model.plane.joint_after,
             node,
             model.node_mass,
             factor,
@@ -116,9 +117,6 @@ class PlanarMatrix(NewtonMatrix):
             self.frame,
             self.polar_gradient,
             self.polar_hessian,
-            model.bend_count,
-            model.joint_a,
-            model.joint_b,
             self.cross_hessian,
             self.node_hessian,
             band,
