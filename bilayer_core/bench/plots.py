@@ -114,11 +114,14 @@ def cantilever_figure(content: dict, path: Path) -> None:
 def scaling_figure(records: list[dict], path: Path) -> None:
     """CPU time of a step against nodes, with slopes."""
     figure, axis = figure_of(1, 1, WIDE)
+    steep = scaling.slopes(records, scaling.MANY)
     for ((model, dimension), slope), colour in zip(scaling.slopes(records).items(), SERIES, strict=False):
         points = [r for r in records if (r["model"], r["dimension"]) == (model, dimension)]
         nodes, times = np.array([(r["nodes"], 1e3 * r["cpu_time"]) for r in points]).T
         mark = MARKS[model, dimension]
-        axis.plot(nodes, times, mark + "-", color=colour, label=f"{model} {dimension}-D: slope {slope:.2f}")
+        many = steep.get((model, dimension))
+        label = f"{model} {dimension}-D: slope {slope:.2f}" + (f", {many:.2f} from {scaling.MANY} on" if many else "")
+        axis.plot(nodes, times, mark + "-", color=colour, label=label)
     nodes = np.array(sorted({record["nodes"] for record in records}))
     least = min(1e3 * record["cpu_time"] for record in records)
     axis.plot(nodes, 0.7 * least * nodes / nodes[0], color=GREY, linestyle="--", label="proportional to nodes")

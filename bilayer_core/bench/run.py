@@ -63,7 +63,9 @@ def measure(chosen: Sequence[str], results: Results, quick: bool, progress: Call
     progress : callable
         Called with what is done next.
     """
-    work_precision.measure(work_precision.plan(chosen_problems(chosen), quick), results, progress)
+    runs = work_precision.plan(chosen_problems(chosen), quick)
+    work_precision.check_references(runs)
+    work_precision.measure(runs, results, progress)
     skipped = cantilever.measure(results, quick, progress) if PEERS in chosen else []
     if SCALING in chosen:
         scaling.measure(results, quick, progress)

@@ -135,14 +135,14 @@ def scaling_table(content: dict) -> list[str]:
     """Milliseconds a step by nodes, and the slopes."""
     records = content[scaling.PART]
     nodes = sorted({record["nodes"] for record in records})
-    steps, iterations = scaling.slopes(records), scaling.slopes(records, "per_iteration")
+    steep = scaling.slopes(records, scaling.MANY)
     rows = []
-    for (model, dimension), slope in steps.items():
+    for (model, dimension), slope in scaling.slopes(records).items():
         times = {r["nodes"]: r["cpu_time"] for r in records if (r["model"], r["dimension"]) == (model, dimension)}
         cells = [f"{1e3 * times[n]:.3g}" if n in times else NONE for n in nodes]
-        rows.append([f"{model} {dimension}-D", *cells, f"{slope:.2f}", f"{iterations[model, dimension]:.2f}"])
+        rows.append([f"{model} {dimension}-D", *cells, f"{slope:.2f}", _slope(steep.get((model, dimension)))])
     head = [f"{n} nodes [ms]" for n in nodes]
-    return _table(["model", *head, "slope", "slope of an iteration"], rows)
+    return _table(["model", *head, "slope", f"from {scaling.MANY} nodes on"], rows)
 
 
 def start_table(content: dict) -> list[str]:
@@ -165,6 +165,10 @@ def start_table(content: dict) -> list[str]:
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     return [f"| {' | '.join(cells)} |" for cells in (head, ["---"] * len(head), *rows)]
+
+
+def _slope(value: float | None) -> str:
+    return NONE if value is None else f"{value:.2f}"
 
 
 def _seconds(value: float) -> str:

@@ -22,6 +22,18 @@ def plan(problems: Iterable[Problem], quick: bool) -> list[tuple[Problem, Config
     ]
 
 
+def check_references(runs: Iterable[tuple[Problem, Configuration]]) -> None:
+    """Refuse, before anything is computed, what no reference is there for.
+
+    Raises
+    ------
+    InputError
+        Says how to make it.
+    """
+    for problem, model in dict.fromkeys((problem, configuration.family.model) for problem, configuration in runs):
+        references.stored(problem, model)
+
+
 def measure(
     runs: Iterable[tuple[Problem, Configuration]], results: Results, progress: Callable[[str], None] = lambda text: None
 ) -> None:

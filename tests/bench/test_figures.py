@@ -83,6 +83,9 @@ def test_each_instant_of_a_way_weighs_as_its_time():
 def test_the_slope_of_times_that_grow_with_a_power_is_the_power():
     records = [{"model": "m", "dimension": 3, "nodes": n, "cpu_time": 2e-6 * n**1.3} for n in (50, 200, 800)]
     assert scaling.slopes(records) == {("m", 3): pytest.approx(1.3)}
+    records[0]["cpu_time"] *= 10.0
+    assert scaling.slopes(records)["m", 3] < 1.0
+    assert scaling.slopes(records, 200) == {("m", 3): pytest.approx(1.3)}
 
 
 def test_the_independent_rod_swings_with_the_frequency_of_a_cantilever_about_its_equilibrium():
