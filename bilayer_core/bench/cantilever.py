@@ -36,6 +36,7 @@ class Peer:
     module : str
         By which it is imported.
     label : str
+        For tables and legends.
     cases, quick_cases : tuple of (int, tuple of float)
         Elements with the steps [s] tried on each: explicit ones near the largest stable step.
     """
@@ -65,14 +66,14 @@ PEERS = (
     Peer(
         "pyelastica",
         "elastica",
-        "PyElastica, explicit Cosserat rod",
+        "PyElastica",
         ((10, (4e-5,)), (20, (4e-5, 2e-5)), (40, (4e-5, 2e-5)), (80, (2e-5,))),
         ((10, (4e-5,)), (20, (4e-5,))),
     ),
     Peer(
         "mujoco",
         "mujoco",
-        "MuJoCo, flex rod",
+        "MuJoCo",
         tuple(product((10, 20, 40), ((1e-3, 4e-4, 2e-4, 1e-4, 4e-5),))),  # it wants edges longer than thick
         ((10, (1e-3, 2e-4)), (20, (1e-3, 2e-4, 1e-4))),
     ),

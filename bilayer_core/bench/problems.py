@@ -182,7 +182,7 @@ PROBLEMS = (
         1.3,
         Headline("the rise", "mm", 1e3, rise),
         levels=((26, (2e-3, 1e-3)), (51, (2e-3, 1e-3, 5e-4)), (101, (5e-4,))),
-        reference_levels=halved(26, 1e-3, 3),
+        reference_levels=halved(51, 5e-4, 3),
         integrators=OF_ROBOTS,
         tolerances=ROBOT_TOLERANCES,
     ),

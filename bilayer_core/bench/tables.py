@@ -86,7 +86,7 @@ def cantilever_series(content: dict) -> dict[str, list[dict]]:
         for shifted, clamp in ((False, "its own clamp"), (True, "shifted by half an edge")):
             runs = [r for r in content[cantilever.PART] if r["tool"] == peer.name and r["shifted"] is shifted]
             if runs:
-                series[f"{peer.label} ({version}), {clamp}"] = runs
+                series[f"{peer.label} {version}, {clamp}"] = runs
     return series
 
 

@@ -77,7 +77,7 @@ class Trajectory:
     def error_label(self) -> str:
         """What the error is, in words."""
         name = {"com": "mass centre"}.get(self.point, self.point)
-        return f"rms error of the {name} over {self.until:g} s / length of the rod"
+        return f"rms error of the {name} / length of the rod"
 
     @property
     def stops(self) -> tuple[float, ...]:
