@@ -15,7 +15,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,6 +39,8 @@ ORDER, HIGHEST_ORDER = 2.0, 2.5
 """Order of meshes and steps, and the largest observed one that counts: beyond it the runs are on no power law."""
 JUDGE = "two_rod"
 """Whose reference other programs are judged by, where the models have one layer and are one."""
+BLURRED = 2e-2
+"""A problem whose reference has a larger error bar does not count when families are compared."""
 NO_LIMIT = math.inf
 DIGITS = 9
 
@@ -80,6 +82,12 @@ def stored(problem: Problem, model: str) -> Reference:
     if entry["problem"] != fingerprint(problem):
         raise InputError(f"{problem.name}: has changed since its reference for {model} was made; {remedy}")
     return Reference(np.array(entry["values"]), entry["bar"], entry["check"], entry["difference"])
+
+
+def sharp(problem: str, models: Iterable[str]) -> bool:
+    """Whether the references of a problem for these models are good enough to compare families."""
+    entries = read_file()[problem]
+    return all(entries[model]["bar"] <= BLURRED for model in models)
 
 
 def fingerprint(problem: Problem) -> str:

@@ -11,7 +11,7 @@ from ..errors import InputError
 from . import cantilever, pareto, scaling, start, work_precision
 from .configurations import Family
 from .problems import PROBLEMS
-from .references import read_file
+from .references import read_file, sharp
 
 NONE = "–"
 
@@ -100,7 +100,7 @@ def _cheapest_at(runs: list[dict]) -> list[str]:
 
 def costs_table(content: dict) -> list[str]:
     """CPU seconds of each family at one per cent, by problem, the best family first."""
-    by_problem = pareto.costs(content[work_precision.PART])
+    by_problem = pareto.costs(comparable(content))
     names = [problem.name for problem in PROBLEMS if problem.name in by_problem]
     best = {name: min(costs.values()) for name, costs in by_problem.items()}
     rows = []
@@ -199,4 +199,13 @@ def _write(path: Path, fill: Callable) -> None:
 
 def recommendation(content: dict) -> Family | None:
     """The family to recommend."""
-    return pareto.recommended(content[work_precision.PART])
+    return pareto.recommended(comparable(content))
+
+
+def comparable(content: dict) -> list[dict]:
+    """Runs of the problems whose references are sharp enough to compare families by."""
+    runs = content[work_precision.PART]
+    models: dict[str, set[str]] = {}
+    for run in runs:
+        models.setdefault(run["problem"], set()).add(run["model"])
+    return [run for run in runs if sharp(run["problem"], models[run["problem"]])]

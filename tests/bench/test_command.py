@@ -12,6 +12,8 @@ from bilayer_core.bench.configurations import Configuration, Family, families
 from bilayer_core.cli import main
 from bilayer_core.model.plan import MODELS
 
+BLURRED = {("jumping", "laminate")}
+"""The rise of the jumper depends on how its ends slip past each other, and does not settle with mesh and step."""
 FAMILY = Family("two_rod", 3, "sdirk2")
 
 
@@ -44,6 +46,7 @@ def small(monkeypatch):
     for module in (plots, tables):
         monkeypatch.setattr(module, "PROBLEMS", chosen)
         monkeypatch.setattr(module, "read_file", lambda: entries)
+    monkeypatch.setattr(references, "read_file", lambda: entries)
     monkeypatch.setattr(references, "stored", lambda problem, model: made)
     monkeypatch.setattr(measuring, "REPEATS", 1)
     monkeypatch.setattr(cantilever, "find_spec", lambda name: None)
@@ -108,7 +111,8 @@ def test_every_problem_has_a_reference_that_fits_it(problem):
         reference = references.stored(problem, model)
         assert reference.values.shape[1] in (1, 4) and np.isfinite(reference.values).all()
         # two methods that have neither mesh nor step, or not the integrator, in common
-        assert reference.difference < 0.02
+        assert reference.difference <= reference.bar + 1e-3
+        assert (reference.bar > references.BLURRED) is ((problem.name, model) in BLURRED)
 
 
 @pytest.mark.parametrize("problem", problems.PROBLEMS, ids=lambda problem: problem.name)
