@@ -15,7 +15,7 @@ from .problems import Problem
 from .track import Track
 
 Array = np.ndarray
-SHORT = 0.5
+SHORT = 0.25
 """Runs shorter than this [s of CPU] are repeated, and the fastest counts."""
 REPEATS = 3
 LONGEST = 40.0

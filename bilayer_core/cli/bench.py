@@ -14,7 +14,7 @@ DEFAULT_DIRECTORY = "runs/bench"
 
 
 @click.command(cls=Verb)
-@click.option("--quick", is_flag=True, help="Fewer problems, meshes and steps: under 3 minutes.")
+@click.option("--quick", is_flag=True, help="Fewer problems, meshes and steps: about 3 minutes.")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
 @click.option("--only", multiple=True, metavar="NAME", help="A problem, or peers, scaling or start; may be repeated.")
 @click.option("--list", "listing", is_flag=True, help="Say what there is, and measure nothing.")
