@@ -36,6 +36,7 @@ def _cache_is_usable() -> bool:
 
 
 CACHE = os.environ.get("BILAYER_JIT_CACHE", "1") != "0" and _cache_is_usable()
+OPTIONS = dict(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, no_cfunc_wrapper=True)
 
 
 def kernel(function):
@@ -43,4 +44,9 @@ def kernel(function):
 
     Small scalar functions take it too; LLVM inlines them into the kernels that call them.
     """
-    return numba.njit(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH)(function)
+    return numba.njit(**OPTIONS)(function)
+
+
+def part(function):
+    """A kernel that one other kernel calls, once: compiled there, as if it were written there, and not by itself."""
+    return numba.njit(**OPTIONS, inline="always")(function)

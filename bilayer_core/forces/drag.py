@@ -19,9 +19,10 @@ they made the stroke of a swimmer 6 % wrong at 1 ms with any integrator.
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
 from ..jit import kernel
+from ..kinematics.vector import combine, cross, dot, row, scaled
 
 
 @kernel
@@ -32,17 +33,16 @@ def node_directions(node, edge_before, edge_after, tangent, director1, direction
     """
     for k in range(node.shape[0]):
         a, b = edge_before[k], edge_after[k]
-        t = tangent[a] + tangent[b]
-        t /= np.sqrt((t * t).sum())
-        m = director1[a] + director1[b]
-        m -= (m * t).sum() * t
-        m /= np.sqrt((m * m).sum())
+        t = combine(1.0, row(tangent, a), 1.0, row(tangent, b))
+        t = scaled(1.0 / math.sqrt(dot(t, t)), t)
+        m = combine(1.0, row(director1, a), 1.0, row(director1, b))
+        m = combine(1.0, m, -dot(m, t), t)
+        m = scaled(1.0 / math.sqrt(dot(m, m)), m)
+        n = cross(t, m)
         for c in range(3):
             direction_out[k, 0, c] = t[c]
             direction_out[k, 1, c] = m[c]
-        direction_out[k, 2, 0] = t[1] * m[2] - t[2] * m[1]
-        direction_out[k, 2, 1] = t[2] * m[0] - t[0] * m[2]
-        direction_out[k, 2, 2] = t[0] * m[1] - t[1] * m[0]
+            direction_out[k, 2, c] = n[c]
 
 
 @kernel

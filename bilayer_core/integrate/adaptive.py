@@ -83,7 +83,7 @@ class AdaptiveStepper(Stepper):
         begin = float(state.time[0])
         stop, breaks = self._next_stop(state, until)
         planned = float(state.next_step[0]) or self._first
-        kept, touched = state.copy(), self._touched
+        kept, touched = state.copy(), self._touched.copy()
         if self.ledger is not None:
             self.ledger.mark()
         h, rejected, inaccurate, iterations, factorisations = planned, 0, 0, 0, 0
@@ -100,7 +100,7 @@ class AdaptiveStepper(Stepper):
                 if error <= 1.0:
                     break
                 state.take(kept)
-                self._touched = touched
+                self._touched[:] = touched
                 if self.ledger is not None:
                     self.ledger.roll_back()
             if h <= STRETCH * self._shortest:
@@ -117,6 +117,9 @@ class AdaptiveStepper(Stepper):
             self.restart(state)
         return StepReport(time, h, 1, rejected, iterations, factorisations, report.residual, inaccurate)
 
+    def march(self, state: State, steps: int) -> None:
+        """None: how long a step is depends on the one before."""
+
     def restart(self, state: State) -> None:
         """Begin again with short steps: something has jumped."""
         state.next_step[0] = min(float(state.next_step[0]), self._first)
@@ -127,7 +130,7 @@ class AdaptiveStepper(Stepper):
     ) -> None:
         """Write the length of the next step into the state; one cut short by what it had to end at says little."""
         following = self._control.after_success(h, error, float(kept.last_error[0]), iterations, shortened)
-        if h < planned and not shortened:
+        if h < (1.0 - TIME_ROUNDING) * planned and not shortened:
             state.next_step[0] = max(following, min(planned, self._control.largest))
         else:
             state.next_step[0], state.last_error[0] = following, error

@@ -20,6 +20,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from ..march.arrays import Method as MethodArrays
+
 
 @dataclass(frozen=True)
 class History:
@@ -78,6 +82,23 @@ class Method:
     momentum_diagonal: float | None = None
     history: History | None = None
     estimate: float | None = None
+
+    def arrays(self) -> MethodArrays:
+        """The coefficients as compiled loops take them; couplings are over γ."""
+        stages, history = len(self.nodes), self.history
+        couplings = np.zeros((stages, stages))
+        for row, own in enumerate(self.couplings):
+            couplings[row, : len(own)] = own
+        return MethodArrays.of(
+            diagonal=self.diagonal,
+            momentum_diagonal=self.momentum_diagonal or self.diagonal,
+            couplings=couplings / self.diagonal,
+            history=history is not None,
+            along=np.array(history.positions if history else np.zeros(stages)),
+            momenta=np.array(history.momenta if history else np.zeros(stages)),
+            bend=history.bend if history else 0.0,
+            carry=history.carry if history else 0.0,
+        )
 
 
 def estimate_of(error: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Protocol
@@ -56,6 +57,12 @@ class Schedule:
             default=end,
         )
         return due if due < end - self._rounding else end
+
+    def steps_until_due(self, most: float) -> int:
+        """Fixed steps until the next observer is due, at most `most`."""
+        now, dt = self._simulator.time, self._simulator.dt
+        due = self.next_stop(math.inf)
+        return int(most) if math.isinf(due) else int(min(most, max(1.0, math.ceil((due - now - self._rounding) / dt))))
 
     def observe_due(self) -> None:
         elapsed = self._simulator.time - self._origin + self._rounding

@@ -22,10 +22,12 @@ from .ledger import EnergyLedger
 from .observer import Observer, Schedule
 from .result import BodyView, RunResult, Termination
 from .statics import StaticReport, solve_static
-from .statistics import RunStatistics, center_of_mass, largest_row
+from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper, StepReport
 
 Array = np.ndarray
+STEPS_AT_ONCE = 64
+"""That a compiled loop makes before anyone is asked whether to go on."""
 
 
 class Simulator:
@@ -92,6 +94,7 @@ class Simulator:
 
     def _start_over(self) -> None:
         self.statistics = RunStatistics(com_max_height=float(self.com[2]))
+        self._stepper.engine.start_over(self.statistics.com_max_height)
         self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
@@ -228,11 +231,7 @@ class Simulator:
             begin = clock.thread_time()
             self._compile_time = 0.0
             self._stepper.rest(self._state)
-            try:
-                self._stepper.advance(self._state.copy())
-            except SimulationError:
-                pass  # the first step of the run meets it again and reports it
-            largest_row(self._state.position)
+            self._stepper.compile(self._state)
             self._stepper.rest(self._state)
             self._begin_budget()
             self._compile_time = clock.thread_time() - begin
@@ -264,6 +263,20 @@ class Simulator:
         self.wall_time += clock.perf_counter() - wall
         return report
 
+    def _step_once(self, until: float) -> int:
+        self.step(until)
+        return 1
+
+    def _march(self, steps: int) -> int:
+        """Advance by as many steps, at most `steps`, as a compiled loop makes without help; returns how many."""
+        begin, wall = clock.thread_time(), clock.perf_counter()
+        report = self._stepper.march(self._state, steps)
+        if report is not None:
+            self.statistics.update_with(report, self._stepper)
+        self.cpu_time += clock.thread_time() - begin
+        self.wall_time += clock.perf_counter() - wall
+        return report.done if report is not None else 0
+
     def run(
         self,
         duration: float | None = None,
@@ -282,9 +295,9 @@ class Simulator:
         observers : sequence of Observer
             Each sees the first frame, the last, and those at its rate between; all are closed whatever happens.
         stop : callable, optional
-            Asked after every step; true ends the run as interrupted.
+            Asked every few steps; true ends the run as interrupted.
         progress : callable, optional
-            Called after every step with the simulated time [s].
+            Called every few steps with the simulated time [s].
 
         Raises
         ------
@@ -306,8 +319,8 @@ class Simulator:
         try:
             schedule.start()
             while done < steps and self.time < end:
-                self.step(schedule.next_stop(end))
-                done += 1
+                at_once = schedule.steps_until_due(min(steps - done, STEPS_AT_ONCE))
+                done += self._march(at_once) or self._step_once(schedule.next_stop(end))
                 schedule.observe_due()
                 if progress is not None:
                     progress(self.time)

@@ -7,19 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..jit import kernel
+from ..march.engine import MarchReport
 from ..model.model import Model
 from ..model.state import State
 from .stepper import Stepper, StepReport
-
-
-@kernel
-def largest_row(rows):
-    """Largest Euclidean norm of the rows of an (n, 3) array; 0 if it is empty."""
-    largest = 0.0
-    for i in range(rows.shape[0]):
-        largest = max(largest, rows[i, 0] ** 2 + rows[i, 1] ** 2 + rows[i, 2] ** 2)
-    return largest**0.5
 
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:
@@ -63,7 +54,6 @@ class RunStatistics:
 
     def update(self, report: StepReport, stepper: Stepper, state: State) -> None:
         """Take in one step."""
-        model, potential = stepper.model, stepper.potential
         self.steps += 1
         self.substeps += report.substeps
         self.rejected += report.rejected
@@ -73,25 +63,29 @@ class RunStatistics:
         self.factorisations += report.factorisations
         self.last_residual = report.residual
         self.largest_residual = max(self.largest_residual, report.residual)
-        self.com_max_height = max(self.com_max_height, float(center_of_mass(model, state)[2]))
-        if not potential.has_contact:
-            return
-        self.min_gap = min(self.min_gap, potential.min_gap)
-        nodes = potential.carrier_gradient[: model.node_count]
-        self.max_contact_force = max(self.max_contact_force, largest_row(nodes))
-        if potential.near is not None:
-            self._count_contacts(report.time, stepper)
+        stepper.engine.count_in(state, stepper.potential.min_gap)
+        self._take_extremes(stepper)
 
-    def _count_contacts(self, time: float, stepper: Stepper) -> None:
-        model, near = stepper.model, stepper.potential.near
-        touching = near.gap[: near.count] < model.scene.contact.barrier_distance
-        touching &= near.carrier[: near.count] < model.node_count
-        nodes = np.bincount(near.surface[: near.count][touching], minlength=len(model.surfaces.names))
+    def update_with(self, report: MarchReport, stepper: Stepper) -> None:
+        """Take in the steps that a compiled loop made."""
+        newton = report.newton
+        self.steps += report.done
+        self.substeps += report.done
+        self.shortest, self.longest = min(self.shortest, stepper.dt), max(self.longest, stepper.dt)
+        self.iterations += newton.iterations
+        self.factorisations += newton.factorisations
+        self.last_residual = newton.residual if report.finished else report.largest_residual
+        self.largest_residual = max(self.largest_residual, report.largest_residual)
+        self._take_extremes(stepper)
+
+    def _take_extremes(self, stepper: Stepper) -> None:
+        engine, model = stepper.engine, stepper.model
+        self.com_max_height, self.min_gap, self.max_contact_force = engine.figures.tolist()
+        if stepper.potential.near is None:
+            return
         for surface, body in enumerate(model.surfaces.body):
-            if body == len(model.bodies.names):
-                continue
-            found = self.bodies.setdefault(model.bodies.names[body], BodyContact())
-            found.nodes = int(nodes[surface])
-            found.most_nodes = max(found.most_nodes, found.nodes)
-            if found.nodes and found.first_contact is None:
-                found.first_contact = time
+            if body < len(model.bodies.names):
+                first = float(engine.first_contact[surface])
+                self.bodies[model.bodies.names[body]] = BodyContact(
+                    None if math.isnan(first) else first, int(engine.most_nodes[surface]), int(engine.nodes[surface])
+                )

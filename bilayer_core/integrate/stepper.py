@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import SimulationError
+from ..march.arrays import Course
+from ..march.engine import Engine, MarchReport, Settings
+from ..march.step import AT_ONCE, NO_JUMP
 from ..model.model import Model, scheduled_motion
 from ..model.state import State
 from ..scene.schedule import value_before
@@ -28,10 +31,8 @@ if TYPE_CHECKING:
     from .ledger import EnergyLedger
 
 Array = np.ndarray
-AT_ONCE = 1e-2
-"""Part of a step below which the lag of a layer makes no difference to a jump of its stimulus."""
-NO_JUMP = 1e-9
-"""Part of a channel's range below which a change at once is rounding."""
+LISTS_AT_MOST = 10
+"""That are made anew for one step of a loop."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,8 @@ class Stepper:
         Value of each channel over the last step.
     used : Method
         The method of the last attempt, which after a jump is not `method`.
+    loops : bool
+        Whether steps are made in compiled loops where they can.
     ledger : EnergyLedger or None
         What keeps the energy budget, if anything does.
     """
@@ -109,6 +112,12 @@ class Stepper:
         self._prescribed = np.flatnonzero(model.bodies.free_index[:-1] < 0)
         self._channels = list(model.scene.stimuli.values())
         self._range = np.array([channel.maximum - channel.minimum for channel in self._channels])
+        places = [self._start, self.end, self._trial]
+        self._places = places
+        self.engine = Engine(model, self.potential, places, method.history is not None)
+        self._arrays = {used: used.arrays() for used in {method, SELF_STARTING} if used.weights is None}
+        self._touched = self.engine.touched
+        self.loops = method.weights is None
         self.stimulus = np.zeros(len(self._channels))
         self.rest_strains = RestStrains(model.rest_strain, model.joint_rest)
         self.ledger: EnergyLedger | None = None
@@ -158,7 +167,12 @@ class Stepper:
         """Evaluate the potential at `end` with the velocities of the state."""
         self.potential.start_step(momentary_context(self.model, self.end, state, rest, load_factor))
         self.potential.evaluate(self.end, False)
-        self._touched = self._touching()
+        self._touched[:] = self._touching()
+
+    def compile(self, state: State) -> None:
+        """Make a step of every kind that the run may need, for its kernels; `state` stays as it is."""
+        for attempt in (self._attempt, self._attempt_by_terms) if self.model.rod_surfaces else (self._attempt,):
+            attempt(state.copy(), self.dt, float(state.time[0]) + self.dt)
 
     def restart(self, state: State) -> None:
         """Something has jumped: fixed steps go on as they are."""
@@ -174,7 +188,7 @@ class Stepper:
         parts = 2**self.max_halvings
         if self.ledger is not None:
             self.ledger.mark()
-        kept = state.copy()
+        kept: State | None = None  # of the start, once a part of the step is done
         begin, count = float(state.time[0]), float(state.step[0])
         on_grid = begin == count * self.dt  # not so after steps of another length
         level = int(state.halvings[0])
@@ -184,6 +198,8 @@ class Stepper:
             size = parts >> level
             fraction = (done + size) / parts
             time = (count + fraction) * self.dt if on_grid else begin + fraction * self.dt
+            if done == 0 and size < parts:
+                kept = state.copy()
             report = self._attempt(state, self.dt * size / parts, time)
             iterations += report.iterations
             factorisations += report.factorisations
@@ -196,7 +212,8 @@ class Stepper:
                 continue
             rejected += 1
             if level == self.max_halvings:
-                state.take(kept)
+                if kept is not None:
+                    state.take(kept)
                 if self.ledger is not None:
                     self.ledger.roll_back()
                 raise SimulationError(self._explain(report, time, self.dt * size / parts), begin)
@@ -206,8 +223,107 @@ class Stepper:
         state.halvings[0] = level
         return StepReport(time, self.dt, substeps, rejected, iterations, factorisations, residual)
 
+    def march(self, state: State, steps: int) -> MarchReport | None:
+        """As many of the next fixed steps as a compiled loop makes without help, at most `steps`, each taken into the
+        tally. None if it made none: the next step is one for `advance`.
+        """
+        count = float(state.step[0])
+        if not self.loops or self.ledger is not None or state.halvings[0] or state.time[0] != count * self.dt:
+            return None
+        times = [(count + done) * self.dt for done in range(1, steps + 1)]
+        found = self._loop(state, self.method, times, self.dt, self.method.history is not None, counts=True)
+        if found is None or found.done == 0:
+            return None
+        state.time[0], state.step[0] = times[found.done - 1], count + found.done
+        self.used = self.method
+        if not found.finished:
+            self.rest(state)  # what the last attempt left is not what the state is
+        return found
+
     def _attempt(self, state: State, h: float, time: float) -> NewtonReport:
         """Try one part of length `h` [s] that ends at `time` [s]; `state` changes only if it converged."""
+        report = self._attempt_in_loop(state, h, time) if self.loops else None
+        return self._attempt_by_terms(state, h, time) if report is None else report
+
+    def _attempt_in_loop(self, state: State, h: float, time: float) -> NewtonReport | None:
+        """`_attempt` in a compiled loop; None, and nothing is changed, if it is not for one."""
+        method = self.used = self._method_at(state, self.stimulus_at(state, time - h), time - h, h)
+        found = self._loop(state, method, [time], h, changes=False, counts=False)
+        if found is None:
+            return None
+        report = found.newton
+        if not report.converged:
+            return replace(report, detail=self.solver.who_blocks(found.pair)) if found.pair >= 0 else report
+        if self.ledger is not None:
+            self.ledger.record(state, self.rest_strains, self.load_factor(time, h), h)
+        return report
+
+    def _loop(
+        self, state: State, method: Method, times: list[float], h: float, changes: bool, counts: bool
+    ) -> MarchReport | None:
+        """Steps that end at the given times, as many as succeed, in a compiled loop; None if none is for one."""
+        solver = self.model.scene.solver
+        settings = Settings(self.solver.tolerance, solver.max_newton_iterations, changes, counts)
+        course = self._course(state, method, times, h)
+        for attempt in range(LISTS_AT_MOST):
+            found = self.engine.march(state, self._arrays[method], course, h, settings)
+            if found.done > 0 or not self.engine.make_room(found.status, attempt):
+                break
+        if found.done == 0 and found.failure is None and not found.finished:
+            return None
+        self.end = self._places[found.place]
+        self._start, self._trial = (self._places[k] for k in range(3) if k != found.place)
+        if found.done > 0:
+            self.stimulus = self.stimulus_at(state, times[found.done - 1], h)
+            self.rest_strains = self.rest_strains_of(state.transduction)
+        return found
+
+    def _course(self, state: State, method: Method, times: list[float], h: float) -> Course:
+        """What acts from outside at the stages of steps of length `h` [s] that end at `times` [s]."""
+        elapsed = [node * h for node in method.nodes]
+        shape = len(times), len(elapsed)
+        begins = [time - h for time in times]
+        stages = [begin + part for begin in begins for part in elapsed]
+        parts = elapsed * len(times)
+        loads = self.model.scene.loads
+        factors = np.array([[_value(load.factor, *when) for load in loads] for when in zip(stages, parts, strict=True)])
+        jumps = np.zeros(len(times), dtype=bool)
+        if loads and method.history is not None:
+            jumps[:] = [not np.array_equal(self.load_factor(t), self.load_factor(t, h)) for t in begins]
+        placed = self._when_placed(times)
+        poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.nodes]
+        rows = len(placed), shape[1], len(self.model.bodies.names)
+        return Course.of(
+            time=np.array(times),
+            elapsed=np.array(elapsed),
+            first=self._stimuli(state, begins, [0.0] * len(begins)),
+            jumps=jumps,
+            stimulus=self._stimuli(state, stages, parts).reshape(*shape, -1),
+            load_factor=factors.reshape(*shape, len(loads)),
+            position=np.array([pose.position for pose in poses]).reshape(*rows, 3),
+            rotation=np.array([pose.rotation for pose in poses]).reshape(*rows, 3, 3),
+            rates=np.array([pose.rates for pose in poses]).reshape(*rows, 6),
+        )
+
+    def _when_placed(self, times: list[float]) -> list[float]:
+        """The times of which the poses of prescribed bodies are needed: one if none of them moves."""
+        moves = any(len(self.model.bodies.times[index]) for index in self._prescribed)
+        return times if moves else times[:1]
+
+    def _stimuli(self, state: State, times: list[float], ended: list[float]) -> Array:
+        """`stimulus_at` for several times, shape (n_time, n_channel)."""
+        values = np.empty((len(times), len(self._channels)))
+        for index, (channel, fixed) in enumerate(zip(self._channels, state.override.tolist(), strict=True)):
+            value = channel.schedule.value
+            values[:, index] = (
+                [_value(value, *when) for when in zip(times, ended, strict=True)] if math.isnan(fixed) else fixed
+            )
+        return values
+
+    def _attempt_by_terms(self, state: State, h: float, time: float) -> NewtonReport:
+        """`_attempt` term by term, for what compiled loops do not know: rods that touch, and ends of steps beyond their
+        last stage.
+        """
         model = self.model
         self._start.take_state(state)
         first = start_point(model, state, self._start)
@@ -258,7 +374,7 @@ class Stepper:
             keep_slopes(state, origin, last, momentum_length, method.history)
             touching = self._touching()
             state.kept[0] = np.array_equal(touching, self._touched)
-            self._touched = touching
+            self._touched[:] = touching
         state.transduction[:] = drive.transduction
         self.stimulus, self.rest_strains = drive.stimulus, drive.rest
         if self.ledger is not None:

@@ -28,6 +28,13 @@ class ReadOnlyArrays:
                     array.flags.writeable = False
 
 
+def columns(pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The two columns of an (n, 2) array, contiguous and read-only as what kernels are compiled for."""
+    both = np.ascontiguousarray(pairs.T)
+    both.flags.writeable = False
+    return both[0], both[1]
+
+
 @dataclass(frozen=True)
 class Layout(ReadOnlyArrays):
     """Numbers of unknowns.

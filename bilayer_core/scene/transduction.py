@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from ..jit import kernel
 
-def follow(
-    filtered: np.ndarray, first: np.ndarray, last: np.ndarray, rising: np.ndarray, falling: np.ndarray, dt: float
-) -> np.ndarray:
+
+@kernel
+def lagged(filtered, first, last, rising, falling, dt):
     """First-order lag over a time, exact for a stimulus that is linear over it.
 
     The solution of  T dy/dt = u - y  for u from u₀ to u₁ is, with x = dt/T and φ = (1 - exp(-x))/x,
@@ -18,44 +21,59 @@ def follow(
 
     Parameters
     ----------
-    filtered : ndarray
+    filtered : float
         y at the start, in the unit of the stimulus.
-    first, last : ndarray
-        u₀ and u₁, at the start and the end, of the same shape.
-    rising, falling : ndarray
-        T >= 0 [s] where u₁ > y and elsewhere, of the same shape.
+    first, last : float
+        u₀ and u₁, at the start and the end.
+    rising, falling : float
+        T >= 0 [s] where u₁ > y and elsewhere.
     dt : float
         Length of the time > 0 [s].
 
     Returns
     -------
-    ndarray
+    float
         y at the end.
     """
-    with np.errstate(divide="ignore"):
-        x = dt / np.where(last > filtered, rising, falling)
-    part = -np.expm1(-x)
+    lag = rising if last > filtered else falling
+    if lag == 0.0:
+        return last
+    x = dt / lag
+    part = -math.expm1(-x)
     return filtered + part * (first - filtered) + (1.0 - part / x) * (last - first)
 
 
-def free_strain(filtered: np.ndarray, gain: np.ndarray, reference: np.ndarray, saturation: np.ndarray) -> np.ndarray:
-    """Eigenstrain of each law: linear near the reference, with a smooth limit.
+@kernel
+def grown(filtered, gain, reference, saturation):
+    """Eigenstrain of a law: linear near the reference, with a smooth limit.
 
     η = S tanh(g (y - y0)/S), which tends to g (y - y0) for infinite S. Its slope is g (1 - (η/S)²): g at the
     reference, 0 far from it.
 
     Parameters
     ----------
-    filtered : ndarray
+    filtered : float
         y, the stimulus that the material has reached.
-    gain : ndarray
+    gain : float
         g, eigenstrain per unit of the stimulus.
-    reference : ndarray
+    reference : float
         y0, the stimulus without eigenstrain, in its unit.
-    saturation : ndarray
+    saturation : float
         S > 0, may be infinite.
     """
     strain = gain * (filtered - reference)
-    limited = np.isfinite(saturation)
-    strain[limited] = saturation[limited] * np.tanh(strain[limited] / saturation[limited])
-    return strain
+    return strain if math.isinf(saturation) else saturation * math.tanh(strain / saturation)
+
+
+def follow(filtered: np.ndarray, first, last, rising, falling, dt: float) -> np.ndarray:
+    """`lagged` for each of some laws, shape (n,)."""
+    return _for_each(lagged.py_func, filtered, first, last, rising, falling, dt)
+
+
+def free_strain(filtered: np.ndarray, gain, reference, saturation) -> np.ndarray:
+    """`grown` for each of some laws, shape (n,)."""
+    return _for_each(grown.py_func, filtered, gain, reference, saturation)
+
+
+def _for_each(law, *arguments) -> np.ndarray:
+    return np.array([law(*(float(value) for value in values)) for values in np.broadcast(*arguments)], dtype=float)

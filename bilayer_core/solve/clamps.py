@@ -79,6 +79,27 @@ def hand_gradient_to_bodies(
 
 
 @kernel
+def hand_rows_to_bodies(axes, attached_unknown, attached_free, arm, border, body_hessian_out):
+    """Add what the border holds in rows of attached nodes (their contact with other bodies) to D; the border is not
+    changed.
+    """
+    for k in range(attached_unknown.shape[0]):
+        f = attached_free[k]
+        if f < 0:
+            continue
+        for c in range(axes.shape[0]):
+            row = attached_unknown[k] + c
+            for i in range(border.shape[1]):
+                value = border[row, i]
+                if value == 0.0:
+                    continue
+                for n in range(6):
+                    own = value * arm_jacobian(axes, arm, k, c, n)
+                    body_hessian_out[6 * f + n, i] += own
+                    body_hessian_out[i, 6 * f + n] += own
+
+
+@kernel
 def hand_nodes_to_bodies(
     axes,
     attached_unknown,

@@ -14,7 +14,7 @@ Array = np.ndarray
 
 
 @kernel
-def _take_step(step, alpha, node_unknown, edge_unknown, position, turn, position_out, angle_out, turn_out):
+def take_step(step, alpha, node_unknown, edge_unknown, position, turn, position_out, angle_out, turn_out):
     """x + α δx of nodes, α δθ of edges and their turn since the start of the step."""
     for i in range(node_unknown.shape[0]):
         d = node_unknown[i]
@@ -27,7 +27,7 @@ def _take_step(step, alpha, node_unknown, edge_unknown, position, turn, position
 
 
 @kernel
-def _second_director(tangent, director1, director2_out):
+def second_director(tangent, director1, director2_out):
     """m2 = t × m1."""
     for k in range(tangent.shape[0]):
         director2_out[k, 0] = tangent[k, 1] * director1[k, 2] - tangent[k, 2] * director1[k, 1]
@@ -36,7 +36,7 @@ def _second_director(tangent, director1, director2_out):
 
 
 @kernel
-def _place(body, local, position, rotation, arm_out, place_out):
+def carry_points(body, local, position, rotation, arm_out, place_out):
     """X + R r of points r of bodies, and the arms R r [m]."""
     for k in range(body.shape[0]):
         b = body[k]
@@ -47,7 +47,7 @@ def _place(body, local, position, rotation, arm_out, place_out):
 
 
 @kernel
-def _turn_walls(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
+def carry_walls(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
     """t and m1 of walls, edges from `first` on, turned with their bodies, and m2 = t × m1."""
     for k in range(body.shape[0]):
         b, w = body[k], first + k
@@ -62,7 +62,7 @@ def _turn_walls(body, local_tangent, local_director1, rotation, first, tangent, 
 
 
 @kernel
-def _turn(body, local, rotation, turn_out):
+def carry_turns(body, local, rotation, turn_out):
     """R L of matrices L of bodies."""
     for k in range(body.shape[0]):
         b = body[k]
@@ -95,6 +95,8 @@ class Configuration:
         Positions [m] and axes of surfaces, shapes (n_surface, 3), (n_surface, 3, 3).
     arm : Array
         From the position of its body to each attached node [m], shape (n_attached, 3).
+    arrays : tuple of Array
+        All of them and scratch, in the order of `march.arrays.Place`.
     """
 
     def __init__(self, model: Model):
@@ -123,6 +125,28 @@ class Configuration:
         self.arm = np.zeros((len(model.attached_node), 3))
         self._held = np.zeros_like(self.arm)
         self._angle = np.zeros(model.edge_count)
+        self.arrays = (
+            self.carrier,
+            self.position,
+            self._point,
+            self.length,
+            self.tangent,
+            self.director1,
+            self.director2,
+            self.turn,
+            self._angle,
+            self.joint_strain,
+            self.body_position,
+            self.body_rotation,
+            self.place,
+            self.rotation,
+            self.surface_place,
+            self.surface_turn,
+            self.arm,
+            self._held,
+            self._point_arm,
+            self._surface_arm,
+        )
         self._surfaces_move = bool((surfaces.body < bodies).any())
         if len(surfaces.kind):
             self._place_surfaces()
@@ -139,7 +163,7 @@ class Configuration:
         self.place_prescribed(state.body_position, state.body_rotation)
         self.place_held()
         edge_geometry(self.position, model.edge_node, self.length, self.tangent)
-        _second_director(self.tangent, self.director1, self.director2)
+        second_director(self.tangent, self.director1, self.director2)
 
     def place_prescribed(self, position: Array, rotation: Array) -> None:
         """Take the poses of prescribed bodies from those of all, shapes (n_body, 3), (n_body, 3, 3)."""
@@ -156,21 +180,21 @@ class Configuration:
         self.rotation[free] = self.body_rotation
         if len(self.arm):
             held = (model.attached_body, model.attached_position, self.place, self.rotation)
-            _place(*held, self.arm, self._held)
+            carry_points(*held, self.arm, self._held)
             self.position[model.attached_node] = self._held
             walls = (model.wall_body, model.wall_tangent, model.start_director1, self.rotation, model.edge_count)
-            _turn_walls(*walls, self.tangent, self.director1, self.director2)
+            carry_walls(*walls, self.tangent, self.director1, self.director2)
         if len(self._point):
             points = (self._point_body, model.carriers.position, self.place, self.rotation)
-            _place(*points, self._point_arm, self._point)
+            carry_points(*points, self._point_arm, self._point)
         if self._surfaces_move:
             self._place_surfaces()
 
     def _place_surfaces(self) -> None:
         surfaces = self._model.surfaces
         owned = (surfaces.body, surfaces.position, self.place, self.rotation)
-        _place(*owned, self._surface_arm, self.surface_place)
-        _turn(surfaces.body, surfaces.turn, self.rotation, self.surface_turn)
+        carry_points(*owned, self._surface_arm, self.surface_place)
+        carry_turns(surfaces.body, surfaces.turn, self.rotation, self.surface_turn)
 
     def set_moved(self, base: Configuration, step: Array, body_step: Array, alpha: float) -> None:
         """Become `base` moved by α times a step of the unknowns, shape (size,), and of free bodies, shape (n_free,
@@ -180,7 +204,7 @@ class Configuration:
         layout = model.layout
         self.place[self._prescribed] = base.place[self._prescribed]
         self.rotation[self._prescribed] = base.rotation[self._prescribed]
-        _take_step(
+        take_step(
             step, alpha, layout.node, layout.edge, base.position, base.turn, self.position, self._angle, self.turn
         )
         for b in range(model.free_count):

@@ -18,8 +18,8 @@ class Neighbours:
 
     Attributes
     ----------
-    count : int
-        Pairs in the list.
+    counted, margin : Array
+        Number of pairs, and margin of the list [m], as compiled loops share them, shape (1,).
     carrier, surface : Array
         The pairs, by surfaces and then by carriers; only the first `count` count.
     gap : Array
@@ -30,38 +30,48 @@ class Neighbours:
         self._model = model
         surfaces, carriers = model.surfaces, model.carriers
         self._reach = model.scene.contact.barrier_distance if model.scene.contact else 0.0
-        self._node_free = carriers.follows[: model.node_count] < 0
-        self._extent = np.zeros(len(surfaces.kind))
-        self._margin = -1.0  # no list yet
-        self._listed_carrier = np.zeros((len(carriers.weight), 3))
-        self._listed_place = np.zeros((len(surfaces.kind), 3))
-        self._listed_turn = np.zeros((len(surfaces.kind), 3, 3))
-        self.count = 0
+        self.node_free = carriers.follows[: model.node_count] < 0
+        self.extent = np.zeros(len(surfaces.kind))
+        self.margin = np.full(1, -1.0)  # no list yet
+        self.listed_carrier = np.zeros((len(carriers.weight), 3))
+        self.listed_place = np.zeros((len(surfaces.kind), 3))
+        self.listed_turn = np.zeros((len(surfaces.kind), 3, 3))
+        self.counted = np.zeros(1, dtype=np.int64)
         self._make_room(len(carriers.weight) if len(surfaces.kind) else 0)
+
+    @property
+    def count(self) -> int:
+        """Pairs in the list."""
+        return int(self.counted[0])
 
     def _make_room(self, room: int) -> None:
         self.carrier = np.zeros(room, dtype=np.int64)
         self.surface = np.zeros(room, dtype=np.int64)
         self.gap = np.zeros(room)
 
+    def grow(self) -> None:
+        """Have room for twice as many pairs, none of which is listed then."""
+        self._make_room(2 * max(1, len(self.carrier)))
+        self.counted[0], self.margin[0] = 0, -1.0
+
     def update(self, at: Configuration, motion: float = 0.0) -> None:
         """Make the list valid at a configuration and whatever can be reached from it by `motion` [m]."""
         moved = moved_since(
             at.carrier,
-            self._listed_carrier,
+            self.listed_carrier,
             at.surface_place,
-            self._listed_place,
+            self.listed_place,
             at.surface_turn,
-            self._listed_turn,
-            self._extent,
+            self.listed_turn,
+            self.extent,
         )
-        if not moved + motion <= self._margin:
+        if not moved + motion <= self.margin[0]:
             self._list(at, max(self._reach, MOTION_MARGIN * motion))
 
     def _list(self, at: Configuration, margin: float) -> None:
         surfaces, carriers = self._model.surfaces, self._model.carriers
         while True:
-            self.count = list_near(
+            self.counted[0] = list_near(
                 self._reach,
                 margin,
                 surfaces.kind,
@@ -76,15 +86,15 @@ class Neighbours:
                 at.carrier,
                 self.carrier,
                 self.surface,
-                self._extent,
+                self.extent,
             )
             if self.count <= len(self.carrier):
                 break
             self._make_room(2 * self.count)
-        self._margin = margin
-        self._listed_carrier[:] = at.carrier
-        self._listed_place[:] = at.surface_place
-        self._listed_turn[:] = at.surface_turn
+        self.margin[0] = margin
+        self.listed_carrier[:] = at.carrier
+        self.listed_place[:] = at.surface_place
+        self.listed_turn[:] = at.surface_turn
 
     def bound(self, at: Configuration, node_step: Array, body_motion: Array) -> tuple[float, int]:
         """`contact.step_bound` at a configuration: the fraction, and the carrier and surface that set it.
@@ -104,8 +114,8 @@ class Neighbours:
             Place in the list of the pair that sets the bound, −1 if none.
         """
         surfaces, carriers, reach = self._model.surfaces, self._model.carriers, self._model.bodies.reach
-        extent = self._extent
-        self.update(at, largest_motion(node_step, self._node_free, body_motion, reach, surfaces.body, extent))
+        extent = self.extent
+        self.update(at, largest_motion(node_step, self.node_free, body_motion, reach, surfaces.body, extent))
         return step_bound(
             self.count,
             self.carrier,

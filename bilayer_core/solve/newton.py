@@ -33,7 +33,7 @@ ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the pote
 
 
 @kernel
-def _largest_move(step, node_unknown, edge_unknown, half_width):
+def largest_move(step, node_unknown, edge_unknown, half_width):
     """Largest displacement of a node, or of an edge's border by its turn [m]; NaN if any is."""
     largest = 0.0
     for i in range(node_unknown.shape[0]):
@@ -100,7 +100,7 @@ class NewtonSolver:
     def __init__(self, model: Model, potential: IncrementalPotential, tolerance: float, max_iterations: int):
         self._model = model
         self._potential = potential
-        self._tolerance = tolerance
+        self.tolerance = tolerance
         self._max_iterations = max_iterations
         bodies = model.bodies
         self._node_unknown = model.layout.node[:, None] + np.arange(3)
@@ -114,7 +114,7 @@ class NewtonSolver:
         model = self._model
         if not np.isfinite(body_step).all():
             return math.nan
-        largest = _largest_move(step, model.layout.node, model.layout.edge, model.half_width)
+        largest = largest_move(step, model.layout.node, model.layout.edge, model.half_width)
         for b in range(model.free_count):
             turn = self._reach[b] * math.sqrt(body_step[b, 3:] @ body_step[b, 3:])
             largest = max(largest, math.sqrt(body_step[b, :3] @ body_step[b, :3]) + turn)
@@ -155,7 +155,8 @@ class NewtonSolver:
             if self._turns[b]:
                 self._motion[b, 3:] = rotation_vector(end.rotation[b] @ start.rotation[b].T)
 
-    def _who_blocks(self, pair: int) -> str:
+    def who_blocks(self, pair: int) -> str:
+        """What a message says of the near pair that blocks prescribed motion."""
         if pair < 0:
             return "a rod would reach another"
         model, near = self._model, self._potential.near
@@ -192,7 +193,7 @@ class NewtonSolver:
             if alpha >= 1.0:
                 break
             if retry is None:
-                return NewtonReport(NewtonStatus.BLOCKED, 0, 0, math.inf, detail=self._who_blocks(blocking))
+                return NewtonReport(NewtonStatus.BLOCKED, 0, 0, math.inf, detail=self.who_blocks(blocking))
             fraction *= retry * alpha
         guess.position[:] = start.position + fraction * inertial
         guess.turn[:] = fraction * context.predicted_turn
@@ -228,7 +229,7 @@ class NewtonSolver:
             if not math.isfinite(residual):
                 status = NewtonStatus.NOT_FINITE
                 break
-            if residual <= self._tolerance:
+            if residual <= self.tolerance:
                 status = NewtonStatus.CONVERGED
                 break
             if iterations >= self._max_iterations:

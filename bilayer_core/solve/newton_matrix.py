@@ -16,11 +16,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..jit import kernel
-from ..kinematics.rotation import skew
 from ..model.model import Model
 from .assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
-from .band import band_kernels, signed_factor
-from .clamps import hand_nodes_to_bodies, hand_walls_to_bodies
+from .band import factor_band, factor_signed, solve_band, solve_columns, width
+from .clamps import hand_nodes_to_bodies, hand_rows_to_bodies, hand_walls_to_bodies
 from .configuration import Configuration
 from .dense import eliminate, factor_dense, solve_dense
 from .rod_border import RodBorder
@@ -43,7 +42,7 @@ def zeros_in_one(shapes: dict[str, tuple[int, ...]]) -> tuple[Array, list[Array]
 
 
 @kernel
-def _add_links(axes, links, link_node, link_body, link_hessian, node_unknown, border_out):
+def add_links(axes, links, link_node, link_body, link_hessian, node_unknown, border_out):
     """Add the blocks between nodes, whose unknowns are along `axes`, and free bodies to the border."""
     for k in range(links):
         row, column = node_unknown[link_node[k]], 6 * link_body[k]
@@ -68,7 +67,7 @@ class NewtonMatrix:
             "node_hessian": (model.node_count if has_node_blocks else 0, 3, 3),
             "body_hessian": (6 * model.free_count, 6 * model.free_count),
         }
-        self._second_derivatives, parts = zeros_in_one(shapes)
+        self.second_derivatives, parts = zeros_in_one(shapes)
         for name, part in zip(shapes, parts, strict=True):
             setattr(self, name, part)
         self.links = 0  # blocks between nodes and free bodies: the node, the free body, and ∂²/∂x ∂(X, φ) of each
@@ -76,14 +75,14 @@ class NewtonMatrix:
         self.link_body = np.zeros(0, dtype=np.int64)
         self.link_hessian = np.zeros((0, 3, 6))
         self._band = np.zeros((size + b, b + 1))
-        self._factor, self._solve, self._solve_border = band_kernels(b)
+        self._bandwidth = width(b)
         self._right = np.zeros(size + b)
         self._border = np.zeros((size + b, 6 * model.free_count))
         self._border_free = np.zeros((size + b, model.bodies.freedom.shape[1]))
         self._border_solution = np.zeros_like(self._border_free)
         self._corner = np.zeros_like(self.body_hessian)
         self._held_unknowns = (self._layout.attached[:, None] + np.arange(self._layout.dimension)).ravel()
-        self._body_masses = np.concatenate(
+        self.body_masses = np.concatenate(
             [np.repeat([m, np.trace(j)], 3) for m, j in zip(model.bodies.mass, model.bodies.second_moment, strict=True)]
             or [np.zeros(0)]
         )
@@ -106,7 +105,7 @@ class NewtonMatrix:
 
     def clear(self) -> None:
         """Set all second derivatives to zero."""
-        self._second_derivatives.fill(0.0)
+        self.second_derivatives.fill(0.0)
         self.links = 0
 
     def make_room_for_links(self, room: int) -> None:
@@ -158,7 +157,7 @@ class NewtonMatrix:
             if self.links:
                 self._coupled = True
                 links = (self.links, self.link_node, self.link_body, self.link_hessian)
-                _add_links(model.directions, *links, layout.node, self._border)
+                add_links(model.directions, *links, layout.node, self._border)
             if (model.attached_free >= 0).any():
                 self._add_clamps(at, edge_gradient, attached_gradient)
         hold_unknowns(layout.attached, layout.dimension, layout.half_bandwidth, self._band)
@@ -196,16 +195,11 @@ class NewtonMatrix:
 
     def _add_clamps(self, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> None:
         """Rows of nodes attached to free bodies, from the band and the border, and clamps' elements: into U and D."""
-        model, layout, d = self._model, self._layout, self._layout.dimension
+        model, layout = self._model, self._layout
         self._coupled = True
         if self.rods:
             self._rod_border.add_to_bodies(at.arm, self._border, self._corner)
-        for k in np.flatnonzero(model.attached_free >= 0):
-            free, rows = model.attached_free[k], slice(layout.attached[k], layout.attached[k] + d)
-            block = (model.directions @ np.hstack([np.eye(3), -skew(at.arm[k])])).T @ self._border[rows]
-            own = slice(6 * free, 6 * free + 6)
-            self._corner[own] += block
-            self._corner[:, own] += block.T
+        hand_rows_to_bodies(model.directions, layout.attached, model.attached_free, at.arm, self._border, self._corner)
         attached = (layout.attached, model.attached_free)
         hand_nodes_to_bodies(
             model.directions,
@@ -248,7 +242,7 @@ class NewtonMatrix:
 
     def _factorise(self, factor: float) -> bool:
         schur = self._take_border(self.shift * factor)
-        if self._factor(self._band, self._layout.size) >= 0:
+        if factor_band(self._band, self._layout.size, self._bandwidth) >= 0:
             return False
         if schur is None:
             return True
@@ -272,7 +266,7 @@ class NewtonMatrix:
         if not model.free_count and not len(self._leaving):
             return None
         freedom = model.bodies.freedom
-        corner = self._corner + shift * np.diag(self._body_masses) if shift else self._corner
+        corner = self._corner + shift * np.diag(self.body_masses) if shift else self._corner
         schur = freedom.T @ corner @ freedom
         self._wide, self._wide_solution = self._border_free, self._border_solution
         if self._coupled:
@@ -292,7 +286,7 @@ class NewtonMatrix:
             return
         size = self._layout.size
         self._wide_solution[:] = self._wide
-        self._solve_border(self._band, size, self._wide_solution)
+        solve_columns(self._band, size, self._bandwidth, self._wide_solution)
         if len(self._leaving):
             eliminate(self._wide, self._wide_solution, size, schur)
         else:
@@ -305,7 +299,7 @@ class NewtonMatrix:
         """
         self.assemble(factor, at, edge_gradient, attached_gradient)
         schur = self._take_border(factor)
-        count = int(signed_factor(self._layout.half_bandwidth)(self._band, self._layout.size))
+        count = int(factor_signed(self._band, self._layout.size, self._bandwidth))
         if schur is not None:
             self._eliminate_band(schur)
             count += int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
@@ -318,7 +312,7 @@ class NewtonMatrix:
         np.negative(gradient, out=right[:size])
         right[size:] = 0.0
         right[leaving] = 0.0
-        self._solve(self._band, size, right)
+        solve_band(self._band, size, self._bandwidth, right)
         step = right[:size].copy()
         if not self._model.free_count and not len(leaving):
             return step, np.zeros((0, 6))

@@ -84,6 +84,8 @@ class IncrementalPotential:
             (RodFriction, has_rods and slides and law.coefficient > 0.0),
         )
 
+        self._names = [name for term in (*self._of_rods_and_bodies, *self._of_carriers) for name in term.names]
+
     def _needed(self, *register: tuple[type[Term], bool]) -> list[Term]:
         return [term(self.model, self.accumulators) for term, needed in register if needed]
 
@@ -149,6 +151,15 @@ class IncrementalPotential:
                 out.clear_contact()
                 part.add(at, False)
                 yield part, part.names[0], float(self.terms[part.names[0]])
+
+    def take_over(self, energies: dict[str, float], gap: float) -> None:
+        """Note energies [J] and the smallest gap [m] that a compiled loop left with the derivatives in these arrays."""
+        self.terms.clear()
+        self.terms.update({name: energies.get(name, 0.0) for name in self._names})
+        if self._barrier:
+            self._barrier.min_gap = gap
+        if self.matrix.rods:
+            self.matrix.rods.min_gap = math.inf
 
     def _expand(self, at: Configuration) -> None:
         """From nodes, edges, pairs and bodies to the unknowns."""

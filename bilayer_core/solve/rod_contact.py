@@ -63,8 +63,14 @@ class RodContact:
 
     Attributes
     ----------
-    contacts, sliding : Contacts
-        Those of the last `barrier`, and those that `start_step` froze for friction.
+    contacts, sliding, none : Contacts
+        Those of the last `barrier`, those that `start_step` froze for friction, and room for none.
+    pairs, base, margin : NearPairs, Array, float
+        The list of near pairs, the positions [m] for which it was made, shape (n_node, 3), and how far it reaches [m].
+    unit : float
+        Barrier distance and thickest layer together [m].
+    listed : object
+        Another one after each list.
     min_gap : float
         Smallest gap below d̂ at the last `barrier` [m], infinite without one.
     """
@@ -77,27 +83,33 @@ class RodContact:
         self._coefficient = law.coefficient if law else 0.0
         self._threshold = law.speed_threshold if law else math.inf
         self._surfaces = surfaces
-        self._unit = self._d_hat + 2.0 * float(surfaces.edge_radius.max())
-        self._pairs = NearPairs(surfaces, model.edge_node, model.start_position, self._d_hat)
-        self._base = np.full((model.node_count, 3), math.inf)
-        self._margin = -1.0
+        self.unit = self._d_hat + 2.0 * float(surfaces.edge_radius.max())
+        self.pairs = NearPairs(surfaces, model.edge_node, model.start_position, self._d_hat)
+        self.base = np.full((model.node_count, 3), math.inf)
+        self.margin = -1.0
+        self.listed = object()
         self._no_step = np.zeros((model.node_count, 3))
         self._scratch = np.zeros((model.node_count, 3))
-        self.contacts, self.sliding = Contacts(0), Contacts(0)
+        self.contacts, self.sliding, self.none = Contacts(0), Contacts(0), Contacts(0)
         self.min_gap = math.inf
 
     def _list(self, position: Array, move: float) -> None:
         """List pairs about `position`, for moves of size `move` [m]."""
-        self._margin = min(max(2.0 * STEPS_AHEAD * move, LEAST_MARGIN * self._unit), LARGEST_MARGIN * self._unit)
-        self._base[:] = position
-        self._pairs.find(self._base, self._d_hat + self._margin)
+        self.margin = min(max(2.0 * STEPS_AHEAD * move, LEAST_MARGIN * self.unit), LARGEST_MARGIN * self.unit)
+        self.base[:] = position
+        self.listed = object()
+        self.pairs.find(self.base, self._d_hat + self.margin)
+
+    def list_about(self, position: Array, move: float) -> None:
+        """List pairs so that a step of size `move` [m] from positions of nodes can be bounded."""
+        self._list(position, move)
 
     def _find(self, position: Array) -> float:
         """Contacts at `position`; returns the smallest gap [m]."""
-        travel, _ = largest_travel(position, self._no_step, self._base)
-        if not travel <= 0.5 * self._margin:
+        travel, _ = largest_travel(position, self._no_step, self.base)
+        if not travel <= 0.5 * self.margin:
             self._list(position, 0.0)
-        pairs, surfaces = self._pairs, self._surfaces
+        pairs, surfaces = self.pairs, self._surfaces
         while True:
             contacts = self.contacts
             contacts.count, gap = facing_contacts(
@@ -193,13 +205,13 @@ class RodContact:
         """Largest fraction of a step of nodes [m], shape (n_node, 3), that keeps all gaps open, and the node that sets
         it (−1: none).
         """
-        travel, move = largest_travel(position, step, self._base)
-        now, _ = largest_travel(position, self._no_step, self._base)
+        travel, move = largest_travel(position, step, self.base)
+        now, _ = largest_travel(position, self._no_step, self.base)
         limit = 1.0
-        if not max(travel, now) <= 0.5 * self._margin:
+        if not max(travel, now) <= 0.5 * self.margin:
             self._list(position, move)
-            limit = min(1.0, 0.5 * self._margin / max(move, 1e-300))
-        pairs, surfaces = self._pairs, self._surfaces
+            limit = min(1.0, 0.5 * self.margin / max(move, 1e-300))
+        pairs, surfaces = self.pairs, self._surfaces
         if pairs.count == 0:
             return limit, -1
         return rod_step_bound(

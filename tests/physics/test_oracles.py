@@ -11,7 +11,7 @@ from bilayer_core.contact.friction_law import friction_over_speed, friction_pote
 from bilayer_core.forces.bend_twist import bend_twist
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
-from bilayer_core.solve.band import band_kernels, signed_factor
+from bilayer_core.solve.band import factor_band, factor_signed, solve_band, solve_columns, width
 
 
 def random_frames(rng, count):
@@ -113,19 +113,18 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     for j in range(n):
         for r in range(min(b, n - 1 - j) + 1):
             band[j, r] = dense[j + r, j]
-    factor, solve, solve_border = band_kernels(b)
     indefinite = band.copy()
     indefinite[41, 0] = -5.0
-    assert factor(band, n) == -1
+    assert factor_band(band, n, width(b)) == -1
     right = np.zeros((n + b, 6))
     right[:n] = rng.standard_normal((n, 6))
     expected = np.linalg.solve(dense, right[:n])
     one = right[:, 2].copy()
-    solve(band, n, one)
-    solve_border(band, n, right)
+    solve_band(band, n, width(b), one)
+    solve_columns(band, n, width(b), right)
     assert one[:n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
     assert right[:n] == pytest.approx(expected, rel=1e-10, abs=1e-12)
-    assert factor(indefinite, n) == 41
+    assert factor_band(indefinite, n, width(b)) == 41
 
 
 @pytest.mark.parametrize("shift", [0.5, -2.0, -7.0])
@@ -143,7 +142,7 @@ def test_the_signed_factor_counts_negative_eigenvalues(shift):
             band[j, r] = dense[j + r, j]
     expected = np.count_nonzero(np.linalg.eigvalsh(dense) < 0.0)
     assert 0 < expected < n
-    assert signed_factor(b)(band, n) == expected
+    assert factor_signed(band, n, width(b)) == expected
 
 
 def test_barrier_derivatives_agree_with_differences_and_vanish_at_its_distance():

@@ -13,7 +13,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BASE = {"errors", "jit"}
 GEOMETRY = BASE | {"kinematics", "contact"}
 MECHANICS = GEOMETRY | {"scene", "model", "forces"}
-NUMERICS = MECHANICS | {"solve", "integrate"}
+NUMERICS = MECHANICS | {"solve", "march", "integrate"}
 ALLOWED = {
     "errors": set(),
     "jit": {"errors"},
@@ -23,7 +23,8 @@ ALLOWED = {
     "model": GEOMETRY | {"scene"},
     "forces": GEOMETRY | {"scene", "model"},
     "solve": MECHANICS,
-    "integrate": MECHANICS | {"solve"},
+    "march": MECHANICS | {"solve"},
+    "integrate": MECHANICS | {"solve", "march"},
     "record": NUMERICS,
     "view": NUMERICS | {"record"},
     "converge": NUMERICS,

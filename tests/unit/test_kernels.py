@@ -16,16 +16,23 @@ from bilayer_core import Simulator, load_scene
 
 ribbons = [rod([layer()], name="a"), rod([layer(), layer("top")], name="b", start=(0, 0, 2.3e-3))]
 touching = scene(ribbons, contact=contact(coefficient=0.5), gravity=[0, 0, -10])
+def run(description, loops=False, **settings):
+    simulator = Simulator(load_scene(description), **settings)
+    simulator._stepper.loops = loops
+    simulator.run(0.005)
+    return simulator
+
 for description in (everything(), everything(stations=7), scene([rod([layer()])]), touching):
     for model in ("two_rod", "laminate"):
-        simulator = Simulator(load_scene(description), model=model, budget=True)
-        simulator.run(0.005)
-        simulator.frame()
-        Simulator(load_scene(description), model=model, tolerance=1e-3).run(0.005)
+        run(description, model=model, budget=True).frame()
+        run(description, model=model, tolerance=1e-3)
 for description in (everything_in_plane(AHEAD["oblique"]), scene([rod([layer()])]), touching):
     for model in ("two_rod", "laminate"):
-        Simulator(load_scene(description), model=model, dimension=2, budget=True).run(0.005)
-Simulator(load_scene(scene([rod([layer(), layer("top")])]))).solve_static()
+        run(description, model=model, dimension=2, budget=True)
+run(scene([rod([layer(), layer("top")])])).solve_static()
+# compiled loops call the same kernels; one of each model, because each set of forces is compiled by itself
+run(everything(), loops=True)
+run(everything_in_plane(AHEAD["oblique"]), loops=True, model="laminate", dimension=2)
 
 used = {}
 for part in ("kinematics", "contact", "forces", "solve", "integrate"):
@@ -34,6 +41,8 @@ for part in ("kinematics", "contact", "forces", "solve", "integrate"):
         for name, value in vars(importlib.import_module(f"bilayer_core.{part}.{info.name}")).items():
             # small functions whose names begin with _ are inlined
             if isinstance(value, CPUDispatcher) and not name.startswith("_") and value.signatures:
+                if value.py_func.__module__.endswith(".band"):  # one for each half-bandwidth
+                    continue
                 used[f"{value.py_func.__module__}.{name}"] = len(value.signatures)
 print(json.dumps(used))
 """

@@ -37,6 +37,10 @@ class Stretching(Term):
 class _Joints(Term):
     """A range of joints, with stiffness and rest strains (n_joint, 3) of its own."""
 
+    def start_step(self, context: StepContext) -> None:
+        super().start_step(context)
+        self._twist = context.start.joint_strain[:, 2].copy()
+
     def _bend_twist(
         self, first: int, last: int, stiffness: Array, rest: Array, at: Configuration, with_hessian: bool
     ) -> tuple[float, float]:
@@ -52,7 +56,7 @@ class _Joints(Term):
             at.tangent,
             at.director1,
             at.director2,
-            self.context.start.joint_strain[:, 2],
+            self._twist,
             at.joint_strain,
             out.edge,
             out.matrix.edge_hessian,

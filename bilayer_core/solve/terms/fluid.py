@@ -6,6 +6,7 @@ import numpy as np
 
 from ...forces.added_mass import added_mass, fluid_momentum
 from ...forces.drag import drag, node_directions
+from ...model.layout import columns
 from ...model.model import Model
 from ..configuration import Configuration
 from .term import Accumulators, Kind, StepContext, Term
@@ -22,6 +23,7 @@ class Drag(Term):
     def __init__(self, model: Model, out: Accumulators):
         super().__init__(model, out)
         self._direction = np.zeros((len(model.drag_node), 3, 3))
+        self._edges = columns(model.drag_edge)
         self._flow = np.array(model.scene.fluid.velocity)
 
     def start_step(self, context: StepContext) -> None:
@@ -29,8 +31,7 @@ class Drag(Term):
         self.follow(context.start)
 
     def follow(self, at: Configuration) -> bool:
-        before, after = self.model.drag_edge.T
-        node_directions(self.model.drag_node, before, after, at.tangent, at.director1, self._direction)
+        node_directions(self.model.drag_node, *self._edges, at.tangent, at.director1, self._direction)
         return True
 
     def add(self, at: Configuration, with_hessian: bool) -> None:

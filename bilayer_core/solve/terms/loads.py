@@ -6,6 +6,7 @@ import numpy as np
 
 from ...forces.drag import node_directions
 from ...forces.load import body_moment, point_force
+from ...model.layout import columns
 from ...model.model import Model, PointLoads
 from ..configuration import Configuration
 from .term import Accumulators, Kind, StepContext, Term
@@ -47,9 +48,7 @@ class Followers(Loads):
 
     def __init__(self, model: Model, out: Accumulators):
         super().__init__(model, out)
-        edges = model.carriers.node_edges[self._shares.nodes.target]
-        edges.flags.writeable = False  # as the model's: another type would be another specialisation
-        self._edges = edges.T
+        self._edges = columns(model.carriers.node_edges[self._shares.nodes.target])
         self._direction = np.zeros((len(self._on_nodes), 3, 3))
 
     def _of(self, model: Model) -> PointLoads:

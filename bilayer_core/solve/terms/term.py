@@ -130,7 +130,7 @@ class Accumulators:
             "pair": (len(model.pair_top), 3),
             "body": (model.free_count, 6),
         }
-        self._all_but_carriers, parts = zeros_in_one(shapes)
+        self.all_but_carriers, parts = zeros_in_one(shapes)
         self.node, self.edge, self.pair, self.body = parts
         self.carrier = np.zeros((len(model.carriers.weight), 3))
         self.energy: dict[str, float] = {}
@@ -140,7 +140,7 @@ class Accumulators:
     def clear(self, with_hessian: bool) -> None:
         """Forget energies and first derivatives, those of contact apart, and second ones on request."""
         self.energy.clear()
-        self._all_but_carriers.fill(0.0)
+        self.all_but_carriers.fill(0.0)
         if with_hessian:
             self.matrix.clear()
 

@@ -1,0 +1,513 @@
+"""What compiled loops take: the arrays of a model, of a configuration, of a stage, in groups.
+
+A group that a scene does not need is None; then the compiler leaves out what would use it (`if group is None` on an
+argument is decided when a kernel is compiled), so an absent force costs neither time nor compilation. Each set of
+present groups is compiled once: what always occurs together is None together.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .group import group
+
+Array = np.ndarray
+
+
+@group
+class Strands:
+    """Numbering, sections and joints of rods; see `model.Model` and `model.layout`."""
+
+    size: int  # unknowns of the matrix
+    dimension: int  # of them at each node
+    edge_count: int
+    first_bend: int  # elements from this one up to `bend_count` are bends and twists, the rest are bonds
+    bend_count: int
+    bandwidth: tuple[int, ...]  # its length is the half-bandwidth: a compile-time constant
+    axes: Array  # directions of a node's unknowns in the matrix, shape (dimension, 3)
+    row: Array  # first of them in the matrix, shape (n_node,)
+    node_unknown: Array  # place of a node in gradients and steps, which are vectors in space
+    edge_unknown: Array  # likewise of an edge
+    edge_node: Array
+    node_mass: Array
+    spin_inertia: Array
+    half_width: Array
+    rest_length: Array
+    axial_stiffness: Array
+    joint_a: Array
+    joint_b: Array
+    joint_stiffness: Array
+
+
+@group
+class Drives:
+    """What stimuli change: rest strains of edges and joints."""
+
+    rest_strain: Array
+    driven_edge: Array
+    driven_law: Array
+    driven_weight: Array
+    joint_rest: Array
+    driven_joint: Array
+    driven_joint_law: Array
+    driven_joint_weight: Array
+    law_channel: Array
+    law_rising: Array
+    law_falling: Array
+    law_gain: Array
+    law_reference: Array
+    law_saturation: Array
+
+
+@group
+class Space:
+    """What dimension 3 has: angles of edges, and second derivatives of bonds. None in a plane."""
+
+    edge_unknown: Array
+    top_hessian: Array
+    bottom_hessian: Array
+    bond_hessian: Array  # the part of cross_hessian that belongs to bonds
+
+
+@group
+class Plane:
+    """What dimension 2 has instead of frames and twist; see `forces.planar` and `solve.planar_matrix`."""
+
+    normal: Array
+    side: Array
+    joint_after: Array
+    frame: Array
+    polar_gradient: Array
+    polar_hessian: Array
+    mixed_hessian: Array
+    gradient: Array
+
+
+@group
+class OffAxis:
+    """Joints whose natural curvature depends on the strains of their edges; see `forces.stretch_bend`."""
+
+    joint: Array
+    coupling: Array
+    rest_out: Array
+    rest: Array  # the same, read-only
+
+
+@group
+class Bonds:
+    """Paired edges of two layers."""
+
+    top: Array
+    bottom: Array
+    stiffness: Array
+    rest: Array
+
+
+@group
+class Bodies:
+    """Rigid bodies; the last place is the world."""
+
+    free_index: Array
+    body_of_free: Array
+    prescribed: Array  # bodies without unknowns, shape (n_prescribed,)
+    mass: Array
+    second_moment: Array
+    inertia: Array  # factor of the shift for each unknown of free bodies: m and tr(J), shape (6 n_free,)
+    freedom: Array
+    reach: Array
+    turns: Array  # whether a body can turn, bool
+
+
+@group
+class Held:
+    """Nodes and directions that bodies hold."""
+
+    node: Array
+    unknown: Array
+    row: Array
+    body: Array
+    free: Array
+    position: Array  # in the body's frame
+    wall_body: Array
+    wall_free: Array
+    wall_tangent: Array  # in the body's frame
+    wall_director1: Array  # likewise, after the edges' own: shape (n_edge + n_wall, 3)
+
+
+@group
+class Grips:
+    """What free bodies among them hold: how it enters the border."""
+
+    holding: int  # how many nodes
+    unknown: Array  # rows of the matrix
+    free: Array
+    of_unknown: Array
+    wall_free: Array
+    wall_joint: Array
+
+
+@group
+class Surfaces:
+    """Carriers, surfaces, and the list of near pairs with what it was made for; see `solve.neighbours`."""
+
+    d_hat: float
+    stiffness: float
+    radius: Array
+    weight: Array
+    carrier_body: Array
+    follows: Array
+    node_free: Array
+    group: Array
+    point_position: Array  # of points and centres in their bodies' frames
+    point_body: Array
+    kind: Array
+    size: Array
+    rounding: Array
+    bound: Array
+    body: Array
+    position: Array
+    turn: Array
+    meets: Array
+    near_carrier: Array
+    near_surface: Array
+    near_gap: Array
+    near_count: Array  # shape (1,)
+    margin: Array  # shape (1,)
+    extent: Array
+    listed_carrier: Array
+    listed_place: Array
+    listed_turn: Array
+
+
+@group
+class Sliding:
+    """Friction of the contacts at the start of a stage; see `forces.friction`."""
+
+    acts: bool
+    threshold: float
+    coefficient: Array
+    node_edges: Array
+    node_axis: Array
+    count: Array  # shape (1,)
+    first: Array
+    surface: Array
+    load: Array
+    normal: Array
+    axis: Array
+    arm: Array
+    lever: Array
+    back: Array
+    turn: Array
+    origin_turn: Array
+
+
+@group
+class Threads:
+    """Rods that can meet: near pairs of points and segments, and room for contacts; see `solve.rod_contact`."""
+
+    d_hat: float
+    edge_radius: Array
+    point_edge: Array
+    point_fraction: Array
+    pair_count: int
+    pair_point: Array
+    pair_edge: Array
+    pair_before: Array
+    pair_after: Array
+    base: Array  # positions for which the pairs are listed
+    margin: float
+    near_point: Array  # the nearer ones among the pairs, for which see `march.threads`
+    near_edge: Array
+    near_before: Array
+    near_after: Array
+    near_count: Array  # shape (1,)
+    near_base: Array
+    near_margin: Array  # shape (1,)
+    least_margin: float
+    largest_margin: float
+    no_step: Array
+    wanted: Array  # positions about which a list is missing, shape (n_node, 3)
+    wanted_move: Array  # and the step that could not be bounded [m], shape (1,)
+    point: Array  # of contacts, without room: none is kept here
+    edge: Array
+    fraction: Array
+    inner: Array
+    times: Array
+    gap: Array
+
+
+@group
+class Flow:
+    """Drag."""
+
+    velocity: Array
+    node: Array
+    edge_before: Array
+    edge_after: Array
+    coefficient: Array
+    direction: Array
+
+
+@group
+class Fluid:
+    """Added mass."""
+
+    velocity: Array
+    mass: Array
+    direction1: Array
+    direction2: Array
+    shape_gradient: Array
+    momentum: Array
+    node_velocity: Array  # scratch
+    still: Array
+
+
+@group
+class PointForces:
+    """Forces of fixed direction, or that turn with what they act on (then with the edges of their nodes)."""
+
+    node: Array
+    node_load: Array
+    node_vector: Array
+    body: Array
+    body_load: Array
+    body_vector: Array
+    on_nodes: Array  # the present ones
+    on_bodies: Array
+    edge_before: Array
+    edge_after: Array
+    direction: Array
+
+
+@group
+class Moments:
+    """Moments on free bodies; the first `dead` keep their direction."""
+
+    dead: int
+    body: Array
+    load: Array
+    vector: Array
+    present: Array
+
+
+@group
+class Sums:
+    """First and second derivatives to which forces add; see `solve.terms.term.Accumulators`."""
+
+    energy: Array  # of each term, in the order of `march.potential.TERMS` [J]
+    first: Array  # node, edge, pair and body in one piece, for clearing
+    node: Array
+    edge: Array
+    pair: Array
+    body: Array
+    carrier: Array
+    contact: Array
+    gradient: Array
+    attached: Array
+    second: Array  # all second derivatives but links in one piece
+    edge_hessian: Array
+    cross_hessian: Array
+    pair_hessian: Array
+    node_hessian: Array
+    body_hessian: Array
+    links: Array  # number of links, shape (1,)
+    link_node: Array
+    link_body: Array
+    link_hessian: Array
+
+
+@group
+class System:
+    """The Newton matrix, its factors, and steps; see `solve.newton_matrix`."""
+
+    band: Array
+    right: Array
+    step: Array
+    body_step: Array
+    node_step: Array
+    motion: Array
+
+
+@group
+class Border:
+    """Rows and columns of free bodies in the Newton matrix."""
+
+    border: Array
+    wide: Array
+    wide_solution: Array
+    corner: Array
+    schur: Array
+    load: Array  # shape (n_freedom,)
+    coupled: Array  # whether the border is not zero, shape (1,)
+
+
+@group
+class Problem:
+    """Everything that stays from step to step."""
+
+    gravity: Array
+    damping: float
+    strands: Strands
+    drives: Drives
+    space: Space | None
+    plane: Plane | None
+    off_axis: OffAxis | None
+    bonds: Bonds | None
+    bodies: Bodies
+    border: Border | None
+    held: Held
+    grips: Grips | None
+    surfaces: Surfaces | None
+    sliding: Sliding | None
+    threads: Threads | None
+    flow: Flow | None
+    fluid: Fluid | None
+    loads: PointForces | None
+    followers: PointForces | None
+    moments: Moments | None
+    sums: Sums
+    system: System
+
+
+@group
+class Place:
+    """A configuration; see `solve.configuration.Configuration`, whose arrays these are."""
+
+    carrier: Array
+    position: Array
+    point: Array
+    length: Array
+    tangent: Array
+    director1: Array
+    director2: Array
+    turn: Array
+    angle: Array
+    joint_strain: Array
+    body_position: Array
+    body_rotation: Array
+    place: Array
+    rotation: Array
+    surface_place: Array
+    surface_turn: Array
+    arm: Array
+    held: Array
+    point_arm: Array
+    surface_arm: Array
+
+
+@group
+class Stage:
+    """What is frozen over a stage; see `solve.terms.term.StepContext`. `lengths` holds γ h and γ′ h [s]."""
+
+    lengths: Array
+    origin_position: Array
+    origin_turn: Array
+    origin_body_position: Array
+    origin_place: Array
+    origin_rotation: Array
+    origin_fluid_momentum: Array
+    predicted_position: Array
+    predicted_turn: Array
+    predicted_body_position: Array
+    predicted_body_rotation: Array
+    twist: Array  # of joints at the start of the stage
+    rest_edge: Array  # strains without stress
+    rest_joint_out: Array
+    rest_joint: Array  # the same, read-only
+    load_factor: Array
+    body_turn: Array  # rotation vector to where inertia takes free bodies
+
+
+@group
+class Point:
+    """Positions and momenta at the start of a step, at the origin of a stage, or at its end; see `integrate.stages`."""
+
+    position: Array
+    body_position: Array
+    turn: Array
+    velocity: Array
+    spin: Array
+    body_velocity: Array
+    angular_momentum: Array
+    fluid_momentum: Array
+    rotation: Array
+
+
+@group
+class Method:
+    """Coefficients of an integrator; see `integrate.method`."""
+
+    diagonal: float
+    momentum_diagonal: float
+    couplings: Array  # over the diagonal, shape (n_stage, n_stage)
+    history: bool
+    along: Array
+    momenta: Array
+    bend: float
+    carry: float
+
+
+@group
+class Course:
+    """What acts from outside over some steps, at the end of each of their stages."""
+
+    time: Array  # at the end of each step [s], shape (n_step,)
+    elapsed: Array  # from the start of a step to each stage [s], shape (n_stage,)
+    first: Array  # stimuli at the start of each step, shape (n_step, n_channel)
+    jumps: Array  # whether a load jumps there, shape (n_step,)
+    stimulus: Array  # shape (n_step, n_stage, n_channel)
+    load_factor: Array  # shape (n_step, n_stage, n_load)
+    position: Array  # of all bodies; those of prescribed ones count, shape (n_step or 1, n_stage, n_body, 3)
+    rotation: Array  # shape (n_step or 1, n_stage, n_body, 3, 3)
+    rates: Array  # shape (n_step or 1, n_stage, n_body, 6)
+
+
+@group
+class Tally:
+    """Extremes over a run; see `integrate.statistics`."""
+
+    mass_moment: Array  # of edges along m1 [kg m], shape (n_edge,) or (0,)
+    mass: float  # of all rods [kg]
+    figures: Array  # greatest height of the mass centre [m], smallest gap [m], largest contact force [N]
+    nodes: Array  # that touch each surface now, shape (n_surface,)
+    most_nodes: Array
+    first_contact: Array  # [s], NaN before, shape (n_surface,)
+
+
+@group
+class Work:
+    """Places and points that a step needs."""
+
+    places: tuple[Place, Place, Place]
+    stage: Stage
+    first: Point
+    origins: tuple[Point, Point]
+    ends: tuple[Point, Point]
+    turned: Array
+    rotation: Array
+    transduction: Array  # at a stage, shape (n_law,)
+    strain: Array  # of laws at a stage, shape (n_law,)
+    touched: Array  # carriers that something pushed at the end of the last step, shape (n_carrier,)
+
+
+@group
+class StateArrays:
+    """What of a `model.state.State` a step changes."""
+
+    position: Array
+    velocity: Array
+    director1: Array
+    spin: Array
+    fluid_excess: Array
+    twist: Array
+    body_position: Array
+    body_rotation: Array
+    body_velocity: Array
+    body_angular_velocity: Array
+    kept: Array
+    acceleration: Array
+    spin_acceleration: Array
+    body_acceleration: Array
+    body_moment: Array
+    fluid_force: Array
+    transduction: Array

@@ -1,0 +1,277 @@
+"""Newton's method in compiled form: line search, step bound and measure of convergence as in `solve.newton`."""
+
+from __future__ import annotations
+
+import math
+
+from ..contact.near import largest_motion
+from ..contact.step_bound import step_bound
+from ..jit import kernel, part
+from ..kinematics.turning import turn_between, turn_by
+from ..solve.newton import ARMIJO, BACKTRACKING, KEEP_FACTOR_BELOW, MAX_BACKTRACKS, ROUNDING, largest_move
+from .matrix import factorise, solve
+from .place import carry_frames, copy_prescribed, move, put_carried
+from .potential import READY, RODS_FAR, RODS_TOUCH, evaluate, follow, list_pairs
+from .threads import bound_between_rods, rods_touch
+
+CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BEYOND, BLOCKED = 0, 10, 11, 12, 13, 14, 15
+"""How Newton ended, beside `NO_ROOM` and `RODS_TOUCH`: places of `solve.newton.NewtonStatus`, 10 on."""
+
+
+@kernel
+def correction_speed(strands, bodies, system, length):
+    """Largest displacement of a material point in the present step over a length of time [m/s]; NaN if any is."""
+    largest = largest_move(system.step, strands.node_unknown, strands.edge_unknown, strands.half_width)
+    for f in range(bodies.mass.shape[0]):
+        shift, turn = 0.0, 0.0
+        for c in range(3):
+            shift += system.body_step[f, c] ** 2
+            turn += system.body_step[f, 3 + c] ** 2
+        size = math.sqrt(shift) + bodies.reach[bodies.body_of_free[f]] * math.sqrt(turn)
+        if math.isnan(size):
+            return size
+        largest = max(largest, size)
+    return largest / length
+
+
+@kernel
+def bound(surfaces, threads, bodies, held, strands, system, at):
+    """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open, the near pair that sets it
+    (−1: none), and whether that could be found.
+    """
+    fraction, pair, status = _bound_at_surfaces(surfaces, bodies, system, at)
+    if status != READY:
+        return fraction, pair, status
+    between, status = _bound_between_rods(threads, strands, held, system, at)
+    if between < fraction:
+        return between, -1, status
+    return fraction, pair, status
+
+
+@kernel
+def _bound_at_surfaces(surfaces, bodies, system, at):
+    if surfaces is None:
+        return 1.0, -1, READY
+    motion = largest_motion(
+        system.node_step, surfaces.node_free, system.motion, bodies.reach, surfaces.body, surfaces.extent
+    )
+    status = list_pairs(surfaces, at, motion)
+    if status != READY:
+        return 0.0, -1, status
+    fraction, pair = step_bound(
+        surfaces.near_count[0],
+        surfaces.near_carrier,
+        surfaces.near_surface,
+        at.carrier,
+        surfaces.radius,
+        surfaces.follows,
+        system.node_step,
+        surfaces.kind,
+        surfaces.size,
+        surfaces.rounding,
+        at.surface_place,
+        at.surface_turn,
+        surfaces.body,
+        at.place,
+        system.motion,
+    )
+    return fraction, pair, READY
+
+
+@kernel
+def _bound_between_rods(threads, strands, held, system, at):
+    if threads is None:
+        return 1.0, READY
+    _move_held(held, system, at)
+    fraction, reached = bound_between_rods(threads, strands, system, at)
+    return fraction, READY if reached else RODS_FAR
+
+
+@kernel
+def _move_held(held, system, at):
+    """Displacements of nodes that bodies hold."""
+    for k in range(held.node.shape[0]):
+        i, b = held.node[k], held.body[k]
+        r0, r1, r2 = system.motion[b, 3], system.motion[b, 4], system.motion[b, 5]
+        system.node_step[i, 0] = system.motion[b, 0] + r1 * at.arm[k, 2] - r2 * at.arm[k, 1]
+        system.node_step[i, 1] = system.motion[b, 1] + r2 * at.arm[k, 0] - r0 * at.arm[k, 2]
+        system.node_step[i, 2] = system.motion[b, 2] + r0 * at.arm[k, 1] - r1 * at.arm[k, 0]
+
+
+@kernel
+def _move_prescribed(bodies, start, position, rotation, motion):
+    """Displacements and rotation vectors of prescribed bodies from a configuration to the given poses of all."""
+    for k in range(bodies.prescribed.shape[0]):
+        b = bodies.prescribed[k]
+        for c in range(3):
+            motion[b, c] = position[b, c] - start.place[b, c]
+            motion[b, 3 + c] = 0.0
+        if bodies.turns[b]:
+            motion[b, 3], motion[b, 4], motion[b, 5] = turn_between(start.rotation, b, rotation, b)
+
+
+@part
+def first_guess(p, start, position, rotation, stage, guess):
+    """Set `guess` to `start` moved by its velocity, prescribed bodies to the given poses.
+
+    Returns a status: `BLOCKED` with the blocking pair if prescribed motion would close a gap.
+    """
+    bodies, system = p.bodies, p.system
+    free = bodies.mass.shape[0]
+    _move_prescribed(bodies, start, position, rotation, system.motion)
+    fraction, pair = 1.0, -1
+    for attempt in range(3):
+        for f in range(free):
+            b = bodies.body_of_free[f]
+            for c in range(3):
+                way = stage.predicted_body_position[f, c] - start.body_position[f, c]
+                system.motion[b, c] = fraction * way
+                system.motion[b, 3 + c] = fraction * stage.body_turn[f, c]
+        for i in range(system.node_step.shape[0]):
+            for c in range(3):
+                system.node_step[i, c] = fraction * (stage.predicted_position[i, c] - start.position[i, c])
+        alpha, pair, status = bound(p.surfaces, p.threads, bodies, p.held, p.strands, system, start)
+        if status != READY:
+            return status, -1
+        if alpha >= 1.0:
+            break
+        if attempt == 2:
+            return BLOCKED, pair
+        fraction *= (0.5 if attempt == 0 else 0.0) * alpha
+    for i in range(system.node_step.shape[0]):
+        for c in range(3):
+            way = stage.predicted_position[i, c] - start.position[i, c]
+            guess.position[i, c] = start.position[i, c] + fraction * way
+    for k in range(p.strands.edge_count):
+        guess.turn[k] = fraction * stage.predicted_turn[k]
+    copy_prescribed(bodies, position, rotation, guess)
+    for f in range(free):
+        for c in range(3):
+            way = stage.predicted_body_position[f, c] - start.body_position[f, c]
+            guess.body_position[f, c] = start.body_position[f, c] + fraction * way
+        turn_by(
+            fraction * stage.body_turn[f, 0],
+            fraction * stage.body_turn[f, 1],
+            fraction * stage.body_turn[f, 2],
+            start.body_rotation,
+            f,
+            guess.body_rotation,
+            f,
+        )
+    put_carried(bodies, p.held, p.surfaces, p.strands, guess)
+    carry_frames(p.space, p.plane, p.strands, start, guess, guess.turn)
+    for k in range(stage.twist.shape[0]):
+        guess.joint_strain[k, 2] = stage.twist[k]
+    return (RODS_TOUCH if rods_touch(p.threads, p.strands, guess) else READY), -1
+
+
+FACTORISE, REFRESH, SEARCH = 0, 1, 2
+"""What an evaluation is for: a new matrix, a gradient for the old one, a step of the line search."""
+
+
+@part
+def minimise(p, at, trial, stage, tolerance, max_iterations):
+    """Move `at` to the minimum of the potential; `trial` is scratch.
+
+    The method is that of `solve.newton.NewtonSolver.minimise`, turned inside out: all evaluations are at one place,
+    because the compiler would make as many copies of them as there are places.
+
+    Returns
+    -------
+    status : int
+    swapped : bool
+        Whether the minimum is `trial` and not `at`.
+    iterations, factorisations, backtracks : int
+    residual : float
+        Speed of the correction that was left [m/s].
+    gap : float
+        Smallest gap to a surface [m].
+    """
+    follow(p, at, stage)
+    swapped, fresh, bounded, task = False, True, False, FACTORISE
+    iterations = factorisations = backtracks = halvings = 0
+    residual = previous = gap = math.inf
+    energy = alpha = slope = noise = 0.0
+    while True:
+        if task == SEARCH:
+            step, body_step = p.system.step, p.system.body_step
+            move(p.bodies, p.held, p.surfaces, p.space, p.plane, p.strands, at, step, body_step, alpha, trial)
+            if rods_touch(p.threads, p.strands, trial):
+                status = RODS_TOUCH
+                break
+        value, new_gap = evaluate(p, trial if task == SEARCH else at, stage, task == FACTORISE)
+        if task == SEARCH:
+            if not value <= energy + ARMIJO * alpha * slope + noise:
+                alpha *= BACKTRACKING
+                halvings += 1
+                if halvings < MAX_BACKTRACKS:
+                    continue
+                if fresh:
+                    status = LINE_SEARCH
+                    break
+                previous, task = 0.0, REFRESH  # a direction of an old matrix: try that of a new one
+                continue
+            energy, gap = value, new_gap
+            backtracks += halvings + bounded
+            iterations += not fresh
+            previous = residual if halvings + bounded == 0 else 0.0
+            fresh = False
+            at, trial, swapped = trial, at, not swapped
+            if follow(p, at, stage):
+                task = REFRESH
+                continue
+        else:
+            energy, gap = value, new_gap
+            if task == FACTORISE:
+                if factorisations == 0 and not math.isfinite(energy):
+                    status = NOT_FINITE
+                    break
+                factorisations += 1
+                if not factorise(p, at, stage):
+                    status = INDEFINITE
+                    break
+                iterations += 1
+                fresh, previous = True, math.inf
+        solve(p.space, p.plane, p.border, p.strands, p.bodies, p.sums, p.system)
+        residual = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
+        if not math.isfinite(residual):
+            status = NOT_FINITE
+            break
+        if residual <= tolerance:
+            status = CONVERGED
+            break
+        if iterations >= max_iterations:
+            status = MAX_ITERATIONS
+            break
+        if not fresh and residual > KEEP_FACTOR_BELOW * previous:
+            task = FACTORISE
+            continue
+        slope, noise = _look_ahead(p.strands, p.bodies, p.sums, p.system)
+        alpha, _, status = bound(p.surfaces, p.threads, p.bodies, p.held, p.strands, p.system, at)
+        if status != READY:
+            break
+        bounded, halvings, task = alpha < 1.0, 0, SEARCH
+    return status, swapped, iterations, factorisations, backtracks, residual, gap
+
+
+@kernel
+def _look_ahead(strands, bodies, sums, system):
+    """Slope of the potential along the present step, and the difference below which its values mean nothing [J]; the
+    motion of nodes and bodies is left for the bound.
+    """
+    slope, noise = 0.0, 0.0
+    for j in range(system.step.shape[0]):
+        slope += sums.gradient[j] * system.step[j]
+    for f in range(bodies.mass.shape[0]):
+        for c in range(6):
+            slope += sums.body[f, c] * system.body_step[f, c]
+            system.motion[bodies.body_of_free[f], c] = system.body_step[f, c]
+    for k in range(sums.energy.shape[0]):
+        noise += abs(sums.energy[k])
+    for k in range(bodies.prescribed.shape[0]):
+        for c in range(6):
+            system.motion[bodies.prescribed[k], c] = 0.0
+    for i in range(strands.node_unknown.shape[0]):
+        for c in range(3):
+            system.node_step[i, c] = system.step[strands.node_unknown[i] + c]
+    return slope, ROUNDING * noise

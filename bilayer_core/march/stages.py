@@ -1,0 +1,328 @@
+"""Origins, predictions and ends of stages in compiled form; see `integrate.stages` and `integrate.slopes`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..jit import kernel
+from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn_by
+from ..kinematics.vector import row
+from .copying import add_scaled, copy, copy_matrix, copy_row
+from .potential import survey
+
+SPIN_ITERATIONS = 50
+SPIN_CHANGE = 1e-15
+
+
+@kernel
+def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
+    """I ω of free body f at rotation[b], as a tuple."""
+    inertia_tensor(second_moment, f, rotation, b, scratch)
+    return (
+        scratch[0, 0] * x + scratch[0, 1] * y + scratch[0, 2] * z,
+        scratch[1, 0] * x + scratch[1, 1] * y + scratch[1, 2] * z,
+        scratch[2, 0] * x + scratch[2, 1] * y + scratch[2, 2] * z,
+    )
+
+
+@kernel
+def start_point(bodies, fluid, strands, state, start, first):
+    """The start of a step."""
+    copy(start.position, first.position)
+    copy(state.body_position, first.body_position)
+    copy(state.body_rotation, first.rotation)
+    first.turn[:] = 0.0
+    copy(state.velocity, first.velocity)
+    copy(state.spin, first.spin)
+    scratch = np.empty((3, 3))
+    for f in range(bodies.mass.shape[0]):
+        b = bodies.body_of_free[f]
+        copy_row(state.body_velocity, b, first.body_velocity, f)
+        w0, w1, w2 = row(state.body_angular_velocity, b)
+        momentum = _tensor_times(bodies.second_moment, f, start.body_rotation, f, w0, w1, w2, scratch)
+        for c in range(3):
+            first.angular_momentum[f, c] = momentum[c]
+    survey(fluid, strands, start, state.velocity, first.fluid_momentum)
+    add_scaled(first.fluid_momentum, 1.0, state.fluid_excess)
+
+
+@kernel
+def _add_weighted(total, end, origin, weight):
+    """total += w (end − origin) of arrays with the same shape."""
+    a, b, c = total.reshape(total.size), end.reshape(end.size), origin.reshape(origin.size)
+    for i in range(a.shape[0]):
+        a[i] += weight * (b[i] - c[i])
+
+
+@kernel
+def copy_point(source, target):
+    """All parts of a point."""
+    copy(source.position, target.position)
+    copy(source.body_position, target.body_position)
+    copy(source.turn, target.turn)
+    copy(source.velocity, target.velocity)
+    copy(source.spin, target.spin)
+    copy(source.body_velocity, target.body_velocity)
+    copy(source.angular_momentum, target.angular_momentum)
+    copy(source.fluid_momentum, target.fluid_momentum)
+    copy(source.rotation, target.rotation)
+
+
+@kernel
+def add_stage(total, weight, origin, end, scratch):
+    """total += w (end − origin); rotations likewise on their group. `scratch` has room for all rotations."""
+    _add_weighted(total.position, end.position, origin.position, weight)
+    _add_weighted(total.body_position, end.body_position, origin.body_position, weight)
+    _add_weighted(total.turn, end.turn, origin.turn, weight)
+    _add_weighted(total.velocity, end.velocity, origin.velocity, weight)
+    _add_weighted(total.spin, end.spin, origin.spin, weight)
+    _add_weighted(total.body_velocity, end.body_velocity, origin.body_velocity, weight)
+    _add_weighted(total.angular_momentum, end.angular_momentum, origin.angular_momentum, weight)
+    _add_weighted(total.fluid_momentum, end.fluid_momentum, origin.fluid_momentum, weight)
+    copy(total.rotation, scratch)
+    for b in range(total.rotation.shape[0]):
+        x, y, z = turn_between(origin.rotation, b, end.rotation, b)
+        turn_by(weight * x, weight * y, weight * z, scratch, b, total.rotation, b)
+
+
+@kernel
+def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
+    """Move an origin by what the slopes at the start of a step of length h add to it.
+
+    `along`, `bend` and `momenta` are the weights of q̇ h, q̈ h² and ṗ h.
+    """
+    add_scaled(point.position, along * h, state.velocity)
+    add_scaled(point.body_position, along * h, state.body_velocity)
+    add_scaled(point.turn, along * h, state.spin)
+    if bend != 0.0:
+        add_scaled(point.position, bend * h * h, state.acceleration)
+        add_scaled(point.turn, bend * h * h, state.spin_acceleration)
+    add_scaled(point.velocity, momenta * h, state.acceleration)
+    add_scaled(point.spin, momenta * h, state.spin_acceleration)
+    add_scaled(point.body_velocity, momenta * h, state.body_acceleration)
+    add_scaled(point.angular_momentum, momenta * h, state.body_moment)
+    add_scaled(point.fluid_momentum, momenta * h, state.fluid_force)
+    tensor = np.empty((3, 3))
+    copy(point.rotation, scratch)
+    for b in range(point.rotation.shape[0]):
+        f = bodies.free_index[b]
+        w = row(state.body_angular_velocity, b)
+        x, y, z = along * h * w[0], along * h * w[1], along * h * w[2]
+        if f >= 0:
+            for c in range(3):
+                point.body_position[b, c] += bend * h * h * state.body_acceleration[f, c]
+            m = row(first.angular_momentum, f)
+            inertia_tensor(bodies.second_moment, f, state.body_rotation, b, tensor)
+            rate = solve_three(
+                tensor,
+                state.body_moment[f, 0] - (w[1] * m[2] - w[2] * m[1]),
+                state.body_moment[f, 1] - (w[2] * m[0] - w[0] * m[2]),
+                state.body_moment[f, 2] - (w[0] * m[1] - w[1] * m[0]),
+            )
+            x += bend * h * h * rate[0]
+            y += bend * h * h * rate[1]
+            z += bend * h * h * rate[2]
+        turn_by(x, y, z, scratch, b, point.rotation, b)
+
+
+@kernel
+def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned, scratch):
+    """ω̃ with I(exp(length ω̃) R̄) ω̃ = L̄ [rad/s], by iteration; exp(length ω̃) R̄ is left in turned[f]."""
+    x = y = z = 0.0
+    copy_matrix(rotation, b, turned, f)
+    if momentum[f, 0] == 0.0 and momentum[f, 1] == 0.0 and momentum[f, 2] == 0.0:
+        return x, y, z
+    for _ in range(SPIN_ITERATIONS):
+        inertia_tensor(second_moment, f, turned, f, scratch)
+        u, v, w = solve_three(scratch, momentum[f, 0], momentum[f, 1], momentum[f, 2])
+        change = max(abs(u - x), abs(v - y), abs(w - z))
+        x, y, z = u, v, w
+        turn_by(length * x, length * y, length * z, rotation, b, turned, f)
+        if change <= SPIN_CHANGE * max(abs(x), abs(y), abs(z)):
+            break
+    return x, y, z
+
+
+@kernel
+def predict(bodies, held, origin, start, turned, position, rotation, rates, stage):
+    """Frozen data of a stage from its origin; puts the origin of what bodies hold to where it has their velocity.
+
+    `turned` is the turn of edges from the start of the step to `start`; `position`, `rotation` and `rates` are those
+    of prescribed bodies at the time of the stage, among those of all.
+    """
+    length = stage.lengths[0]
+    count = origin.rotation.shape[0]
+    for b in range(count):
+        f = bodies.free_index[b]
+        if f < 0:
+            w0, w1, w2 = rates[b, 3], rates[b, 4], rates[b, 5]
+            for c in range(3):
+                origin.body_position[b, c] = position[b, c] - length * rates[b, c]
+            _set_back(rotation, b, length, w0, w1, w2, stage.origin_rotation, b)
+        else:
+            scratch = np.empty((3, 3))
+            w0, w1, w2 = _spin_without_moment(
+                bodies.second_moment,
+                f,
+                origin.rotation,
+                b,
+                origin.angular_momentum,
+                length,
+                stage.predicted_body_rotation,
+                scratch,
+            )
+            _set_back(stage.predicted_body_rotation, f, length, w0, w1, w2, stage.origin_rotation, b)
+            for c in range(3):
+                stage.origin_body_position[f, c] = origin.body_position[b, c]
+                stage.predicted_body_position[f, c] = origin.body_position[b, c] + length * origin.body_velocity[f, c]
+            x, y, z = turn_between(start.body_rotation, f, stage.predicted_body_rotation, f)
+            stage.body_turn[f, 0], stage.body_turn[f, 1], stage.body_turn[f, 2] = x, y, z
+        for c in range(3):
+            stage.origin_place[b, c] = origin.body_position[b, c]
+    _put_origin_of_held(held, origin, stage)
+    for i in range(origin.position.shape[0]):
+        for c in range(3):
+            stage.origin_position[i, c] = origin.position[i, c]
+            stage.predicted_position[i, c] = origin.position[i, c] + length * origin.velocity[i, c]
+    for k in range(origin.turn.shape[0]):
+        stage.origin_turn[k] = origin.turn[k] - turned[k]
+        stage.predicted_turn[k] = stage.origin_turn[k] + length * origin.spin[k]
+    for i in range(origin.fluid_momentum.shape[0]):
+        for c in range(3):
+            stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
+    for k in range(stage.twist.shape[0]):
+        stage.twist[k] = start.joint_strain[k, 2]
+
+
+@kernel
+def _set_back(rotation, b, length, w0, w1, w2, out, c):
+    """out[c] = (1 − length [ω]×) rotation[b]"""
+    for j in range(3):
+        u0, u1, u2 = rotation[b, 0, j], rotation[b, 1, j], rotation[b, 2, j]
+        out[c, 0, j] = u0 - length * (w1 * u2 - w2 * u1)
+        out[c, 1, j] = u1 - length * (w2 * u0 - w0 * u2)
+        out[c, 2, j] = u2 - length * (w0 * u1 - w1 * u0)
+
+
+@kernel
+def _put_origin_of_held(held, origin, stage):
+    for k in range(held.node.shape[0]):
+        b, i = held.body[k], held.node[k]
+        for c in range(3):
+            origin.position[i, c] = origin.body_position[b, c]
+            for m in range(3):
+                origin.position[i, c] += stage.origin_rotation[b, c, m] * held.position[k, m]
+
+
+@kernel
+def end_point(bodies, fluid, strands, stage, origin, turned, end, position, rotation, point):
+    """The end of a stage that was solved; parameters as for `predict`."""
+    length = stage.lengths[0]
+    for b in range(position.shape[0]):
+        f = bodies.free_index[b]
+        if f < 0:
+            copy_row(position, b, point.body_position, b)
+            copy_matrix(rotation, b, point.rotation, b)
+            continue
+        copy_row(end.body_position, f, point.body_position, b)
+        copy_matrix(end.body_rotation, f, point.rotation, b)
+        for c in range(3):
+            point.body_velocity[f, c] = (end.body_position[f, c] - stage.origin_body_position[f, c]) / length
+        # moment of inertia's potential at the end: −ax(R̃ J Rᵀ)/(γ γ′ h²), see `forces.body`
+        second, r, q = bodies.second_moment, stage.predicted_body_rotation, end.body_rotation
+        factor = 1.0 / length  # γ′ h times 1/(γ γ′ h²)
+        a21 = a12 = a02 = a20 = a10 = a01 = 0.0
+        for k in range(3):
+            for m in range(3):
+                j = second[f, k, m]
+                a21 += r[f, 2, k] * j * q[f, 1, m]
+                a12 += r[f, 1, k] * j * q[f, 2, m]
+                a02 += r[f, 0, k] * j * q[f, 2, m]
+                a20 += r[f, 2, k] * j * q[f, 0, m]
+                a10 += r[f, 1, k] * j * q[f, 0, m]
+                a01 += r[f, 0, k] * j * q[f, 1, m]
+        point.angular_momentum[f, 0] = origin.angular_momentum[f, 0] - factor * (a21 - a12)
+        point.angular_momentum[f, 1] = origin.angular_momentum[f, 1] - factor * (a02 - a20)
+        point.angular_momentum[f, 2] = origin.angular_momentum[f, 2] - factor * (a10 - a01)
+    for i in range(point.position.shape[0]):
+        for c in range(3):
+            point.position[i, c] = end.position[i, c]
+            point.velocity[i, c] = (end.position[i, c] - stage.origin_position[i, c]) / length
+    for k in range(point.turn.shape[0]):
+        point.turn[k] = turned[k] + end.turn[k]
+        point.spin[k] = (end.turn[k] - stage.origin_turn[k]) / length
+    survey(fluid, strands, end, point.velocity, point.fluid_momentum)
+
+
+@kernel
+def write_state(bodies, held, fluid, strands, state, last, end, rates):
+    """Take the end of a step into the state; `rates` are those of prescribed bodies."""
+    copy(last.velocity, state.velocity)
+    _write_velocity_of_held(held, end, rates, state)
+    copy(end.position, state.position)
+    survey(fluid, strands, end, last.velocity, state.fluid_excess)
+    for i in range(state.fluid_excess.shape[0]):
+        for c in range(3):
+            state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]
+    for k in range(strands.edge_count):
+        copy_row(end.director1, k, state.director1, k)
+    copy(last.spin, state.spin)
+    for k in range(state.twist.shape[0]):
+        state.twist[k] = end.joint_strain[k, 2]
+    copy(last.body_position, state.body_position)
+    copy(last.rotation, state.body_rotation)
+    tensor = np.empty((3, 3))
+    for b in range(rates.shape[0]):
+        f = bodies.free_index[b]
+        if f < 0:
+            for c in range(3):
+                state.body_velocity[b, c], state.body_angular_velocity[b, c] = rates[b, c], rates[b, 3 + c]
+            continue
+        inertia_tensor(bodies.second_moment, f, end.body_rotation, f, tensor)
+        momentum = row(last.angular_momentum, f)
+        spin = solve_three(tensor, momentum[0], momentum[1], momentum[2])
+        for c in range(3):
+            state.body_velocity[b, c], state.body_angular_velocity[b, c] = last.body_velocity[f, c], spin[c]
+        _write_orthonormal(end.body_rotation, f, state.body_rotation, b)
+
+
+@kernel
+def _write_velocity_of_held(held, end, rates, state):
+    for k in range(held.node.shape[0]):
+        if held.free[k] >= 0:
+            continue
+        b, i = held.body[k], held.node[k]
+        w0, w1, w2 = rates[b, 3], rates[b, 4], rates[b, 5]
+        state.velocity[i, 0] = rates[b, 0] + w1 * end.arm[k, 2] - w2 * end.arm[k, 1]
+        state.velocity[i, 1] = rates[b, 1] + w2 * end.arm[k, 0] - w0 * end.arm[k, 2]
+        state.velocity[i, 2] = rates[b, 2] + w0 * end.arm[k, 1] - w1 * end.arm[k, 0]
+
+
+@kernel
+def _write_orthonormal(matrix, f, out, b):
+    """The rotation nearest to `matrix[f]` to first order in its error: 1.5 R − 0.5 R Rᵀ R."""
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                for m in range(3):
+                    total += matrix[f, i, k] * matrix[f, m, k] * matrix[f, m, j]
+            out[b, i, j] = 1.5 * matrix[f, i, j] - 0.5 * total
+
+
+@kernel
+def _keep(rate, end, origin, length, carry):
+    a, b, c = rate.reshape(rate.size), end.reshape(end.size), origin.reshape(origin.size)
+    for i in range(a.shape[0]):
+        a[i] = ((b[i] - c[i]) / length - carry * a[i]) / (1.0 - carry)
+
+
+@kernel
+def keep_slopes(state, origin, end, momentum_length, carry):
+    """Write the slopes of momenta at the end of the last stage of a step into the state."""
+    _keep(state.acceleration, end.velocity, origin.velocity, momentum_length, carry)
+    _keep(state.spin_acceleration, end.spin, origin.spin, momentum_length, carry)
+    _keep(state.body_acceleration, end.body_velocity, origin.body_velocity, momentum_length, carry)
+    _keep(state.body_moment, end.angular_momentum, origin.angular_momentum, momentum_length, carry)
+    _keep(state.fluid_force, end.fluid_momentum, origin.fluid_momentum, momentum_length, carry)
+    state.kept[0] = 1.0

@@ -1,0 +1,244 @@
+"""One step, all its stages, in one compiled function."""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import kernel, part
+from ..scene.transduction import grown, lagged
+from .copying import copy
+from .newton import CONVERGED, MAX_ITERATIONS, first_guess, minimise
+from .place import take_state
+from .potential import JUMPED, READY, start_stage
+from .stages import add_stage, copy_point, end_point, keep_slopes, move_along, predict, start_point, write_state
+
+
+@kernel
+def grow(drives, law_strain, rest_edge_out, rest_joint_out):
+    """Rest strains of edges and joints from the eigenstrain of laws."""
+    copy(drives.rest_strain, rest_edge_out)
+    for k in range(drives.driven_edge.shape[0]):
+        rest_edge_out[drives.driven_edge[k]] += drives.driven_weight[k] * law_strain[drives.driven_law[k]]
+    copy(drives.joint_rest, rest_joint_out)
+    for k in range(drives.driven_joint.shape[0]):
+        bent = drives.driven_joint_weight[k] * law_strain[drives.driven_joint_law[k]]
+        rest_joint_out[drives.driven_joint[k], 0] += bent
+
+
+@part
+def _compare_touched(sums, touched):
+    """Note which carriers something pushes; whether they are those of before."""
+    same = True
+    for i in range(touched.shape[0]):
+        pushed = sums.carrier[i, 0] != 0.0 or sums.carrier[i, 1] != 0.0 or sums.carrier[i, 2] != 0.0
+        same &= pushed == touched[i]
+        touched[i] = pushed
+    return same
+
+
+@part
+def _has_jumped(drives, state, first, range_of_channel, h):
+    """Whether a stimulus has jumped that some layer follows at once, or a step before did not leave its slopes."""
+    if state.kept[0] == 0.0:
+        return True
+    for k in range(drives.law_channel.shape[0]):
+        channel = drives.law_channel[k]
+        way = first[channel] - state.transduction[k]
+        lag = drives.law_rising[k] if way > 0.0 else drives.law_falling[k]
+        if abs(way) > NO_JUMP * range_of_channel[channel] and lag < AT_ONCE * h:
+            return True
+    return False
+
+
+AT_ONCE = 1e-2
+"""Part of a step below which the lag of a layer makes no difference to a jump of its stimulus."""
+NO_JUMP = 1e-9
+"""Part of a channel's range below which a change at once is rounding."""
+
+
+@part
+def _drive(drives, state, course, k, n, work, stage):
+    """What acts from outside at stage n of step k."""
+    transduction, strain = work.transduction, work.strain
+    for i in range(drives.law_channel.shape[0]):
+        channel = drives.law_channel[i]
+        first, last = course.first[k, channel], course.stimulus[k, n, channel]
+        lags = drives.law_rising[i], drives.law_falling[i]
+        transduction[i] = lagged(state.transduction[i], first, last, lags[0], lags[1], course.elapsed[n])
+        strain[i] = grown(transduction[i], drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i])
+    grow(drives, strain, stage.rest_edge, stage.rest_joint_out)
+    for i in range(stage.load_factor.shape[0]):
+        stage.load_factor[i] = course.load_factor[k, n, i]
+
+
+@part
+def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterations):
+    """Advance a state by a step of length h [s]; it changes only if every stage converged.
+
+    Parameters
+    ----------
+    p : Problem
+    state : StateArrays
+    method : Method
+        For this step.
+    keeps : bool
+        Whether the integrator of the run keeps slopes.
+    course : Course
+    k : int
+        Which step of the course.
+    work : Work
+    h : float
+    tolerance : float
+        [m/s]
+    max_iterations : int
+
+    Returns
+    -------
+    status : int
+    pair : int
+        Blocking pair, −1 if none.
+    end : int
+        Place in `work.places` of the last configuration.
+    iterations, factorisations, backtracks : int
+    residual, gap : float
+    """
+    first, stage = work.first, work.stage
+    bodies, held, strands = p.bodies, p.held, p.strands
+    s, e, t = 0, 1, 2
+    take_state(bodies, held, p.surfaces, strands, state, work.places[s])
+    start_point(bodies, p.fluid, strands, state, work.places[s], first)
+    stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
+    work.turned[:] = 0.0
+    iterations = factorisations = backtracks = 0
+    worst, gap = 0.0, math.inf
+    stages = course.elapsed.shape[0]
+    place = min(k, course.position.shape[0] - 1)
+    for n in range(stages):
+        origin = work.origins[n]
+        copy_point(first, origin)
+        for j in range(n):
+            add_stage(origin, method.couplings[n, j], work.origins[j], work.ends[j], work.rotation)
+        if method.history:
+            move_along(bodies, origin, state, first, h, method.along[n], method.bend, method.momenta[n], work.rotation)
+        _drive(p.drives, state, course, k, n, work, stage)
+        position, rotation = course.position[place, n], course.rotation[place, n]
+        start = work.places[s]
+        predict(bodies, held, origin, start, work.turned, position, rotation, course.rates[place, n], stage)
+        status = start_stage(p, start, stage)
+        if status != READY:
+            return status, -1, e, iterations, factorisations, backtracks, worst, gap
+        status, pair = first_guess(p, start, position, rotation, stage, work.places[e])
+        if status != READY:
+            return status, pair, e, iterations, factorisations, backtracks, math.inf, gap
+        status, swapped, more, factors, halvings, residual, gap = minimise(
+            p, work.places[e], work.places[t], stage, tolerance, max_iterations
+        )
+        if swapped:
+            e, t = t, e
+        iterations += more
+        factorisations += factors
+        backtracks += halvings
+        if status != CONVERGED:
+            return status, -1, e, iterations, factorisations, backtracks, residual, gap
+        worst = max(worst, residual)
+        end, ended = work.places[e], work.ends[n]
+        end_point(bodies, p.fluid, strands, stage, origin, work.turned, end, position, rotation, ended)
+        if n + 1 < stages:
+            copy(work.ends[n].turn, work.turned)
+            s, e = e, s
+            work.places[s].turn[:] = 0.0
+    last = stages - 1
+    write_state(bodies, held, p.fluid, strands, state, work.ends[last], work.places[e], course.rates[place, last])
+    for i in range(state.transduction.shape[0]):
+        state.transduction[i] = work.transduction[i]
+    if keeps:
+        keep_slopes(state, work.origins[last], work.ends[last], stage.lengths[1], method.carry)
+        state.kept[0] = _compare_touched(p.sums, work.touched)
+    return CONVERGED, -1, e, iterations, factorisations, backtracks, worst, gap
+
+
+@kernel
+def count_in(surfaces, strands, sums, state, gap, time, tally):
+    """Take the end of a step into the extremes of a run."""
+    figures, nodes = tally.figures, strands.node_mass.shape[0]
+    height = 0.0
+    for i in range(nodes):
+        height += strands.node_mass[i] * state.position[i, 2]
+    for k in range(tally.mass_moment.shape[0]):
+        height += tally.mass_moment[k] * state.director1[k, 2]
+    figures[0] = max(figures[0], height / tally.mass)
+    figures[1] = min(figures[1], gap)
+    largest = 0.0
+    for i in range(nodes):
+        force = sums.carrier[i, 0] ** 2 + sums.carrier[i, 1] ** 2 + sums.carrier[i, 2] ** 2
+        largest = max(largest, force)
+    figures[2] = max(figures[2], math.sqrt(largest))
+    _count_contacts(surfaces, nodes, time, tally)
+
+
+@kernel
+def _count_contacts(surfaces, nodes, time, tally):
+    if surfaces is None:
+        return
+    count = tally.nodes
+    count[:] = 0
+    for c in range(surfaces.near_count[0]):
+        if surfaces.near_gap[c] < surfaces.d_hat and surfaces.near_carrier[c] < nodes:
+            count[surfaces.near_surface[c]] += 1
+    for s in range(count.shape[0]):
+        tally.most_nodes[s] = max(tally.most_nodes[s], count[s])
+        if count[s] > 0 and math.isnan(tally.first_contact[s]):
+            tally.first_contact[s] = time
+
+
+@kernel
+def take_steps(p, state, method, keeps, changes, course, ranges, work, counts, tally, h, tolerance, max_iterations):
+    """Advance a state by the steps of a course, as far as each succeeds; parameters beside those of `take_step`:
+
+    Parameters
+    ----------
+    changes : bool
+        Whether `method` begins with slopes that the step before must have left: a jump ends the loop then.
+    ranges : Array
+        Of channels, in their units, shape (n_channel,).
+    counts : bool
+        Whether to take the steps into the tally.
+    tally : Tally
+
+    Returns
+    -------
+    done : int
+        Number of steps made.
+    status, pair, end : int
+        Of the last attempt, as for `take_step`.
+    iterations, factorisations, backtracks : int
+        Of all attempts.
+    residual, largest_residual, gap : float
+    """
+    iterations = factorisations = backtracks = 0
+    residual = worst = 0.0
+    gap = math.inf
+    status, pair, end = READY, -1, 1
+    for k in range(course.time.shape[0]):
+        if changes and (course.jumps[k] or _has_jumped(p.drives, state, course.first[k], ranges, h)):
+            return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
+        status, pair, e, more, factors, halvings, left, nearest = take_step(
+            p, state, method, keeps, course, k, work, h, tolerance, max_iterations
+        )
+        if status == CONVERGED or status >= MAX_ITERATIONS:  # what has to be begun again does not count
+            iterations += more
+            factorisations += factors
+            backtracks += halvings
+        if status != CONVERGED:
+            return k, status, pair, e, iterations, factorisations, backtracks, left, worst, nearest
+        residual, gap, end = left, nearest, e
+        worst = max(worst, residual)
+        if counts:
+            count_in(p.surfaces, p.strands, p.sums, state, gap, course.time[k], tally)
+    return course.time.shape[0], status, pair, end, iterations, factorisations, backtracks, residual, worst, gap
+
+
+@kernel
+def count_step(p, state, gap, time, tally):
+    """Take the end of a step that no loop has made into the extremes of a run."""
+    count_in(p.surfaces, p.strands, p.sums, state, gap, time, tally)
