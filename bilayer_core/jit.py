@@ -47,6 +47,11 @@ def kernel(function):
     return numba.njit(**OPTIONS)(function)
 
 
+def inner(function):
+    """A kernel that only other kernels call: without what would let the interpreter do so."""
+    return numba.njit(**OPTIONS, no_cpython_wrapper=True)(function)
+
+
 def part(function):
     """A kernel that one other kernel calls, once: compiled there, as if it were written there, and not by itself."""
     return numba.njit(**OPTIONS, inline="always")(function)

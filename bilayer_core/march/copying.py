@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ..jit import kernel
+from ..jit import inner
 
 
-@kernel
+@inner
 def copy(source, target):
     """target = source, for contiguous arrays."""
     a, b = source.reshape(source.size), target.reshape(target.size)
@@ -13,7 +13,7 @@ def copy(source, target):
         b[i] = a[i]
 
 
-@kernel
+@inner
 def add_scaled(target, factor, source):
     """target += factor source, for contiguous arrays."""
     a, b = source.reshape(source.size), target.reshape(target.size)
@@ -21,14 +21,14 @@ def add_scaled(target, factor, source):
         b[i] += factor * a[i]
 
 
-@kernel
+@inner
 def copy_row(source, i, target, j):
     """target[j] = source[i], for rows of three."""
     for c in range(3):
         target[j, c] = source[i, c]
 
 
-@kernel
+@inner
 def copy_matrix(source, i, target, j):
     """target[j] = source[i], for 3 × 3 matrices."""
     for c in range(3):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..jit import kernel, part
+from ..jit import inner, part
 from ..solve.assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
 from ..solve.band import factor_band, solve_band, solve_columns
 from ..solve.clamps import hand_nodes_to_bodies, hand_rows_to_bodies, hand_walls_to_bodies
@@ -13,7 +13,7 @@ from ..solve.planar_matrix import hand_walls_to_bodies_in_plane
 from .copying import copy
 
 
-@kernel
+@inner
 def _assemble_in_space(space, bonds, strands, sums, factor, band):
     if space is None:
         return
@@ -43,7 +43,7 @@ def _assemble_in_space(space, bonds, strands, sums, factor, band):
     _add_pairs(bonds, space, strands, sums, band)
 
 
-@kernel
+@inner
 def _assemble_in_plane(plane, bonds, strands, at, sums, factor, band):
     if plane is None:
         return
@@ -65,7 +65,7 @@ def _assemble_in_plane(plane, bonds, strands, at, sums, factor, band):
     _add_pairs_in_plane(plane, bonds, strands, sums, band)
 
 
-@kernel
+@inner
 def _add_pairs_in_plane(plane, bonds, strands, sums, band):
     if bonds is None:
         return
@@ -83,7 +83,7 @@ def _add_pairs_in_plane(plane, bonds, strands, sums, band):
     )
 
 
-@kernel
+@inner
 def _add_pairs(bonds, space, strands, sums, band):
     if bonds is None:
         return
@@ -100,7 +100,7 @@ def _add_pairs(bonds, space, strands, sums, band):
     )
 
 
-@kernel
+@inner
 def _assemble_border(border, grips, space, plane, strands, sums, band, at):
     """U and D of free bodies: links of contact, and what they hold. Whether U is not zero is left in `coupled`."""
     if border is None:
@@ -115,7 +115,7 @@ def _assemble_border(border, grips, space, plane, strands, sums, band, at):
     _hand_to_bodies(grips, space, plane, border, strands, at, sums, band)
 
 
-@kernel
+@inner
 def _hand_to_bodies(grips, space, plane, border, strands, at, sums, band):
     if grips is None:
         return
@@ -140,7 +140,7 @@ def _hand_to_bodies(grips, space, plane, border, strands, at, sums, band):
     _hand_walls_in_plane(plane, grips, border, strands, at, sums)
 
 
-@kernel
+@inner
 def _hand_walls(space, grips, border, strands, at, sums):
     if space is None:
         return
@@ -167,7 +167,7 @@ def _hand_walls(space, grips, border, strands, at, sums):
     )
 
 
-@kernel
+@inner
 def _hand_walls_in_plane(plane, grips, border, strands, at, sums):
     if plane is None:
         return
@@ -193,12 +193,12 @@ def _hand_walls_in_plane(plane, grips, border, strands, at, sums):
     )
 
 
-@kernel
+@inner
 def _hold(held, strands, band):
     hold_unknowns(held.row, strands.dimension, len(strands.bandwidth), band)
 
 
-@kernel
+@inner
 def _clear_held_rows(held, dimension, border):
     for k in range(held.row.shape[0]):
         for row in range(held.row[k], held.row[k] + dimension):
@@ -206,7 +206,7 @@ def _clear_held_rows(held, dimension, border):
                 border[row, i] = 0.0
 
 
-@kernel
+@inner
 def _take_border(border, bodies, held, dimension, size, shift):
     """D and U restricted to what bodies may do, shifted by multiples of their masses."""
     if border is None:
@@ -236,7 +236,7 @@ def _take_border(border, bodies, held, dimension, size, shift):
                     wide[row, a] += value * freedom[i, a]
 
 
-@kernel
+@inner
 def _factorise_border(border, strands, band):
     """S = D − Uᵀ A⁻¹ U, factorised; false if it is not positive definite."""
     if border is None:
@@ -276,7 +276,7 @@ def factorise(p, at, stage):
             return False
 
 
-@kernel
+@inner
 def solve(space, plane, border, strands, bodies, sums, system):
     """Minus the inverse of the factorised matrix times the present gradient, to `step` and `body_step`."""
     size, right = strands.size, system.right
@@ -292,7 +292,7 @@ def solve(space, plane, border, strands, bodies, sums, system):
     _put_step_in_plane(plane, strands, right, system.step)
 
 
-@kernel
+@inner
 def _take_gradient(space, gradient, out):
     if space is None:
         return
@@ -300,14 +300,14 @@ def _take_gradient(space, gradient, out):
         out[j] = gradient[j]
 
 
-@kernel
+@inner
 def _take_gradient_in_plane(plane, strands, gradient, out):
     if plane is None:
         return
     take_in_plane(strands.axes, strands.node_unknown, strands.row, gradient, out)
 
 
-@kernel
+@inner
 def _put_step(space, right, step):
     if space is None:
         return
@@ -315,14 +315,14 @@ def _put_step(space, right, step):
         step[j] = right[j]
 
 
-@kernel
+@inner
 def _put_step_in_plane(plane, strands, right, step):
     if plane is None:
         return
     put_in_space(strands.axes, strands.node_unknown, strands.row, right, step)
 
 
-@kernel
+@inner
 def _solve_border(border, bodies, body_gradient, size, right, body_step):
     """The step of free bodies, and what it changes in that of rods."""
     if border is None:

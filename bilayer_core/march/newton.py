@@ -6,7 +6,7 @@ import math
 
 from ..contact.near import largest_motion
 from ..contact.step_bound import step_bound
-from ..jit import kernel, part
+from ..jit import inner, part
 from ..kinematics.turning import turn_between, turn_by
 from ..solve.newton import ARMIJO, BACKTRACKING, KEEP_FACTOR_BELOW, MAX_BACKTRACKS, ROUNDING, largest_move
 from .matrix import factorise, solve
@@ -18,7 +18,7 @@ CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BEYOND, BLOCKED 
 """How Newton ended, beside `NO_ROOM` and `RODS_TOUCH`: places of `solve.newton.NewtonStatus`, 10 on."""
 
 
-@kernel
+@inner
 def correction_speed(strands, bodies, system, length):
     """Largest displacement of a material point in the present step over a length of time [m/s]; NaN if any is."""
     largest = largest_move(system.step, strands.node_unknown, strands.edge_unknown, strands.half_width)
@@ -34,7 +34,7 @@ def correction_speed(strands, bodies, system, length):
     return largest / length
 
 
-@kernel
+@inner
 def bound(surfaces, threads, bodies, held, strands, system, at):
     """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open, the near pair that sets it
     (−1: none), and whether that could be found.
@@ -48,7 +48,7 @@ def bound(surfaces, threads, bodies, held, strands, system, at):
     return fraction, pair, status
 
 
-@kernel
+@inner
 def _bound_at_surfaces(surfaces, bodies, system, at):
     if surfaces is None:
         return 1.0, -1, READY
@@ -78,7 +78,7 @@ def _bound_at_surfaces(surfaces, bodies, system, at):
     return fraction, pair, READY
 
 
-@kernel
+@inner
 def _bound_between_rods(threads, strands, held, system, at):
     if threads is None:
         return 1.0, READY
@@ -87,7 +87,7 @@ def _bound_between_rods(threads, strands, held, system, at):
     return fraction, READY if reached else RODS_FAR
 
 
-@kernel
+@inner
 def _move_held(held, system, at):
     """Displacements of nodes that bodies hold."""
     for k in range(held.node.shape[0]):
@@ -98,7 +98,7 @@ def _move_held(held, system, at):
         system.node_step[i, 2] = system.motion[b, 2] + r0 * at.arm[k, 1] - r1 * at.arm[k, 0]
 
 
-@kernel
+@inner
 def _move_prescribed(bodies, start, position, rotation, motion):
     """Displacements and rotation vectors of prescribed bodies from a configuration to the given poses of all."""
     for k in range(bodies.prescribed.shape[0]):
@@ -254,7 +254,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
     return status, swapped, iterations, factorisations, backtracks, residual, gap
 
 
-@kernel
+@inner
 def _look_ahead(strands, bodies, sums, system):
     """Slope of the potential along the present step, and the difference below which its values mean nothing [J]; the
     motion of nodes and bodies is left for the bound.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ..jit import kernel
+from ..jit import inner
 from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
 from ..kinematics.turning import turn_by
 from ..solve.configuration import carry_points, carry_turns, carry_walls, second_director, take_step
 from .copying import copy, copy_matrix, copy_row
 
 
-@kernel
+@inner
 def put_held(held, strands, at):
     """Nodes and clamps' directions that bodies hold."""
     carry_points(held.body, held.position, at.place, at.rotation, at.arm, at.held)
@@ -28,7 +28,7 @@ def put_held(held, strands, at):
     )
 
 
-@kernel
+@inner
 def put_surfaces(surfaces, at):
     """Points of bodies and surfaces."""
     if surfaces is None:
@@ -38,7 +38,7 @@ def put_surfaces(surfaces, at):
     carry_turns(surfaces.body, surfaces.turn, at.rotation, at.surface_turn)
 
 
-@kernel
+@inner
 def put_carried(bodies, held, surfaces, strands, at):
     """What bodies carry, to where these are: free ones take their place in the list of all first."""
     for f in range(bodies.body_of_free.shape[0]):
@@ -49,14 +49,14 @@ def put_carried(bodies, held, surfaces, strands, at):
     put_surfaces(surfaces, at)
 
 
-@kernel
+@inner
 def carry_frames(space, plane, strands, base, at, angle):
     """Frames of `base`, carried to the present positions and turned by `angle` [rad]; in a plane those of positions."""
     _carry_in_space(space, strands, base, at, angle)
     _carry_in_plane(plane, strands, at)
 
 
-@kernel
+@inner
 def _carry_in_space(space, strands, base, at, angle):
     if space is None:
         return
@@ -73,7 +73,7 @@ def _carry_in_space(space, strands, base, at, angle):
     )
 
 
-@kernel
+@inner
 def _carry_in_plane(plane, strands, at):
     if plane is None:
         return
@@ -89,7 +89,7 @@ def _carry_in_plane(plane, strands, at):
     )
 
 
-@kernel
+@inner
 def copy_prescribed(bodies, source_place, source_rotation, at):
     """Take the poses of prescribed bodies."""
     for k in range(bodies.prescribed.shape[0]):
@@ -98,7 +98,7 @@ def copy_prescribed(bodies, source_place, source_rotation, at):
         copy_matrix(source_rotation, b, at.rotation, b)
 
 
-@kernel
+@inner
 def move(bodies, held, surfaces, space, plane, strands, base, step, body_step, alpha, at):
     """Become `base` moved by α times a step of the unknowns and of free bodies."""
     copy_prescribed(bodies, base.place, base.rotation, at)
@@ -129,7 +129,7 @@ def move(bodies, held, surfaces, space, plane, strands, base, step, body_step, a
     carry_frames(space, plane, strands, base, at, at.angle)
 
 
-@kernel
+@inner
 def take_state(bodies, held, surfaces, strands, state, at):
     """Start from a state."""
     copy(state.position, at.position)

@@ -24,7 +24,7 @@ from ..forces.planar import (
 from ..forces.quadratic import angle_spring, gravity, node_spring
 from ..forces.stretch import stretch
 from ..forces.stretch_bend import natural_curvature, stretch_bend
-from ..jit import kernel, part
+from ..jit import inner, part
 from ..kinematics.turning import product_transposed
 from ..solve.assembly import expand_gradient
 from ..solve.clamps import hand_gradient_to_bodies
@@ -57,7 +57,7 @@ near pairs reaches, rods that touch, a jump that asks for another integrator.
 # elasticity, inertia, bodies
 
 
-@kernel
+@inner
 def _add_in_space(space, off_axis, bonds, strands, at, stage, sums, with_hessian):
     """Stretching, bending, twisting and bonds of dimension 3."""
     if space is None:
@@ -94,7 +94,7 @@ def _add_in_space(space, off_axis, bonds, strands, at, stage, sums, with_hessian
     _add_bonds(bonds, space, strands, at, stage, sums, with_hessian)
 
 
-@kernel
+@inner
 def _rest_of_joints(off_axis, strands, at, stage):
     if off_axis is None:
         return stage.rest_joint
@@ -112,7 +112,7 @@ def _rest_of_joints(off_axis, strands, at, stage):
     return off_axis.rest
 
 
-@kernel
+@inner
 def _add_off_axis(off_axis, strands, at, sums, with_hessian):
     if off_axis is None:
         return
@@ -136,7 +136,7 @@ def _add_off_axis(off_axis, strands, at, sums, with_hessian):
     )
 
 
-@kernel
+@inner
 def _add_in_plane(plane, off_axis, bonds, strands, at, stage, sums, with_hessian):
     """Stretching, bending and bonds of dimension 2."""
     if plane is None:
@@ -173,7 +173,7 @@ def _add_in_plane(plane, off_axis, bonds, strands, at, stage, sums, with_hessian
     polar_to_edges(strands.axes, plane.frame, plane.polar_gradient, sums.edge)
 
 
-@kernel
+@inner
 def _add_off_axis_in_plane(plane, off_axis, strands, at, sums, with_hessian):
     if off_axis is None:
         return
@@ -195,7 +195,7 @@ def _add_off_axis_in_plane(plane, off_axis, strands, at, sums, with_hessian):
     )
 
 
-@kernel
+@inner
 def _add_bonds_in_plane(plane, bonds, strands, at, stage, sums, with_hessian):
     if bonds is None:
         return
@@ -235,7 +235,7 @@ def _add_bonds_in_plane(plane, bonds, strands, at, stage, sums, with_hessian):
     )
 
 
-@kernel
+@inner
 def _add_bonds(bonds, space, strands, at, stage, sums, with_hessian):
     if bonds is None:
         return
@@ -280,7 +280,7 @@ def _add_bonds(bonds, space, strands, at, stage, sums, with_hessian):
     sums.energy[3] = bending + twisting + translation
 
 
-@kernel
+@inner
 def _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian):
     if border is None:
         return 0.0
@@ -298,7 +298,7 @@ def _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian
     )
 
 
-@kernel
+@inner
 def _add_inertia(gravitation, damping, border, strands, bodies, at, stage, sums, with_hessian):
     factor = 1.0 / (stage.lengths[0] * stage.lengths[1])
     energy = node_spring(strands.node_mass, factor, at.position, stage.predicted_position, sums.node)
@@ -319,7 +319,7 @@ def _add_inertia(gravitation, damping, border, strands, bodies, at, stage, sums,
 # loads
 
 
-@kernel
+@inner
 def _scale_loads(loads, load_factor):
     """Dead loads, by their present factors."""
     if loads is None:
@@ -332,7 +332,7 @@ def _scale_loads(loads, load_factor):
             loads.on_bodies[k, c] = load_factor[loads.body_load[k]] * loads.body_vector[k, c]
 
 
-@kernel
+@inner
 def _add_loads(loads, at, sums, place):
     if loads is None:
         return
@@ -340,7 +340,7 @@ def _add_loads(loads, at, sums, place):
     sums.energy[place] = energy + point_force(loads.body, loads.on_bodies, at.body_position, sums.body)
 
 
-@kernel
+@inner
 def _turn_followers(loads, load_factor, at):
     """Followers take the directions of a configuration; whether there are any."""
     if loads is None:
@@ -363,7 +363,7 @@ def _turn_followers(loads, load_factor, at):
     return True
 
 
-@kernel
+@inner
 def _turn_moments(moments, load_factor, at):
     """Moments, those that follow in the axes of their bodies; whether any does."""
     if moments is None:
@@ -381,7 +381,7 @@ def _turn_moments(moments, load_factor, at):
     return count > moments.dead
 
 
-@kernel
+@inner
 def _add_moments(moments, at, stage, sums, with_hessian):
     if moments is None:
         return
@@ -399,7 +399,7 @@ def _add_moments(moments, at, stage, sums, with_hessian):
 # fluid
 
 
-@kernel
+@inner
 def _turn_drag(flow, at):
     if flow is None:
         return False
@@ -407,7 +407,7 @@ def _turn_drag(flow, at):
     return flow.node.shape[0] > 0
 
 
-@kernel
+@inner
 def _add_drag(flow, at, stage, sums, with_hessian):
     if flow is None:
         return
@@ -425,7 +425,7 @@ def _add_drag(flow, at, stage, sums, with_hessian):
     )
 
 
-@kernel
+@inner
 def _turn_fluid(fluid, strands, at, stage):
     if fluid is None:
         return False
@@ -442,7 +442,7 @@ def _turn_fluid(fluid, strands, at, stage):
     return True
 
 
-@kernel
+@inner
 def survey(fluid, strands, at, velocity, momentum_out):
     """Momentum of the fluid at nodes with given velocities [N s], shape (n_node, 3); ∂T/∂q is left in the group."""
     if fluid is None:
@@ -462,7 +462,7 @@ def survey(fluid, strands, at, velocity, momentum_out):
     )
 
 
-@kernel
+@inner
 def _add_fluid(fluid, strands, at, stage, sums, with_hessian):
     if fluid is None:
         return
@@ -491,7 +491,7 @@ def _add_fluid(fluid, strands, at, stage, sums, with_hessian):
 # contact
 
 
-@kernel
+@inner
 def list_pairs(surfaces, at, motion):
     """Make the list of near pairs valid at a configuration and whatever can be reached from it by `motion` [m]."""
     if surfaces is None:
@@ -541,7 +541,7 @@ MOTION_MARGIN = 4.0
 """Margin of a list, in units of the motion that demands it."""
 
 
-@kernel
+@inner
 def _add_barrier(surfaces, bodies, at, sums, with_hessian):
     """Barrier of carriers against surfaces; returns the smallest gap [m]."""
     if surfaces is None:
@@ -578,7 +578,7 @@ def _add_barrier(surfaces, bodies, at, sums, with_hessian):
     return gap
 
 
-@kernel
+@inner
 def _lag_sliding(sliding, surfaces, start, stage):
     """Contacts at the start of a stage, for friction."""
     if sliding is None:
@@ -624,7 +624,7 @@ def _lag_sliding(sliding, surfaces, start, stage):
     )
 
 
-@kernel
+@inner
 def _add_sliding(sliding, surfaces, bodies, at, stage, sums, with_hessian):
     if sliding is None:
         return
@@ -681,7 +681,7 @@ def start_stage(p, start, stage):
     return READY
 
 
-@kernel
+@inner
 def follow(p, at, stage):
     """Let forces take from a configuration what they hold fixed between moves; whether any does."""
     moved = _turn_followers(p.followers, stage.load_factor, at)
@@ -719,7 +719,7 @@ def evaluate(p, at, stage, with_hessian):
     return energy, gap
 
 
-@kernel
+@inner
 def _add_contact(surfaces, sliding, bodies, at, stage, sums, with_hessian):
     """Barrier and friction, which sum apart from other forces; returns the smallest gap [m]."""
     if surfaces is None:
@@ -737,7 +737,7 @@ def _add_contact(surfaces, sliding, bodies, at, stage, sums, with_hessian):
     return gap
 
 
-@kernel
+@inner
 def _expand(bonds, held, strands, at, sums):
     """From nodes, edges, pairs and bodies to the unknowns."""
     _expand_edges(bonds, strands, sums)
@@ -755,7 +755,7 @@ def _expand(bonds, held, strands, at, sums):
     )
 
 
-@kernel
+@inner
 def _expand_edges(bonds, strands, sums):
     top = strands.joint_a[:0] if bonds is None else bonds.top
     bottom = strands.joint_a[:0] if bonds is None else bonds.bottom

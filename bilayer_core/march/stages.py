@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..jit import kernel
+from ..jit import inner
 from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn_by
 from ..kinematics.vector import row
 from .copying import add_scaled, copy, copy_matrix, copy_row
@@ -14,7 +14,7 @@ SPIN_ITERATIONS = 50
 SPIN_CHANGE = 1e-15
 
 
-@kernel
+@inner
 def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
     """I ω of free body f at rotation[b], as a tuple."""
     inertia_tensor(second_moment, f, rotation, b, scratch)
@@ -25,7 +25,7 @@ def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
     )
 
 
-@kernel
+@inner
 def start_point(bodies, fluid, strands, state, start, first):
     """The start of a step."""
     copy(start.position, first.position)
@@ -46,7 +46,7 @@ def start_point(bodies, fluid, strands, state, start, first):
     add_scaled(first.fluid_momentum, 1.0, state.fluid_excess)
 
 
-@kernel
+@inner
 def _add_weighted(total, end, origin, weight):
     """total += w (end − origin) of arrays with the same shape."""
     a, b, c = total.reshape(total.size), end.reshape(end.size), origin.reshape(origin.size)
@@ -54,7 +54,7 @@ def _add_weighted(total, end, origin, weight):
         a[i] += weight * (b[i] - c[i])
 
 
-@kernel
+@inner
 def copy_point(source, target):
     """All parts of a point."""
     copy(source.position, target.position)
@@ -68,7 +68,7 @@ def copy_point(source, target):
     copy(source.rotation, target.rotation)
 
 
-@kernel
+@inner
 def add_stage(total, weight, origin, end, scratch):
     """total += w (end − origin); rotations likewise on their group. `scratch` has room for all rotations."""
     _add_weighted(total.position, end.position, origin.position, weight)
@@ -85,7 +85,7 @@ def add_stage(total, weight, origin, end, scratch):
         turn_by(weight * x, weight * y, weight * z, scratch, b, total.rotation, b)
 
 
-@kernel
+@inner
 def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
     """Move an origin by what the slopes at the start of a step of length h add to it.
 
@@ -125,7 +125,7 @@ def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
         turn_by(x, y, z, scratch, b, point.rotation, b)
 
 
-@kernel
+@inner
 def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned, scratch):
     """ω̃ with I(exp(length ω̃) R̄) ω̃ = L̄ [rad/s], by iteration; exp(length ω̃) R̄ is left in turned[f]."""
     x = y = z = 0.0
@@ -143,7 +143,7 @@ def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned
     return x, y, z
 
 
-@kernel
+@inner
 def predict(bodies, held, origin, start, turned, position, rotation, rates, stage):
     """Frozen data of a stage from its origin; puts the origin of what bodies hold to where it has their velocity.
 
@@ -194,7 +194,7 @@ def predict(bodies, held, origin, start, turned, position, rotation, rates, stag
         stage.twist[k] = start.joint_strain[k, 2]
 
 
-@kernel
+@inner
 def _set_back(rotation, b, length, w0, w1, w2, out, c):
     """out[c] = (1 − length [ω]×) rotation[b]"""
     for j in range(3):
@@ -204,7 +204,7 @@ def _set_back(rotation, b, length, w0, w1, w2, out, c):
         out[c, 2, j] = u2 - length * (w0 * u1 - w1 * u0)
 
 
-@kernel
+@inner
 def _put_origin_of_held(held, origin, stage):
     for k in range(held.node.shape[0]):
         b, i = held.body[k], held.node[k]
@@ -214,7 +214,7 @@ def _put_origin_of_held(held, origin, stage):
                 origin.position[i, c] += stage.origin_rotation[b, c, m] * held.position[k, m]
 
 
-@kernel
+@inner
 def end_point(bodies, fluid, strands, stage, origin, turned, end, position, rotation, point):
     """The end of a stage that was solved; parameters as for `predict`."""
     length = stage.lengths[0]
@@ -254,7 +254,7 @@ def end_point(bodies, fluid, strands, stage, origin, turned, end, position, rota
     survey(fluid, strands, end, point.velocity, point.fluid_momentum)
 
 
-@kernel
+@inner
 def write_state(bodies, held, fluid, strands, state, last, end, rates):
     """Take the end of a step into the state; `rates` are those of prescribed bodies."""
     copy(last.velocity, state.velocity)
@@ -286,7 +286,7 @@ def write_state(bodies, held, fluid, strands, state, last, end, rates):
         _write_orthonormal(end.body_rotation, f, state.body_rotation, b)
 
 
-@kernel
+@inner
 def _write_velocity_of_held(held, end, rates, state):
     for k in range(held.node.shape[0]):
         if held.free[k] >= 0:
@@ -298,7 +298,7 @@ def _write_velocity_of_held(held, end, rates, state):
         state.velocity[i, 2] = rates[b, 2] + w0 * end.arm[k, 1] - w1 * end.arm[k, 0]
 
 
-@kernel
+@inner
 def _write_orthonormal(matrix, f, out, b):
     """The rotation nearest to `matrix[f]` to first order in its error: 1.5 R − 0.5 R Rᵀ R."""
     for i in range(3):
@@ -310,14 +310,14 @@ def _write_orthonormal(matrix, f, out, b):
             out[b, i, j] = 1.5 * matrix[f, i, j] - 0.5 * total
 
 
-@kernel
+@inner
 def _keep(rate, end, origin, length, carry):
     a, b, c = rate.reshape(rate.size), end.reshape(end.size), origin.reshape(origin.size)
     for i in range(a.shape[0]):
         a[i] = ((b[i] - c[i]) / length - carry * a[i]) / (1.0 - carry)
 
 
-@kernel
+@inner
 def keep_slopes(state, origin, end, momentum_length, carry):
     """Write the slopes of momenta at the end of the last stage of a step into the state."""
     _keep(state.acceleration, end.velocity, origin.velocity, momentum_length, carry)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, part
+from ..jit import inner, kernel, part
 from ..scene.transduction import grown, lagged
 from .copying import copy
 from .newton import CONVERGED, MAX_ITERATIONS, first_guess, minimise
@@ -13,7 +13,7 @@ from .potential import JUMPED, READY, start_stage
 from .stages import add_stage, copy_point, end_point, keep_slopes, move_along, predict, start_point, write_state
 
 
-@kernel
+@inner
 def grow(drives, law_strain, rest_edge_out, rest_joint_out):
     """Rest strains of edges and joints from the eigenstrain of laws."""
     copy(drives.rest_strain, rest_edge_out)
@@ -157,7 +157,7 @@ def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterat
     return CONVERGED, -1, e, iterations, factorisations, backtracks, worst, gap
 
 
-@kernel
+@inner
 def count_in(surfaces, strands, sums, state, gap, time, tally):
     """Take the end of a step into the extremes of a run."""
     figures, nodes = tally.figures, strands.node_mass.shape[0]
@@ -176,7 +176,7 @@ def count_in(surfaces, strands, sums, state, gap, time, tally):
     _count_contacts(surfaces, nodes, time, tally)
 
 
-@kernel
+@inner
 def _count_contacts(surfaces, nodes, time, tally):
     if surfaces is None:
         return

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from ..contact.rod_bound import largest_travel, rod_step_bound
 from ..contact.segment import distance_at, facing_contacts, fraction_along
-from ..jit import kernel
+from ..jit import inner
 from .copying import copy
 
 AHEAD = 2.5
 """Margin of a short list, in units of the step that demands it."""
 
 
-@kernel
+@inner
 def _shorten(threads, strands, position, margin):
     """Keep the pairs nearer than the barrier distance and a margin [m]."""
     found, reach = 0, threads.d_hat + margin
@@ -37,7 +37,7 @@ def _shorten(threads, strands, position, margin):
     copy(position, threads.near_base)
 
 
-@kernel
+@inner
 def _reach(threads, strands, position, step, fraction):
     """Have a short list that is valid at `position` and over a fraction of a step from there; false if all pairs
     together are not.
@@ -58,7 +58,7 @@ def _reach(threads, strands, position, step, fraction):
     return True
 
 
-@kernel
+@inner
 def rods_touch(threads, strands, at):
     """Whether rods are nearer to each other than the barrier distance; where the list of pairs does not reach, so far
     as it does: the bound of the step that led there has asked for another list.
@@ -89,7 +89,7 @@ def rods_touch(threads, strands, at):
     return count > 0
 
 
-@kernel
+@inner
 def bound_between_rods(threads, strands, system, at):
     """Largest fraction of `System.node_step` that keeps rods apart, and whether the list of pairs reaches so far."""
     if threads is None:
