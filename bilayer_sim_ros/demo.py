@@ -32,6 +32,8 @@ RAMP_DURATION = 13.3
 """Time in which the controller takes the stimulus from nothing to all [s]."""
 STOP_TIMEOUT = 20.0
 """Longest wait for a process that was asked to end [s]."""
+COMPILATION = 600.0
+"""Longest wait of the controller for a node that compiles for the first time [s]."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,12 @@ def simulate(log: Path, duration: float, console: Console) -> None:
         "sim_node", scene=SCENE, log=log, duration=duration, real_time_factor=0.0, start_paused=True
     )
     controller = node_command(
-        "ramp_controller", channel=CHANNEL, duration=RAMP_DURATION, resume=True, use_sim_time=True
+        "ramp_controller",
+        channel=CHANNEL,
+        duration=RAMP_DURATION,
+        resume=True,
+        use_sim_time=True,
+        connection_timeout=COMPILATION,
     )
     simulated = 0.0
 
@@ -140,7 +147,7 @@ def demonstrate(directory: Path) -> None:
         path.unlink(missing_ok=True)
     console.print(
         f"The scene '{SCENE}', simulated by one ROS 2 node; another one ramps its stimulus '{CHANNEL}'.\n"
-        "The first start on a machine compiles for up to a minute.",
+        "The first start on a machine compiles for one or two minutes.",
         soft_wrap=True,
     )
     start = time.monotonic()

@@ -118,5 +118,5 @@ RAMP_CONTROLLER = (
     NodeParameter("duration", 1.0, "time from the start value to the end value [s]", 0.0, above_minimum=True),
     NodeParameter("rate", 50.0, "messages per second [Hz]", 0.0, above_minimum=True),
     NodeParameter("resume", False, "call the simulation's service ~/resume once the stimulus topic is connected"),
-    NodeParameter("connection_timeout", 60.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
+    NodeParameter("connection_timeout", 180.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
 )

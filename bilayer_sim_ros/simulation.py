@@ -42,7 +42,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         dt=parameters["dt"] or None,
         tolerance=parameters["tolerance"] or None,
     )
-    node.get_logger().info("compiling, the first start on a machine may take a minute ...")
+    node.get_logger().info("compiling, the first start on a machine may take two minutes ...")
     seconds = simulator.compile()
     description = simulator.description
     inputs = StimulusInputs(
