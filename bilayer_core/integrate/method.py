@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..march.arrays import Method as MethodArrays
+from ..march.step_groups import Method as MethodArrays
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import SimulationError
-from ..march.arrays import Course
 from ..march.engine import Engine, MarchReport, Settings
 from ..march.step import AT_ONCE, NO_JUMP
+from ..march.step_groups import Course
 from ..model.model import Model, scheduled_motion
 from ..model.state import State
 from ..scene.schedule import value_before

@@ -9,13 +9,22 @@ from ..contact.step_bound import step_bound
 from ..jit import inner, part
 from ..kinematics.turning import turn_between, turn_by
 from ..solve.newton import ARMIJO, BACKTRACKING, KEEP_FACTOR_BELOW, MAX_BACKTRACKS, ROUNDING, largest_move
+from .contact import list_pairs
 from .matrix import factorise, solve
 from .place import carry_frames, copy_prescribed, move, put_carried
-from .potential import READY, RODS_FAR, RODS_TOUCH, evaluate, follow, list_pairs
+from .potential import evaluate, follow
+from .status import (
+    BLOCKED,
+    CONVERGED,
+    INDEFINITE,
+    LINE_SEARCH,
+    MAX_ITERATIONS,
+    NOT_FINITE,
+    READY,
+    RODS_FAR,
+    RODS_TOUCH,
+)
 from .threads import bound_between_rods, rods_touch
-
-CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BEYOND, BLOCKED = 0, 10, 11, 12, 13, 14, 15
-"""How Newton ended, beside `NO_ROOM` and `RODS_TOUCH`: places of `solve.newton.NewtonStatus`, 10 on."""
 
 
 @inner

@@ -8,7 +8,7 @@ from ..jit import inner
 from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn_by
 from ..kinematics.vector import row
 from .copying import add_scaled, copy, copy_matrix, copy_row
-from .potential import survey
+from .fluid import survey
 
 SPIN_ITERATIONS = 50
 SPIN_CHANGE = 1e-15

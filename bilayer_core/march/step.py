@@ -7,10 +7,11 @@ import math
 from ..jit import inner, kernel, part
 from ..scene.transduction import grown, lagged
 from .copying import copy
-from .newton import CONVERGED, MAX_ITERATIONS, first_guess, minimise
+from .newton import first_guess, minimise
 from .place import take_state
-from .potential import JUMPED, READY, start_stage
+from .potential import start_stage
 from .stages import add_stage, copy_point, end_point, keep_slopes, move_along, predict, start_point, write_state
+from .status import CONVERGED, JUMPED, MAX_ITERATIONS, READY
 
 
 @inner

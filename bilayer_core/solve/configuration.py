@@ -96,7 +96,7 @@ class Configuration:
     arm : Array
         From the position of its body to each attached node [m], shape (n_attached, 3).
     arrays : tuple of Array
-        All of them and scratch, in the order of `march.arrays.Place`.
+        All of them and scratch, in the order of `march.step_groups.Place`.
     """
 
     def __init__(self, model: Model):

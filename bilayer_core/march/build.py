@@ -1,0 +1,309 @@
+"""From a model to the groups of arrays of its problem."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..model.layout import columns
+from ..model.model import Model, PointLoads
+from ..solve.band import width
+from ..solve.neighbours import Neighbours
+from ..solve.newton_matrix import NewtonMatrix
+from ..solve.planar_matrix import PlanarMatrix
+from ..solve.potential import IncrementalPotential
+from ..solve.rod_contact import LARGEST_MARGIN, RodContact
+from .model_groups import (
+    Bodies,
+    Bonds,
+    Drives,
+    Flow,
+    Fluid,
+    Grips,
+    Held,
+    Moments,
+    OffAxis,
+    Plane,
+    PointForces,
+    Sliding,
+    Space,
+    Strands,
+    Surfaces,
+    Threads,
+)
+from .problem import Border, System
+
+Array = np.ndarray
+
+
+def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, Any]:
+    """The groups of a problem that stay as they are."""
+    layout, matrix, scene = model.solved_layout, potential.matrix, model.scene
+    bodies, free, plane = model.bodies, len(model.bodies.mass), model.plane
+    b, n = layout.half_bandwidth, bodies.freedom.shape[1]
+    return dict(
+        gravity=np.array(scene.gravity, dtype=float),
+        damping=float(scene.damping.mass),
+        strands=Strands.of(
+            size=layout.size,
+            dimension=layout.dimension,
+            edge_count=model.edge_count,
+            first_bend=0,
+            bend_count=model.bend_count,
+            bandwidth=width(b),
+            axes=model.directions,
+            row=layout.node,
+            node_unknown=model.layout.node,
+            edge_unknown=model.layout.edge,
+            **{name: getattr(model, name) for name in Strands.fields[10:]},
+        ),
+        drives=Drives.of(**{name: getattr(model, name) for name in Drives.fields}),
+        space=_space(model, matrix) if plane is None else None,
+        plane=_plane(model, matrix) if plane is not None else None,
+        off_axis=None if len(model.pair_top) else _off_axis(model),
+        bonds=(
+            Bonds.of(top=model.pair_top, bottom=model.pair_bottom, stiffness=model.pair_stiffness, rest=model.pair_rest)
+            if len(model.pair_top)
+            else None
+        ),
+        bodies=Bodies.of(
+            free_index=bodies.free_index,
+            body_of_free=bodies.body_of_free,
+            prescribed=np.flatnonzero(bodies.free_index[:-1] < 0),
+            mass=bodies.mass,
+            second_moment=bodies.second_moment,
+            inertia=matrix.body_masses,
+            freedom=bodies.freedom,
+            reach=bodies.reach,
+            turns=np.array(
+                [f >= 0 or len(r) > 0 for f, r in zip(bodies.free_index, bodies.rotations, strict=False)], dtype=bool
+            ),
+        ),
+        border=_border(layout.size + b, free, n) if free else None,
+        held=_held(model),
+        grips=_grips(model) if free else None,
+        flow=_flow(model) if scene.fluid is not None else None,
+        fluid=_fluid(model) if scene.fluid is not None else None,
+        loads=_forces(model, model.dead_loads) if scene.loads else None,
+        followers=_forces(model, model.follower_loads) if scene.loads else None,
+        moments=_moments(model) if scene.loads else None,
+        system=System.of(
+            band=np.zeros((layout.size + b, b + 1)),
+            right=np.zeros(layout.size + b),
+            step=np.zeros(model.layout.size),
+            body_step=np.zeros((free, 6)),
+            node_step=np.zeros((model.node_count, 3)),
+            motion=np.zeros((len(bodies.names) + 1, 6)),
+        ),
+    )
+
+
+def _space(model: Model, matrix: NewtonMatrix) -> Space:
+    return Space.of(
+        edge_unknown=model.layout.edge,
+        top_hessian=matrix.top_hessian,
+        bottom_hessian=matrix.bottom_hessian,
+        bond_hessian=matrix.cross_hessian[model.bend_count :],
+    )
+
+
+def _plane(model: Model, matrix: PlanarMatrix) -> Plane:
+    names = ("frame", "polar_gradient", "polar_hessian", "mixed_hessian")
+    return Plane.of(
+        normal=model.plane.normal,
+        side=model.plane.side,
+        joint_after=model.plane.joint_after,
+        **{name: getattr(matrix, name) for name in names},
+        gradient=np.zeros(model.solved_layout.size),
+    )
+
+
+def _off_axis(model: Model) -> OffAxis:
+    rest = np.zeros_like(model.joint_rest)
+    return OffAxis.of(joint=model.coupled_joint, coupling=model.strain_coupling, rest_out=rest, rest=read_only(rest))
+
+
+def read_only(array: Array) -> Array:
+    """A view of the type that arrays of models have: kernels are compiled for one type only."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+def _border(rows: int, free: int, freedom: int) -> Border:
+    return Border.of(
+        border=np.zeros((rows, 6 * free)),
+        wide=np.zeros((rows, freedom)),
+        wide_solution=np.zeros((rows, freedom)),
+        corner=np.zeros((6 * free, 6 * free)),
+        schur=np.zeros((freedom, freedom)),
+        load=np.zeros(freedom),
+        coupled=np.zeros(1, dtype=np.int64),
+    )
+
+
+def _grips(model: Model) -> Grips:
+    return Grips.of(
+        holding=int((model.attached_free >= 0).sum()),
+        unknown=model.solved_layout.attached,
+        free=model.attached_free,
+        of_unknown=model.solved_layout.attached_of_unknown,
+        wall_free=model.wall_free,
+        wall_joint=model.wall_joint,
+    )
+
+
+def _held(model: Model) -> Held:
+    return Held.of(
+        node=model.attached_node,
+        unknown=model.layout.attached,
+        row=model.solved_layout.attached,
+        body=model.attached_body,
+        free=model.attached_free,
+        position=model.attached_position,
+        wall_body=model.wall_body,
+        wall_free=model.wall_free,
+        wall_tangent=model.wall_tangent,
+        wall_director1=model.start_director1,
+    )
+
+
+def surfaces_of(model: Model, near: Neighbours) -> Surfaces:
+    carriers, surfaces, contact = model.carriers, model.surfaces, model.scene.contact
+    return Surfaces.of(
+        d_hat=contact.barrier_distance,
+        stiffness=contact.stiffness,
+        radius=carriers.radius,
+        weight=carriers.weight,
+        carrier_body=carriers.body,
+        follows=carriers.follows,
+        node_free=near.node_free,
+        group=carriers.group,
+        point_position=carriers.position,
+        point_body=carriers.body[model.node_count :],
+        kind=surfaces.kind,
+        size=surfaces.size,
+        rounding=surfaces.rounding,
+        bound=surfaces.bound,
+        body=surfaces.body,
+        position=surfaces.position,
+        turn=surfaces.turn,
+        meets=surfaces.meets,
+        near_carrier=near.carrier,
+        near_surface=near.surface,
+        near_gap=near.gap,
+        near_count=near.counted,
+        margin=near.margin,
+        extent=near.extent,
+        listed_carrier=near.listed_carrier,
+        listed_place=near.listed_place,
+        listed_turn=near.listed_turn,
+    )
+
+
+def sliding_of(model: Model, room: int) -> Sliding:
+    carriers, bodies, law = model.carriers, len(model.bodies.names) + 1, model.scene.contact.friction
+    return Sliding.of(
+        acts=law is not None and law.acts,
+        threshold=law.speed_threshold if law is not None else 0.0,
+        coefficient=carriers.friction,
+        node_edges=carriers.node_edges,
+        node_axis=carriers.node_axis,
+        count=np.zeros(1, dtype=np.int64),
+        first=np.zeros(room, dtype=np.int64),
+        surface=np.zeros(room, dtype=np.int64),
+        load=np.zeros(room),
+        **{name: np.zeros((room, 3)) for name in ("normal", "axis", "arm", "lever")},
+        **{name: np.zeros((bodies, 3, 3)) for name in ("back", "turn", "origin_turn")},
+    )
+
+
+def threads_of(model: Model, rods: RodContact, wanted: Array, wanted_move: Array) -> Threads:
+    pairs, surfaces, contacts = rods.pairs, model.rod_surfaces, rods.none
+    return Threads.of(
+        d_hat=model.scene.contact.barrier_distance,
+        edge_radius=surfaces.edge_radius,
+        point_edge=surfaces.point_edge,
+        point_fraction=surfaces.point_fraction,
+        pair_count=pairs.count,
+        pair_point=pairs.point,
+        pair_edge=pairs.edge,
+        pair_before=pairs.before,
+        pair_after=pairs.after,
+        base=rods.base,
+        margin=rods.margin,
+        near_point=np.empty_like(pairs.point),
+        near_edge=np.empty_like(pairs.edge),
+        near_before=np.empty_like(pairs.before),
+        near_after=np.empty_like(pairs.after),
+        near_count=np.zeros(1, dtype=np.int64),
+        near_base=np.zeros((model.node_count, 3)),
+        near_margin=np.full(1, -1.0),
+        least_margin=0.5 * rods.unit,
+        largest_margin=LARGEST_MARGIN * rods.unit,
+        no_step=np.zeros((model.node_count, 3)),
+        wanted=wanted,
+        wanted_move=wanted_move,
+        point=contacts.point,
+        edge=contacts.edge,
+        fraction=contacts.fraction,
+        inner=contacts.inner,
+        times=contacts.times,
+        gap=contacts.gap,
+    )
+
+
+def _flow(model: Model) -> Flow:
+    before, after = columns(model.drag_edge)
+    return Flow.of(
+        velocity=np.array(model.scene.fluid.velocity),
+        node=model.drag_node,
+        edge_before=before,
+        edge_after=after,
+        coefficient=model.drag_coefficient,
+        direction=np.zeros((len(model.drag_node), 3, 3)),
+    )
+
+
+def _fluid(model: Model) -> Fluid:
+    edges, wet = model.edge_count + model.wall_count, model.node_count if len(model.fluid_mass) else 0
+    return Fluid.of(
+        velocity=np.array(model.scene.fluid.velocity),
+        mass=model.fluid_mass,
+        direction1=np.zeros((edges, 3)),
+        direction2=np.zeros((edges, 3)),
+        shape_gradient=np.zeros((model.edge_count, 4)),
+        momentum=np.zeros((wet, 3)),
+        node_velocity=np.zeros((wet, 3)),
+        still=np.zeros(model.edge_count),
+    )
+
+
+def _forces(model: Model, loads: PointLoads) -> PointForces:
+    before, after = columns(model.carriers.node_edges[loads.nodes.target])
+    return PointForces.of(
+        node=loads.nodes.target,
+        node_load=loads.nodes.load,
+        node_vector=loads.nodes.vector,
+        body=loads.bodies.target,
+        body_load=loads.bodies.load,
+        body_vector=loads.bodies.vector,
+        on_nodes=np.zeros((len(loads.nodes.target), 3)),
+        on_bodies=np.zeros((len(loads.bodies.target), 3)),
+        edge_before=before,
+        edge_after=after,
+        direction=np.zeros((len(loads.nodes.target), 3, 3)),
+    )
+
+
+def _moments(model: Model) -> Moments:
+    dead, following = model.dead_loads.moments, model.follower_loads.moments
+    body = np.concatenate([dead.target, following.target])
+    return Moments.of(
+        dead=len(dead.target),
+        body=body,
+        load=np.concatenate([dead.load, following.load]),
+        vector=np.concatenate([dead.vector, following.vector]),
+        present=np.zeros((len(body), 3)),
+    )

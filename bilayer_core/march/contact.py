@@ -1,0 +1,203 @@
+"""Barrier and friction of carriers against surfaces, and the list of those near each other."""
+
+from __future__ import annotations
+
+import math
+
+from ..contact.near import list_near, moved_since
+from ..forces.contact import surface_contact
+from ..forces.friction import friction, lag_axes, lag_friction
+from ..jit import inner
+from ..kinematics.turning import product_transposed
+from ..solve.neighbours import MOTION_MARGIN
+from .copying import copy, copy_matrix
+from .status import NO_ROOM, READY
+from .terms import BARRIER, FRICTION
+
+
+@inner
+def list_pairs(surfaces, at, motion):
+    """Make the list of near pairs valid at a configuration and whatever can be reached from it by `motion` [m]."""
+    if surfaces is None:
+        return READY
+    moved = moved_since(
+        at.carrier,
+        surfaces.listed_carrier,
+        at.surface_place,
+        surfaces.listed_place,
+        at.surface_turn,
+        surfaces.listed_turn,
+        surfaces.extent,
+    )
+    if moved + motion <= surfaces.margin[0]:
+        return READY
+    margin = max(surfaces.d_hat, MOTION_MARGIN * motion)
+    count = list_near(
+        surfaces.d_hat,
+        margin,
+        surfaces.kind,
+        surfaces.size,
+        surfaces.rounding,
+        surfaces.bound,
+        at.surface_place,
+        at.surface_turn,
+        surfaces.radius,
+        surfaces.group,
+        surfaces.meets,
+        at.carrier,
+        surfaces.near_carrier,
+        surfaces.near_surface,
+        surfaces.extent,
+    )
+    if count > surfaces.near_carrier.shape[0]:
+        surfaces.margin[0] = -1.0
+        surfaces.near_count[0] = 0
+        return NO_ROOM
+    surfaces.near_count[0] = count
+    surfaces.margin[0] = margin
+    copy(at.carrier, surfaces.listed_carrier)
+    copy(at.surface_place, surfaces.listed_place)
+    copy(at.surface_turn, surfaces.listed_turn)
+    return READY
+
+
+@inner
+def _add_barrier(surfaces, bodies, at, sums, with_hessian):
+    """Barrier of carriers against surfaces; returns the smallest gap [m]."""
+    if surfaces is None:
+        return math.inf
+    sums.energy[BARRIER], gap, sums.links[0] = surface_contact(
+        surfaces.d_hat,
+        surfaces.stiffness,
+        surfaces.near_count[0],
+        surfaces.near_carrier,
+        surfaces.near_surface,
+        at.carrier,
+        surfaces.radius,
+        surfaces.weight,
+        surfaces.carrier_body,
+        surfaces.kind,
+        surfaces.size,
+        surfaces.rounding,
+        at.surface_place,
+        at.surface_turn,
+        surfaces.body,
+        at.place,
+        bodies.free_index,
+        sums.carrier,
+        sums.contact,
+        surfaces.near_gap,
+        sums.node_hessian,
+        sums.body_hessian,
+        sums.links[0],
+        sums.link_node,
+        sums.link_body,
+        sums.link_hessian,
+        with_hessian,
+    )
+    return gap
+
+
+@inner
+def lag_sliding(sliding, surfaces, start, stage):
+    """Contacts at the start of a stage, for friction."""
+    if sliding is None:
+        return
+    if not sliding.acts:
+        return
+    for b in range(start.rotation.shape[0]):
+        copy_matrix(start.rotation, b, sliding.back, b)
+        product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_turn, b)
+    sliding.count[0] = lag_friction(
+        surfaces.d_hat,
+        surfaces.stiffness,
+        surfaces.near_count[0],
+        surfaces.near_carrier,
+        surfaces.near_surface,
+        start.carrier,
+        surfaces.radius,
+        surfaces.weight,
+        surfaces.carrier_body,
+        surfaces.kind,
+        surfaces.size,
+        surfaces.rounding,
+        start.surface_place,
+        start.surface_turn,
+        surfaces.body,
+        start.place,
+        sliding.first,
+        sliding.surface,
+        sliding.load,
+        sliding.normal,
+        sliding.arm,
+        sliding.lever,
+    )
+    lag_axes(
+        sliding.count[0],
+        sliding.first,
+        sliding.normal,
+        sliding.node_edges,
+        sliding.node_axis,
+        start.tangent,
+        start.director1,
+        sliding.axis,
+    )
+
+
+@inner
+def _add_sliding(sliding, surfaces, bodies, at, stage, sums, with_hessian):
+    if sliding is None:
+        return
+    if not sliding.acts:
+        return
+    for b in range(at.rotation.shape[0]):
+        product_transposed(at.rotation, b, sliding.back, b, sliding.turn, b)
+    sums.energy[FRICTION], sums.links[0] = friction(
+        sliding.count[0],
+        sliding.first,
+        sliding.surface,
+        sliding.load,
+        sliding.normal,
+        sliding.axis,
+        sliding.arm,
+        sliding.lever,
+        sliding.coefficient,
+        stage.lengths[0],
+        sliding.threshold,
+        at.position,
+        stage.origin_position,
+        surfaces.carrier_body,
+        surfaces.body,
+        at.place,
+        stage.origin_place,
+        sliding.turn,
+        sliding.origin_turn,
+        bodies.free_index,
+        sums.carrier,
+        sums.contact,
+        sums.node_hessian,
+        sums.body_hessian,
+        sums.links[0],
+        sums.link_node,
+        sums.link_body,
+        sums.link_hessian,
+        with_hessian,
+    )
+
+
+@inner
+def add_contact(surfaces, sliding, bodies, at, stage, sums, with_hessian):
+    """Barrier and friction, which sum apart from other forces; returns the smallest gap [m]."""
+    if surfaces is None:
+        return math.inf
+    sums.carrier[:] = 0.0
+    sums.contact[:] = 0.0
+    gap = _add_barrier(surfaces, bodies, at, sums, with_hessian)
+    _add_sliding(sliding, surfaces, bodies, at, stage, sums, with_hessian)
+    for i in range(sums.node.shape[0]):
+        for c in range(3):
+            sums.node[i, c] += sums.carrier[i, c]
+    for f in range(bodies.body_of_free.shape[0]):
+        for c in range(6):
+            sums.body[f, c] += sums.contact[bodies.body_of_free[f], c]
+    return gap

@@ -1,0 +1,97 @@
+"""Drag and added mass."""
+
+from __future__ import annotations
+
+from ..forces.added_mass import added_mass, fluid_momentum
+from ..forces.drag import drag, node_directions
+from ..jit import inner
+from .terms import ADDED_MASS, DRAG
+
+
+@inner
+def turn_drag(flow, at):
+    if flow is None:
+        return False
+    node_directions(flow.node, flow.edge_before, flow.edge_after, at.tangent, at.director1, flow.direction)
+    return flow.node.shape[0] > 0
+
+
+@inner
+def add_drag(flow, at, stage, sums, with_hessian):
+    if flow is None:
+        return
+    sums.energy[DRAG] = drag(
+        flow.node,
+        flow.coefficient,
+        flow.direction,
+        flow.velocity,
+        stage.lengths[0],
+        at.position,
+        stage.origin_position,
+        sums.node,
+        sums.node_hessian,
+        with_hessian,
+    )
+
+
+@inner
+def turn_fluid(fluid, strands, at, stage):
+    if fluid is None:
+        return False
+    velocity = fluid.node_velocity
+    if velocity.shape[0] == 0:
+        return False
+    for i in range(velocity.shape[0]):
+        for c in range(3):
+            velocity[i, c] = (at.position[i, c] - stage.origin_position[i, c]) / stage.lengths[0]
+    survey(fluid, strands, at, velocity, fluid.momentum)
+    for k in range(fluid.direction1.shape[0]):
+        for c in range(3):
+            fluid.direction1[k, c], fluid.direction2[k, c] = at.director1[k, c], at.director2[k, c]
+    return True
+
+
+@inner
+def survey(fluid, strands, at, velocity, momentum_out):
+    """Momentum of the fluid at nodes with given velocities [N s], shape (n_node, 3); ∂T/∂q is left in the group."""
+    if fluid is None:
+        return
+    fluid_momentum(
+        fluid.mass,
+        strands.edge_node,
+        at.length,
+        at.tangent,
+        at.director1,
+        at.director2,
+        fluid.velocity,
+        velocity,
+        fluid.still,
+        momentum_out,
+        fluid.shape_gradient,
+    )
+
+
+@inner
+def add_fluid(fluid, strands, at, stage, sums, with_hessian):
+    if fluid is None:
+        return
+    sums.energy[ADDED_MASS] = added_mass(
+        fluid.mass,
+        strands.edge_node,
+        fluid.direction1,
+        fluid.direction2,
+        fluid.shape_gradient,
+        stage.origin_fluid_momentum,
+        fluid.velocity,
+        stage.lengths[0],
+        stage.lengths[1],
+        at.position,
+        stage.origin_position,
+        at.turn,
+        stage.predicted_turn,
+        sums.node,
+        sums.node_hessian,
+        sums.edge,
+        sums.edge_hessian,
+        with_hessian,
+    )

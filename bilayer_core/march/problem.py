@@ -1,0 +1,106 @@
+"""Everything that stays from step to step: the groups of a model, and what derivatives and the Newton matrix need."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .group import group
+from .model_groups import (
+    Bodies,
+    Bonds,
+    Drives,
+    Flow,
+    Fluid,
+    Grips,
+    Held,
+    Moments,
+    OffAxis,
+    Plane,
+    PointForces,
+    Sliding,
+    Space,
+    Strands,
+    Surfaces,
+    Threads,
+)
+
+Array = np.ndarray
+
+
+@group
+class Sums:
+    """First and second derivatives to which forces add; see `solve.terms.term.Accumulators`."""
+
+    energy: Array  # of each term, in the order of `march.terms` [J]
+    first: Array  # node, edge, pair and body in one piece, for clearing
+    node: Array
+    edge: Array
+    pair: Array
+    body: Array
+    carrier: Array
+    contact: Array
+    gradient: Array
+    attached: Array
+    second: Array  # all second derivatives but links in one piece
+    edge_hessian: Array
+    cross_hessian: Array
+    pair_hessian: Array
+    node_hessian: Array
+    body_hessian: Array
+    links: Array  # number of links, shape (1,)
+    link_node: Array
+    link_body: Array
+    link_hessian: Array
+
+
+@group
+class System:
+    """The Newton matrix, its factors, and steps; see `solve.newton_matrix`."""
+
+    band: Array
+    right: Array
+    step: Array
+    body_step: Array
+    node_step: Array
+    motion: Array
+
+
+@group
+class Border:
+    """Rows and columns of free bodies in the Newton matrix."""
+
+    border: Array
+    wide: Array
+    wide_solution: Array
+    corner: Array
+    schur: Array
+    load: Array  # shape (n_freedom,)
+    coupled: Array  # whether the border is not zero, shape (1,)
+
+
+@group
+class Problem:
+    """Everything that stays from step to step."""
+
+    gravity: Array
+    damping: float
+    strands: Strands
+    drives: Drives
+    space: Space | None
+    plane: Plane | None
+    off_axis: OffAxis | None
+    bonds: Bonds | None
+    bodies: Bodies
+    border: Border | None
+    held: Held
+    grips: Grips | None
+    surfaces: Surfaces | None
+    sliding: Sliding | None
+    threads: Threads | None
+    flow: Flow | None
+    fluid: Fluid | None
+    loads: PointForces | None
+    followers: PointForces | None
+    moments: Moments | None
+    sums: Sums
+    system: System
