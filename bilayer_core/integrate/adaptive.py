@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..errors import InputError, SimulationError
 from ..model.model import Model
 from ..model.state import State
@@ -146,8 +144,7 @@ class AdaptiveStepper(Stepper):
 
     def _jumps(self, state: State, time: float, h: float) -> bool:
         """Whether a stimulus or a load jumps at the end of a step of length `h` [s]."""
-        same = np.array_equal(self.stimulus_at(state, time), self.stimulus_at(state, time, h))
-        return not (same and np.array_equal(self.load_factor(time), self.load_factor(time, h)))
+        return self.surroundings.stimuli_jump(state, time, h) or self.surroundings.loads_jump(time, h)
 
     def _too_inaccurate(self, error: float, time: float, h: float) -> str:
         allowed = self.tolerance

@@ -101,7 +101,9 @@ class Simulator:
 
     def _begin_budget(self) -> None:
         if self._ledger is not None:
-            self._ledger.begin(self._state, self._stepper.rest_strains, self._stepper.load_factor(self.time))
+            self._ledger.begin(
+                self._state, self._stepper.rest_strains, self._stepper.surroundings.load_factor(self.time)
+            )
             self._stepper.ledger = self._ledger
 
     # what the scene looks like now

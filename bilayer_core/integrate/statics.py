@@ -100,10 +100,10 @@ class _Search:
         self.time = float(state.time[0])
         self.size = max(rod.path.length for rod in model.scene.rods)
         self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
-        self.stimulus = stepper.stimulus_at(state, self.time)
+        self.stimulus = stepper.surroundings.stimulus_at(state, self.time)
         self.transduction = self.stimulus[model.law_channel] if len(state.transduction) else state.transduction
-        self.rest = stepper.rest_strains_of(self.transduction)
-        self.load_factor = stepper.load_factor(self.time)
+        self.rest = stepper.surroundings.rest_strains_of(self.transduction)
+        self.load_factor = stepper.surroundings.load_factor(self.time)
         self.start, self.end, self.trial = (Configuration(model) for _ in range(3))
         for configuration in (self.start, self.end, self.trial):
             configuration.take_state(state)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,11 +11,8 @@ import numpy as np
 from ..errors import SimulationError
 from ..march.engine import Engine, MarchReport, Settings
 from ..march.step import AT_ONCE, NO_JUMP
-from ..march.step_groups import Course
-from ..model.model import Model, scheduled_motion
+from ..model.model import Model
 from ..model.state import State
-from ..scene.schedule import value_before
-from ..scene.transduction import follow, free_strain
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonSolver, NewtonStatus
 from ..solve.potential import IncrementalPotential
@@ -26,6 +22,7 @@ from .motion import momentary_context
 from .sdirk2 import METHOD as SELF_STARTING
 from .slopes import keep_slopes, move_along, slopes_of
 from .stages import Point, Prescribed, combine, end_point, predict, start_point, write_state
+from .surroundings import Surroundings
 
 if TYPE_CHECKING:
     from .ledger import EnergyLedger
@@ -65,20 +62,6 @@ class StepReport:
     inaccurate: int = 0
 
 
-@dataclass(frozen=True)
-class _Drive:
-    """Values of stimuli, what the laws made of them, rest strains and factors of loads at one time."""
-
-    stimulus: Array
-    transduction: Array
-    rest: RestStrains
-    load_factor: Array
-
-
-def _value(value: Callable[[float], float], time: float, ended: float) -> float:
-    return value_before(value, time, ended) if ended > 0.0 else value(time)
-
-
 class Stepper:
     """Advances a `State` by fixed steps dt, halving where Newton fails and doubling again where it succeeds.
 
@@ -90,6 +73,7 @@ class Stepper:
         Value of each channel over the last step.
     used : Method
         The method of the last attempt, which after a jump is not `method`.
+    surroundings : Surroundings
     loops : bool
         Whether steps are made in compiled loops where they can.
     ledger : EnergyLedger or None
@@ -109,59 +93,24 @@ class Stepper:
         self._target = Configuration(model)
         self.end = Configuration(model)
         self._trial = Configuration(model)
-        self._prescribed = np.flatnonzero(model.bodies.free_index[:-1] < 0)
-        self._channels = list(model.scene.stimuli.values())
-        self._range = np.array([channel.maximum - channel.minimum for channel in self._channels])
+        self.surroundings = Surroundings(model)
         places = [self._start, self.end, self._trial]
         self._places = places
         self.engine = Engine(model, self.potential, places, method.history is not None)
         self._arrays = {used: used.arrays() for used in {method, SELF_STARTING} if used.weights is None}
         self._touched = self.engine.touched
         self.loops = method.weights is None
-        self.stimulus = np.zeros(len(self._channels))
+        self.stimulus = np.zeros(len(model.scene.stimuli))
         self.rest_strains = RestStrains(model.rest_strain, model.joint_rest)
         self.ledger: EnergyLedger | None = None
-
-    def prescribed(self, state: State, time: float) -> Prescribed:
-        """Motion of prescribed bodies at `time`, of free ones as they are, without rates."""
-        position, rotation = state.body_position.copy(), state.body_rotation.copy()
-        rates = np.zeros((len(position), 6))
-        for index in self._prescribed:
-            position[index], rotation[index], rates[index] = scheduled_motion(self.model.bodies, index, time)
-        return Prescribed(self._prescribed, position, rotation, rates)
-
-    def stimulus_at(self, state: State, time: float, ended: float = 0.0) -> Array:
-        """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's.
-
-        At the end of a step of length `ended` [s], a schedule that jumps there still has its value from before.
-        """
-        scheduled = [_value(channel.schedule.value, time, ended) for channel in self._channels]
-        return np.where(np.isnan(state.override), np.array(scheduled, dtype=float), state.override)
-
-    def rest_strains_of(self, transduction: Array) -> RestStrains:
-        """Strains without stress from the filtered stimuli."""
-        model = self.model
-        strain = free_strain(transduction, model.law_gain, model.law_reference, model.law_saturation)
-        grown = np.bincount(model.driven_edge, model.driven_weight * strain[model.driven_law], model.edge_count)
-        joint = model.joint_rest
-        if len(model.driven_joint):
-            bent = model.driven_joint_weight * strain[model.driven_joint_law]
-            joint = joint.copy()
-            joint[:, 0] += np.bincount(model.driven_joint, bent, len(joint))
-            joint.flags.writeable = False
-        return RestStrains(model.rest_strain + grown, joint)
-
-    def load_factor(self, time: float, ended: float = 0.0) -> Array:
-        """Factor of each load at `time`, at the end of a step of length `ended` [s], shape (n_load,)."""
-        return np.array([_value(load.factor, time, ended) for load in self.model.scene.loads], dtype=float)
 
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
         time = float(state.time[0])
         self.end.take_state(state)
-        self.stimulus = self.stimulus_at(state, time)
-        self.rest_strains = self.rest_strains_of(state.transduction)
-        self._look_at(state, self.rest_strains, self.load_factor(time))
+        self.stimulus = self.surroundings.stimulus_at(state, time)
+        self.rest_strains = self.surroundings.rest_strains_of(state.transduction)
+        self._look_at(state, self.rest_strains, self.surroundings.load_factor(time))
 
     def _look_at(self, state: State, rest: RestStrains, load_factor: Array) -> None:
         """Evaluate the potential at `end` with the velocities of the state."""
@@ -247,7 +196,7 @@ class Stepper:
 
     def _attempt_in_loop(self, state: State, h: float, time: float) -> NewtonReport | None:
         """`_attempt` in a compiled loop; None, and nothing is changed, if it is not for one."""
-        method = self.used = self._method_at(state, self.stimulus_at(state, time - h), time - h, h)
+        method = self.used = self._method_at(state, self.surroundings.stimulus_at(state, time - h), time - h, h)
         found = self._loop(state, method, [time], h, changes=False, counts=False)
         if found is None:
             return None
@@ -255,7 +204,7 @@ class Stepper:
         if not report.converged:
             return replace(report, detail=self.solver.who_blocks(found.pair)) if found.pair >= 0 else report
         if self.ledger is not None:
-            self.ledger.record(state, self.rest_strains, self.load_factor(time, h), h)
+            self.ledger.record(state, self.rest_strains, self.surroundings.load_factor(time, h), h)
         return report
 
     def _loop(
@@ -264,7 +213,7 @@ class Stepper:
         """Steps that end at the given times, as many as succeed, in a compiled loop; None if none is for one."""
         solver = self.model.scene.solver
         settings = Settings(self.solver.tolerance, solver.max_newton_iterations, changes, counts)
-        course = self._course(state, method, times, h)
+        course = self.surroundings.course(state, method, times, h)
         for attempt in range(LISTS_AT_MOST):
             found = self.engine.march(state, self._arrays[method], course, h, settings)
             if found.done > 0 or not self.engine.make_room(found.status, attempt):
@@ -274,51 +223,9 @@ class Stepper:
         self.end = self._places[found.place]
         self._start, self._trial = (self._places[k] for k in range(3) if k != found.place)
         if found.done > 0:
-            self.stimulus = self.stimulus_at(state, times[found.done - 1], h)
-            self.rest_strains = self.rest_strains_of(state.transduction)
+            self.stimulus = self.surroundings.stimulus_at(state, times[found.done - 1], h)
+            self.rest_strains = self.surroundings.rest_strains_of(state.transduction)
         return found
-
-    def _course(self, state: State, method: Method, times: list[float], h: float) -> Course:
-        """What acts from outside at the stages of steps of length `h` [s] that end at `times` [s]."""
-        elapsed = [node * h for node in method.nodes]
-        shape = len(times), len(elapsed)
-        begins = [time - h for time in times]
-        stages = [begin + part for begin in begins for part in elapsed]
-        parts = elapsed * len(times)
-        loads = self.model.scene.loads
-        factors = np.array([[_value(load.factor, *when) for load in loads] for when in zip(stages, parts, strict=True)])
-        jumps = np.zeros(len(times), dtype=bool)
-        if loads and method.history is not None:
-            jumps[:] = [not np.array_equal(self.load_factor(t), self.load_factor(t, h)) for t in begins]
-        placed = self._when_placed(times)
-        poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.nodes]
-        rows = len(placed), shape[1], len(self.model.bodies.names)
-        return Course.of(
-            time=np.array(times),
-            elapsed=np.array(elapsed),
-            first=self._stimuli(state, begins, [0.0] * len(begins)),
-            jumps=jumps,
-            stimulus=self._stimuli(state, stages, parts).reshape(*shape, -1),
-            load_factor=factors.reshape(*shape, len(loads)),
-            position=np.array([pose.position for pose in poses]).reshape(*rows, 3),
-            rotation=np.array([pose.rotation for pose in poses]).reshape(*rows, 3, 3),
-            rates=np.array([pose.rates for pose in poses]).reshape(*rows, 6),
-        )
-
-    def _when_placed(self, times: list[float]) -> list[float]:
-        """The times of which the poses of prescribed bodies are needed: one if none of them moves."""
-        moves = any(len(self.model.bodies.times[index]) for index in self._prescribed)
-        return times if moves else times[:1]
-
-    def _stimuli(self, state: State, times: list[float], ended: list[float]) -> Array:
-        """`stimulus_at` for several times, shape (n_time, n_channel)."""
-        values = np.empty((len(times), len(self._channels)))
-        for index, (channel, fixed) in enumerate(zip(self._channels, state.override.tolist(), strict=True)):
-            value = channel.schedule.value
-            values[:, index] = (
-                [_value(value, *when) for when in zip(times, ended, strict=True)] if math.isnan(fixed) else fixed
-            )
-        return values
 
     def _attempt_by_terms(self, state: State, h: float, time: float) -> NewtonReport:
         """`_attempt` term by term, for what compiled loops do not know: rods that touch, and ends of steps beyond their
@@ -327,7 +234,7 @@ class Stepper:
         model = self.model
         self._start.take_state(state)
         first = start_point(model, state, self._start)
-        first_stimulus = self.stimulus_at(state, time - h)
+        first_stimulus = self.surroundings.stimulus_at(state, time - h)
         method = self.used = self._method_at(state, first_stimulus, time - h, h)
         slopes = slopes_of(model, state, first) if method.history else None
         turned = np.zeros(model.edge_count)
@@ -340,8 +247,8 @@ class Stepper:
             origin = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
             if slopes is not None:
                 move_along(origin, slopes, method.history, number, h)
-            drive = self._drive(state, first_stimulus, time - h, node * h)
-            prescribed = self.prescribed(state, time - (1.0 - node) * h)
+            drive = self.surroundings.drive(state, first_stimulus, time - h, node * h)
+            prescribed = self.surroundings.prescribed(state, time - (1.0 - node) * h)
             driven = drive.rest, drive.load_factor
             context = predict(model, origin, self._start, turned, length, *driven, momentum_length, prescribed)
             report = self._solve(context, prescribed)
@@ -361,8 +268,8 @@ class Stepper:
         if method.weights is not None:
             weights = [weight / method.diagonal for weight in method.weights]
             last = combine(first, [(w, *stage) for w, stage in zip(weights, stages, strict=True)])
-            drive = self._drive(state, first_stimulus, time - h, h)
-            prescribed = self.prescribed(state, time)
+            drive = self.surroundings.drive(state, first_stimulus, time - h, h)
+            prescribed = self.surroundings.prescribed(state, time)
             last.body_position[prescribed.index] = prescribed.position[prescribed.index]
             last.rotation[prescribed.index] = prescribed.rotation[prescribed.index]
             if not self._go_beyond(last, turned):
@@ -390,23 +297,16 @@ class Stepper:
         if self.method.history is None:
             return self.method
         model = self.model
-        jumped = not state.kept[0] or not np.array_equal(self.load_factor(time), self.load_factor(time, h))
+        jumped = not state.kept[0] or not np.array_equal(
+            self.surroundings.load_factor(time), self.surroundings.load_factor(time, h)
+        )
         if len(state.transduction):
             way = stimulus[model.law_channel] - state.transduction
             lag = np.where(way > 0.0, model.law_rising, model.law_falling)
-            jumped |= bool(np.any((np.abs(way) > NO_JUMP * self._range[model.law_channel]) & (lag < AT_ONCE * h)))
+            jumped |= bool(
+                np.any((np.abs(way) > NO_JUMP * self.surroundings.ranges[model.law_channel]) & (lag < AT_ONCE * h))
+            )
         return SELF_STARTING if jumped else self.method
-
-    def _drive(self, state: State, first_stimulus: Array, begin: float, elapsed: float) -> _Drive:
-        """What acts from outside `elapsed` [s] after `begin` [s], the start of a step."""
-        model = self.model
-        stimulus = self.stimulus_at(state, begin + elapsed, elapsed)
-        transduction = state.transduction
-        if len(transduction):
-            ends = first_stimulus[model.law_channel], stimulus[model.law_channel]
-            transduction = follow(transduction, *ends, model.law_rising, model.law_falling, elapsed)
-        load_factor = self.load_factor(begin + elapsed, elapsed)
-        return _Drive(stimulus, transduction, self.rest_strains_of(transduction), load_factor)
 
     def _solve(self, context: StepContext, prescribed: Prescribed) -> NewtonReport:
         """Solve a stage; its result is `end`."""

@@ -30,6 +30,8 @@ class Engine:
     ----------
     touched : Array
         Carriers that something pushed at the end of the last step, bool, shape (n_carrier,).
+    ranges : Array
+        Of channels, in their units, shape (n_channel,).
     figures, nodes, most_nodes, first_contact : Array
         Extremes of the run; see `march.step_groups.Tally`.
     """
@@ -41,7 +43,7 @@ class Engine:
         self._problem: Problem | None = None
         self._lists: tuple | None = None
         self._state: State | None = None
-        self._ranges = np.array([c.maximum - c.minimum for c in model.scene.stimuli.values()], dtype=float)
+        self.ranges = np.array([c.maximum - c.minimum for c in model.scene.stimuli.values()], dtype=float)
         self._wanted, self._wanted_move = np.zeros((model.node_count, 3)), np.zeros(1)
         self.figures = np.zeros(3)
         self.nodes, self.most_nodes = np.zeros((2, len(model.surfaces.names)), dtype=np.int64)
@@ -88,7 +90,7 @@ class Engine:
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:
         """Make the steps of a course, each of length `h` [s], as far as they succeed; `state` is that after them."""
         arrays = self._arrays_of(state)
-        ways = settings.changes, course, self._ranges, self._work, settings.counts, self.tally
+        ways = settings.changes, course, self.ranges, self._work, settings.counts, self.tally
         done, status, pair, place, iterations, factorisations, backtracks, residual, worst, gap = take_steps(
             self._gather(), arrays, method, self._keeps, *ways, h, settings.tolerance, settings.max_iterations
         )

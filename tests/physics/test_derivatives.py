@@ -88,7 +88,10 @@ class Problem:
             state.body_angular_velocity[body] = rng.standard_normal(3)
         start = Configuration(model)
         start.take_state(state)
-        drive = stepper.rest_strains_of(np.full(len(model.law_gain), 0.7)), stepper.load_factor(0.03)
+        drive = (
+            stepper.surroundings.rest_strains_of(np.full(len(model.law_gain), 0.7)),
+            stepper.surroundings.load_factor(0.03),
+        )
         origin = start_point(model, state, start)  # of a later stage: not where that is solved from
         origin.position[:] += 1e-5 * rng.standard_normal(origin.position.shape)
         origin.body_position[:] += 1e-5 * rng.standard_normal(origin.body_position.shape)

@@ -40,7 +40,10 @@ class Problem:
             state.body_angular_velocity[body] = rng.standard_normal() * normal
         start = Configuration(model)
         start.take_state(state)
-        drive = stepper.rest_strains_of(np.full(len(model.law_gain), 0.7)), stepper.load_factor(0.03)
+        drive = (
+            stepper.surroundings.rest_strains_of(np.full(len(model.law_gain), 0.7)),
+            stepper.surroundings.load_factor(0.03),
+        )
         origin = start_point(model, state, start)
         origin.position[:] += 1e-5 * rng.standard_normal((model.node_count, 2)) @ axes
         context = predict(model, origin, start, np.zeros(model.edge_count), h, *drive, momentum_length=1.3 * h)

@@ -1,0 +1,137 @@
+"""What acts on a robot from outside: stimuli, what its layers make of them, loads, and bodies on prescribed paths."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..march.step_groups import Course
+from ..model.model import Model, scheduled_motion
+from ..model.state import State
+from ..scene.schedule import value_before
+from ..scene.transduction import follow, free_strain
+from ..solve.terms.term import RestStrains
+from .method import Method
+from .stages import Prescribed
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Values of stimuli, what the laws made of them, rest strains and factors of loads at one time."""
+
+    stimulus: Array
+    transduction: Array
+    rest: RestStrains
+    load_factor: Array
+
+
+def _value(value: Callable[[float], float], time: float, ended: float) -> float:
+    return value_before(value, time, ended) if ended > 0.0 else value(time)
+
+
+class Surroundings:
+    """Stimuli, loads and prescribed motion of a scene over time."""
+
+    def __init__(self, model: Model):
+        self.model = model
+        self._prescribed = np.flatnonzero(model.bodies.free_index[:-1] < 0)
+        self._channels = list(model.scene.stimuli.values())
+
+    def prescribed(self, state: State, time: float) -> Prescribed:
+        """Motion of prescribed bodies at `time`, of free ones as they are, without rates."""
+        position, rotation = state.body_position.copy(), state.body_rotation.copy()
+        rates = np.zeros((len(position), 6))
+        for index in self._prescribed:
+            position[index], rotation[index], rates[index] = scheduled_motion(self.model.bodies, index, time)
+        return Prescribed(self._prescribed, position, rotation, rates)
+
+    def stimulus_at(self, state: State, time: float, ended: float = 0.0) -> Array:
+        """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's.
+
+        At the end of a step of length `ended` [s], a schedule that jumps there still has its value from before.
+        """
+        scheduled = [_value(channel.schedule.value, time, ended) for channel in self._channels]
+        return np.where(np.isnan(state.override), np.array(scheduled, dtype=float), state.override)
+
+    def rest_strains_of(self, transduction: Array) -> RestStrains:
+        """Strains without stress from the filtered stimuli."""
+        model = self.model
+        strain = free_strain(transduction, model.law_gain, model.law_reference, model.law_saturation)
+        grown = np.bincount(model.driven_edge, model.driven_weight * strain[model.driven_law], model.edge_count)
+        joint = model.joint_rest
+        if len(model.driven_joint):
+            bent = model.driven_joint_weight * strain[model.driven_joint_law]
+            joint = joint.copy()
+            joint[:, 0] += np.bincount(model.driven_joint, bent, len(joint))
+            joint.flags.writeable = False
+        return RestStrains(model.rest_strain + grown, joint)
+
+    def load_factor(self, time: float, ended: float = 0.0) -> Array:
+        """Factor of each load at `time`, at the end of a step of length `ended` [s], shape (n_load,)."""
+        return np.array([_value(load.factor, time, ended) for load in self.model.scene.loads], dtype=float)
+
+    def loads_jump(self, time: float, h: float) -> bool:
+        """Whether a load jumps at `time`, seen from a step of length `h` [s]."""
+        return not np.array_equal(self.load_factor(time), self.load_factor(time, h))
+
+    def stimuli_jump(self, state: State, time: float, h: float) -> bool:
+        """Whether a stimulus does so."""
+        return not np.array_equal(self.stimulus_at(state, time), self.stimulus_at(state, time, h))
+
+    def drive(self, state: State, first_stimulus: Array, begin: float, elapsed: float) -> Drive:
+        """What acts from outside `elapsed` [s] after `begin` [s], the start of a step."""
+        model = self.model
+        stimulus = self.stimulus_at(state, begin + elapsed, elapsed)
+        transduction = state.transduction
+        if len(transduction):
+            ends = first_stimulus[model.law_channel], stimulus[model.law_channel]
+            transduction = follow(transduction, *ends, model.law_rising, model.law_falling, elapsed)
+        load_factor = self.load_factor(begin + elapsed, elapsed)
+        return Drive(stimulus, transduction, self.rest_strains_of(transduction), load_factor)
+
+    def course(self, state: State, method: Method, times: list[float], h: float) -> Course:
+        """What acts from outside at the stages of steps of length `h` [s] that end at `times` [s]."""
+        elapsed = [node * h for node in method.nodes]
+        shape = len(times), len(elapsed)
+        begins = [time - h for time in times]
+        stages = [begin + part for begin in begins for part in elapsed]
+        parts = elapsed * len(times)
+        loads = self.model.scene.loads
+        factors = np.array([[_value(load.factor, *when) for load in loads] for when in zip(stages, parts, strict=True)])
+        jumps = np.zeros(len(times), dtype=bool)
+        if loads and method.history is not None:
+            jumps[:] = [self.loads_jump(begin, h) for begin in begins]
+        placed = self._when_placed(times)
+        poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.nodes]
+        rows = len(placed), shape[1], len(self.model.bodies.names)
+        return Course.of(
+            time=np.array(times),
+            elapsed=np.array(elapsed),
+            first=self._stimuli(state, begins, [0.0] * len(begins)),
+            jumps=jumps,
+            stimulus=self._stimuli(state, stages, parts).reshape(*shape, -1),
+            load_factor=factors.reshape(*shape, len(loads)),
+            position=np.array([pose.position for pose in poses]).reshape(*rows, 3),
+            rotation=np.array([pose.rotation for pose in poses]).reshape(*rows, 3, 3),
+            rates=np.array([pose.rates for pose in poses]).reshape(*rows, 6),
+        )
+
+    def _when_placed(self, times: list[float]) -> list[float]:
+        """The times of which the poses of prescribed bodies are needed: one if none of them moves."""
+        moves = any(len(self.model.bodies.times[index]) for index in self._prescribed)
+        return times if moves else times[:1]
+
+    def _stimuli(self, state: State, times: list[float], ended: list[float]) -> Array:
+        """`stimulus_at` for several times, shape (n_time, n_channel)."""
+        values = np.empty((len(times), len(self._channels)))
+        for index, (channel, fixed) in enumerate(zip(self._channels, state.override.tolist(), strict=True)):
+            value = channel.schedule.value
+            values[:, index] = (
+                [_value(value, *when) for when in zip(times, ended, strict=True)] if math.isnan(fixed) else fixed
+            )
+        return values
