@@ -297,15 +297,12 @@ class Stepper:
         if self.method.history is None:
             return self.method
         model = self.model
-        jumped = not state.kept[0] or not np.array_equal(
-            self.surroundings.load_factor(time), self.surroundings.load_factor(time, h)
-        )
+        jumped = not state.kept[0] or self.surroundings.loads_jump(time, h)
         if len(state.transduction):
             way = stimulus[model.law_channel] - state.transduction
             lag = np.where(way > 0.0, model.law_rising, model.law_falling)
-            jumped |= bool(
-                np.any((np.abs(way) > NO_JUMP * self.surroundings.ranges[model.law_channel]) & (lag < AT_ONCE * h))
-            )
+            seen = np.abs(way) > NO_JUMP * self.engine.ranges[model.law_channel]
+            jumped |= bool(np.any(seen & (lag < AT_ONCE * h)))
         return SELF_STARTING if jumped else self.method
 
     def _solve(self, context: StepContext, prescribed: Prescribed) -> NewtonReport:
