@@ -108,7 +108,6 @@ def simulate(log: Path, duration: float, console: Console) -> None:
         channel=CHANNEL,
         duration=RAMP_DURATION,
         resume=True,
-        use_sim_time=True,
         connection_timeout=COMPILATION,
     )
     simulated = 0.0

@@ -117,6 +117,7 @@ RAMP_CONTROLLER = (
     NodeParameter("end_value", 1.0, "value at the end, in the channel's unit"),
     NodeParameter("duration", 1.0, "time from the start value to the end value [s]", 0.0, above_minimum=True),
     NodeParameter("rate", 50.0, "messages per second [Hz]", 0.0, above_minimum=True),
+    NodeParameter("simulated_time", True, "ramp in the simulation's time, that of /clock; false = in real time"),
     NodeParameter("resume", False, "call the simulation's service ~/resume once the stimulus topic is connected"),
     NodeParameter("connection_timeout", 180.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
 )

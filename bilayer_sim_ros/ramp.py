@@ -32,7 +32,11 @@ def ramp(elapsed: float, duration: float, start_value: float, end_value: float) 
 
 
 def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
-    """Connect, ramp in simulated time if there is a /clock and in real time otherwise, and end."""
+    """Connect, ramp in simulated time or, if `simulated_time` is false, in that of the node's own clock, and end.
+
+    Which of the two is never guessed from what has been discovered so far: a publisher of /clock may be found
+    later than the subscriber of the stimulus in the same process.
+    """
     target, channel = parameters["node"].rstrip("/"), parameters["channel"]
     topic = f"{target}/stimulus/{channel}"
     publisher = node.create_publisher(Float64, topic, 10)
@@ -41,13 +45,12 @@ def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) 
     if not _wait(lambda: publisher.get_subscription_count() > 0, stop, limit, f"nobody subscribes to {topic}"):
         return
     clock = node.get_clock()
-    if node.count_publishers("/clock") > 0:
+    if parameters["simulated_time"]:
         node.set_parameters([Parameter("use_sim_time", value=True)])
-    if node.get_parameter("use_sim_time").value:
         heard: deque[Clock] = deque(maxlen=1)
         node.create_subscription(Clock, "/clock", lambda message: heard.append(message), BEST_EFFORT)
         # A paused simulation repeats its time once a second.
-        if not _wait(lambda: heard, stop, limit, "/clock is silent"):
+        if not _wait(lambda: heard, stop, limit, "/clock is silent, and simulated_time is true"):
             return
         start = Time.from_msg(heard[-1].clock, clock_type=clock.clock_type)
     else:

@@ -101,7 +101,6 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
 
 def _space(model: Model, matrix: NewtonMatrix) -> Space:
     return Space.of(
-        edge_unknown=model.layout.edge,
         top_hessian=matrix.top_hessian,
         bottom_hessian=matrix.bottom_hessian,
         bond_hessian=matrix.cross_hessian[model.bend_count :],
@@ -115,7 +114,6 @@ def _plane(model: Model, matrix: PlanarMatrix) -> Plane:
         side=model.plane.side,
         joint_after=model.plane.joint_after,
         **{name: getattr(matrix, name) for name in names},
-        gradient=np.zeros(model.solved_layout.size),
     )
 
 

@@ -20,7 +20,7 @@ def _assemble_in_space(space, bonds, strands, sums, factor, band):
     expand_edges(
         strands.edge_node,
         strands.row,
-        space.edge_unknown,
+        strands.edge_unknown,
         strands.node_mass,
         strands.spin_inertia,
         factor,
@@ -36,7 +36,7 @@ def _assemble_in_space(space, bonds, strands, sums, factor, band):
         strands.joint_b,
         strands.edge_node,
         strands.row,
-        space.edge_unknown,
+        strands.edge_unknown,
         sums.cross_hessian,
         band,
     )
@@ -153,7 +153,7 @@ def _hand_walls(space, grips, border, strands, at, sums):
         strands.edge_count,
         strands.edge_node,
         strands.row,
-        space.edge_unknown,
+        strands.edge_unknown,
         grips.of_unknown,
         grips.unknown,
         grips.free,

@@ -61,9 +61,8 @@ class Drives:
 
 @group
 class Space:
-    """What dimension 3 has: angles of edges, and second derivatives of bonds. None in a plane."""
+    """What dimension 3 has: second derivatives of bonds. None in a plane."""
 
-    edge_unknown: Array
     top_hessian: Array
     bottom_hessian: Array
     bond_hessian: Array  # the part of cross_hessian that belongs to bonds
@@ -80,7 +79,6 @@ class Plane:
     polar_gradient: Array
     polar_hessian: Array
     mixed_hessian: Array
-    gradient: Array
 
 
 @group

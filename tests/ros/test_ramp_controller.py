@@ -1,11 +1,18 @@
 """The controller beside a simulation node: two processes, connected by topics alone."""
 
 import signal
+import threading
+import time
 
 import numpy as np
 import pytest
+import rclpy
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import Float64
 
 from bilayer_core.record.log_reader import read_log
 from bilayer_sim_ros.ramp import ramp
@@ -67,14 +74,49 @@ def test_each_stimulus_is_logged_at_the_time_from_which_it_acts(log, run):
         ]
     assert len({value for _, value in messages}) > 10
     # A frame shows the stimulus of the step that ends with it.
-    for time, applied in zip(run.times[1:], run.stimulus[1:, 0], strict=True):
-        assert applied == [value for since, value in messages if since < time - 1e-9][-1]
+    for end, applied in zip(run.times[1:], run.stimulus[1:, 0], strict=True):
+        assert applied == [value for since, value in messages if since < end - 1e-9][-1]
 
 
 def test_a_controller_without_a_simulation_gives_up_with_exit_code_2(start, domain):
     controller = start("ramp_controller", domain, {"connection_timeout": 0.5})
     assert controller.wait() == 2
     assert "nobody subscribes to /bilayer_sim/stimulus/humidity (waited 0.5 s)" in controller.output
+
+
+@pytest.fixture
+def subscriber(domain):
+    """Somebody who listens to the stimulus, and publishes no time: the values heard so far."""
+    values = []
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = Node("robot", context=context)
+    node.create_subscription(Float64, "/bilayer_sim/stimulus/humidity", lambda message: values.append(message.data), 10)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    yield values
+    executor.shutdown()
+    thread.join()
+    node.destroy_node()
+    rclpy.shutdown(context=context)
+
+
+def test_without_a_clock_the_controller_does_not_take_real_time_for_simulated(start, domain, subscriber):
+    controller = start("ramp_controller", domain, {"connection_timeout": 1.0})
+    assert controller.wait() == 2
+    assert "/clock is silent, and simulated_time is true (waited 1 s)" in controller.output
+    assert not subscriber
+
+
+def test_a_ramp_in_real_time_needs_no_clock(start, domain, subscriber):
+    begin = time.monotonic()
+    controller = start("ramp_controller", domain, {"simulated_time": False, "duration": 0.5})
+    assert controller.wait() == 0, controller.output
+    assert time.monotonic() - begin > 0.5
+    assert subscriber[-1] == 1.0 and len(set(subscriber)) > 10
+    assert np.all(np.diff(subscriber) >= 0.0)
 
 
 def test_a_waiting_controller_can_be_interrupted(start, domain):
