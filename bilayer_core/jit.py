@@ -36,7 +36,7 @@ def _cache_is_usable() -> bool:
 
 
 CACHE = os.environ.get("BILAYER_JIT_CACHE", "1") != "0" and _cache_is_usable()
-OPTIONS = dict(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, no_cfunc_wrapper=True)
+OPTIONS = dict(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, no_cfunc_wrapper=True, _nrt=False)
 
 
 def kernel(function):
@@ -45,6 +45,11 @@ def kernel(function):
     Small scalar functions take it too; LLVM inlines them into the kernels that call them.
     """
     return numba.njit(**OPTIONS)(function)
+
+
+def allocating(function):
+    """A kernel that makes arrays: alone among kernels it counts references."""
+    return numba.njit(**(OPTIONS | {"_nrt": True}))(function)
 
 
 def inner(function):

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..jit import kernel
+from ..jit import allocating, kernel
 from .segment import distance_at, fraction_along
 
 
@@ -60,7 +60,7 @@ def _sees(
     return True
 
 
-@kernel
+@allocating
 def near_pairs(
     position,
     start_position,

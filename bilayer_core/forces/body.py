@@ -15,9 +15,8 @@ Mass damping is the same with R̃ = Rₙ and α/h in place of 1/h².
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..jit import kernel
+from ..kinematics.stack import stack_matrix
 
 
 @kernel
@@ -55,9 +54,10 @@ def body_spring(
             energy += 0.5 * weight * difference * difference
             body_gradient_out[b, i] += weight * difference
         # A = R_ref J Rᵀ, and the energy from the columns of R − R_ref (no cancellation)
-        a = np.zeros((3, 3))
+        a = stack_matrix(3, 3)
         for i in range(3):
             for j in range(3):
+                a[i, j] = 0.0
                 for k in range(3):
                     for m in range(3):
                         jkm = second_moment[b, k, m]

@@ -20,12 +20,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
 from ..contact.near import gap_normal
 from ..contact.shapes import shape_curvature
 from ..jit import kernel
+from ..kinematics.stack import stack_matrix, stack_vector
 from .coupled import add_coupled, add_force
 
 
@@ -94,11 +93,9 @@ def surface_contact(
     """
     energy = 0.0
     min_gap = math.inf
-    m = np.zeros((3, 3))
-    g = np.zeros(3)
-    arm = np.zeros(3)
-    lever = np.zeros(3)
-    scratch = np.zeros((15, 12))
+    m, scratch = stack_matrix(3, 3), stack_matrix(15, 12)
+    g, arm, lever = stack_vector(3), stack_vector(3), stack_vector(3)
+    arm[0] = arm[1] = arm[2] = 0.0
     for k in range(count):
         i, s = near_carrier[k], near_surface[k]
         x0, x1, x2 = carrier[i, 0], carrier[i, 1], carrier[i, 2]

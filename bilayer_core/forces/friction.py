@@ -25,12 +25,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..contact.barrier import barrier_gradient
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from ..contact.near import gap_normal
 from ..jit import kernel
+from ..kinematics.stack import stack_matrix, stack_vector
 from .coupled import add_coupled, add_force
 
 
@@ -203,14 +202,10 @@ def friction(
         How many links are listed now.
     """
     energy = 0.0
-    arm_a = np.zeros(3)
-    arm_b = np.zeros(3)
-    u = np.zeros(3)
-    g = np.zeros(3)
-    q = np.zeros(3)
-    across = np.zeros(3)
-    f = np.zeros((3, 3))
-    scratch = np.zeros((15, 12))
+    arm_a, arm_b, u = stack_vector(3), stack_vector(3), stack_vector(3)
+    g, q, across = stack_vector(3), stack_vector(3), stack_vector(3)
+    f, scratch = stack_matrix(3, 3), stack_matrix(15, 12)
+    arm_a[0] = arm_a[1] = arm_a[2] = 0.0
     for k in range(count):
         i = first[k]
         largest = max(coefficient[i, 0], coefficient[i, 1], coefficient[i, 2])

@@ -20,9 +20,8 @@ last, as drag does, and is then one of these: the step ends with the direction t
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..jit import kernel
+from ..kinematics.stack import stack_matrix
 
 
 @kernel
@@ -69,8 +68,9 @@ def body_moment(index, moment, rotation, predicted_rotation, body_gradient_out, 
     for k in range(index.shape[0]):
         b = index[k]
         # row i of [M]× R̃ is that of the cross products of M with the columns of R̃
-        a = np.zeros((3, 3))
+        a = stack_matrix(3, 3)
         for j in range(3):
+            a[0, j] = a[1, j] = a[2, j] = 0.0
             for m in range(3):
                 r0, r1, r2 = predicted_rotation[b, 0, m], predicted_rotation[b, 1, m], predicted_rotation[b, 2, m]
                 half = 0.5 * rotation[b, j, m]

@@ -29,6 +29,7 @@ import numpy as np
 
 from ..jit import kernel
 from ..kinematics.rotation import rotation_vector
+from ..kinematics.stack import stack_vector
 from ..model.model import Model
 from ..model.state import State
 
@@ -66,7 +67,7 @@ def largest_deviation(
         Length of the step [s].
     """
     largest, half = 0.0, 0.5 * h
-    d, t, u = np.empty(3), np.empty(3), np.empty(3)
+    d, t, u = stack_vector(3), stack_vector(3), stack_vector(3)
     for s in range(first_node.shape[0] - 1):
         total = 0.0
         for i in range(first_node[s], first_node[s + 1]):

@@ -89,7 +89,7 @@ class Method:
         couplings = np.zeros((stages, stages))
         for row, own in enumerate(self.couplings):
             couplings[row, : len(own)] = own
-        return MethodArrays.of(
+        return MethodArrays(
             diagonal=self.diagonal,
             momentum_diagonal=self.momentum_diagonal or self.diagonal,
             couplings=couplings / self.diagonal,

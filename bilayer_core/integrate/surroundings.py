@@ -109,7 +109,7 @@ class Surroundings:
         placed = self._when_placed(times)
         poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.nodes]
         rows = len(placed), shape[1], len(self.model.bodies.names)
-        return Course.of(
+        return Course(
             time=np.array(times),
             elapsed=np.array(elapsed),
             first=self._stimuli(state, begins, [0.0] * len(begins)),

@@ -45,7 +45,7 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
     return dict(
         gravity=np.array(scene.gravity, dtype=float),
         damping=float(scene.damping.mass),
-        strands=Strands.of(
+        strands=Strands(
             size=layout.size,
             dimension=layout.dimension,
             edge_count=model.edge_count,
@@ -58,16 +58,16 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
             edge_unknown=model.layout.edge,
             **{name: getattr(model, name) for name in Strands.fields[10:]},
         ),
-        drives=Drives.of(**{name: getattr(model, name) for name in Drives.fields}),
+        drives=Drives(**{name: getattr(model, name) for name in Drives.fields}),
         space=_space(model, matrix) if plane is None else None,
         plane=_plane(model, matrix) if plane is not None else None,
         off_axis=None if len(model.pair_top) else _off_axis(model),
         bonds=(
-            Bonds.of(top=model.pair_top, bottom=model.pair_bottom, stiffness=model.pair_stiffness, rest=model.pair_rest)
+            Bonds(top=model.pair_top, bottom=model.pair_bottom, stiffness=model.pair_stiffness, rest=model.pair_rest)
             if len(model.pair_top)
             else None
         ),
-        bodies=Bodies.of(
+        bodies=Bodies(
             free_index=bodies.free_index,
             body_of_free=bodies.body_of_free,
             prescribed=np.flatnonzero(bodies.free_index[:-1] < 0),
@@ -88,7 +88,7 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
         loads=_forces(model, model.dead_loads) if scene.loads else None,
         followers=_forces(model, model.follower_loads) if scene.loads else None,
         moments=_moments(model) if scene.loads else None,
-        system=System.of(
+        system=System(
             band=np.zeros((layout.size + b, b + 1)),
             right=np.zeros(layout.size + b),
             step=np.zeros(model.layout.size),
@@ -100,7 +100,7 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
 
 
 def _space(model: Model, matrix: NewtonMatrix) -> Space:
-    return Space.of(
+    return Space(
         top_hessian=matrix.top_hessian,
         bottom_hessian=matrix.bottom_hessian,
         bond_hessian=matrix.cross_hessian[model.bend_count :],
@@ -109,7 +109,7 @@ def _space(model: Model, matrix: NewtonMatrix) -> Space:
 
 def _plane(model: Model, matrix: PlanarMatrix) -> Plane:
     names = ("frame", "polar_gradient", "polar_hessian", "mixed_hessian")
-    return Plane.of(
+    return Plane(
         normal=model.plane.normal,
         side=model.plane.side,
         joint_after=model.plane.joint_after,
@@ -119,7 +119,7 @@ def _plane(model: Model, matrix: PlanarMatrix) -> Plane:
 
 def _off_axis(model: Model) -> OffAxis:
     rest = np.zeros_like(model.joint_rest)
-    return OffAxis.of(joint=model.coupled_joint, coupling=model.strain_coupling, rest_out=rest, rest=read_only(rest))
+    return OffAxis(joint=model.coupled_joint, coupling=model.strain_coupling, rest_out=rest, rest=read_only(rest))
 
 
 def read_only(array: Array) -> Array:
@@ -130,7 +130,7 @@ def read_only(array: Array) -> Array:
 
 
 def _border(rows: int, free: int, freedom: int) -> Border:
-    return Border.of(
+    return Border(
         border=np.zeros((rows, 6 * free)),
         wide=np.zeros((rows, freedom)),
         wide_solution=np.zeros((rows, freedom)),
@@ -142,7 +142,7 @@ def _border(rows: int, free: int, freedom: int) -> Border:
 
 
 def _grips(model: Model) -> Grips:
-    return Grips.of(
+    return Grips(
         holding=int((model.attached_free >= 0).sum()),
         unknown=model.solved_layout.attached,
         free=model.attached_free,
@@ -153,7 +153,7 @@ def _grips(model: Model) -> Grips:
 
 
 def _held(model: Model) -> Held:
-    return Held.of(
+    return Held(
         node=model.attached_node,
         unknown=model.layout.attached,
         row=model.solved_layout.attached,
@@ -169,7 +169,7 @@ def _held(model: Model) -> Held:
 
 def surfaces_of(model: Model, near: Neighbours) -> Surfaces:
     carriers, surfaces, contact = model.carriers, model.surfaces, model.scene.contact
-    return Surfaces.of(
+    return Surfaces(
         d_hat=contact.barrier_distance,
         stiffness=contact.stiffness,
         radius=carriers.radius,
@@ -202,7 +202,7 @@ def surfaces_of(model: Model, near: Neighbours) -> Surfaces:
 
 def sliding_of(model: Model, room: int) -> Sliding:
     carriers, bodies, law = model.carriers, len(model.bodies.names) + 1, model.scene.contact.friction
-    return Sliding.of(
+    return Sliding(
         acts=law is not None and law.acts,
         threshold=law.speed_threshold if law is not None else 0.0,
         coefficient=carriers.friction,
@@ -219,7 +219,7 @@ def sliding_of(model: Model, room: int) -> Sliding:
 
 def threads_of(model: Model, rods: RodContact, wanted: Array, wanted_move: Array) -> Threads:
     pairs, surfaces, contacts = rods.pairs, model.rod_surfaces, rods.none
-    return Threads.of(
+    return Threads(
         d_hat=model.scene.contact.barrier_distance,
         edge_radius=surfaces.edge_radius,
         point_edge=surfaces.point_edge,
@@ -254,7 +254,7 @@ def threads_of(model: Model, rods: RodContact, wanted: Array, wanted_move: Array
 
 def _flow(model: Model) -> Flow:
     before, after = columns(model.drag_edge)
-    return Flow.of(
+    return Flow(
         velocity=np.array(model.scene.fluid.velocity),
         node=model.drag_node,
         edge_before=before,
@@ -266,7 +266,7 @@ def _flow(model: Model) -> Flow:
 
 def _fluid(model: Model) -> Fluid:
     edges, wet = model.edge_count + model.wall_count, model.node_count if len(model.fluid_mass) else 0
-    return Fluid.of(
+    return Fluid(
         velocity=np.array(model.scene.fluid.velocity),
         mass=model.fluid_mass,
         direction1=np.zeros((edges, 3)),
@@ -280,7 +280,7 @@ def _fluid(model: Model) -> Fluid:
 
 def _forces(model: Model, loads: PointLoads) -> PointForces:
     before, after = columns(model.carriers.node_edges[loads.nodes.target])
-    return PointForces.of(
+    return PointForces(
         node=loads.nodes.target,
         node_load=loads.nodes.load,
         node_vector=loads.nodes.vector,
@@ -298,7 +298,7 @@ def _forces(model: Model, loads: PointLoads) -> PointForces:
 def _moments(model: Model) -> Moments:
     dead, following = model.dead_loads.moments, model.follower_loads.moments
     body = np.concatenate([dead.target, following.target])
-    return Moments.of(
+    return Moments(
         dead=len(dead.target),
         body=body,
         load=np.concatenate([dead.load, following.load]),

@@ -34,13 +34,14 @@ def add_in_space(space, off_axis, bonds, strands, at, stage, sums, with_hessian)
         sums.edge_hessian,
         with_hessian,
     )
+    _bend_off_axis(off_axis, strands, at, stage)
     sums.energy[BENDING], sums.energy[TWISTING] = bend_twist(
         strands.first_bend,
         strands.bend_count,
         strands.joint_a,
         strands.joint_b,
         strands.joint_stiffness,
-        _rest_of_joints(off_axis, strands, at, stage),
+        stage.natural,
         at.length,
         at.tangent,
         at.director1,
@@ -57,9 +58,10 @@ def add_in_space(space, off_axis, bonds, strands, at, stage, sums, with_hessian)
 
 
 @inner
-def _rest_of_joints(off_axis, strands, at, stage):
+def _bend_off_axis(off_axis, strands, at, stage):
+    """Natural curvature of joints off the axis."""
     if off_axis is None:
-        return stage.rest_joint
+        return
     copy(stage.rest_joint, off_axis.rest_out)
     natural_curvature(
         off_axis.joint,
@@ -71,7 +73,6 @@ def _rest_of_joints(off_axis, strands, at, stage):
         stage.rest_joint,
         off_axis.rest_out,
     )
-    return off_axis.rest
 
 
 @inner
@@ -114,14 +115,14 @@ def add_in_plane(plane, off_axis, bonds, strands, at, stage, sums, with_hessian)
         plane.polar_hessian,
         with_hessian,
     )
-    rest = _rest_of_joints(off_axis, strands, at, stage)
+    _bend_off_axis(off_axis, strands, at, stage)
     sums.energy[BENDING] = planar_bend(
         strands.first_bend,
         strands.bend_count,
         strands.joint_a,
         strands.joint_b,
         strands.joint_stiffness,
-        rest,
+        stage.natural,
         plane.side,
         plane.frame,
         at.joint_strain,

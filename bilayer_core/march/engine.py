@@ -48,7 +48,7 @@ class Engine:
         self.figures = np.zeros(3)
         self.nodes, self.most_nodes = np.zeros((2, len(model.surfaces.names)), dtype=np.int64)
         self.first_contact = np.zeros(len(model.surfaces.names))
-        self.tally = Tally.of(
+        self.tally = Tally(
             mass_moment=model.mass_moment,
             mass=float(model.node_mass.sum()),
             figures=self.figures,
@@ -58,7 +58,7 @@ class Engine:
         )
         self.start_over(-math.inf)
         self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
-        self._work = work_of(model, places, self.touched)
+        self._work = work_of(model, places, self.touched, self._groups["off_axis"])
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""
@@ -71,7 +71,7 @@ class Engine:
         lists = near.carrier if near else None, rods.listed if rods else None
         if self._lists is None or any(a is not b for a, b in zip(lists, self._lists, strict=True)):
             room = len(near.carrier) if near else 0
-            self._problem = Problem.of(
+            self._problem = Problem(
                 **self._groups,
                 surfaces=surfaces_of(self._model, near) if near else None,
                 sliding=sliding_of(self._model, room) if near else None,
@@ -84,7 +84,7 @@ class Engine:
     def _arrays_of(self, state: State) -> StateArrays:
         if state is not self._state:
             self._state = state
-            self._state_arrays = StateArrays.of(**{name: getattr(state, name) for name in StateArrays.fields})
+            self._state_arrays = StateArrays(**{name: getattr(state, name) for name in StateArrays.fields})
         return self._state_arrays
 
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:

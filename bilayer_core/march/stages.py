@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..jit import inner
+from ..kinematics.stack import stack_matrix
 from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn_by
 from ..kinematics.vector import row
 from .copying import add_scaled, copy, copy_matrix, copy_row
@@ -34,7 +33,7 @@ def start_point(bodies, fluid, strands, state, start, first):
     first.turn[:] = 0.0
     copy(state.velocity, first.velocity)
     copy(state.spin, first.spin)
-    scratch = np.empty((3, 3))
+    scratch = stack_matrix(3, 3)
     for f in range(bodies.mass.shape[0]):
         b = bodies.body_of_free[f]
         copy_row(state.body_velocity, b, first.body_velocity, f)
@@ -102,7 +101,7 @@ def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
     add_scaled(point.body_velocity, momenta * h, state.body_acceleration)
     add_scaled(point.angular_momentum, momenta * h, state.body_moment)
     add_scaled(point.fluid_momentum, momenta * h, state.fluid_force)
-    tensor = np.empty((3, 3))
+    tensor = stack_matrix(3, 3)
     copy(point.rotation, scratch)
     for b in range(point.rotation.shape[0]):
         f = bodies.free_index[b]
@@ -160,7 +159,7 @@ def predict(bodies, held, origin, start, turned, position, rotation, rates, stag
                 origin.body_position[b, c] = position[b, c] - length * rates[b, c]
             _set_back(rotation, b, length, w0, w1, w2, stage.origin_rotation, b)
         else:
-            scratch = np.empty((3, 3))
+            scratch = stack_matrix(3, 3)
             w0, w1, w2 = _spin_without_moment(
                 bodies.second_moment,
                 f,
@@ -271,7 +270,7 @@ def write_state(bodies, held, fluid, strands, state, last, end, rates):
         state.twist[k] = end.joint_strain[k, 2]
     copy(last.body_position, state.body_position)
     copy(last.rotation, state.body_rotation)
-    tensor = np.empty((3, 3))
+    tensor = stack_matrix(3, 3)
     for b in range(rates.shape[0]):
         f = bodies.free_index[b]
         if f < 0:

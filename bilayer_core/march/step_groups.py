@@ -54,6 +54,7 @@ class Stage:
     rest_edge: Array  # strains without stress
     rest_joint_out: Array
     rest_joint: Array  # the same, read-only
+    natural: Array  # of joints, with what strains off the axis add; `rest_joint` itself where none do
     load_factor: Array
     body_turn: Array  # rotation vector to where inertia takes free bodies
 

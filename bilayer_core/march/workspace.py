@@ -8,6 +8,7 @@ from ..model.model import Model
 from ..solve.configuration import Configuration
 from ..solve.potential import IncrementalPotential
 from .build import read_only
+from .model_groups import OffAxis
 from .problem import Sums
 from .step_groups import Place, Point, Stage, Work
 
@@ -17,7 +18,7 @@ Array = np.ndarray
 def sums_of(model: Model, potential: IncrementalPotential, energy: Array, links: int) -> Sums:
     out, matrix = potential.accumulators, potential.matrix
     second = ("edge_hessian", "cross_hessian", "pair_hessian")
-    return Sums.of(
+    return Sums(
         energy=energy,
         first=out.all_but_carriers,
         **{name: getattr(out, name) for name in ("node", "edge", "pair", "body", "carrier", "contact")},
@@ -35,7 +36,7 @@ def sums_of(model: Model, potential: IncrementalPotential, energy: Array, links:
 def _point(model: Model) -> Point:
     nodes, edges, free = model.node_count, model.edge_count, model.free_count
     bodies, wet = len(model.bodies.names), model.node_count if len(model.fluid_mass) else 0
-    return Point.of(
+    return Point(
         position=np.zeros((nodes, 3)),
         body_position=np.zeros((bodies, 3)),
         turn=np.zeros(edges),
@@ -48,14 +49,15 @@ def _point(model: Model) -> Point:
     )
 
 
-def work_of(model: Model, places: list[Configuration], touched: Array) -> Work:
+def work_of(model: Model, places: list[Configuration], touched: Array, off_axis: OffAxis | None) -> Work:
     nodes, edges, free, bodies = model.node_count, model.edge_count, model.free_count, len(model.bodies.names)
     world = np.zeros((bodies + 1, 3, 3))
     world[-1] = np.eye(3)
     rest_joint = np.zeros_like(model.joint_rest)
-    return Work.of(
-        places=tuple(Place.of(**dict(zip(Place.fields, place.arrays, strict=True))) for place in places),
-        stage=Stage.of(
+    read_only_rest = read_only(rest_joint)
+    return Work(
+        places=tuple(Place(**dict(zip(Place.fields, place.arrays, strict=True))) for place in places),
+        stage=Stage(
             lengths=np.zeros(2),
             origin_position=np.zeros((nodes, 3)),
             origin_turn=np.zeros(edges),
@@ -70,7 +72,8 @@ def work_of(model: Model, places: list[Configuration], touched: Array) -> Work:
             twist=np.zeros(len(model.joint_a)),
             rest_edge=np.zeros(edges),
             rest_joint_out=rest_joint,
-            rest_joint=read_only(rest_joint),
+            rest_joint=read_only_rest,
+            natural=read_only_rest if off_axis is None else off_axis.rest,
             load_factor=np.zeros(len(model.scene.loads)),
             body_turn=np.zeros((free, 3)),
         ),

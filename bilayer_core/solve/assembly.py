@@ -8,9 +8,8 @@ numbers of unknowns.
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..jit import kernel
+from ..kinematics.stack import stack_matrix
 
 
 @kernel
@@ -161,7 +160,7 @@ def expand_pairs(
     (`model.layout`).
     Their local matrix is collected first, its lower triangle then added.
     """
-    local = np.empty((14, 14))
+    local = stack_matrix(14, 14)
     for k in range(pair_bottom.shape[0]):
         x = first_joint + k
         for m in range(3):
