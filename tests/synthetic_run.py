@@ -42,6 +42,7 @@ def description() -> Description:
                     width=np.full(NODES, WIDTH),
                     thickness=np.full(NODES, THICKNESS),
                     offset=np.zeros(NODES),
+                    curvature=np.zeros(NODES),
                 )
             )
     node_count = len(strands) * NODES + 1

@@ -23,6 +23,11 @@ class Strand:
         Of the cross-section at each node [m], shape (nodes,).
     offset : ndarray
         Of the middle of the cross-section from the node, along m1 [m], shape (nodes,).
+    curvature : ndarray
+        χ of its nodes' curve at the start [1/m], shape (nodes,).
+    layers : tuple of Strand
+        The layers of a strand that stands for several, bottom first: each with those of its nodes where it is, its
+        own cross-section there, and the offset of its own middle. Empty for a strand of one layer.
     """
 
     name: str
@@ -33,6 +38,23 @@ class Strand:
     width: np.ndarray
     thickness: np.ndarray
     offset: np.ndarray
+    curvature: np.ndarray
+    layers: tuple[Strand, ...] = ()
+
+    def strain_of(self, strain: np.ndarray, curvature: np.ndarray) -> np.ndarray:
+        """Axial strain in the middle of its section, which stays plane: (1 + ε − yχ)/(1 − yχ₀) − 1 at y = `offset`.
+
+        Parameters
+        ----------
+        strain, curvature : ndarray
+            ε and χ at its nodes [1, 1/m], shape (..., nodes).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., nodes).
+        """
+        return (1.0 + strain - self.offset * curvature) / (1.0 - self.offset * self.curvature) - 1.0
 
 
 @dataclass(frozen=True)
@@ -113,6 +135,11 @@ class Description:
     channel_ranges: tuple[tuple[float, float], ...]
     state_layout: tuple[tuple[str, tuple[int, ...]], ...]
     settings: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def layers(self) -> tuple[Strand, ...]:
+        """Each layer of each rod, as it is to be drawn: strands of one layer, and the layers of the others."""
+        return tuple(layer for strand in self.strands for layer in strand.layers or (strand,))
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import platform
 import numpy as np
 
 from ..kinematics.rotation import quaternion_from_matrix
-from ..model.model import Model
+from ..model.model import Model, StrandArrays
 from ..model.shapes import Shape, obstacle_pose, shape_of
 from ..model.state import State
 from ..solve.terms.fluid import energy_of_fluid
@@ -37,19 +37,6 @@ def versions() -> dict[str, str]:
 def describe(model: Model, state: State, settings: dict[str, str], scene_text: str) -> Description:
     """The unchanging part of what observers see."""
     scene = model.scene
-    strands = tuple(
-        Strand(
-            s.name,
-            s.rod,
-            s.layer,
-            slice(s.first_node, s.first_node + s.node_count),
-            slice(s.first_edge, s.first_edge + s.node_count - 1),
-            s.width,
-            s.thickness,
-            s.offset,
-        )
-        for s in model.strands
-    )
     bodies = model.bodies
     return Description(
         scene_name=scene.name,
@@ -57,7 +44,7 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         scene_text=scene_text,
         node_count=model.node_count + model.point_count,
         edge_count=model.edge_count,
-        strands=strands,
+        strands=tuple(map(_strand, model.strands)),
         bodies=tuple(
             BodyInfo(name, _shape_info(shape) if shape else None, bool(free < 0))
             for name, shape, free in zip(bodies.names, bodies.shapes, bodies.free_index, strict=False)
@@ -69,6 +56,21 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         channel_ranges=tuple((channel.minimum, channel.maximum) for channel in scene.stimuli.values()),
         state_layout=state.layout(),
         settings=settings,
+    )
+
+
+def _strand(s: StrandArrays) -> Strand:
+    return Strand(
+        s.name,
+        s.rod,
+        s.layer,
+        slice(s.first_node, s.first_node + s.node_count),
+        slice(s.first_edge, s.first_edge + s.node_count - 1),
+        s.width,
+        s.thickness,
+        s.offset,
+        s.curvature,
+        tuple(map(_strand, s.layers)),
     )
 
 

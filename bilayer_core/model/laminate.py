@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,7 +67,10 @@ def add_laminate(
         width=values_at(rod.width, rod.edge_length * np.arange(rod.stations)),
         thickness=high - low,
         offset=0.5 * (high + low),
+        curvature=shape.curvature,
     )
+    if len(rod.layers) > 1:
+        strand = replace(strand, layers=_drawn_layers(rod, axis, strand))
     elements = StrandElements(
         edge_mass=sum(layer.mass for layer in layers),
         spin_inertia=sum(layer.spin_inertia(axis) for layer in layers),
@@ -128,6 +131,31 @@ def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
     if len(layers) == 1:
         return -0.5 * layers[0] - axis, 0.5 * layers[0] - axis
     return -layers[0] - axis, layers[1] - axis
+
+
+def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandArrays, ...]:
+    """Each layer on those nodes of a laminate's strand where it is."""
+    _, thickness = outline(rod, np.arange(rod.stations))
+    layers = []
+    for place, layer in enumerate(rod.layers):
+        first, last = rod.covered_stations(layer)
+        own = slice(first, last + 1)
+        layers.append(
+            replace(
+                strand,
+                name=f"{strand.rod}/{layer.name}",
+                layer=layer.name,
+                first_station=first,
+                first_node=strand.first_node + first,
+                node_count=last - first + 1,
+                first_edge=strand.first_edge + first,
+                width=strand.width[own],
+                thickness=thickness[place, own],
+                offset=side(rod, place) * thickness[place, own] - axis,
+                curvature=strand.curvature[own],
+            )
+        )
+    return tuple(layers)
 
 
 def uneven_faces(scene: SceneConfig) -> Iterator[Figure]:

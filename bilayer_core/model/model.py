@@ -32,6 +32,8 @@ class StrandArrays(ReadOnlyArrays):
     width: Array  # at its nodes [m], shape (node_count,)
     thickness: Array  # likewise
     offset: Array  # of the middle between its faces from its nodes, along m1 [m], likewise
+    curvature: Array  # of its nodes' curve at the start [1/m], likewise
+    layers: tuple[StrandArrays, ...] = ()  # of a strand that stands for several: each on those nodes where it is
 
 
 @dataclass(frozen=True)

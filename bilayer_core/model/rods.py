@@ -38,6 +38,7 @@ def add_bonded_rods(
             width=at_nodes.width,
             thickness=at_nodes.thickness,
             offset=np.zeros(last - first + 1),
+            curvature=shape.curvature,
         )
         _add_eigenstrain(found, scene, rod, layer, strand)
         add_strand(found, scene, rod, strand, shape, _elements(rod, layer, at_nodes, at_edges, shape), body_index)

@@ -89,6 +89,11 @@ class StrandShape:
         """Half the lengths of the edges at each node [m], shape (n_node,)."""
         return halves_to_nodes(self.lengths)
 
+    @property
+    def curvature(self) -> Array:
+        """χ at each node [1/m], shape (n_node,)."""
+        return self.strains()[:, 0] / self.voronoi
+
     def strains(self) -> Array:
         """κ₁ κ₂ ψ [rad] at each node: between the edges at it, at the ends between path and edge, shape (n_node, 3)."""
         tangents = np.concatenate([self.end_tangents[:1], self.tangents, self.end_tangents[1:]])

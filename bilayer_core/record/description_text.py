@@ -22,6 +22,18 @@ def _shape(values: dict) -> ShapeInfo:
     return ShapeInfo(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
 
 
+def _strand(values: dict) -> Strand:
+    """A strand from its attributes; older logs have neither offset nor curvature nor layers."""
+    none = np.zeros(len(values["width"]))
+    return Strand(
+        **{name: values[name] for name in ("name", "rod", "layer")},
+        **{name: slice(*values[name]) for name in ("nodes", "edges")},
+        **{name: np.array(values[name]) for name in ("width", "thickness")},
+        **{name: np.array(values.get(name, none)) for name in ("offset", "curvature")},
+        layers=tuple(map(_strand, values.get("layers", ()))),
+    )
+
+
 def to_text(description: Description) -> dict[str, str]:
     """One JSON value for each attribute but the scene's text, which a log holds as an attachment."""
     attributes = asdict(description)
@@ -33,15 +45,7 @@ def from_text(attributes: dict[str, str], scene_text: str) -> Description:
     """The description of which `attributes` is `to_text`."""
     names = [item.name for item in fields(Description) if item.name != "scene_text"]
     values = {name: json.loads(attributes[name]) for name in names}
-    values["strands"] = tuple(
-        Strand(
-            **{name: strand[name] for name in ("name", "rod", "layer")},
-            **{name: slice(*strand[name]) for name in ("nodes", "edges")},
-            **{name: np.array(strand[name]) for name in ("width", "thickness")},
-            offset=np.array(strand.get("offset", np.zeros(len(strand["width"])))),  # older logs have none
-        )
-        for strand in values["strands"]
-    )
+    values["strands"] = tuple(map(_strand, values["strands"]))
     values["bodies"] = tuple(
         BodyInfo(body["name"], _shape(body["shape"]) if body["shape"] else None, body["prescribed"])
         for body in values["bodies"]

@@ -2,7 +2,8 @@
 
 ================================ =============================================================================
 ``strands/<rod>/<layer>``        LINE_LIST: one bar across the width at each node, as thick as the spacing of
-                                 nodes, so that the bars tile the ribbon; coloured by strain, full at `STRAIN_LIMIT`
+                                 nodes, so that the bars tile the ribbon; coloured by the strain in its middle, full at
+                                 `STRAIN_LIMIT`
 ``bodies/<name>``                SPHERE, CUBE or CYLINDER (edges sharp, whatever their rounding); a small CUBE for a
                                  body without a surface
 ``obstacles/<name>``             the same; a plane is a CUBE of `PLANE_SIZE`, its upper face on the plane
@@ -20,7 +21,7 @@ from bilayer_core.integrate.frame import Description, Frame, ShapeInfo
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
 from bilayer_core.record.cdr import Template
 from bilayer_core.record.colours import strain_colours
-from bilayer_core.record.node_frames import NodeFrames
+from bilayer_core.record.node_frames import NodeFrames, layer_rows
 from bilayer_core.record.topics import FRAME_ID
 
 STRAIN_LIMIT = 0.05
@@ -90,10 +91,11 @@ class MarkerEncoder:
     def __init__(self, description: Description, node_frames: NodeFrames):
         self._nodes = node_frames
         template = Template()
-        template.put("<u4", len(description.strands) + len(description.bodies) + len(description.obstacles) + 1)
-        for index, (strand, own) in enumerate(zip(description.strands, node_frames.ranges, strict=True)):
-            count = 2 * (own.stop - own.start)
-            _head(template, f"strands/{strand.name}", LINE_LIST, (1.0, 1.0, 1.0, 1.0), scale_field=f"spacing{index}")
+        self._layers = list(zip(description.layers, layer_rows(description), strict=True))
+        template.put("<u4", len(self._layers) + len(description.bodies) + len(description.obstacles) + 1)
+        for index, (layer, rows) in enumerate(self._layers):
+            count = 2 * (rows.stop - rows.start)
+            _head(template, f"strands/{layer.name}", LINE_LIST, (1.0, 1.0, 1.0, 1.0), scale_field=f"spacing{index}")
             template.put("<u4", count)
             template.array(f"points{index}", "<f8", (count, 3))
             template.put("<u4", count)
@@ -125,28 +127,26 @@ class MarkerEncoder:
 
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
-        strands = range(len(description.strands))
-        self._points = [views[f"points{i}"].reshape(-1, 2, 3) for i in strands]
-        self._colours = [views[f"colours{i}"].reshape(-1, 2, 4) for i in strands]
-        self._spacings = [views[f"spacing{i}"] for i in strands]
+        layers = range(len(self._layers))
+        self._points = [views[f"points{i}"].reshape(-1, 2, 3) for i in layers]
+        self._colours = [views[f"colours{i}"].reshape(-1, 2, 4) for i in layers]
+        self._spacings = [views[f"spacing{i}"] for i in layers]
         self._body_poses = [views[f"pose{i}"] for i in range(len(description.bodies))]
-        self._half_width = 0.5 * np.concatenate([strand.width for strand in description.strands])[:, None]
-        self._bars = np.empty((len(node_frames.order), 2, 3))
 
     def encode(self, frame: Frame) -> bytes:
         """The message for `frame`."""
         nodes = self._nodes
         nodes.update(frame)
-        half = self._half_width * nodes.widths
-        np.subtract(nodes.middles, half, out=self._bars[:, 0])
-        np.add(nodes.middles, half, out=self._bars[:, 1])
         steps = nodes.positions[1:] - nodes.positions[:-1]
         lengths = np.sqrt(np.einsum("ij,ij->i", steps, steps))
-        colours = strain_colours(frame.strain[nodes.order], STRAIN_LIMIT)[:, None, :]
-        for own, points, colour, spacing in zip(nodes.ranges, self._points, self._colours, self._spacings, strict=True):
-            points[:] = self._bars[own]
-            colour[:] = colours[own]
-            spacing[0] = lengths[own.start : own.stop - 1].mean()
+        for index, (layer, rows) in enumerate(self._layers):
+            middles = nodes.positions[rows] + layer.offset[:, None] * nodes.normals[rows]
+            half = 0.5 * layer.width[:, None] * nodes.widths[rows]
+            np.subtract(middles, half, out=self._points[index][:, 0])
+            np.add(middles, half, out=self._points[index][:, 1])
+            strain = layer.strain_of(frame.strain[layer.nodes], frame.curvature[layer.nodes])
+            self._colours[index][:] = strain_colours(strain, STRAIN_LIMIT)[:, None, :]
+            self._spacings[index][0] = lengths[rows.start : rows.stop - 1].mean()
         for index, pose in enumerate(self._body_poses):
             own, quaternion = self._own_poses[index], frame.body_quaternions[index]
             pose[:3] = frame.body_positions[index]

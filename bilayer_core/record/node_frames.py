@@ -11,12 +11,11 @@ from bilayer_core.kinematics.vector import combine, cross, dot, row, scaled
 
 @kernel
 def _frames_at_nodes(
-    positions, directors, edge_before, edge_after, start_node, offset, quaternions_out, widths_out, middles_out
+    positions, directors, edge_before, edge_after, start_node, quaternions_out, normals_out, widths_out
 ):
     """Frame of each node: m3 the mean tangent of its edges, m1 their mean director made normal to it, m2 = m3 × m1.
 
-    The quaternion x y z w is that of the matrix with columns m1, m2, m3, by the largest of its components. The middle
-    of the section is `offset` along m1 from the node.
+    The quaternion x y z w is that of the matrix with columns m1, m2, m3, by the largest of its components.
     """
     for node in range(positions.shape[0]):
         before, after = edge_before[node], edge_after[node]
@@ -38,9 +37,8 @@ def _frames_at_nodes(
         quaternions_out[node, 1] = scale * y
         quaternions_out[node, 2] = scale * z
         quaternions_out[node, 3] = scale * w
+        normals_out[node, 0], normals_out[node, 1], normals_out[node, 2] = m1
         widths_out[node, 0], widths_out[node, 1], widths_out[node, 2] = m2
-        for c in range(3):
-            middles_out[node, c] = positions[node, c] + offset[node] * m1[c]
 
 
 @kernel
@@ -61,6 +59,17 @@ def node_order(description: Description) -> np.ndarray:
     return np.concatenate([nodes[strand.nodes] for strand in description.strands])
 
 
+def layer_rows(description: Description) -> list[slice]:
+    """Where the nodes of each of the description's `layers` stand in this order."""
+    rows, count = [], 0
+    for strand in description.strands:
+        for layer in strand.layers or (strand,):
+            first = count + layer.nodes.start - strand.nodes.start
+            rows.append(slice(first, first + layer.nodes.stop - layer.nodes.start))
+        count += strand.nodes.stop - strand.nodes.start
+    return rows
+
+
 class NodeFrames:
     """Positions and material frames of the nodes of all strands, strand by strand.
 
@@ -68,18 +77,16 @@ class NodeFrames:
     ----------
     order : ndarray
         Index in a `Frame` of each node in this order, shape (nodes,).
-    ranges : tuple of slice
-        Where each strand stands in this order.
-    positions, quaternions, widths, middles : ndarray
-        Of the frame last given to `update`: position [m], x y z w of the frame m1 m2 m3, the axis m2, and the middle of
-        the section [m]; shapes (nodes, 3), (nodes, 4), (nodes, 3), (nodes, 3).
+    positions, quaternions, normals, widths : ndarray
+        Of the frame last given to `update`: position [m], x y z w of the frame m1 m2 m3, and its axes m1 and m2; shapes
+        (nodes, 3), (nodes, 4), (nodes, 3), (nodes, 3).
     """
 
     def __init__(self, description: Description):
         edges = np.arange(description.edge_count)
         self.order = node_order(description)
         self._edge_order = np.concatenate([edges[strand.edges] for strand in description.strands])
-        before, after, start, ranges = [], [], [], []
+        before, after, start = [], [], []
         node_count = edge_count = 0
         for strand in description.strands:
             size = len(edges[strand.edges]) + 1
@@ -87,17 +94,14 @@ class NodeFrames:
             before += [own[0], *own]
             after += [*own, own[-1]]
             start += list(node_count + np.arange(size - 1))
-            ranges.append(slice(node_count, node_count + size))
             node_count += size
             edge_count += size - 1
-        self.ranges = tuple(ranges)
         self._edge_before, self._edge_after, self._start_node = (np.array(part) for part in (before, after, start))
         self._directors = np.empty((edge_count, 3))
         self.positions = np.empty((node_count, 3))
         self.quaternions = np.empty((node_count, 4))
+        self.normals = np.empty((node_count, 3))
         self.widths = np.empty((node_count, 3))
-        self.middles = np.empty((node_count, 3))
-        self._offset = np.concatenate([strand.offset for strand in description.strands])
         self._frame: Frame | None = None
 
     def update(self, frame: Frame) -> None:
@@ -112,9 +116,8 @@ class NodeFrames:
             self._edge_before,
             self._edge_after,
             self._start_node,
-            self._offset,
             self.quaternions,
+            self.normals,
             self.widths,
-            self.middles,
         )
         self._frame = frame

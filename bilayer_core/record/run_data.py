@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bilayer_core.integrate.frame import Description
+from bilayer_core.integrate.frame import Description, Strand
 
 
 @dataclass(frozen=True)
@@ -53,3 +53,7 @@ class RunData:
     material_frames: np.ndarray
     strain: np.ndarray
     curvature: np.ndarray
+
+    def strain_of(self, layer: Strand) -> np.ndarray:
+        """Axial strain in the middle of one of the description's `layers`, shape (shapes, its nodes)."""
+        return layer.strain_of(self.strain[:, layer.nodes], self.curvature[:, layer.nodes])

@@ -71,7 +71,7 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
     ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
                                      frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
     ``points``                       x y z strain curvature fx fy fz of the same nodes, then of contact points of bodies
-    ``markers``                      strands coloured by strain, bodies, obstacles, contact forces
+    ``markers``                      layers coloured by their strain, bodies, obstacles, contact forces
     ================================ ==================================================================================
     """
     output, display = Rate.OUTPUT, Rate.DISPLAY

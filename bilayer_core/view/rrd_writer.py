@@ -12,6 +12,7 @@ import rerun.blueprint as rrb
 from bilayer_core.errors import InputError
 from bilayer_core.integrate.frame import ShapeInfo
 from bilayer_core.record.colours import STRAIN_MAP, strain_colours
+from bilayer_core.record.node_frames import layer_rows
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view import geometry
 from bilayer_core.view.layout import CHANNEL_COLOURS, TIMELINE, blueprint, summary
@@ -99,18 +100,15 @@ def _mesh(parts: geometry.Mesh) -> rr.Mesh3D:
 
 
 def _send_strands(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
-    first = 0
-    for strand in run.description.strands:
-        path = f"world/strands/{strand.name}"
-        positions, strain = run.positions[:, strand.nodes], run.strain[:, strand.nodes]
-        nodes = positions.shape[1]
-        frames = run.material_frames[:, first : first + nodes]
-        first += nodes
+    for layer, rows in zip(run.description.layers, layer_rows(run.description), strict=True):
+        path = f"world/strands/{layer.name}"
+        positions, frames = run.positions[:, layer.nodes], run.material_frames[:, rows]
+        nodes, strain = positions.shape[1], run.strain_of(layer)
         triangles = geometry.ribbon_triangles(nodes)
         recording.log(path, rr.Mesh3D.from_fields(triangle_indices=triangles), static=True)
         shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
         for part in _chunks(len(run.shape_times)):
-            vertices = geometry.ribbon_vertices(strand, positions[part], frames[part])
+            vertices = geometry.ribbon_vertices(layer, positions[part], frames[part])
             colours = _bytes(strain_colours(strain[part], scales.strain_limit)[:, :, None, :3] * shade)
             sizes = [nodes * geometry.CORNERS] * len(vertices)
             recording.send_columns(

@@ -61,7 +61,7 @@ class Scales:
 def choose_scales(run: RunData) -> Scales:
     """Scales that suit a run."""
     size = float(np.ptp(run.positions[0], axis=0).max())
-    strain = max(float(np.abs(run.strain).max()), SMALLEST_STRAIN)
+    strain = max(*(float(np.abs(run.strain_of(layer)).max()) for layer in run.description.layers), SMALLEST_STRAIN)
     # A few frames of impact would make all other arrows invisible.
     largest = np.linalg.norm(run.contact_forces, axis=2).max(axis=1)
     largest = largest[largest > 0]

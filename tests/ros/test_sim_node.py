@@ -131,7 +131,7 @@ def test_warnings_about_bad_stimuli_are_throttled(client, process):
     assert sent > 10
 
 
-def test_markers_show_every_strand_where_the_simulation_has_it(client, heard, scene):
+def test_markers_show_every_layer_where_the_simulation_has_it(client, heard, scene):
     applied, states = heard(Float64MultiArray, "stimulus_applied"), heard(Float64MultiArray, "state")
     full = [stimulus.maximum for stimulus in scene.stimuli.values()]
     client.sender(Float64MultiArray, "/bilayer_sim/stimulus")(Float64MultiArray(data=full))
@@ -143,11 +143,14 @@ def test_markers_show_every_strand_where_the_simulation_has_it(client, heard, sc
     simulator.load_state(np.array(state.data))
     assert np.abs(simulator.positions - at_rest).max() > 1e-4
     shown = {marker.ns: marker for marker in markers}
-    for strand in simulator.description.strands:
-        marker = shown[f"strands/{strand.name}"]
+    for layer in simulator.description.layers:
+        marker = shown[f"strands/{layer.name}"]
         bars = np.array([[point.x, point.y, point.z] for point in marker.points]).reshape(-1, 2, 3)
-        assert bars.mean(axis=1) == pytest.approx(simulator.positions[strand.nodes], abs=1e-9)
-        assert np.linalg.norm(bars[:, 1] - bars[:, 0], axis=1) == pytest.approx(strand.width)
+        across = bars[:, 1] - bars[:, 0]
+        beside = bars.mean(axis=1) - simulator.positions[layer.nodes]
+        assert np.linalg.norm(beside, axis=1) == pytest.approx(np.abs(layer.offset), abs=1e-9)
+        assert np.einsum("ni,ni->n", beside, across) == pytest.approx(np.zeros(len(across)), abs=1e-9)
+        assert np.linalg.norm(across, axis=1) == pytest.approx(layer.width)
         assert len(marker.colors) == len(marker.points)
     assert {marker.header.frame_id for marker in markers} == {"world"}
     assert len(shown) == len(markers)
