@@ -91,10 +91,13 @@ def sharp(problem: str, models: Iterable[str]) -> bool:
 
 
 def fingerprint(problem: Problem) -> str:
-    """Of all that a reference depends on: the scene file without its solver settings, the changes, what is measured."""
+    """Of all that a reference depends on: the scene file without its words and solver settings, the changes, what is
+    measured.
+    """
     path = bundled_scene(problem.scene)
     scene = read_yaml(read_scene_file(path), str(path))
-    scene.pop("solver", None)
+    for key in ("title", "description", "solver"):
+        scene.pop(key, None)
     measure = {key: value for key, value in vars(problem.measure).items() if not callable(value)}
     measure.pop("stops", None)
     content = [scene, problem.changes, problem.duration, measure]
