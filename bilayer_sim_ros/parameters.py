@@ -104,7 +104,7 @@ SIM_NODE = (
     NodeParameter("rerun", "off", "rerun recording: off, or an .rrd file to write when the run ends"),
     NodeParameter("model", "auto", "auto, or a model's name"),
     NodeParameter("dimension", "auto", "auto, 2 or 3"),
-    NodeParameter("dt", 0.0, "time step [s]; 0 = as the scene says", 0.0),
+    NodeParameter("dt", 0.0, "fixed steps of this length, with `tolerance` the first [s]; 0 = as the scene says", 0.0),
     NodeParameter(
         "tolerance", 0.0, "largest error of an adaptive step over the longest rod; 0 = as the scene says", 0.0
     ),

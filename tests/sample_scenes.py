@@ -1,8 +1,8 @@
 """Small scenes as dictionaries, for tests to change and load."""
 
-from bilayer_core.validate.parts import GEL, GROUND, ball, contact, fixed, layer, rod, scene
+from bilayer_core.validate.parts import GEL, GROUND, PAPER, ball, contact, fixed, layer, rod, scene
 
-__all__ = ["GEL", "GROUND", "ball", "contact", "everything", "fixed", "layer", "rod", "scene"]
+__all__ = ["GEL", "GROUND", "PAPER", "ball", "contact", "everything", "fixed", "layer", "rod", "scene"]
 
 
 def everything(stations=6):

@@ -5,6 +5,8 @@ import numpy as np
 from bilayer_core import Simulator, load_scene
 
 PERIOD = 2.4  # of both crawlers
+DAMPED = "solver.integrator=implicit_euler"
+"""Brings a crawler to rest: integrators of second order keep vibrations, which shake its feet along."""
 
 
 def strides(scene, cycles, *changes):

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from bilayer_core.cli.options import Verb, scene_argument, set_option
+from bilayer_core.cli.report import CHOICES
 
 WIDTH = 100
 """Of the text beside a name [characters]."""
@@ -49,12 +50,13 @@ def _report(simulator) -> dict[str, Any]:
         "model": plan.model,
         "dimension": plan.dimension,
         "integrator": plan.integrator,
-        "reasons": plan.reasons,
+        "stepping": str(simulator.steps),
+        "reasons": simulator.reasons,
         "nodes": model.node_count + model.point_count,
         "dof": model.unknowns,
         "dt": simulator.dt,
         "tolerance": simulator.tolerance,
-        "max_step": None if simulator.tolerance is None else simulator.max_step,
+        "max_step": None if simulator.tolerance is None else simulator.steps.longest,
         "duration": scene.duration,
         "terms": plan.terms,
         "contact_pairs": list(plan.contact_pairs),
@@ -111,10 +113,10 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         for name, text in report["stimuli"].items():
             yield from _block(name, [text])
     yield "computation"
-    for key in ("model", "dimension", "integrator"):
+    for key in CHOICES:
         yield from _block(key, [f"{report[key]} ({report['reasons'][key]})"])
     yield from _block("size", [f"{report['nodes']} nodes, {report['dof']} unknowns"])
-    yield from _block("time", [_steps(report)])
+    yield from _block("time", [_time(report)])
     yield from _forces(report["terms"])
     yield "contact pairs"
     yield from (f"  {pair}" for pair in report["contact_pairs"] or ["none"])
@@ -130,15 +132,12 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
     yield f"no faults, {count or 'no'} warning{'' if count == 1 else 's'}"
 
 
-def _steps(report: dict[str, Any]) -> str:
-    """How long steps are."""
+def _time(report: dict[str, Any]) -> str:
+    """How much time is simulated, in which steps."""
     duration, dt = report["duration"], report["dt"]
     if report["tolerance"] is None:
         return f"{duration:g} s in {round(duration / dt)} steps of {1e3 * dt:g} ms"
-    return (
-        f"{duration:g} s in steps with an error of at most {report['tolerance']:g} of the longest rod, the first "
-        f"{1e3 * dt:g} ms long, none longer than {1e3 * report['max_step']:g} ms"
-    )
+    return f"{duration:g} s, the first step {1e3 * dt:g} ms long, none longer than {1e3 * report['max_step']:g} ms"
 
 
 def _block(name: str, lines: list[str]) -> Iterator[str]:

@@ -50,9 +50,7 @@ def converge(
 
     with notice_of_compilation(quiet):
         found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
-    solver = config.solver
-    steps = f"step {1e3 * solver.dt:g} ms" if solver.tolerance is None else f"tolerance {solver.tolerance:g}"
-    click.echo(f"{config.name}: {found.integrator}, {steps}")
+    click.echo(f"{config.name}: {found.integrator}, steps {found.stepping}")
     _print_table(found.rows)
     for name, reason in found.missing.items():
         click.echo(f"  {name}: {reason}")
@@ -95,6 +93,7 @@ def _content(name: str, found: Any) -> dict[str, Any]:
     return {
         "scene": name,
         "integrator": found.integrator,
+        "stepping": found.stepping,
         "quantities": [
             {
                 "name": row.name,

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+CHOICES = ("model", "dimension", "integrator", "stepping")
+"""What `auto` may choose; `reasons` says why for each."""
+
 
 def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     """What a user wants to know first.
@@ -18,8 +21,9 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     """
     factor = summary["real_time_factor"]
     yield f"{summary['scene']}: {summary['termination']}, {summary['simulated']:g} s in {summary['steps']} steps"
-    size = f"{summary['nodes']} nodes, {summary['dof']} unknowns"
-    yield f"  {'model':22}{summary['model']}, {summary['integrator']}, {size}"
+    for key in CHOICES:
+        yield f"  {key:22}{summary[key]} ({summary['reasons'][key]})"
+    yield f"  {'size':22}{summary['nodes']} nodes, {summary['dof']} unknowns"
     yield f"  {'CPU time':22}{summary['cpu_time']:.3g} s" + (f", real-time factor {factor:.3g}" if factor else "")
     iterations = summary["newton_iterations"]
     each = f", {1e3 * summary['cpu_time'] / iterations:.2g} ms each" if iterations else ""
@@ -28,8 +32,7 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     yield f"  {'steps':22}{summary['steps']}{refused}; correction left at most {summary['largest_residual']:.1g} m/s"
     if summary["tolerance"] is not None and summary["steps"]:
         lengths = ", ".join(f"{name} {1e3 * length:.3g} ms" for name, length in summary["step_length"].items())
-        refused = f"{summary['inaccurate_steps']} attempts refused for their error"
-        yield f"  {'tolerance':22}{summary['tolerance']:g} of the longest rod; {lengths}; {refused}"
+        yield f"  {'their length':22}{lengths}; {summary['inaccurate_steps']} attempts refused for their error"
     yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m"
     if summary["min_gap"] is not None:
         yield f"  {'smallest gap':22}{1e3 * summary['min_gap']:.4g} mm"

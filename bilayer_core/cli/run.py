@@ -24,7 +24,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.command(cls=Verb)
 @scene_argument
 @click.option("--duration", type=Duration(), help="Simulated time of this run; default: to the end of the scene.")
-@click.option("--dt", metavar="TIME", help="Time step; the first one if steps are adaptive.")
+@click.option("--dt", metavar="TIME", help="Fixed steps of this length; with --tolerance the first one.")
 @click.option("--model", metavar="NAME", help="auto, two_rod or laminate.")
 @click.option("--dimension", metavar="D", help="auto, 2 or 3.")
 @click.option("--integrator", metavar="NAME", help="auto, or a name from docs/scene_keys.md (solver).")
@@ -44,6 +44,8 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     from bilayer_core.scene.loader import load_scene
 
     changes = [*overrides, *(f"solver.{key}={options[key]}" for key in SOLVER_OPTIONS if options[key] is not None)]
+    if options["dt"] is not None and options["tolerance"] is None:
+        changes.append("solver.tolerance=null")  # fixed steps, whatever the scene says
     if options["log_rate"] is not None:
         changes.append(f"output.rate={options['log_rate']}")
     config = load_scene(scene, changes)

@@ -15,6 +15,7 @@ from bilayer_core.converge.quantities import check_names, headline, measure
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrate.integrators import INTEGRATORS
 from bilayer_core.integrate.simulator import Simulator
+from bilayer_core.integrate.steps import choose_steps
 from bilayer_core.model.plan import make_plan
 from bilayer_core.scene.config import LARGEST_TOLERANCE, SceneConfig
 from bilayer_core.scene.loader import load_scene, parse_scene, scene_text
@@ -62,9 +63,10 @@ class Row:
 
 @dataclass(frozen=True)
 class Study:
-    """A finished study: its integrator, its rows, and why a coarser run is missing, by its name."""
+    """A finished study: integrator and steps of the scene, its rows, and why a coarser run is missing, by its name."""
 
     integrator: str
+    stepping: str
     rows: list[Row]
     missing: dict[str, str]
 
@@ -85,14 +87,13 @@ def planned_runs(scene: SceneConfig) -> list[Run]:
 
 def _with_steps(scene: SceneConfig, part: float) -> tuple[str, ...]:
     """Overrides with which steps are `part` as long."""
-    solver = scene.solver
-    first = f"solver.dt={part * solver.dt!r}"
-    if solver.tolerance is None:
+    method = INTEGRATORS[make_plan(scene).integrator]
+    steps = choose_steps(scene, method)
+    first = f"solver.dt={part * steps.dt!r}"
+    if not steps.adaptive:
         return (first,)
-    order = INTEGRATORS[make_plan(scene).integrator].order
-    tolerance = min(part ** (order + 1) * solver.tolerance, LARGEST_TOLERANCE)
-    longest = part * (solver.max_step or 1.0 / scene.output.rate)
-    return first, f"solver.tolerance={tolerance!r}", f"solver.max_step={longest!r}"
+    tolerance = min(part ** (method.order + 1) * steps.tolerance, LARGEST_TOLERANCE)
+    return first, f"solver.tolerance={tolerance!r}", f"solver.max_step={part * steps.longest!r}"
 
 
 def converge(
@@ -153,7 +154,8 @@ def converge(
             raise InputError(f"--quantity {name}: did not happen in one of the runs: {absent[0]}")
     names = [name for name in names if all(name in found[run] for run in NEEDED)]
     by_name = {run.name: run for run in runs}
-    return Study(simulator.plan.integrator, [_row(name, found, by_name) for name in names], missing)
+    rows = [_row(name, found, by_name) for name in names]
+    return Study(simulator.plan.integrator, str(simulator.steps), rows, missing)
 
 
 def _run(text: str, overrides: Sequence[str], duration: float) -> dict[str, float]:

@@ -12,7 +12,7 @@ from ..errors import InputError, SimulationError
 from ..model.build import build_model
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
-from ..scene.config import LARGEST_TOLERANCE, SceneConfig
+from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observe
 from .adaptive import AdaptiveStepper
@@ -24,6 +24,7 @@ from .result import BodyView, RunResult, Termination
 from .statics import StaticReport, solve_static
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper, StepReport
+from .steps import choose_steps
 
 Array = np.ndarray
 STEPS_AT_ONCE = 64
@@ -40,7 +41,7 @@ class Simulator:
     model, dimension, integrator : str or int
         Override the scene's; ``"auto"`` keeps them.
     dt : float, optional
-        Overrides the scene's step [s].
+        Alone: fixed steps of this length [s], whatever the scene says; with `tolerance` the first adaptive one.
     tolerance : float, optional
         Overrides the scene's: the largest error of a step, relative to the longest rod. With one, steps are adaptive.
     budget : bool
@@ -65,24 +66,18 @@ class Simulator:
         tolerance: float | None = None,
         budget: bool = False,
     ):
-        if dt is not None and not (math.isfinite(dt) and dt > 0.0):
-            raise InputError(f"dt: {dt} is not a time step; allowed is a positive number of seconds")
-        if tolerance is not None and not 0.0 < tolerance <= LARGEST_TOLERANCE:
-            allowed = f"a part of the longest rod above 0 and at most {LARGEST_TOLERANCE:g}"
-            raise InputError(f"tolerance: {tolerance} is not allowed; it must be {allowed}")
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
+        method = INTEGRATORS[self.plan.integrator]
+        self.steps = choose_steps(scene, method, dt, tolerance)
+        self.dt, self.tolerance = self.steps.dt, self.steps.tolerance
         self.scene = scene
-        self.dt = scene.solver.dt if dt is None else float(dt)
         self.model = build_model(scene, self.plan.model, self.plan.dimension)
         solver = scene.solver
-        self.tolerance = solver.tolerance if tolerance is None else float(tolerance)
-        self.max_step = 1.0 / scene.output.rate if solver.max_step is None else solver.max_step
-        method = INTEGRATORS[self.plan.integrator]
         newton = solver.newton_tolerance, solver.max_newton_iterations, solver.max_halvings
         if self.tolerance is None:
             self._stepper = Stepper(self.model, method, self.dt, *newton)
         else:
-            self._stepper = AdaptiveStepper(self.model, method, self.dt, *newton, self.tolerance, self.max_step)
+            self._stepper = AdaptiveStepper(self.model, method, self.dt, *newton, self.tolerance, self.steps.longest)
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = self._initial_state()
@@ -105,6 +100,11 @@ class Simulator:
                 self._state, self._stepper.rest_strains, self._stepper.surroundings.load_factor(self.time)
             )
             self._stepper.ledger = self._ledger
+
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Why `model`, `dimension`, `integrator` and `stepping` are what they are."""
+        return {**self.plan.reasons, "stepping": self.steps.reason}
 
     # what the scene looks like now
 

@@ -25,6 +25,8 @@ def summarise(simulator: Simulator) -> dict:
         "model": plan.model,
         "dimension": plan.dimension,
         "integrator": plan.integrator,
+        "stepping": str(simulator.steps),
+        "reasons": simulator.reasons,
         "nodes": len(positions),
         "dof": model.unknowns,
         "dt": simulator.dt,

@@ -32,6 +32,8 @@ from bilayer_core.scene.units import (
 )
 
 LARGEST_TOLERANCE = 0.1
+DEFAULT_TOLERANCE, DEFAULT_DT = 1e-4, 1e-3
+"""Of `Solver`: where neither is given, steps are adaptive with this tolerance and begin with this length [s]."""
 ErrorTolerance = real(
     "a part of the longest rod (the speed that Newton may leave is `newton_tolerance`)",
     "1",
@@ -173,19 +175,21 @@ class Solver(Part):
     """How the equations are solved."""
 
     model: Literal["auto", "two_rod", "laminate"] = "auto"
-    """`two_rod`: each layer a rod of its own, bonded to the other; `laminate`: one curve for both, bonded exactly."""
+    """`two_rod`: each layer a rod of its own, bonded to the other; `laminate`: one curve for both, bonded exactly;
+    `auto`: the laminate, unless the scene asks for what only two rods have."""
     dimension: Literal["auto", 2, 3] = "auto"
-    """Of space: 2 is faster, where all stays in a plane; `auto` is 3."""
+    """Of space; `auto`: 2 where all stays in a plane, which is faster, otherwise 3."""
     integrator: Literal["auto", "implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"] = (
         "auto"
     )
-    """How a step is taken in time; `auto` is the recommended one."""
-    dt: PositiveTime = 1e-3
-    """Time step; with `tolerance` the first one, and the first after a jump of a stimulus or a load."""
+    """How a step is taken in time; `auto` is the recommended one, `sdirk2`."""
+    dt: PositiveTime | None = None
+    """Alone: the time step, always the same. With `tolerance`, or by default (1 ms): the first adaptive step, and the
+    first after a jump of a stimulus or a load."""
     tolerance: ErrorTolerance | None = None
-    """Largest error of a step: displacement over the length of the longest rod. Without it, steps are fixed."""
+    """Largest error of an adaptive step: displacement over the length of the longest rod; 1e-4 unless `dt` is given."""
     max_step: PositiveTime | None = None
-    """Longest step with `tolerance`; by default a period of `output.rate`."""
+    """Longest adaptive step; by default a period of `output.rate`."""
     newton_tolerance: PositiveSpeed = 1e-6
     """Largest velocity correction that Newton may leave."""
     max_newton_iterations: whole(1) = 50

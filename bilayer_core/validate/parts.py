@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 
+PAPER = {"model": "two_rod", "dimension": 3, "integrator": "implicit_euler", "dt": 1e-3}
+"""The paper's method, by which `scene` is solved where nothing else is asked for."""
 GEL = {"youngs_modulus": 1e8, "poisson_ratio": 0.5, "density": 1000.0}
 GROUND = {"name": "ground", "type": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}
 
@@ -27,8 +29,8 @@ def rod(layers, length=0.1, stations=21, start=(0, 0, 0), name="rod", width=0.01
     }
 
 
-def scene(rods, **more):
-    """A scene without gravity, contact, stimuli or bodies."""
+def scene(rods, solver=None, **more):
+    """A scene without gravity, contact, stimuli or bodies, solved by the paper's method but for what `solver` says."""
     base = {
         "schema": 1,
         "name": "sample",
@@ -37,6 +39,7 @@ def scene(rods, **more):
         "gravity": [0, 0, 0],
         "materials": {"gel": GEL},
         "rods": rods,
+        "solver": {**PAPER, **(solver or {})},
     }
     return copy.deepcopy({**base, **more})
 

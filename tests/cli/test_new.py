@@ -33,7 +33,7 @@ def test_a_strip_is_written_without_a_template_and_runs(here, capsys):
     assert main(["new", "robot.yaml"]) == 0
     assert main(["run", "robot.yaml", "--duration", "20 ms", "--summary", "run.json"]) == 0
     summary = json.loads((here / "run.json").read_text())
-    assert summary["scene"] == "robot" and summary["steps"] == 20 and summary["converged"]
+    assert summary["scene"] == "robot" and summary["simulated"] == 0.02 and summary["converged"]
 
 
 @pytest.mark.parametrize("template", bundled_templates())

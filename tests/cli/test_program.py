@@ -74,10 +74,14 @@ def test_check_says_what_is_computed_and_why_the_rest_is_skipped(capsys):
         "bottom to top: passive 1 mm, active 1 mm",
         "eigenstrain up to 1 %: if nothing hinders it, curvature up to 7.5 1/m, radius 133 mm",
         "  swelling      0 to 1 [1], ramp",
-        "  model         two_rod (",
-        "  time          2 s in 2000 steps of 1 ms",
-        "  active        stretching, bending, twisting, bond, eigenstrain, inertia, damping\n",
-        "  skipped       gravity: gravity is zero\n",
+        "  model         laminate (one curve carries both layers",
+        "  dimension     2 (all stays in the plane y = 0)\n",
+        "  integrator    sdirk2 (second order, L-stable; ",
+        "  stepping      adaptive, error at most 0.0001 of the longest rod (neither `dt` nor `tolerance` is given; ",
+        "  time          2 s, the first step 1 ms long, none longer than 20 ms\n",
+        "  active        stretching, bending, eigenstrain, inertia, damping\n",
+        "  skipped       twisting: nothing twists in a plane\n",
+        "gravity: gravity is zero\n",
         "drag, added mass: no fluid\n",
         "contact pairs\n  none\n",
         "  within        rods.strip: length/width 10 (at least 5)\n",
@@ -85,6 +89,19 @@ def test_check_says_what_is_computed_and_why_the_rest_is_skipped(capsys):
         assert line in text
     assert "/bilayer_sim/markers" in text and "20 Hz" in text
     assert text.endswith("no faults, no warnings\n")
+
+
+def test_check_says_what_is_set(capsys):
+    solver = "solver={model: two_rod, dimension: 3, integrator: implicit_euler, dt: 1 ms}"
+    assert main(["check", "bending", "--set", solver]) == 0
+    text = capsys.readouterr().out
+    for line in (
+        "  model         two_rod (set by `solver.model`)\n",
+        "  stepping      fixed, 1 ms (set by `solver.dt`)\n",
+        "  time          2 s in 2000 steps of 1 ms\n",
+        "  active        stretching, bending, twisting, bond, eigenstrain, inertia, damping\n",
+    ):
+        assert line in text
 
 
 def test_check_wraps_what_is_long_and_counts_the_warnings(capsys):
@@ -101,7 +118,13 @@ def test_check_as_json_holds_the_same(capsys):
     assert report["terms"]["damping"] == "skipped: damping.mass is zero"
     assert "rods – ball (nodes against sphere)" in report["contact_pairs"]
     assert {stream["rate"] for stream in report["outputs"]} == {10.0}
-    assert report["nodes"] >= 4 * (50 + 48) and report["dof"] > 3 * report["nodes"]
+    assert report["nodes"] == 4 * 50 + 1 and report["dof"] > 3 * report["nodes"]
+    assert report["stepping"].startswith("adaptive") and set(report["reasons"]) == {
+        "model",
+        "dimension",
+        "integrator",
+        "stepping",
+    }
 
 
 def test_a_scene_that_starts_in_penetration_is_refused_with_the_node_and_the_depth(scene_file):

@@ -43,13 +43,30 @@ def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
     assert main(["run", "cantilever", "--duration", "50 ms", *outputs]) == 0
     summary = json.loads((here / "run.json").read_text())
     assert not set(SUMMARY_KEYS) - set(summary)
-    assert summary["steps"] == 50 and summary["duration"] == 0.05 and summary["converged"] is True
+    assert summary["simulated"] == summary["duration"] == 0.05 and summary["converged"] is True
+    assert set(summary["reasons"]) == {"model", "dimension", "integrator", "stepping"}
     info = read_info("run.mcap")
     assert info.complete and info.termination == "completed" and info.last_time == pytest.approx(0.05)
     assert info.topics["/bilayer_sim/com"]["count"] == 6
     told = capsys.readouterr().out
-    assert told.startswith("cantilever: completed, 0.05 s in 50 steps\n")
+    assert told.startswith(f"cantilever: completed, 0.05 s in {summary['steps']} steps\n")
+    assert f"  stepping              {summary['stepping']} ({summary['reasons']['stepping']})\n" in told
     assert "real-time factor" in told and "run.mcap" in told
+
+
+@pytest.mark.parametrize(
+    ("asked", "tolerance"),
+    [(["--dt", "2 ms"], None), (["--tolerance", "1e-3"], 1e-3), (["--dt", "2 ms", "--tolerance", "1e-3"], 1e-3)],
+)
+def test_dt_alone_asks_for_fixed_steps_and_a_tolerance_for_adaptive_ones_whatever_the_scene_says(
+    here, capsys, asked, tolerance
+):
+    of_scene = ["--set", "solver={dt: 2 ms, tolerance: 1e-2}", "--duration", "0.02"]
+    assert main(["run", "cantilever", *of_scene, *asked, "--summary", "run.json"]) == 0
+    summary = json.loads((here / "run.json").read_text())
+    assert (summary["tolerance"], summary["dt"]) == (tolerance, 2e-3)
+    assert summary["stepping"].startswith("fixed, 2 ms" if tolerance is None else "adaptive")
+    assert (summary["steps"] == 10) == (tolerance is None)
 
 
 def test_a_run_shows_on_request_where_its_energy_went(here, capsys):

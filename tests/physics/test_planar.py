@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from planar_scenes import AHEAD, everything_in_plane, mechanism, snap
-from sample_scenes import fixed, layer, rod, scene
+from sample_scenes import PAPER, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
@@ -17,7 +17,7 @@ SAME = 1e-8
 def pair(content, integrator="implicit_euler", dt=1e-3, **more):
     """The same scene in three and in two dimensions, solved to rounding."""
     if isinstance(content, dict):
-        content = content | {"solver": {"newton_tolerance": 1e-10}}
+        content = content | {"solver": {**PAPER, "newton_tolerance": 1e-10}}
     config = load_scene(content)
     return [Simulator(config, dimension=d, integrator=integrator, dt=dt, **more) for d in (3, 2)]
 

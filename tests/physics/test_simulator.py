@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import yaml
-from sample_scenes import GROUND, contact, everything, layer, rod, scene
+from sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, PenetrationError, SceneError, SimulationError
@@ -130,7 +130,7 @@ def test_an_interrupted_run_tells_its_observers(simulator):
 
 def test_a_solver_that_cannot_go_on_says_what_and_when_and_keeps_the_last_state():
     hopeless = everything()
-    hopeless["solver"] = {"max_newton_iterations": 1, "max_halvings": 1, "newton_tolerance": 1e-15}
+    hopeless["solver"] = {**PAPER, "max_newton_iterations": 1, "max_halvings": 1, "newton_tolerance": 1e-15}
     simulator = Simulator(load_scene(hopeless))
     before = simulator.save_state()
     recorder = Recorder(100.0)
@@ -169,7 +169,7 @@ def test_a_correction_that_is_not_finite_is_never_small(simulator):
 
 def test_a_step_that_does_not_converge_is_halved_and_the_steps_grow_again():
     rough = everything()
-    rough["solver"] = {"dt": 0.01, "max_newton_iterations": 6}
+    rough["solver"] = {**PAPER, "dt": 0.01, "max_newton_iterations": 6}
     rough["damping"] = {"mass": 0.0}
     simulator = Simulator(load_scene(rough))
     simulator.run(0.2)

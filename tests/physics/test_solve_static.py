@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from sample_scenes import GROUND, PAPER, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError
@@ -12,6 +12,7 @@ from bilayer_core.errors import InputError, SimulationError
 LENGTH = 0.1
 EI = 1e8 * 0.01 * 1e-3**3 / 12  # of `sample_scenes.layer` 10 mm wide
 EULER = math.pi**2 * EI / (4 * LENGTH**2)  # a column with one free end
+LONG_STEPS = {**PAPER, "dt": 1.0, "newton_tolerance": 1e-11}
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 0}}}
 
 
@@ -45,7 +46,7 @@ def test_a_disturbed_column_above_eulers_load_buckles_to_a_stable_shape_of_the_e
 
 
 def test_the_equilibrium_is_that_to_which_time_would_lead_with_lags_settled_and_nothing_moves_there():
-    surroundings = {"bodies": [fixed()], "gravity": [0, 0, -9.81], "solver": {"dt": 1.0, "newton_tolerance": 1e-11}}
+    surroundings = {"bodies": [fixed()], "gravity": [0, 0, -9.81], "solver": LONG_STEPS}
     description = bilayer(clamp_start="wall") | surroundings
     found = Simulator(load_scene(description))
     found.set_stimulus("heat", 1.0)

@@ -1,6 +1,7 @@
 """The paper's robots as laminates do what they do as pairs of bonded rods."""
 
 import pytest
+from paper import PAPERS, TWO_RODS
 from strides import strides
 
 import bilayer_core.model.laminate as laminate
@@ -8,30 +9,32 @@ from bilayer_core import Simulator, load_scene
 
 pytestmark = pytest.mark.slow
 LAMINATE = "solver.model=laminate"
+SECOND_ORDER = "solver.integrator=sdirk2"
 
 
 def both(scene, duration, figure, *changes):
-    """A figure of a run of the scene: of two rods, and of the laminate."""
+    """A figure of a run of the scene by the paper's method: of two rods, and of the laminate."""
     found = []
-    for model in ("solver.model=two_rod", LAMINATE):
-        simulator = Simulator(load_scene(scene, [model, *changes]))
+    for model in (TWO_RODS, LAMINATE):
+        simulator = Simulator(load_scene(scene, [*PAPERS, model, *changes]))
         simulator.run(duration)
         found.append(figure(simulator))
     return found
 
 
 def test_the_walker_with_two_legs_takes_the_same_strides():
-    bonded, whole = (strides("crawling_dual_leg", 2, *model)[0] for model in ((), (LAMINATE,)))
+    bonded, whole = (strides("crawling_dual_leg", 2, *PAPERS, model)[0] for model in (TWO_RODS, LAMINATE))
     assert whole == pytest.approx(bonded, rel=2e-3)
 
 
 def test_the_jumper_rises_as_high():
-    bonded, whole = both("jumping", 1.4, lambda s: s.summary()["com_max_height"] - s.start_com[2])
+    steps = SECOND_ORDER, "solver.dt=0.5 ms"
+    bonded, whole = both("jumping", 1.4, lambda s: s.summary()["com_max_height"] - s.start_com[2], *steps)
     assert whole == pytest.approx(bonded, rel=5e-3)
 
 
 def test_the_swimmer_rises_as_far_with_each_beat():
-    bonded, whole = both("swimming", 0.6, lambda s: s.bodies["hub"].position[2], "rods.arm.stations=79")
+    bonded, whole = both("swimming", 0.6, lambda s: s.bodies["hub"].position[2], "rods.arm.stations=79", SECOND_ORDER)
     assert whole == pytest.approx(bonded, rel=0.03)  # two rods lose half an edge of each arm's bend: first order
 
 
@@ -43,6 +46,6 @@ def test_the_gripper_touches_the_ball_at_the_same_time_and_lifts_it_as_high():
 
 def test_the_inchworms_stride_is_the_same_where_its_nodes_are_as_high_over_the_sole(monkeypatch):
     higher = ("rods.body.path.start=[0, 0, 3.2 mm]",)  # the curve's farther face is 1.5 mm away then
-    bonded = strides("crawling_inchworm", 1, "rods.body.stations=317", *higher)[0][0]
+    bonded = strides("crawling_inchworm", 1, *PAPERS, "rods.body.stations=317", *higher)[0][0]
     monkeypatch.setattr(laminate, "_axis", lambda _: -0.5e-3)
-    assert strides("crawling_inchworm", 1, LAMINATE, *higher)[0][0] == pytest.approx(bonded, rel=2e-3)
+    assert strides("crawling_inchworm", 1, *PAPERS, LAMINATE, *higher)[0][0] == pytest.approx(bonded, rel=2e-3)

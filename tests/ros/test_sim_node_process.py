@@ -61,6 +61,14 @@ def test_adaptive_steps_end_at_output_times_and_at_the_duration(start, domain, t
     assert read_info(log).complete and read_info(log).settings["tolerance"] == "0.001"
 
 
+def test_dt_alone_asks_for_fixed_steps(start, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    node = start("sim_node", domain, FAST | {"log": log, "duration": 0.05, "dt": 2e-3})
+    assert node.wait() == 0, node.output
+    settings = read_info(log).settings
+    assert (settings["dt"], settings["tolerance"]) == ("0.002", "none")
+
+
 def test_a_simulation_that_cannot_go_on_ends_with_3_and_a_log_up_to_its_last_step(start, domain, root, tmp_path):
     scene = yaml.safe_load((root / "config" / "scenes" / "bending.yaml").read_text())
     scene["stimuli"]["swelling"]["schedule"] = {"type": "table", "times": [0.05, 0.051], "values": [0.0, 1.0]}
