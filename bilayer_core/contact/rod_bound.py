@@ -14,16 +14,19 @@ from ..jit import kernel
 from .step_bound import KEPT_FRACTION
 
 TOUCH = 0.05  # of the gap: nearer to the distance to keep than this, the search ends
-MAX_PARTS = 100
+MAX_PARTS = 1000
+FAR, NEAR = 8.0, 2.0  # barrier distances: `KEPT_FRACTION` of one and `TOUCH` of the other together are less than one
 
 
 @kernel
 def rod_step_bound(
-    position, step, limit, pair_count, pair_point, pair_edge, edge_node, edge_radius, point_edge, point_fraction
+    position, step, limit, d_hat, pair_count, pair_point, pair_edge, edge_node, edge_radius, point_edge, point_fraction
 ):
     """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
 
-    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3).
+    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3). A pair that
+    stays beyond the barrier distance `d_hat` [m] sets no bound: of large gaps less is kept. So what is found does not
+    depend on which of these pairs are listed.
 
     Returns
     -------
@@ -46,17 +49,18 @@ def rod_step_bound(
         radii = edge_radius[a] + edge_radius[k]
         gone = 0.0
         gap = _distance(position, step, 0.0, i, s, j) - radii
-        kept = radii + KEPT_FRACTION * gap
-        room = (1.0 - KEPT_FRACTION) * gap
+        keep = KEPT_FRACTION * min(gap, FAR * d_hat)
+        near = TOUCH * min(gap, NEAR * d_hat)
+        room = gap - keep
         part = 0
         while gone < alpha and speed * (alpha - gone) > room:
-            if part > 0 and (room < TOUCH * gap or part == MAX_PARTS):
+            if part > 0 and (room < near or part == MAX_PARTS):
                 alpha = gone
                 blocking = i
                 break
             gone += room / speed
             if gone < alpha:
-                room = _distance(position, step, gone, i, s, j) - kept
+                room = _distance(position, step, gone, i, s, j) - radii - keep
             part += 1
     return alpha, blocking
 
@@ -82,23 +86,22 @@ def _distance(position, step, fraction, i, s, j):
 
 
 @kernel
-def largest_travel(position, step, base):
-    """Largest distance of x + step from `base`, the mean displacement taken off, and that of the step alone [m].
+def largest_spread(position, step, fraction, base):
+    """Largest distance of a node at x + fraction · step from its place in `base`, the mean of all taken off [m].
 
     A translation common to all nodes brings none of them nearer to another.
     """
     count = position.shape[0]
-    t0, t1, t2, m0, m1, m2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    m0, m1, m2 = 0.0, 0.0, 0.0
     for i in range(count):
-        m0, m1, m2 = m0 + step[i, 0] / count, m1 + step[i, 1] / count, m2 + step[i, 2] / count
-        t0 += (position[i, 0] - base[i, 0]) / count
-        t1 += (position[i, 1] - base[i, 1]) / count
-        t2 += (position[i, 2] - base[i, 2]) / count
-    travel, move = 0.0, 0.0
+        m0 += position[i, 0] + fraction * step[i, 0] - base[i, 0]
+        m1 += position[i, 1] + fraction * step[i, 1] - base[i, 1]
+        m2 += position[i, 2] + fraction * step[i, 2] - base[i, 2]
+    m0, m1, m2 = m0 / count, m1 / count, m2 / count
+    largest = 0.0
     for i in range(count):
-        s0, s1, s2 = step[i, 0] - m0, step[i, 1] - m1, step[i, 2] - m2
-        d0, d1 = position[i, 0] - base[i, 0] - t0, position[i, 1] - base[i, 1] - t1
-        d2 = position[i, 2] - base[i, 2] - t2
-        travel = max(travel, (d0 + s0) ** 2 + (d1 + s1) ** 2 + (d2 + s2) ** 2)
-        move = max(move, s0 * s0 + s1 * s1 + s2 * s2)
-    return math.sqrt(travel), math.sqrt(move)
+        d0 = position[i, 0] + fraction * step[i, 0] - base[i, 0] - m0
+        d1 = position[i, 1] + fraction * step[i, 1] - base[i, 1] - m1
+        d2 = position[i, 2] + fraction * step[i, 2] - base[i, 2] - m2
+        largest = max(largest, d0 * d0 + d1 * d1 + d2 * d2)
+    return math.sqrt(largest)

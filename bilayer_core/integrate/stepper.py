@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from .ledger import EnergyLedger
 
 Array = np.ndarray
-LISTS_AT_MOST = 10
-"""That are made anew for one step of a loop."""
 
 
 @dataclass(frozen=True)
@@ -119,9 +117,8 @@ class Stepper:
         self._touched[:] = self._touching()
 
     def compile(self, state: State) -> None:
-        """Make a step of every kind that the run may need, for its kernels; `state` stays as it is."""
-        for attempt in (self._attempt, self._attempt_by_terms) if self.model.rod_surfaces else (self._attempt,):
-            attempt(state.copy(), self.dt, float(state.time[0]) + self.dt)
+        """Make a step, for its kernels; `state` stays as it is."""
+        self._attempt(state.copy(), self.dt, float(state.time[0]) + self.dt)
 
     def restart(self, state: State) -> None:
         """Something has jumped: fixed steps go on as they are."""
@@ -214,9 +211,9 @@ class Stepper:
         solver = self.model.scene.solver
         settings = Settings(self.solver.tolerance, solver.max_newton_iterations, changes, counts)
         course = self.surroundings.course(state, method, times, h)
-        for attempt in range(LISTS_AT_MOST):
+        while True:
             found = self.engine.march(state, self._arrays[method], course, h, settings)
-            if found.done > 0 or not self.engine.make_room(found.status, attempt):
+            if not self.engine.make_room(found.status) or found.done > 0:
                 break
         if found.done == 0 and found.failure is None and not found.finished:
             return None
@@ -228,9 +225,7 @@ class Stepper:
         return found
 
     def _attempt_by_terms(self, state: State, h: float, time: float) -> NewtonReport:
-        """`_attempt` term by term, for what compiled loops do not know: rods that touch, and ends of steps beyond their
-        last stage.
-        """
+        """`_attempt` term by term, for what compiled loops do not know: ends of steps beyond their last stage."""
         model = self.model
         self._start.take_state(state)
         first = start_point(model, state, self._start)

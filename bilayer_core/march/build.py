@@ -13,7 +13,7 @@ from ..solve.neighbours import Neighbours
 from ..solve.newton_matrix import NewtonMatrix
 from ..solve.planar_matrix import PlanarMatrix
 from ..solve.potential import IncrementalPotential
-from ..solve.rod_contact import LARGEST_MARGIN, RodContact
+from ..solve.rod_contact import Contacts, RodContact
 from .model_groups import (
     Bodies,
     Bonds,
@@ -22,6 +22,7 @@ from .model_groups import (
     Fluid,
     Grips,
     Held,
+    Leaving,
     Moments,
     OffAxis,
     Plane,
@@ -31,8 +32,9 @@ from .model_groups import (
     Strands,
     Surfaces,
     Threads,
+    Touches,
 )
-from .problem import Border, System
+from .problem import Border, System, Wide
 
 Array = np.ndarray
 
@@ -41,7 +43,7 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
     """The groups of a problem that stay as they are."""
     layout, matrix, scene = model.solved_layout, potential.matrix, model.scene
     bodies, free, plane = model.bodies, len(model.bodies.mass), model.plane
-    b, n = layout.half_bandwidth, bodies.freedom.shape[1]
+    b = layout.half_bandwidth
     return dict(
         gravity=np.array(scene.gravity, dtype=float),
         damping=float(scene.damping.mass),
@@ -80,7 +82,11 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
                 [f >= 0 or len(r) > 0 for f, r in zip(bodies.free_index, bodies.rotations, strict=False)], dtype=bool
             ),
         ),
-        border=_border(layout.size + b, free, n) if free else None,
+        border=(
+            Border(border=np.zeros((layout.size + b, 6 * free)), corner=np.zeros((6 * free, 6 * free)))
+            if free
+            else None
+        ),
         held=_held(model),
         grips=_grips(model) if free else None,
         flow=_flow(model) if scene.fluid is not None else None,
@@ -88,6 +94,7 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
         loads=_forces(model, model.dead_loads) if scene.loads else None,
         followers=_forces(model, model.follower_loads) if scene.loads else None,
         moments=_moments(model) if scene.loads else None,
+        meets=1 if potential.has_contact else None,
         system=System(
             band=np.zeros((layout.size + b, b + 1)),
             right=np.zeros(layout.size + b),
@@ -129,14 +136,15 @@ def read_only(array: Array) -> Array:
     return view
 
 
-def _border(rows: int, free: int, freedom: int) -> Border:
-    return Border(
-        border=np.zeros((rows, 6 * free)),
-        wide=np.zeros((rows, freedom)),
-        wide_solution=np.zeros((rows, freedom)),
-        corner=np.zeros((6 * free, 6 * free)),
-        schur=np.zeros((freedom, freedom)),
-        load=np.zeros(freedom),
+def wide_of(model: Model, columns: int, width: Array) -> Wide:
+    """A border with room for so many columns."""
+    rows = model.solved_layout.size + model.solved_layout.half_bandwidth
+    return Wide(
+        border=np.zeros((rows, columns)),
+        solution=np.zeros((rows, columns)),
+        schur=np.zeros((columns, columns)),
+        load=np.zeros(columns),
+        width=width,
         coupled=np.zeros(1, dtype=np.int64),
     )
 
@@ -217,39 +225,39 @@ def sliding_of(model: Model, room: int) -> Sliding:
     )
 
 
-def threads_of(model: Model, rods: RodContact, wanted: Array, wanted_move: Array) -> Threads:
-    pairs, surfaces, contacts = rods.pairs, model.rod_surfaces, rods.none
+def _touches(contacts: Contacts) -> Touches:
+    return Touches(**{name: getattr(contacts, name) for name in Touches.fields})
+
+
+def threads_of(model: Model, rods: RodContact) -> Threads:
+    pairs, surfaces, contact = rods.pairs, model.rod_surfaces, model.scene.contact
+    law, surface = contact.friction, ("edge_radius", "edge_rod", "edge_first", "edge_arc", "first_point")
+    points = ("point_edge", "point_fraction", "point_arc", "point_weight")
+    between = ("rod_meets", "rod_joined", "rod_exclusion")
     return Threads(
-        d_hat=model.scene.contact.barrier_distance,
-        edge_radius=surfaces.edge_radius,
-        point_edge=surfaces.point_edge,
-        point_fraction=surfaces.point_fraction,
-        pair_count=pairs.count,
+        d_hat=contact.barrier_distance,
+        stiffness=contact.stiffness,
+        slides=law is not None and law.acts and law.coefficient > 0.0,
+        coefficient=law.coefficient if law is not None else 0.0,
+        threshold=law.speed_threshold if law is not None else 1.0,
+        unit=rods.unit,
+        **{name: getattr(surfaces, name) for name in (*surface, *points, *between)},
+        **{name: getattr(rods, name) for name in ("start_position", "base", "tip", "listed", "no_step", "scratch")},
+        counted=pairs.counted,
         pair_point=pairs.point,
         pair_edge=pairs.edge,
         pair_before=pairs.before,
         pair_after=pairs.after,
-        base=rods.base,
-        margin=rods.margin,
-        near_point=np.empty_like(pairs.point),
-        near_edge=np.empty_like(pairs.edge),
-        near_before=np.empty_like(pairs.before),
-        near_after=np.empty_like(pairs.after),
-        near_count=np.zeros(1, dtype=np.int64),
-        near_base=np.zeros((model.node_count, 3)),
-        near_margin=np.full(1, -1.0),
-        least_margin=0.5 * rods.unit,
-        largest_margin=LARGEST_MARGIN * rods.unit,
-        no_step=np.zeros((model.node_count, 3)),
-        wanted=wanted,
-        wanted_move=wanted_move,
-        point=contacts.point,
-        edge=contacts.edge,
-        fraction=contacts.fraction,
-        inner=contacts.inner,
-        times=contacts.times,
-        gap=contacts.gap,
+        gap=np.zeros(1),
+        contacts=_touches(rods.contacts),
+        sliding=_touches(rods.sliding),
     )
+
+
+def leaving_of(matrix: NewtonMatrix) -> Leaving:
+    border, rods = matrix.rod_border, matrix.rods
+    border.make_room(rods.contacts.room + rods.sliding.room)
+    return Leaving(counts=np.zeros(2, dtype=np.int64), **{name: getattr(border, name) for name in Leaving.fields[1:]})
 
 
 def _flow(model: Model) -> Flow:

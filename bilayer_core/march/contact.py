@@ -187,17 +187,29 @@ def _add_sliding(sliding, surfaces, bodies, at, stage, sums, with_hessian):
 
 @inner
 def add_contact(surfaces, sliding, bodies, at, stage, sums, with_hessian):
-    """Barrier and friction, which sum apart from other forces; returns the smallest gap [m]."""
-    if surfaces is None:
-        return math.inf
-    sums.carrier[:] = 0.0
-    sums.contact[:] = 0.0
+    """Barrier and friction against surfaces; returns the smallest gap [m]."""
     gap = _add_barrier(surfaces, bodies, at, sums, with_hessian)
     _add_sliding(sliding, surfaces, bodies, at, stage, sums, with_hessian)
+    return gap
+
+
+@inner
+def clear_contact(meets, sums):
+    """Contact sums apart from other forces."""
+    if meets is None:
+        return
+    sums.carrier[:] = 0.0
+    sums.contact[:] = 0.0
+
+
+@inner
+def hand_on_contact(meets, bodies, sums):
+    """Nodes and free bodies take their share of contact."""
+    if meets is None:
+        return
     for i in range(sums.node.shape[0]):
         for c in range(3):
             sums.node[i, c] += sums.carrier[i, c]
     for f in range(bodies.body_of_free.shape[0]):
         for c in range(6):
             sums.body[f, c] += sums.contact[bodies.body_of_free[f], c]
-    return gap

@@ -12,9 +12,9 @@ from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
 from ..solve.potential import IncrementalPotential
-from .build import lasting_groups, sliding_of, surfaces_of, threads_of
+from .build import lasting_groups, leaving_of, sliding_of, surfaces_of, threads_of, wide_of
 from .problem import Problem
-from .status import CONVERGED, FAILURES, NO_ROOM, RODS_FAR
+from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
 from .step import count_step, take_steps
 from .step_groups import Course, Method, StateArrays, Tally
 from .terms import NAMES
@@ -41,10 +41,11 @@ class Engine:
         self._energy = np.zeros(len(NAMES))
         self._groups = lasting_groups(model, potential)
         self._problem: Problem | None = None
-        self._lists: tuple | None = None
+        self._rooms: tuple | None = None
         self._state: State | None = None
         self.ranges = np.array([c.maximum - c.minimum for c in model.scene.stimuli.values()], dtype=float)
-        self._wanted, self._wanted_move = np.zeros((model.node_count, 3)), np.zeros(1)
+        self._columns = model.bodies.freedom.shape[1]  # room in the border
+        self._width = np.zeros(1, dtype=np.int64)  # of it in use
         self.figures = np.zeros(3)
         self.nodes, self.most_nodes = np.zeros((2, len(model.surfaces.names)), dtype=np.int64)
         self.first_contact = np.zeros(len(model.surfaces.names))
@@ -66,19 +67,23 @@ class Engine:
         self.nodes[:], self.most_nodes[:], self.first_contact[:] = 0, 0, math.nan
 
     def _gather(self) -> Problem:
-        """The problem with the present lists of near pairs."""
-        near, rods = self._potential.near, self._potential.matrix.rods
-        lists = near.carrier if near else None, rods.listed if rods else None
-        if self._lists is None or any(a is not b for a, b in zip(lists, self._lists, strict=True)):
-            room = len(near.carrier) if near else 0
+        """The problem with the present rooms for near pairs, contacts, and nodes in the border."""
+        potential, model = self._potential, self._model
+        near, matrix = potential.near, potential.matrix
+        rods = matrix.rods
+        rooms = len(near.carrier) if near else 0, rods.room if rods else 0, self._columns
+        if rooms != self._rooms:
+            room = rooms[0]
             self._problem = Problem(
                 **self._groups,
-                surfaces=surfaces_of(self._model, near) if near else None,
-                sliding=sliding_of(self._model, room) if near else None,
-                threads=threads_of(self._model, rods, self._wanted, self._wanted_move) if rods else None,
-                sums=sums_of(self._model, self._potential, self._energy, 2 * room),
+                wide=wide_of(model, self._columns, self._width) if rods or model.free_count else None,
+                surfaces=surfaces_of(model, near) if near else None,
+                sliding=sliding_of(model, room) if near else None,
+                threads=threads_of(model, rods) if rods else None,
+                leaving=leaving_of(matrix) if rods else None,
+                sums=sums_of(model, potential, self._energy, 2 * room),
             )
-            self._lists = lists
+            self._rooms = rooms
         return self._problem
 
     def _arrays_of(self, state: State) -> StateArrays:
@@ -108,14 +113,14 @@ class Engine:
             worst,
         )
 
-    def make_room(self, status: int, times: int) -> bool:
-        """Do what a loop asked for, the n-th of `times`, before it can go on; false if it cannot: rods touch, or
-        something has jumped.
-        """
+    def make_room(self, status: int) -> bool:
+        """Have the room that a loop lacked; false if that is not what it lacked: something has jumped."""
         if status == NO_ROOM:
             self._potential.near.grow()
-        elif status == RODS_FAR:
-            self._potential.matrix.rods.list_about(self._wanted, 2.0**times * float(self._wanted_move[0]))
+        elif status == NO_ROOM_FOR_RODS:
+            self._potential.matrix.rods.make_room()
+        elif status == NO_ROOM_IN_BORDER:
+            self._columns = 2 * int(self._width[0])
         else:
             return False
         return True

@@ -200,38 +200,82 @@ class Sliding:
 
 
 @group
-class Threads:
-    """Rods that can meet: near pairs of points and segments, and room for contacts; see `solve.rod_contact`."""
+class Touches:
+    """Contacts of rods; see `forces.rod_contact`."""
 
-    d_hat: float
-    edge_radius: Array
-    point_edge: Array
-    point_fraction: Array
-    pair_count: int
-    pair_point: Array
-    pair_edge: Array
-    pair_before: Array
-    pair_after: Array
-    base: Array  # positions for which the pairs are listed
-    margin: float
-    near_point: Array  # the nearer ones among the pairs, for which see `march.threads`
-    near_edge: Array
-    near_before: Array
-    near_after: Array
-    near_count: Array  # shape (1,)
-    near_base: Array
-    near_margin: Array  # shape (1,)
-    least_margin: float
-    largest_margin: float
-    no_step: Array
-    wanted: Array  # positions about which a list is missing, shape (n_node, 3)
-    wanted_move: Array  # and the step that could not be bounded [m], shape (1,)
-    point: Array  # of contacts, without room: none is kept here
+    counted: Array  # shape (1,)
+    point: Array
     edge: Array
     fraction: Array
     inner: Array
     times: Array
     gap: Array
+    node: Array
+    weight: Array
+    normal: Array
+    load: Array
+    matrix: Array
+    side: Array
+    turn: Array
+    lean: Array
+    along: Array
+
+
+@group
+class Threads:
+    """Rods that can meet: their geometry, the list of near pairs, and contacts; see `solve.rod_contact`."""
+
+    d_hat: float
+    stiffness: float
+    slides: bool
+    coefficient: float
+    threshold: float
+    unit: float  # barrier distance and thickest layer together
+    start_position: Array
+    edge_radius: Array
+    edge_rod: Array
+    edge_first: Array
+    edge_arc: Array
+    first_point: Array
+    point_edge: Array
+    point_fraction: Array
+    point_arc: Array
+    point_weight: Array
+    rod_meets: Array
+    rod_joined: Array
+    rod_exclusion: Array
+    base: Array
+    tip: Array
+    listed: Array  # shape (1,)
+    counted: Array  # shape (1,)
+    pair_point: Array
+    pair_edge: Array
+    pair_before: Array
+    pair_after: Array
+    no_step: Array
+    scratch: Array  # a gradient that nobody wants
+    gap: Array  # the smallest below the barrier distance, shape (1,)
+    contacts: Touches  # present ones
+    sliding: Touches  # of the start of the stage
+
+
+@group
+class Leaving:
+    """Contacts of rods in the Newton matrix, and nodes that leave the band for them; see `solve.rod_border`."""
+
+    counts: Array  # of contacts and of nodes, shape (2,)
+    node: Array
+    weight: Array
+    matrix: Array
+    side: Array
+    turn: Array
+    strand: Array
+    attached: Array
+    mark: Array
+    met: Array
+    leaving: Array
+    unknown: Array  # the same, read-only
+    place: Array
 
 
 @group

@@ -16,15 +16,13 @@ from .potential import evaluate, follow
 from .status import (
     BLOCKED,
     CONVERGED,
-    INDEFINITE,
     LINE_SEARCH,
     MAX_ITERATIONS,
+    NO_ROOM_FOR_RODS,
     NOT_FINITE,
     READY,
-    RODS_FAR,
-    RODS_TOUCH,
 )
-from .threads import bound_between_rods, rods_touch
+from .threads import bound_between_rods, find_contacts
 
 
 @inner
@@ -92,8 +90,8 @@ def _bound_between_rods(threads, strands, held, system, at):
     if threads is None:
         return 1.0, READY
     _move_held(held, system, at)
-    fraction, reached = bound_between_rods(threads, strands, system, at)
-    return fraction, READY if reached else RODS_FAR
+    fraction, listed = bound_between_rods(threads, strands, system, at)
+    return fraction, READY if listed else NO_ROOM_FOR_RODS
 
 
 @inner
@@ -171,7 +169,7 @@ def first_guess(p, start, position, rotation, stage, guess):
     carry_frames(p.space, p.plane, p.strands, start, guess, guess.turn)
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]
-    return (RODS_TOUCH if rods_touch(p.threads, p.strands, guess) else READY), -1
+    return READY, -1
 
 
 FACTORISE, REFRESH, SEARCH = 0, 1, 2
@@ -194,7 +192,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
     residual : float
         Speed of the correction that was left [m/s].
     gap : float
-        Smallest gap to a surface [m].
+        Smallest gap to a surface or another rod [m].
     """
     follow(p, at, stage)
     swapped, fresh, bounded, task = False, True, False, FACTORISE
@@ -205,10 +203,11 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
         if task == SEARCH:
             step, body_step = p.system.step, p.system.body_step
             move(p.bodies, p.held, p.surfaces, p.space, p.plane, p.strands, at, step, body_step, alpha, trial)
-            if rods_touch(p.threads, p.strands, trial):
-                status = RODS_TOUCH
-                break
-        value, new_gap = evaluate(p, trial if task == SEARCH else at, stage, task == FACTORISE)
+        place = trial if task == SEARCH else at
+        if not find_contacts(p.threads, p.strands, place.position):
+            status = NO_ROOM_FOR_RODS
+            break
+        value, new_gap = evaluate(p, place, stage, task == FACTORISE)
         if task == SEARCH:
             if not value <= energy + ARMIJO * alpha * slope + noise:
                 alpha *= BACKTRACKING
@@ -236,12 +235,12 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
                     status = NOT_FINITE
                     break
                 factorisations += 1
-                if not factorise(p, at, stage):
-                    status = INDEFINITE
+                status = factorise(p, at, stage)
+                if status != READY:
                     break
                 iterations += 1
                 fresh, previous = True, math.inf
-        solve(p.space, p.plane, p.border, p.strands, p.bodies, p.sums, p.system)
+        solve(p.space, p.plane, p.wide, p.leaving, p.strands, p.bodies, p.sums, p.system)
         residual = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
         if not math.isfinite(residual):
             status = NOT_FINITE

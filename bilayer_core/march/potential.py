@@ -5,14 +5,14 @@ from __future__ import annotations
 from ..jit import inner, part
 from ..solve.assembly import expand_gradient
 from ..solve.clamps import hand_gradient_to_bodies
-from .contact import add_contact, lag_sliding, list_pairs
+from .contact import add_contact, clear_contact, hand_on_contact, lag_sliding, list_pairs
 from .elasticity import add_in_plane, add_in_space
 from .fluid import add_drag, add_fluid, turn_drag, turn_fluid
 from .inertia import add_inertia
 from .loads import add_loads, add_moments, scale_loads, turn_followers, turn_moments
-from .status import READY, RODS_TOUCH
+from .status import NO_ROOM_FOR_RODS, READY
 from .terms import FOLLOWERS, LOADS
-from .threads import rods_touch
+from .threads import add_threads, lag_threads
 
 
 @part
@@ -21,8 +21,8 @@ def start_stage(p, start, stage):
     status = list_pairs(p.surfaces, start, 0.0)
     if status != READY:
         return status
-    if rods_touch(p.threads, p.strands, start):
-        return RODS_TOUCH
+    if not lag_threads(p.threads, p.strands, start):
+        return NO_ROOM_FOR_RODS
     lag_sliding(p.sliding, p.surfaces, start, stage)
     scale_loads(p.loads, stage.load_factor)
     return READY
@@ -40,9 +40,9 @@ def follow(p, at, stage):
 
 @part
 def evaluate(p, at, stage, with_hessian):
-    """Potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface [m].
+    """Potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface or a rod [m].
 
-    Gradients always, second derivatives on request, are left in `Sums`.
+    Gradients always, second derivatives on request, are left in `Sums`. The contacts of rods are those found last.
     """
     strands, bodies, sums = p.strands, p.bodies, p.sums
     sums.energy[:] = 0.0
@@ -58,7 +58,10 @@ def evaluate(p, at, stage, with_hessian):
     add_moments(p.moments, at, stage, sums, with_hessian)
     add_drag(p.flow, at, stage, sums, with_hessian)
     add_fluid(p.fluid, strands, at, stage, sums, with_hessian)
+    clear_contact(p.meets, sums)
     gap = add_contact(p.surfaces, p.sliding, bodies, at, stage, sums, with_hessian)
+    gap = min(gap, add_threads(p.threads, strands, at, stage, sums))
+    hand_on_contact(p.meets, bodies, sums)
     _expand(p.bonds, p.held, strands, at, sums)
     energy = 0.0
     for k in range(sums.energy.shape[0]):

@@ -13,6 +13,7 @@ from .model_groups import (
     Fluid,
     Grips,
     Held,
+    Leaving,
     Moments,
     OffAxis,
     Plane,
@@ -70,11 +71,21 @@ class Border:
     """Rows and columns of free bodies in the Newton matrix."""
 
     border: Array
-    wide: Array
-    wide_solution: Array
     corner: Array
+
+
+@group
+class Wide:
+    """The border as it is eliminated: of bodies their freedom, then nodes that left the band.
+
+    Rooms for columns are larger than what is in use; see `solve.newton_matrix`.
+    """
+
+    border: Array
+    solution: Array
     schur: Array
-    load: Array  # shape (n_freedom,)
+    load: Array
+    width: Array  # columns in use, shape (1,)
     coupled: Array  # whether the border is not zero, shape (1,)
 
 
@@ -92,11 +103,14 @@ class Problem:
     bonds: Bonds | None
     bodies: Bodies
     border: Border | None
+    wide: Wide | None
     held: Held
     grips: Grips | None
     surfaces: Surfaces | None
     sliding: Sliding | None
     threads: Threads | None
+    leaving: Leaving | None
+    meets: int | None  # None if nothing touches anything
     flow: Flow | None
     fluid: Fluid | None
     loads: PointForces | None

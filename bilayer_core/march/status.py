@@ -6,10 +6,11 @@ from ..solve.newton import NewtonStatus
 
 READY = 0
 NO_ROOM = 1
-"""There are more near pairs than room for them."""
-RODS_FAR = 2
-"""Rods have moved farther than their list of near pairs reaches."""
-RODS_TOUCH = 3
+"""There are more near pairs with surfaces than room for them."""
+NO_ROOM_FOR_RODS = 2
+"""Likewise of rods with rods, or more contacts."""
+NO_ROOM_IN_BORDER = 3
+"""More nodes leave the band than the border has room for."""
 JUMPED = 4
 """Something has jumped: another integrator has to make this step."""
 CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED = 5, 10, 11, 12, 13, 14

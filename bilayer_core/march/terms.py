@@ -17,6 +17,8 @@ NAMES = (
     "added mass",
     "barrier",
     "friction",
+    "rod barrier",
+    "rod friction",
 )
 STRETCHING, BENDING, TWISTING, BOND, INERTIA, DAMPING, GRAVITY = range(7)
-LOADS, FOLLOWERS, MOMENTS, DRAG, ADDED_MASS, BARRIER, FRICTION = range(7, 14)
+LOADS, FOLLOWERS, MOMENTS, DRAG, ADDED_MASS, BARRIER, FRICTION, ROD_BARRIER, ROD_FRICTION = range(7, 16)

@@ -1,115 +1,193 @@
-"""Rods near each other: a short list within the list of near pairs, made anew in the loop.
-
-The list of pairs reaches far, so that it lasts for many steps (`solve.rod_contact`); most of its pairs are nowhere near
-contact. Those nearer than the barrier distance and a margin are kept in a list of their own until nodes have moved by
-half of that margin, the mean displacement taken off.
-"""
+"""Contact of rods with each other and with themselves, as in `solve.rod_contact`."""
 
 from __future__ import annotations
 
-from ..contact.rod_bound import largest_travel, rod_step_bound
-from ..contact.segment import distance_at, facing_contacts, fraction_along
+import math
+
+from ..contact.rod_bound import rod_step_bound
+from ..contact.rod_list import largest_fraction, list_rods
+from ..contact.segment import facing_contacts
+from ..forces.rod_contact import rod_barrier, rod_friction
 from ..jit import inner
-from .copying import copy
-
-AHEAD = 2.5
-"""Margin of a short list, in units of the step that demands it."""
+from .terms import ROD_BARRIER, ROD_FRICTION
 
 
 @inner
-def _shorten(threads, strands, position, margin):
-    """Keep the pairs nearer than the barrier distance and a margin [m]."""
-    found, reach = 0, threads.d_hat + margin
-    for c in range(threads.pair_count):
-        p, k = threads.pair_point[c], threads.pair_edge[c]
-        a, j, s = threads.point_edge[p], strands.edge_node[k], threads.point_fraction[p]
-        i = strands.edge_node[a]
-        p0 = (1.0 - s) * position[i, 0] + s * position[i + 1, 0]
-        p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
-        p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]
-        t = min(max(fraction_along(p0, p1, p2, position, j), 0.0), 1.0)
-        gap = distance_at(p0, p1, p2, position, j, t) - threads.edge_radius[a] - threads.edge_radius[k]
-        if gap < reach:
-            threads.near_point[found], threads.near_edge[found] = p, k
-            threads.near_before[found], threads.near_after[found] = threads.pair_before[c], threads.pair_after[c]
-            found += 1
-    threads.near_count[0], threads.near_margin[0] = found, margin
-    copy(position, threads.near_base)
+def _list(threads, strands, position, step, fraction):
+    """Have a list of near pairs for a part of a step of nodes from `position`; false if there is no room for it."""
+    return list_rods(
+        position,
+        step,
+        fraction,
+        threads.unit,
+        threads.d_hat,
+        threads.start_position,
+        strands.edge_node,
+        threads.edge_radius,
+        threads.edge_rod,
+        threads.edge_first,
+        threads.edge_arc,
+        threads.first_point,
+        threads.point_fraction,
+        threads.point_arc,
+        threads.rod_meets,
+        threads.rod_joined,
+        threads.rod_exclusion,
+        threads.base,
+        threads.tip,
+        threads.listed,
+        threads.counted,
+        threads.pair_point,
+        threads.pair_edge,
+        threads.pair_before,
+        threads.pair_after,
+    )
 
 
 @inner
-def _reach(threads, strands, position, step, fraction):
-    """Have a short list that is valid at `position` and over a fraction of a step from there; false if all pairs
-    together are not.
-    """
-    travel, move = largest_travel(position, step, threads.base)
-    if fraction < 1.0:
-        travel, _ = largest_travel(position, threads.no_step, threads.base)
-        travel += fraction * move
-    if not travel <= 0.5 * threads.margin:
-        copy(position, threads.wanted)
-        threads.wanted_move[0] = fraction * move
-        return False
-    if threads.pair_count == 0:
-        return True
-    travel, _ = largest_travel(position, threads.no_step, threads.near_base)
-    if not travel + fraction * move <= 0.5 * threads.near_margin[0]:
-        _shorten(threads, strands, position, max(threads.least_margin, AHEAD * fraction * move))
-    return True
-
-
-@inner
-def rods_touch(threads, strands, at):
-    """Whether rods are nearer to each other than the barrier distance; where the list of pairs does not reach, so far
-    as it does: the bound of the step that led there has asked for another list.
-    """
+def find_contacts(threads, strands, position):
+    """Find where rods are nearer to each other than the barrier distance; false if there is no room for that."""
     if threads is None:
+        return True
+    if not _list(threads, strands, position, threads.no_step, 0.0):
         return False
-    if not _reach(threads, strands, at.position, threads.no_step, 1.0) or threads.near_count[0] == 0:
-        return False
-    count, _ = facing_contacts(
-        at.position,
-        threads.near_count[0],
-        threads.near_point,
-        threads.near_edge,
-        threads.near_before,
-        threads.near_after,
+    contacts = threads.contacts
+    contacts.counted[0] = 0
+    threads.gap[0] = math.inf
+    if threads.counted[0] == 0:
+        return True
+    contacts.counted[0], gap = facing_contacts(
+        position,
+        threads.counted[0],
+        threads.pair_point,
+        threads.pair_edge,
+        threads.pair_before,
+        threads.pair_after,
         strands.edge_node,
         threads.edge_radius,
         threads.point_edge,
         threads.point_fraction,
         threads.d_hat,
-        threads.point,
-        threads.edge,
-        threads.fraction,
-        threads.inner,
-        threads.times,
-        threads.gap,
+        contacts.point,
+        contacts.edge,
+        contacts.fraction,
+        contacts.inner,
+        contacts.times,
+        contacts.gap,
     )
-    return count > 0
+    if gap < threads.d_hat:
+        threads.gap[0] = gap
+    return contacts.counted[0] <= contacts.point.shape[0]
+
+
+@inner
+def rods_touch(threads):
+    """Whether any were found nearer than the barrier distance."""
+    if threads is None:
+        return False
+    return threads.contacts.counted[0] > 0
 
 
 @inner
 def bound_between_rods(threads, strands, system, at):
-    """Largest fraction of `System.node_step` that keeps rods apart, and whether the list of pairs reaches so far."""
+    """Largest fraction of `System.node_step` that keeps rods apart, and whether there is room for the pairs near it."""
     if threads is None:
         return 1.0, True
-    _, move = largest_travel(at.position, system.node_step, threads.base)
-    limit = 0.4 * threads.largest_margin / move if move > 0.4 * threads.largest_margin else 1.0
-    if not _reach(threads, strands, at.position, system.node_step, limit):
+    limit = largest_fraction(system.node_step, threads.no_step, threads.unit)
+    if not _list(threads, strands, at.position, system.node_step, limit):
         return 0.0, False
-    if threads.near_count[0] == 0:
-        return limit, True
     fraction, _ = rod_step_bound(
         at.position,
         system.node_step,
         limit,
-        threads.near_count[0],
-        threads.near_point,
-        threads.near_edge,
+        threads.d_hat,
+        threads.counted[0],
+        threads.pair_point,
+        threads.pair_edge,
         strands.edge_node,
         threads.edge_radius,
         threads.point_edge,
         threads.point_fraction,
     )
     return fraction, True
+
+
+@inner
+def _barrier(threads, strands, position, gradient):
+    """Add the barrier's gradient at the contacts found last, and return its energy [J]."""
+    contacts = threads.contacts
+    return rod_barrier(
+        threads.d_hat,
+        threads.stiffness,
+        position,
+        contacts.counted[0],
+        contacts.point,
+        contacts.edge,
+        contacts.fraction,
+        contacts.inner,
+        contacts.times,
+        contacts.gap,
+        strands.edge_node,
+        threads.edge_radius,
+        threads.point_edge,
+        threads.point_fraction,
+        threads.point_weight,
+        gradient,
+        contacts.node,
+        contacts.weight,
+        contacts.normal,
+        contacts.load,
+        contacts.matrix,
+        contacts.side,
+        contacts.turn,
+        contacts.lean,
+        contacts.along,
+    )
+
+
+@inner
+def lag_threads(threads, strands, start):
+    """Freeze the contacts of friction at the start of a stage; false if there is no room for them."""
+    if threads is None:
+        return True
+    if not find_contacts(threads, strands, start.position):
+        return False
+    found, sliding = threads.contacts, threads.sliding
+    sliding.counted[0] = 0
+    if found.counted[0] == 0 or not threads.slides:
+        return True
+    _barrier(threads, strands, start.position, threads.scratch)
+    sliding.counted[0] = found.counted[0]
+    for c in range(found.counted[0]):
+        sliding.node[c, 0], sliding.node[c, 1], sliding.load[c] = found.node[c, 0], found.node[c, 1], found.load[c]
+        for m in range(3):
+            sliding.normal[c, m] = found.normal[c, m]
+        for m in range(4):
+            sliding.weight[c, m] = found.weight[c, m]
+    return True
+
+
+@inner
+def add_threads(threads, strands, at, stage, sums):
+    """Barrier and friction at the contacts found last; returns the smallest gap below the barrier distance [m]."""
+    if threads is None:
+        return math.inf
+    if rods_touch(threads):
+        sums.energy[ROD_BARRIER] = _barrier(threads, strands, at.position, sums.carrier)
+    sliding = threads.sliding
+    if sliding.counted[0] > 0:
+        sums.energy[ROD_FRICTION] = rod_friction(
+            threads.coefficient,
+            threads.threshold,
+            stage.lengths[0],
+            at.position,
+            stage.origin_position,
+            sliding.counted[0],
+            sliding.node,
+            sliding.weight,
+            sliding.normal,
+            sliding.load,
+            sums.carrier,
+            sliding.matrix,
+        )
+    return threads.gap[0]

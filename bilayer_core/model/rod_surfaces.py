@@ -141,46 +141,53 @@ def _strand_points(spacing: float, start: int, length: Array, per_edge: int) -> 
 
 
 class NearPairs:
-    """Points and segments with a gap below `reach` [m] at the positions of the last `find`."""
+    """Points and segments of rods that are near each other.
 
-    def __init__(self, surfaces: RodSurfaces, edge_node: Array, start_position: Array, touch: float):
-        self._surfaces, self._edge_node = surfaces, edge_node
-        self._start_position, self._touch = np.array(start_position), touch
-        self.count = 0
-        self._make_room(0)
+    Attributes
+    ----------
+    counted : Array
+        Number of pairs, as compiled loops share it, shape (1,).
+    point, edge, before, after : Array
+        The pairs, see `contact.broad_phase.near_pairs`; only the first `count` count.
+    geometry : tuple
+        What `near_pairs` takes of the rods.
+    """
 
-    def _make_room(self, room: int) -> None:
+    def __init__(self, surfaces: RodSurfaces, edge_node: Array, room: int = 0):
+        s = surfaces
+        self.geometry = (
+            *(edge_node, s.edge_radius, s.edge_rod, s.edge_first, s.edge_arc),
+            *(s.first_point, s.point_fraction, s.point_arc, s.rod_meets, s.rod_joined, s.rod_exclusion),
+        )
+        self.counted = np.zeros(1, dtype=np.int64)
+        self.make_room(room)
+
+    @property
+    def count(self) -> int:
+        """Pairs in the list."""
+        return int(self.counted[0])
+
+    def make_room(self, room: int) -> None:
+        """Have room for so many pairs, none of which is listed then."""
         self.point, self.edge = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
         self.before, self.after = np.empty(room, dtype=bool), np.empty(room, dtype=bool)
 
-    def find(self, position: Array, reach: float) -> None:
-        """List the pairs at positions of nodes [m], shape (n_node, 3)."""
-        s = self._surfaces
+    @property
+    def outputs(self) -> tuple[Array, Array, Array, Array]:
+        """The pairs."""
+        return self.point, self.edge, self.before, self.after
+
+    def find(self, position: Array, start_position: Array, touch: float, reach: float) -> None:
+        """List the pairs with a gap below `reach` [m] at positions of nodes [m], shape (n_node, 3); for `touch` see
+        `near_pairs`.
+        """
         while True:
-            self.count = near_pairs(
-                position,
-                self._start_position,
-                self._touch,
-                reach,
-                self._edge_node,
-                s.edge_radius,
-                s.edge_rod,
-                s.edge_first,
-                s.edge_arc,
-                s.first_point,
-                s.point_fraction,
-                s.point_arc,
-                s.rod_meets,
-                s.rod_joined,
-                s.rod_exclusion,
-                self.point,
-                self.edge,
-                self.before,
-                self.after,
+            self.counted[0] = near_pairs(
+                position, position, start_position, touch, reach, *self.geometry, *self.outputs
             )
             if self.count <= len(self.point):
                 return
-            self._make_room(2 * self.count)
+            self.make_room(2 * self.count)
 
 
 def refuse_meeting_rods(model: Model) -> None:
@@ -195,8 +202,8 @@ def refuse_meeting_rods(model: Model) -> None:
     if surfaces is None:
         return
     position = np.array(model.start_position)
-    pairs = NearPairs(surfaces, model.edge_node, position, model.scene.contact.barrier_distance)
-    pairs.find(position, 0.0)
+    pairs = NearPairs(surfaces, model.edge_node)
+    pairs.find(position, position, model.scene.contact.barrier_distance, 0.0)
     if pairs.count == 0:
         return
     room = 2 * pairs.count

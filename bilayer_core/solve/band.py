@@ -70,11 +70,10 @@ def solve_band(band, n, bandwidth, right):
 
 
 @kernel
-def solve_columns(band, n, bandwidth, right):
-    """As `solve_band` for each column of `right`, shape (n + b, m): those of a border."""
+def solve_columns(band, n, bandwidth, m, right):
+    """As `solve_band` for each of the first m columns of `right`, shape (n + b, ≥ m): those of a border."""
     b = len(bandwidth)
-    m = right.shape[1]
-    if m == 1:
+    if right.shape[1] == 1:
         solve_band(band, n, bandwidth, right.reshape(right.size))
         return
     for j in range(n):

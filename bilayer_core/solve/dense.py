@@ -12,9 +12,8 @@ from ..jit import kernel
 
 
 @kernel
-def eliminate(border, solution, size, corner):
-    """D − Uᵀ (A⁻¹ U), in place of D; most entries of U, shape (≥ size, n), are zero."""
-    n = border.shape[1]
+def eliminate(border, solution, size, n, corner):
+    """D − Uᵀ (A⁻¹ U), in place of D; most entries of U, shape (≥ size, ≥ n), are zero."""
     for k in range(size):
         for i in range(n):
             value = border[k, i]
@@ -24,9 +23,11 @@ def eliminate(border, solution, size, corner):
 
 
 @kernel
-def factor_dense(matrix):
-    """Factorise a symmetric matrix in place; false if it is not positive definite."""
-    for i in range(matrix.shape[0]):
+def factor_dense(matrix, n):
+    """Factorise the first n rows and columns of a symmetric matrix in place; false if they are not positive
+    definite.
+    """
+    for i in range(n):
         for j in range(i + 1):
             total = matrix[i, j]
             for k in range(j):
@@ -41,9 +42,8 @@ def factor_dense(matrix):
 
 
 @kernel
-def solve_dense(factor, right):
-    """Overwrite a vector with the solution of the factorised system."""
-    n = factor.shape[0]
+def solve_dense(factor, n, right):
+    """Overwrite the first n values of a vector with the solution of the factorised system."""
     for i in range(n):
         total = right[i]
         for k in range(i):

@@ -60,7 +60,7 @@ class NewtonMatrix:
     def __init__(self, model: Model, has_node_blocks: bool):
         self._model, self._layout = model, model.solved_layout
         self.rods = RodContact(model) if model.rod_surfaces is not None else None
-        self._rod_border = RodBorder(model) if self.rods else None
+        self.rod_border = RodBorder(model) if self.rods else None
         self._has_node_blocks = has_node_blocks
         size, b = self._layout.size, self._layout.half_bandwidth
         shapes = self._shapes() | {
@@ -78,17 +78,15 @@ class NewtonMatrix:
         self._bandwidth = width(b)
         self._right = np.zeros(size + b)
         self._border = np.zeros((size + b, 6 * model.free_count))
-        self._border_free = np.zeros((size + b, model.bodies.freedom.shape[1]))
-        self._border_solution = np.zeros_like(self._border_free)
+        self._make_room(model.bodies.freedom.shape[1])
         self._corner = np.zeros_like(self.body_hessian)
         self._held_unknowns = (self._layout.attached[:, None] + np.arange(self._layout.dimension)).ravel()
         self.body_masses = np.concatenate(
             [np.repeat([m, np.trace(j)], 3) for m, j in zip(model.bodies.mass, model.bodies.second_moment, strict=True)]
             or [np.zeros(0)]
         )
-        self._schur = None
         self._nothing = self._leaving = np.zeros(0, dtype=np.int64)
-        self._wide, self._wide_solution = self._border_free, self._border_solution
+        self._width = 0  # columns of the border in use
         self._coupled = False
         self.shift, self.simplified = 0.0, 0
 
@@ -102,6 +100,12 @@ class NewtonMatrix:
             "top_hessian": (pairs, 3, 4),
             "bottom_hessian": (pairs, 3, 4),
         }
+
+    def _make_room(self, columns: int) -> None:
+        """Have room for a border of so many columns."""
+        rows = self._layout.size + self._layout.half_bandwidth
+        self._wide, self._wide_solution = np.zeros((2, rows, columns))
+        self._schur, self._load = np.zeros((columns, columns)), np.zeros(columns)
 
     def clear(self) -> None:
         """Set all second derivatives to zero."""
@@ -149,7 +153,7 @@ class NewtonMatrix:
         model, layout = self._model, self._layout
         self._assemble_band(factor, at)
         if self.rods:
-            self._rod_border.add_to_band([self.rods.contacts, self.rods.sliding], self.simplified, self._band)
+            self.rod_border.add_to_band([self.rods.contacts, self.rods.sliding], self.simplified, self._band)
         self._border.fill(0.0)
         self._corner[:] = self.body_hessian
         self._coupled = False
@@ -198,7 +202,7 @@ class NewtonMatrix:
         model, layout = self._model, self._layout
         self._coupled = True
         if self.rods:
-            self._rod_border.add_to_bodies(at.arm, self._border, self._corner)
+            self.rod_border.add_to_bodies(at.arm, self._border, self._corner)
         hand_rows_to_bodies(model.directions, layout.attached, model.attached_free, at.arm, self._border, self._corner)
         attached = (layout.attached, model.attached_free)
         hand_nodes_to_bodies(
@@ -241,69 +245,54 @@ class NewtonMatrix:
         )
 
     def _factorise(self, factor: float) -> bool:
-        schur = self._take_border(self.shift * factor)
+        self._take_border(self.shift * factor)
         if factor_band(self._band, self._layout.size, self._bandwidth) >= 0:
             return False
-        if schur is None:
-            return True
-        self._eliminate_band(schur)
-        self._schur = schur
-        if len(self._leaving):
-            return factor_dense(schur)
-        try:
-            np.linalg.cholesky(schur)
-        except np.linalg.LinAlgError:
-            return False
-        return True
+        self._eliminate_band()
+        return factor_dense(self._schur, self._width)
 
-    def _take_border(self, shift: float) -> Array | None:
-        """Free bodies and what leaves the band: their own second derivatives, or None if there are none of them.
-
-        Their couplings to the band become `_wide`; `shift` times their masses is added for bodies.
+    def _take_border(self, shift: float) -> None:
+        """Couplings and second derivatives of free bodies' freedom and of what leaves the band; `shift` times their
+        masses is added for bodies.
         """
-        model = self._model
-        self._leaving = self._rod_border.rows if self.rods else self._nothing
-        if not model.free_count and not len(self._leaving):
-            return None
-        freedom = model.bodies.freedom
+        freedom = self._model.bodies.freedom
+        n = freedom.shape[1]
+        self._leaving = self.rod_border.rows if self.rods else self._nothing
+        self._width = n + len(self._leaving)
+        if self._width > self._schur.shape[0]:
+            self._make_room(2 * self._width)
         corner = self._corner + shift * np.diag(self.body_masses) if shift else self._corner
-        schur = freedom.T @ corner @ freedom
-        self._wide, self._wide_solution = self._border_free, self._border_solution
+        self._schur[:n, :n] = freedom.T @ corner @ freedom
         if self._coupled:
             self._border[self._held_unknowns] = 0.0
-            self._border_free[:] = self._border @ freedom
+            self._wide[:, :n] = self._border @ freedom
         elif len(self._leaving):
-            self._border_free.fill(0.0)
+            self._wide[:, :n] = 0.0
         if len(self._leaving):
             self._coupled = True
-            self._wide, schur = self._rod_border.widen(self._band, self._border_free, schur)
-            self._wide_solution = np.empty_like(self._wide)
-        return schur
+            self.rod_border.widen(self._band, n, self._wide, self._schur)
 
-    def _eliminate_band(self, schur: Array) -> None:
+    def _eliminate_band(self) -> None:
         """D − Uᵀ A⁻¹ U in place of D, given the factorised band."""
         if not self._coupled:
             return
         size = self._layout.size
         self._wide_solution[:] = self._wide
-        solve_columns(self._band, size, self._bandwidth, self._wide_solution)
-        if len(self._leaving):
-            eliminate(self._wide, self._wide_solution, size, schur)
-        else:
-            schur -= self._wide.T @ self._wide_solution
+        solve_columns(self._band, size, self._bandwidth, self._width, self._wide_solution)
+        eliminate(self._wide, self._wide_solution, size, self._width, self._schur)
 
     def count_negative(self, factor: float, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> int:
         """Number of negative eigenvalues of the matrix of the last evaluation plus `factor` times the masses [1/s²].
 
         Parameters as for `factorise`; in no direction is the potential concave if there is none at any factor above 0.
         """
+        self.simplified = 0
         self.assemble(factor, at, edge_gradient, attached_gradient)
-        schur = self._take_border(factor)
+        self._take_border(factor)
         count = int(factor_signed(self._band, self._layout.size, self._bandwidth))
-        if schur is not None:
-            self._eliminate_band(schur)
-            count += int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
-        return count
+        self._eliminate_band()
+        schur = self._schur[: self._width, : self._width]
+        return count + int(np.count_nonzero(np.linalg.eigvalsh(schur) < 0.0))
 
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
         """Minus the inverse matrix times the gradient: of rods, shape (size,), and of bodies, shape (n_free, 6)."""
@@ -314,19 +303,14 @@ class NewtonMatrix:
         right[leaving] = 0.0
         solve_band(self._band, size, self._bandwidth, right)
         step = right[:size].copy()
-        if not self._model.free_count and not len(leaving):
-            return step, np.zeros((0, 6))
-        freedom = self._model.bodies.freedom
-        load = np.concatenate([-freedom.T @ body_gradient.ravel(), -gradient[leaving]])
-        if self._coupled:
-            load = load - step @ self._wide[:size]
-        if len(leaving):
-            border_step = load
-            solve_dense(self._schur, border_step)
-        else:
-            border_step = np.linalg.solve(self._schur, load)
-        if self._coupled:
-            step -= self._wide_solution[:size] @ border_step
+        freedom, load, width = self._model.bodies.freedom, self._load, self._width
         bodies = freedom.shape[1]
-        step[leaving] = border_step[bodies:]
-        return step, (freedom @ border_step[:bodies]).reshape(-1, 6)
+        load[:bodies] = -freedom.T @ body_gradient.ravel()
+        load[bodies:width] = -gradient[leaving]
+        if self._coupled:
+            load[:width] -= step @ self._wide[:size, :width]
+        solve_dense(self._schur, width, load)
+        if self._coupled:
+            step -= self._wide_solution[:size, :width] @ load[:width]
+        step[leaving] = load[bodies:width]
+        return step, (freedom @ load[:bodies]).reshape(-1, 6)

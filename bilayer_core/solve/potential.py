@@ -159,7 +159,7 @@ class IncrementalPotential:
         if self._barrier:
             self._barrier.min_gap = gap
         if self.matrix.rods:
-            self.matrix.rods.min_gap = math.inf
+            self.matrix.rods.min_gap = gap
 
     def _expand(self, at: Configuration) -> None:
         """From nodes, edges, pairs and bodies to the unknowns."""

@@ -17,12 +17,75 @@ from __future__ import annotations
 import numpy as np
 
 from ..jit import kernel
-from ..kinematics.rotation import skew
 from ..model.model import Model
 from .assembly import hold_unknowns
+from .clamps import arm_jacobian
 from .rod_contact import Contacts
 
 Array = np.ndarray
+
+
+@kernel
+def take_contacts(
+    axes,
+    simplified,
+    begin,
+    count,
+    node,
+    weight,
+    normal,
+    lean,
+    along,
+    matrix,
+    side,
+    turn,
+    node_out,
+    weight_out,
+    matrix_out,
+    side_out,
+    turn_out,
+):
+    """Append contacts to a list, with components along the unknowns of nodes.
+
+    Parameters
+    ----------
+    axes : Array
+        Directions of a node's unknowns, shape (dimension, 3).
+    simplified : int
+        1: leave out what is negative across the two edges; 2: all that is negative. Friction has nothing negative.
+    begin : int
+        Number of contacts in the list already.
+    count, node, weight, normal, lean, along, matrix, side, turn
+        See `forces.rod_contact.rod_barrier`.
+    node_out, weight_out, matrix_out, side_out, turn_out : Array
+        Written: as the inputs; M and a_m have components along `axes`.
+    """
+    dimension = axes.shape[0]
+    for c in range(count):
+        e = begin + c
+        for n in range(2):
+            node_out[e, n] = node[c, n]
+        side_out[e] = side[c] if simplified < 2 else 0.0
+        for n in range(4):
+            weight_out[e, n] = weight[c, n]
+            for a in range(dimension):
+                turn_out[e, n, a] = axes[a, 0] * turn[c, n, 0] + axes[a, 1] * turn[c, n, 1] + axes[a, 2] * turn[c, n, 2]
+        for a in range(dimension):
+            a0, a1, a2 = axes[a, 0], axes[a, 1], axes[a, 2]
+            m0 = a0 * matrix[c, 0, 0] + a1 * matrix[c, 1, 0] + a2 * matrix[c, 2, 0]
+            m1 = a0 * matrix[c, 0, 1] + a1 * matrix[c, 1, 1] + a2 * matrix[c, 2, 1]
+            m2 = a0 * matrix[c, 0, 2] + a1 * matrix[c, 1, 2] + a2 * matrix[c, 2, 2]
+            if simplified > 0:
+                n0, n1, n2 = normal[c, 0], normal[c, 1], normal[c, 2]
+                u0, u1, u2 = along[c, 0], along[c, 1], along[c, 2]
+                v0, v1, v2 = n1 * u2 - n2 * u1, n2 * u0 - n0 * u2, n0 * u1 - n1 * u0
+                part = lean[c] * (a0 * v0 + a1 * v1 + a2 * v2)
+                m0, m1, m2 = m0 - part * v0, m1 - part * v1, m2 - part * v2
+                if simplified > 1:
+                    part = lean[c] * (a0 * u0 + a1 * u1 + a2 * u2)
+                    m0, m1, m2 = m0 - part * u0, m1 - part * u1, m2 - part * u2
+            for b in range(dimension):
+                matrix_out[e, a, b] = m0 * axes[b, 0] + m1 * axes[b, 1] + m2 * axes[b, 2]
 
 
 @kernel
@@ -48,183 +111,234 @@ def add_own_edges(count, node, weight, matrix, side, turn, node_unknown, band_ou
 
 
 @kernel
-def sum_between(count, node, weight, matrix, side, turn, first, second, index, blocks_out):
-    """Sum the blocks between the two edges of contacts by pairs of nodes.
+def choose_leaving(count, node, strand, attached, mark, met, node_unknown, dimension, leaving_out, place_out):
+    """Of each two strands in contact (or halves of one) the nodes that are fewer leave the band; return how many do.
 
     Parameters
     ----------
-    first, second : Array
-        Nodes of each pair of nodes, in ascending order of (first, second), first < second, shape (n_block,).
-    index : Array
-        Place of the pair of nodes for the four blocks of each contact, shape (count, 2, 2).
-    blocks_out : Array
-        Added to: rows of the first node, columns of the second, shape (n_block, 3, 3), or (n_block, 2, 2) in a plane.
+    count, node
+        Of contacts.
+    strand, attached : Array
+        Strand of each node, and its place among those that bodies hold, which are in the border already (−1: no body
+        does), shape (n_node,).
+    mark, met : Array
+        Scratch, int64, shapes (n_node, 3), (n_strand, n_strand).
+    node_unknown : Array
+        Row of each node, shape (n_node,).
+    leaving_out : Array
+        Written: rows of the nodes, ascending, shape (n_node,).
+    place_out : Array
+        Written: number of each unknown among those that leave, −1 for others, shape (size,).
     """
+    mark[:] = -1
+    met[:] = 0
+    place_out[:] = -1
+    for c in range(count):
+        first, second = min(node[c, 0], node[c, 1]), max(node[c, 0], node[c, 1])
+        s, t = strand[first], strand[second]
+        if met[s, t] == 1:
+            continue
+        met[s, t] = 1
+        lower = upper = 0
+        for e in range(c, count):
+            low, high = min(node[e, 0], node[e, 1]), max(node[e, 0], node[e, 1])
+            if strand[low] != s or strand[high] != t:
+                continue
+            for i in range(low, low + 2):
+                for j in range(high, high + 2):
+                    if attached[i] < 0 and attached[j] < 0:
+                        lower += mark[i, 0] != c
+                        upper += mark[j, 1] != c
+                        mark[i, 0] = mark[j, 1] = c
+        side = 0 if lower <= upper else 1
+        for i in range(mark.shape[0]):
+            if mark[i, side] == c:
+                mark[i, 2] = 1
+    leaving = 0
+    for i in range(mark.shape[0]):
+        if mark[i, 2] == 1:
+            for x in range(dimension):
+                place_out[node_unknown[i] + x] = dimension * leaving + x
+            leaving_out[leaving] = node_unknown[i]
+            leaving += 1
+    return leaving
+
+
+@kernel
+def add_to_bodies(
+    axes,
+    count,
+    node,
+    weight,
+    matrix,
+    side,
+    turn,
+    attached,
+    attached_free,
+    arm,
+    node_unknown,
+    border_out,
+    corner_out,
+):
+    """Add the blocks between the edges of contacts, of nodes that free bodies hold, to these bodies' border and corner;
+    see `solve.clamps`.
+    """
+    dimension = axes.shape[0]
     for c in range(count):
         for m in range(2):
             for n in range(2):
-                place = index[c, m, n]
-                swapped = node[c, 0] + m != first[place]
-                for x in range(matrix.shape[1]):
-                    for y in range(matrix.shape[1]):
+                i, j = node[c, 0] + m, node[c, 1] + n
+                first, second = attached[i], attached[j]
+                f = attached_free[first] if first >= 0 else -1
+                g = attached_free[second] if second >= 0 else -1
+                if f < 0 and g < 0:
+                    continue
+                for x in range(dimension):
+                    for y in range(dimension):
                         value = _block(c, m, 2 + n, x, y, weight, matrix, side, turn)
-                        if swapped:
-                            blocks_out[place, y, x] += value
-                        else:
-                            blocks_out[place, x, y] += value
+                        if f >= 0 and g >= 0:
+                            for k in range(6):
+                                for q in range(6):
+                                    turned = arm_jacobian(axes, arm, first, x, k) * value
+                                    turned *= arm_jacobian(axes, arm, second, y, q)
+                                    corner_out[6 * f + k, 6 * g + q] += turned
+                                    corner_out[6 * g + q, 6 * f + k] += turned
+                        elif f >= 0 and second < 0:
+                            for k in range(6):
+                                turned = arm_jacobian(axes, arm, first, x, k) * value
+                                border_out[node_unknown[j] + y, 6 * f + k] += turned
+                        elif g >= 0 and first < 0:
+                            for k in range(6):
+                                turned = arm_jacobian(axes, arm, second, y, k) * value
+                                border_out[node_unknown[i] + x, 6 * g + k] += turned
 
 
 @kernel
-def move_to_border(unknown, dimension, place_of_unknown, half_bandwidth, size, base, band, border_out, corner_out):
-    """Copy rows and columns of `dimension` unknowns from each of `unknown` to the border and corner; they are left in
-    the band.
+def leave_band(leaving, unknown, dimension, place, half_bandwidth, size, base, border, corner, band):
+    """Move nodes from the band to the border and corner, whose columns from `base` on are theirs.
 
-    `place_of_unknown` numbers the unknowns that leave the band, −1 for all others, shape (size,); their columns begin
-    at `base`.
+    Parameters
+    ----------
+    leaving, unknown, place
+        From `choose_leaving`.
+    dimension, half_bandwidth, size, base : int
+    border, corner : Array
+        Before: of bodies' freedom, the first `base` columns. Changed.
+    band : Array
+        See `solve.band`; rows and columns of nodes that leave become those of the identity.
     """
-    for k in range(unknown.shape[0]):
+    columns = base + dimension * leaving
+    for i in range(border.shape[0]):
+        for c in range(base, columns):
+            border[i, c] = 0.0
+    for i in range(columns):
+        for c in range(base, columns):
+            corner[i, c] = 0.0
+    for k in range(leaving):
         for column in range(unknown[k], unknown[k] + dimension):
-            own = base + place_of_unknown[column]
+            own = base + place[column]
+            for c in range(base):
+                corner[c, own] = corner[own, c] = border[column, c]
+                border[column, c] = 0.0
             for i in range(max(0, column - half_bandwidth), min(size, column + half_bandwidth + 1)):
                 value = band[column, i - column] if i >= column else band[i, column - i]
-                if place_of_unknown[i] >= 0:
-                    corner_out[base + place_of_unknown[i], own] = value
+                if place[i] >= 0:
+                    corner[base + place[i], own] = value
                 else:
-                    border_out[i, own] = value
+                    border[i, own] = value
+    hold_unknowns(unknown[:leaving], dimension, half_bandwidth, band)
 
 
 @kernel
-def add_between(first, second, blocks, place_of_unknown, base, border_out, corner_out):
-    """Add the blocks between the unknowns from each of `first` and those from `second`, one of which has left the
-    band.
-    """
-    for k in range(first.shape[0]):
-        for x in range(blocks.shape[1]):
-            for y in range(blocks.shape[2]):
-                row, column = first[k] + x, second[k] + y
-                a, b, value = place_of_unknown[row], place_of_unknown[column], blocks[k, x, y]
-                if a >= 0 and b >= 0:
-                    corner_out[base + a, base + b] += value
-                    corner_out[base + b, base + a] += value
-                elif a >= 0:
-                    border_out[column, base + a] += value
-                else:
-                    border_out[row, base + b] += value
+def add_between(count, node, weight, matrix, side, turn, attached, node_unknown, place, base, border_out, corner_out):
+    """Add the blocks between the edges of contacts, of nodes that no body holds; one node of each has left the band."""
+    for c in range(count):
+        for m in range(2):
+            for n in range(2):
+                i, j = node[c, 0] + m, node[c, 1] + n
+                if attached[i] >= 0 or attached[j] >= 0:
+                    continue
+                for x in range(matrix.shape[1]):
+                    for y in range(matrix.shape[1]):
+                        row, column = node_unknown[i] + x, node_unknown[j] + y
+                        a, b = place[row], place[column]
+                        value = _block(c, m, 2 + n, x, y, weight, matrix, side, turn)
+                        if a >= 0 and b >= 0:
+                            corner_out[base + a, base + b] += value
+                            corner_out[base + b, base + a] += value
+                        elif a >= 0:
+                            border_out[column, base + a] += value
+                        else:
+                            border_out[row, base + b] += value
 
 
 class RodBorder:
-    """Blocks between nodes that rod contact couples, and the nodes that leave the band for them; `rows` are their
-    unknowns.
+    """The contacts of rods as the Newton matrix takes them, and the nodes that leave the band for them.
+
+    Attributes
+    ----------
+    count, node, weight, matrix, side, turn
+        Contacts of barrier and friction in one list, see `take_contacts`.
+    strand, attached, mark, met, leaving, place
+        See `choose_leaving`.
     """
 
     def __init__(self, model: Model):
         self._model, self._layout = model, model.solved_layout
-        self._axes = model.directions
-        self._strand = np.repeat(np.arange(len(model.strands)), [s.node_count for s in model.strands])
-        self._held = np.zeros(model.node_count, dtype=np.int64) - 1
-        self._held[model.attached_node] = np.arange(len(model.attached_node))
-        self._unknown = self.rows = np.zeros(0, dtype=np.int64)
-        self._place = np.full(self._layout.size, -1, dtype=np.int64)
-        self._first = self._second = self.rows
-        self._blocks = np.zeros((0, self._layout.dimension, self._layout.dimension))
+        nodes, strands = model.node_count, len(model.strands)
+        self.strand = np.repeat(np.arange(strands), [s.node_count for s in model.strands])
+        self.attached = np.full(nodes, -1)
+        self.attached[model.attached_node] = np.arange(len(model.attached_node))
+        self.mark, self.met = np.zeros((nodes, 3), dtype=np.int64), np.zeros((strands, strands), dtype=np.int64)
+        self.leaving = np.zeros(nodes, dtype=np.int64)
+        self.unknown = self.leaving.view()
+        self.unknown.flags.writeable = False  # as those of attached nodes: one type for kernels
+        self.place = np.zeros(self._layout.size, dtype=np.int64)
+        self.count = self._leaving = 0
+        self.make_room(0)
+
+    def make_room(self, room: int) -> None:
+        """Have room for so many contacts."""
+        d = self._layout.dimension
+        self.node, self.side = np.zeros((room, 2), dtype=np.int64), np.zeros(room)
+        self.weight, self.matrix, self.turn = np.zeros((room, 4)), np.zeros((room, d, d)), np.zeros((room, 4, d))
+
+    @property
+    def rows(self) -> Array:
+        """Rows of the matrix that leave the band."""
+        return (self.leaving[: self._leaving, None] + np.arange(self._layout.dimension)).ravel()
 
     def add_to_band(self, parts: list[Contacts], simplified: int, band: Array) -> None:
-        """Add each edge's own blocks to the band, collect those between edges, and choose the nodes that leave the
-        band.
-
-        `simplified` is for `Contacts.curvature`.
+        """Add each edge's own blocks to the band, and choose the nodes that leave it; `simplified` is for
+        `take_contacts`.
         """
-        layout, nodes = self._layout, self._model.node_count
-        self._place[:] = -1
-        self._unknown = self.rows = self._first = self._second = np.zeros(0, dtype=np.int64)
-        parts = [part for part in parts if part.count]
-        if not parts:
-            return
-        keys, tails = [], []
+        layout, model = self._layout, self._model
+        room = sum(part.room for part in parts)
+        if room > len(self.side):
+            self.make_room(room)
+        self.count = 0
         for part in parts:
-            tail = self._of_unknowns(part, simplified)
-            tails.append(tail)
-            add_own_edges(part.count, part.node, *tail, layout.node, band)
-            own = part.node[: part.count, 0, None, None] + np.arange(2)[:, None]
-            other = part.node[: part.count, 1, None, None] + np.arange(2)
-            keys.append(np.minimum(own, other) * nodes + np.maximum(own, other))
-        found, places = np.unique(np.concatenate([key.ravel() for key in keys]), return_inverse=True)
-        self._first, self._second = found // nodes, found % nodes
-        self._blocks = np.zeros((len(found), layout.dimension, layout.dimension))
-        begin = 0
-        for part, key, tail in zip(parts, keys, tails, strict=True):
-            index = places[begin : begin + key.size].reshape(key.shape)
-            begin += key.size
-            sum_between(part.count, part.node, *tail, self._first, self._second, index, self._blocks)
-        self._choose()
-
-    def _of_unknowns(self, part: Contacts, simplified: int) -> tuple[Array, Array, Array, Array]:
-        """Weights, M, κ and turns of contacts, with components along the unknowns of nodes."""
-        matrix, side = part.curvature(simplified)
-        if self._layout.dimension == 3:
-            return part.weight, matrix, side, part.turn
-        axes = self._axes
-        return part.weight, np.ascontiguousarray(axes @ matrix @ axes.T), side, np.ascontiguousarray(part.turn @ axes.T)
-
-    def _choose(self) -> None:
-        """Of each two strands (or halves of one) the nodes that are fewer leave; nodes that bodies hold are in the
-        border already.
-        """
-        between = (self._held[self._first] < 0) & (self._held[self._second] < 0)
-        first, second = self._first[between], self._second[between]
-        leaving = []
-        strands = self._strand[first] * len(self._model.strands) + self._strand[second]
-        for pair in np.unique(strands):
-            sides = [np.unique(side[strands == pair]) for side in (first, second)]
-            leaving.append(min(sides, key=len))
-        nodes = np.unique(np.concatenate(leaving)) if leaving else np.zeros(0, dtype=np.int64)
-        self._unknown = self._layout.node[nodes]
-        self._unknown.flags.writeable = False  # as those of attached nodes: one type for kernels
-        self.rows = (self._unknown[:, None] + np.arange(self._layout.dimension)).ravel()
-        self._place[self.rows] = np.arange(len(self.rows))
+            of_part = (part.node, part.weight, part.normal, part.lean, part.along, part.matrix, part.side, part.turn)
+            take_contacts(
+                *(model.directions, simplified, self.count, part.count, *of_part),
+                *(self.node, self.weight, self.matrix, self.side, self.turn),
+            )
+            self.count += part.count
+        add_own_edges(self.count, self.node, self.weight, self.matrix, self.side, self.turn, layout.node, band)
+        nodes = (self.strand, self.attached, self.mark, self.met, layout.node, layout.dimension)
+        self._leaving = choose_leaving(self.count, self.node, *nodes, self.leaving, self.place)
 
     def add_to_bodies(self, arm: Array, border: Array, corner: Array) -> None:
-        """Add the blocks of nodes that free bodies hold to these bodies' border and corner; see `solve.clamps`."""
-        model, axes, d = self._model, self._axes, self._layout.dimension
-        for k in np.flatnonzero((self._held[self._first] >= 0) | (self._held[self._second] >= 0)):
-            block = self._blocks[k]
-            ends = []
-            for node in (self._first[k], self._second[k]):
-                held = self._held[node]
-                free = model.attached_free[held] if held >= 0 else -1
-                jacobian = axes @ np.hstack([np.eye(3), -skew(arm[held])]) if free >= 0 else None
-                ends.append((held >= 0, free, jacobian, self._layout.node[node]))
-            (held_a, free_a, jacobian_a, row_a), (held_b, free_b, jacobian_b, row_b) = ends
-            if free_a >= 0 and free_b >= 0:
-                turned = jacobian_a.T @ block @ jacobian_b
-                corner[6 * free_a : 6 * free_a + 6, 6 * free_b : 6 * free_b + 6] += turned
-                corner[6 * free_b : 6 * free_b + 6, 6 * free_a : 6 * free_a + 6] += turned.T
-            elif free_a >= 0 and not held_b:
-                border[row_b : row_b + d, 6 * free_a : 6 * free_a + 6] += block.T @ jacobian_a
-            elif free_b >= 0 and not held_a:
-                border[row_a : row_a + d, 6 * free_b : 6 * free_b + 6] += block @ jacobian_b
+        """Add the blocks of nodes that free bodies hold to these bodies' border and corner."""
+        model = self._model
+        blocks = (self.node, self.weight, self.matrix, self.side, self.turn)
+        bodies = (self.attached, model.attached_free, arm, self._layout.node)
+        add_to_bodies(model.directions, self.count, *blocks, *bodies, border, corner)
 
-    def widen(self, band: Array, border: Array, corner: Array) -> tuple[Array, Array]:
-        """Move the nodes that leave from the band to the border and corner of bodies; returns these with their columns.
-
-        Parameters
-        ----------
-        band : Array
-            See `solve.band`; rows and columns of nodes that leave become those of the identity.
-        border, corner : Array
-            Of bodies' freedom, shapes (≥ size, n), (n, n).
-        """
-        layout, base = self._layout, border.shape[1]
-        width = base + len(self.rows)
-        wide, large = np.zeros((len(border), width)), np.zeros((width, width))
-        wide[:, :base], large[:base, :base] = border, corner
-        rows = self.rows
-        large[base:, :base], large[:base, base:] = border[rows], border[rows].T
-        leaving = (self._unknown, layout.dimension)
-        move_to_border(*leaving, self._place, layout.half_bandwidth, layout.size, base, band, wide, large)
-        free = (self._held[self._first] < 0) & (self._held[self._second] < 0)
-        rows_of_blocks = (layout.node[self._first[free]], layout.node[self._second[free]])
-        add_between(*rows_of_blocks, self._blocks[free], self._place, base, wide, large)
-        wide[rows] = 0.0
-        hold_unknowns(*leaving, layout.half_bandwidth, band)
-        return wide, large
+    def widen(self, band: Array, base: int, border: Array, corner: Array) -> None:
+        """Move the nodes that leave from the band to the border and corner of bodies' freedom, after `base` columns."""
+        layout = self._layout
+        leaving = (self._leaving, self.unknown, layout.dimension, self.place)
+        leave_band(*leaving, layout.half_bandwidth, layout.size, base, border, corner, band)
+        blocks = (self.node, self.weight, self.matrix, self.side, self.turn)
+        add_between(self.count, *blocks, self.attached, layout.node, self.place, base, border, corner)

@@ -5,31 +5,30 @@ needs of them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact.rod_bound import largest_travel, rod_step_bound
+from ..contact.rod_bound import rod_step_bound
+from ..contact.rod_list import largest_fraction, list_rods
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
 from ..model.model import Model
 from ..model.rod_surfaces import NearPairs
 
 Array = np.ndarray
-LEAST_MARGIN = 2.0  # of the barrier distance plus the thickest layer: how far beyond contact pairs are listed
-LARGEST_MARGIN = 20.0
-STEPS_AHEAD = 4.0  # moves of the present size for which a list is made
+PAIRS_PER_POINT = 8
+"""That there is room for at first."""
 
 
-@dataclass
 class Contacts:
-    """Arrays with room for some contacts, the first `count` of which are in use; see `forces.rod_contact`."""
+    """Arrays with room for some contacts, the first `count` of which are in use; see `forces.rod_contact`.
 
-    room: int
+    `counted` is their number as compiled loops share it, shape (1,).
+    """
 
-    def __post_init__(self):
-        room = self.room
-        self.count = 0
+    def __init__(self, room: int):
+        self.room = room
+        self.counted = np.zeros(1, dtype=np.int64)
         self.point, self.edge, self.times = (np.zeros(room, dtype=np.int64) for _ in range(3))
         self.fraction, self.gap, self.inner = np.zeros(room), np.zeros(room), np.zeros(room, dtype=bool)
         self.node = np.zeros((room, 2), dtype=np.int64)
@@ -38,39 +37,42 @@ class Contacts:
         self.matrix = np.zeros((room, 3, 3))
         self.lean, self.along = np.zeros(room), np.zeros((room, 3))
 
-    def curvature(self, simplified: int) -> tuple[Array, Array]:
-        """M and κ of the contacts in use; simplified once, without what is negative across the two edges, twice,
-        without all that is negative. Friction has nothing negative.
-        """
-        used = slice(self.count)
-        matrix, side = self.matrix[used], self.side[used]
-        if not simplified or not self.lean.any():
-            return matrix, side
-        across = np.cross(self.normal[used], self.along[used])
-        lean = self.lean[used, None, None]
-        matrix = matrix - lean * across[:, :, None] * across[:, None, :]
-        if simplified == 1:
-            return matrix, side
-        along = self.along[used]
-        return matrix - lean * along[:, :, None] * along[:, None, :], np.zeros_like(side)
+    @property
+    def count(self) -> int:
+        """Contacts in use."""
+        return int(self.counted[0])
+
+    @property
+    def found(self) -> tuple[Array, ...]:
+        """What `facing_contacts` writes."""
+        return self.point, self.edge, self.fraction, self.inner, self.times, self.gap
+
+    def grown(self, room: int) -> Contacts:
+        """A copy with room for so many."""
+        larger, used = Contacts(room), slice(min(self.count, self.room))
+        for name, values in vars(self).items():
+            if name not in ("room", "counted"):
+                getattr(larger, name)[used] = values[used]
+        larger.counted[:] = self.counted
+        return larger
 
 
 class RodContact:
     """Contact of the rods of a model with each other and with themselves.
 
-    Pairs are listed with a margin and listed anew once a node has moved by half of it. What is computed does not depend
-    on the list, which holds all contacts at any time, always in the same order.
+    What is computed does not depend on the list of near pairs, which holds all contacts at any time, always in the same
+    order; see `contact.rod_list`.
 
     Attributes
     ----------
-    contacts, sliding, none : Contacts
-        Those of the last `barrier`, those that `start_step` froze for friction, and room for none.
-    pairs, base, margin : NearPairs, Array, float
-        The list of near pairs, the positions [m] for which it was made, shape (n_node, 3), and how far it reaches [m].
+    contacts, sliding : Contacts
+        Those of the last `barrier`, and those that `start_step` froze for friction.
+    pairs, base, tip, listed : NearPairs, Array, Array, Array
+        The list of near pairs, and for which motion it was made; see `contact.rod_list.list_rods`.
     unit : float
         Barrier distance and thickest layer together [m].
-    listed : object
-        Another one after each list.
+    room : int
+        Changes whenever arrays are replaced by larger ones.
     min_gap : float
         Smallest gap below d̂ at the last `barrier` [m], infinite without one.
     """
@@ -84,56 +86,69 @@ class RodContact:
         self._threshold = law.speed_threshold if law else math.inf
         self._surfaces = surfaces
         self.unit = self._d_hat + 2.0 * float(surfaces.edge_radius.max())
-        self.pairs = NearPairs(surfaces, model.edge_node, model.start_position, self._d_hat)
-        self.base = np.full((model.node_count, 3), math.inf)
-        self.margin = -1.0
-        self.listed = object()
-        self._no_step = np.zeros((model.node_count, 3))
-        self._scratch = np.zeros((model.node_count, 3))
-        self.contacts, self.sliding, self.none = Contacts(0), Contacts(0), Contacts(0)
+        points = len(surfaces.point_edge)
+        self.pairs = NearPairs(surfaces, model.edge_node, PAIRS_PER_POINT * points)
+        self.base, self.tip = np.zeros((2, model.node_count, 3))
+        self.listed = np.zeros(1, dtype=np.int64)
+        self.start_position = np.array(model.start_position)
+        self.no_step, self.scratch = np.zeros((2, model.node_count, 3))
+        self.contacts, self.sliding = Contacts(points), Contacts(points)
         self.min_gap = math.inf
 
-    def _list(self, position: Array, move: float) -> None:
-        """List pairs about `position`, for moves of size `move` [m]."""
-        self.margin = min(max(2.0 * STEPS_AHEAD * move, LEAST_MARGIN * self.unit), LARGEST_MARGIN * self.unit)
-        self.base[:] = position
-        self.listed = object()
-        self.pairs.find(self.base, self._d_hat + self.margin)
+    @property
+    def room(self) -> int:
+        """Of pairs and contacts together."""
+        return len(self.pairs.point) + self.contacts.room + self.sliding.room
 
-    def list_about(self, position: Array, move: float) -> None:
-        """List pairs so that a step of size `move` [m] from positions of nodes can be bounded."""
-        self._list(position, move)
+    def make_room(self) -> None:
+        """Have room for what was counted and not written."""
+        if self.pairs.count > len(self.pairs.point):
+            self.pairs.make_room(2 * self.pairs.count)
+            self.pairs.counted[0] = 0
+        if self.contacts.count > self.contacts.room:
+            self.contacts = Contacts(2 * self.contacts.count)
+        if self.sliding.room < self.contacts.room:
+            self.sliding = self.sliding.grown(self.contacts.room)
+
+    def _list(self, position: Array, step: Array, fraction: float) -> None:
+        """Have a list for a part of a step of nodes [m] from `position`."""
+        pairs = self.pairs
+        while not list_rods(
+            position,
+            step,
+            fraction,
+            self.unit,
+            self._d_hat,
+            self.start_position,
+            *pairs.geometry,
+            self.base,
+            self.tip,
+            self.listed,
+            pairs.counted,
+            *pairs.outputs,
+        ):
+            self.make_room()
 
     def _find(self, position: Array) -> float:
         """Contacts at `position`; returns the smallest gap [m]."""
-        travel, _ = largest_travel(position, self._no_step, self.base)
-        if not travel <= 0.5 * self.margin:
-            self._list(position, 0.0)
+        self._list(position, self.no_step, 0.0)
         pairs, surfaces = self.pairs, self._surfaces
         while True:
             contacts = self.contacts
-            contacts.count, gap = facing_contacts(
+            contacts.counted[0], gap = facing_contacts(
                 position,
                 pairs.count,
-                pairs.point,
-                pairs.edge,
-                pairs.before,
-                pairs.after,
+                *pairs.outputs,
                 self._model.edge_node,
                 surfaces.edge_radius,
                 surfaces.point_edge,
                 surfaces.point_fraction,
                 self._d_hat,
-                contacts.point,
-                contacts.edge,
-                contacts.fraction,
-                contacts.inner,
-                contacts.times,
-                contacts.gap,
+                *contacts.found,
             )
             if contacts.count <= contacts.room:
                 break
-            self.contacts = Contacts(2 * contacts.count)
+            self.make_room()
         return gap if gap < self._d_hat else math.inf
 
     def barrier(self, position: Array, gradient: Array) -> float:
@@ -172,11 +187,9 @@ class RodContact:
 
     def start_step(self, position: Array) -> None:
         """Freeze the contacts of friction."""
-        self.barrier(position, self._scratch)
+        self.barrier(position, self.scratch)
         found, sliding = self.contacts, self.sliding
-        if sliding.room < found.count:
-            self.sliding = sliding = Contacts(2 * found.count)
-        sliding.count = found.count
+        sliding.counted[:] = found.counted
         used = slice(found.count)
         for name in ("node", "weight", "normal", "load"):
             getattr(sliding, name)[used] = getattr(found, name)[used]
@@ -205,19 +218,14 @@ class RodContact:
         """Largest fraction of a step of nodes [m], shape (n_node, 3), that keeps all gaps open, and the node that sets
         it (−1: none).
         """
-        travel, move = largest_travel(position, step, self.base)
-        now, _ = largest_travel(position, self._no_step, self.base)
-        limit = 1.0
-        if not max(travel, now) <= 0.5 * self.margin:
-            self._list(position, move)
-            limit = min(1.0, 0.5 * self.margin / max(move, 1e-300))
+        limit = largest_fraction(step, self.no_step, self.unit)
+        self._list(position, step, limit)
         pairs, surfaces = self.pairs, self._surfaces
-        if pairs.count == 0:
-            return limit, -1
         return rod_step_bound(
             position,
             step,
             limit,
+            self._d_hat,
             pairs.count,
             pairs.point,
             pairs.edge,

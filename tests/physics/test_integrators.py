@@ -14,6 +14,8 @@ from bilayer_core.integrate.integrators import INTEGRATORS
 HISTORY = [name for name, method in INTEGRATORS.items() if method.history is not None]
 SECOND_ORDER = [name for name, method in INTEGRATORS.items() if method.order == 2]
 DAMPED = [name for name in INTEGRATORS if name != "implicit_midpoint"]
+
+
 def turning_with(simulator):
     """Give the strip of `spinner` the velocities of the body that holds it."""
     spin, shift = part(simulator, "body_angular_velocity")[0], part(simulator, "body_velocity")[0]

@@ -121,7 +121,7 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     expected = np.linalg.solve(dense, right[:n])
     one = right[:, 2].copy()
     solve_band(band, n, width(b), one)
-    solve_columns(band, n, width(b), right)
+    solve_columns(band, n, width(b), 6, right)
     assert one[:n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
     assert right[:n] == pytest.approx(expected, rel=1e-10, abs=1e-12)
     assert factor_band(indefinite, n, width(b)) == 41

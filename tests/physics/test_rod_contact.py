@@ -264,13 +264,13 @@ def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_
         rods[1]["path"]["start"] = [0.7e-3, 0, 1.8e-3]
         model = model_of(rods)
         surfaces = model.rod_surfaces
-        pairs = NearPairs(surfaces, model.edge_node, model.start_position, D_HAT)
-        pairs.find(np.array(model.start_position), D_HAT)
+        pairs, start = NearPairs(surfaces, model.edge_node), np.array(model.start_position)
+        pairs.find(start, start, D_HAT, D_HAT)
         counts.append(pairs.count)
         if stations > 201:
             continue
         position = model.start_position + 2e-4 * np.sin(np.arange(3 * model.node_count)).reshape(-1, 3)
-        pairs.find(position, D_HAT)
+        pairs.find(position, start, D_HAT, D_HAT)
         first = model.edge_node[surfaces.point_edge]
         s = surfaces.point_fraction[:, None]
         points = (1 - s) * position[first] + s * position[first + 1]

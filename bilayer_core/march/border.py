@@ -1,0 +1,194 @@
+"""The border of the Newton matrix: free bodies, as in `solve.newton_matrix`, and nodes that left the band for it."""
+
+from __future__ import annotations
+
+from ..jit import inner
+from ..solve.band import solve_columns
+from ..solve.clamps import hand_nodes_to_bodies, hand_rows_to_bodies, hand_walls_to_bodies
+from ..solve.dense import eliminate, factor_dense, solve_dense
+from ..solve.newton_matrix import add_links
+from ..solve.planar_matrix import hand_walls_to_bodies_in_plane
+from .copying import copy
+from .leaving import hand_contacts_to_bodies
+
+
+@inner
+def assemble_border(border, wide, grips, leaving, space, plane, strands, sums, band, at):
+    """U and D of free bodies: links of contact, and what they hold. Whether U is not zero is left in `coupled`."""
+    if border is None:
+        return
+    border.border[:] = 0.0
+    copy(sums.body_hessian, border.corner)
+    if sums.links[0] > 0:
+        wide.coupled[0] = 1
+        links = sums.link_node, sums.link_body, sums.link_hessian
+        add_links(strands.axes, sums.links[0], links[0], links[1], links[2], strands.row, border.border)
+    _hand_to_bodies(wide, grips, leaving, space, plane, border, strands, at, sums, band)
+
+
+@inner
+def _hand_to_bodies(wide, grips, leaving, space, plane, border, strands, at, sums, band):
+    if grips is None:
+        return
+    if grips.holding == 0:
+        return
+    wide.coupled[0] = 1
+    hand_contacts_to_bodies(leaving, grips, strands, at, border)
+    hand_rows_to_bodies(strands.axes, grips.unknown, grips.free, at.arm, border.border, border.corner)
+    hand_nodes_to_bodies(
+        strands.axes,
+        grips.unknown,
+        grips.free,
+        grips.of_unknown,
+        at.arm,
+        sums.attached,
+        len(strands.bandwidth),
+        strands.size,
+        band,
+        border.border,
+        border.corner,
+    )
+    _hand_walls(space, grips, border, strands, at, sums)
+    _hand_walls_in_plane(plane, grips, border, strands, at, sums)
+
+
+@inner
+def _hand_walls(space, grips, border, strands, at, sums):
+    if space is None:
+        return
+    hand_walls_to_bodies(
+        strands.axes,
+        grips.wall_free,
+        grips.wall_joint,
+        strands.joint_a,
+        strands.joint_b,
+        strands.edge_count,
+        strands.edge_node,
+        strands.row,
+        strands.edge_unknown,
+        grips.of_unknown,
+        grips.unknown,
+        grips.free,
+        at.arm,
+        at.tangent,
+        sums.edge,
+        sums.edge_hessian,
+        sums.cross_hessian,
+        border.border,
+        border.corner,
+    )
+
+
+@inner
+def _hand_walls_in_plane(plane, grips, border, strands, at, sums):
+    if plane is None:
+        return
+    hand_walls_to_bodies_in_plane(
+        strands.axes,
+        plane.normal,
+        grips.wall_free,
+        grips.wall_joint,
+        strands.joint_a,
+        strands.joint_b,
+        strands.edge_count,
+        strands.edge_node,
+        strands.row,
+        grips.of_unknown,
+        grips.unknown,
+        grips.free,
+        at.arm,
+        plane.frame,
+        plane.polar_hessian,
+        sums.cross_hessian,
+        border.border,
+        border.corner,
+    )
+
+
+@inner
+def _clear_held_rows(held, dimension, border):
+    for k in range(held.row.shape[0]):
+        for row in range(held.row[k], held.row[k] + dimension):
+            for i in range(border.shape[1]):
+                border[row, i] = 0.0
+
+
+@inner
+def start_border(wide, bodies):
+    """Forget what the last matrix had in the border."""
+    if wide is None:
+        return
+    wide.coupled[0], wide.width[0] = 0, bodies.freedom.shape[1]
+
+
+@inner
+def take_border(border, wide, bodies, held, dimension, size, shift):
+    """D and U restricted to what bodies may do, shifted by multiples of their masses."""
+    if border is None:
+        return
+    freedom, n, m = bodies.freedom, bodies.freedom.shape[1], bodies.freedom.shape[0]
+    schur, corner, rows, columns = wide.schur, border.corner, border.border, wide.border
+    for a in range(n):
+        for b in range(n):
+            total = 0.0
+            for i in range(m):
+                if freedom[i, a] == 0.0:
+                    continue
+                total += shift * bodies.inertia[i] * freedom[i, a] * freedom[i, b]
+                for j in range(m):
+                    total += freedom[i, a] * corner[i, j] * freedom[j, b]
+            schur[a, b] = total
+    if wide.coupled[0] == 0:
+        return
+    _clear_held_rows(held, dimension, rows)
+    for row in range(size):
+        for a in range(n):
+            columns[row, a] = 0.0
+        for i in range(m):
+            value = rows[row, i]
+            if value != 0.0:
+                for a in range(n):
+                    columns[row, a] += value * freedom[i, a]
+
+
+@inner
+def factorise_border(wide, strands, band):
+    """S = D − Uᵀ A⁻¹ U, factorised; false if it is not positive definite."""
+    if wide is None:
+        return True
+    if wide.coupled[0] == 1:
+        copy(wide.border, wide.solution)
+        solve_columns(band, strands.size, strands.bandwidth, wide.width[0], wide.solution)
+        eliminate(wide.border, wide.solution, strands.size, wide.width[0], wide.schur)
+    return factor_dense(wide.schur, wide.width[0])
+
+
+@inner
+def solve_border(wide, bodies, body_gradient, size, right, body_step):
+    """The step of free bodies and of nodes that left the band, and what it changes in that of all others.
+
+    In `Wide.load` is what is wanted of nodes that left.
+    """
+    if wide is None:
+        return
+    freedom, load, columns, solution = bodies.freedom, wide.load, wide.border, wide.solution
+    n, width, free = freedom.shape[1], wide.width[0], body_step.shape[0]
+    for a in range(n):
+        load[a] = 0.0
+        for f in range(free):
+            for c in range(6):
+                load[a] -= freedom[6 * f + c, a] * body_gradient[f, c]
+    if wide.coupled[0] == 1:
+        for j in range(size):
+            for a in range(width):
+                load[a] -= columns[j, a] * right[j]
+    solve_dense(wide.schur, width, load)
+    if wide.coupled[0] == 1:
+        for j in range(size):
+            for a in range(width):
+                right[j] -= solution[j, a] * load[a]
+    for f in range(free):
+        for c in range(6):
+            body_step[f, c] = 0.0
+            for a in range(n):
+                body_step[f, c] += freedom[6 * f + c, a] * load[a]
