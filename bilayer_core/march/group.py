@@ -136,19 +136,20 @@ def _read_field(context, builder, of, address, name):
         offset += _word_count(type_of_field)
     if isinstance(type_of_field, types.NoneType):
         return context.get_dummy_value()
+    return _read(context, builder, type_of_field, address, offset)
+
+
+def _read(context, builder, of, address, offset):
+    """A value that stands `offset` words after `address`."""
+    if isinstance(of, types.BaseTuple):
+        items = []
+        for type_of_item in of:
+            items.append(_read(context, builder, type_of_item, address, offset))
+            offset += _word_count(type_of_item)
+        return context.make_tuple(builder, of, items)
+    model = context.data_model_manager[of]
+    kind = model.get_data_type()
     place = builder.gep(address, [ir.Constant(ir.IntType(64), WORD * offset)])
-    model = context.data_model_manager[type_of_field]
-    if isinstance(type_of_field, types.BaseTuple):
-        return _read_tuple(context, builder, type_of_field, place)
-    return model.load_from_data_pointer(builder, builder.bitcast(place, model.get_data_type().as_pointer()), WORD)
-
-
-def _read_tuple(context, builder, of, place):
-    items, offset = [], 0
-    for type_of_item in of:
-        model = context.data_model_manager[type_of_item]
-        there = builder.gep(place, [ir.Constant(ir.IntType(64), WORD * offset)])
-        there = builder.bitcast(there, model.get_data_type().as_pointer())
-        items.append(model.load_from_data_pointer(builder, there, WORD))
-        offset += _word_count(type_of_item)
-    return context.make_tuple(builder, of, items)
+    value = builder.load(builder.bitcast(place, kind.as_pointer()), align=WORD)
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))  # fields do not change: out of loops with it
+    return value if kind == model.get_value_type() else model.from_data(builder, value)
