@@ -73,7 +73,8 @@ def surface_contact(
     kind, size, rounding, place, turn, surface_body : Array
         Of surfaces: see `contact.near.gap_normal`; and the body of each.
     body_position, free_index : Array
-        Of all bodies and of the world: position [m], shape (n_body + 1, 3), and place among the free ones or −1.
+        Of all bodies and of the world: position [m], shape (n_body + 1, 3), and place among the free ones or −1,
+        which is None if none is free.
     carrier_gradient_out, contact_out : Array
         Of carriers [N], shape (n_carrier, 3), and of (X, φ) of bodies, shape (n_body + 1, 6); added to.
     near_gap_out : Array
@@ -93,7 +94,7 @@ def surface_contact(
     """
     energy = 0.0
     min_gap = math.inf
-    m, scratch = stack_matrix(3, 3), stack_matrix(15, 12)
+    m = stack_matrix(3, 3)
     g, arm, lever = stack_vector(3), stack_vector(3), stack_vector(3)
     arm[0] = arm[1] = arm[2] = 0.0
     for k in range(count):
@@ -135,10 +136,10 @@ def surface_contact(
             arm,
             lever,
             1.0,
-            i if a < 0 else -1,
-            free_index[a] if a >= 0 else -1,
-            free_index[b],
-            scratch,
+            i,
+            a,
+            b,
+            free_index,
             node_hessian_out,
             body_hessian_out,
             links,

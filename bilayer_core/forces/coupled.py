@@ -14,6 +14,7 @@ Blocks between a node and a free body ("links") are listed: the node, the body, 
 from __future__ import annotations
 
 from ..jit import kernel
+from ..kinematics.stack import stack_matrix
 
 
 @kernel
@@ -28,55 +29,51 @@ def add_force(contact_out, body, sign, arm, g):
 
 
 @kernel
-def _add_skew(matrix, row, column, s, a):
-    """matrix[row:row+3, column:column+3] += s [a]×"""
-    matrix[row, column + 1] -= s * a[2]
-    matrix[row, column + 2] += s * a[1]
-    matrix[row + 1, column] += s * a[2]
-    matrix[row + 1, column + 2] -= s * a[0]
-    matrix[row + 2, column] -= s * a[1]
-    matrix[row + 2, column + 1] += s * a[0]
+def _skew(a, out):
+    """out = [a]×, shape (3, 3)."""
+    out[0, 0] = out[1, 1] = out[2, 2] = 0.0
+    out[0, 1], out[0, 2], out[1, 2] = -a[2], a[1], -a[0]
+    out[1, 0], out[2, 0], out[2, 1] = a[2], -a[1], a[0]
 
 
 @kernel
-def _add_turning(local, base, s, arm, g):
-    """s (½ (a gᵀ + g aᵀ) − (a·g) 1) on a diagonal block."""
-    product = arm[0] * g[0] + arm[1] * g[1] + arm[2] * g[2]
-    for m in range(3):
-        for n in range(3):
-            local[base + m, base + n] += 0.5 * s * (arm[m] * g[n] + g[m] * arm[n])
-        local[base + m, base + m] -= s * product
-
-
-@kernel
-def _local_hessian(m, g, arm, lever, turning, jacobian, local):
-    """The Hessian with respect to (x or X_A, φ_A, X_B, φ_B), shape (12, 12); `jacobian` is scratch, shape (3, 12)."""
+def _local_hessian(m, g, arm, lever, turning, local):
+    """The Hessian with respect to (x or X_A, φ_A, X_B, φ_B), shape (12, 12)."""
+    jacobian = stack_matrix(3, 12)
+    crossed_arm, crossed_lever, crossed = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
+    _skew(arm, crossed_arm)
+    _skew(lever, crossed_lever)
     for c in range(3):
-        for p in range(12):
-            jacobian[c, p] = 0.0
-    for c in range(3):
-        jacobian[c, c] = 1.0
-        jacobian[c, 6 + c] = -1.0
-    _add_skew(jacobian, 0, 3, -1.0, arm)
-    _add_skew(jacobian, 0, 9, 1.0, lever)
+        for p in range(3):
+            jacobian[c, p], jacobian[c, 3 + p] = 0.0, -crossed_arm[c, p]
+            jacobian[c, 6 + p], jacobian[c, 9 + p] = 0.0, crossed_lever[c, p]
+        jacobian[c, c], jacobian[c, 6 + c] = 1.0, -1.0
     for p in range(12):
         v0 = m[0, 0] * jacobian[0, p] + m[0, 1] * jacobian[1, p] + m[0, 2] * jacobian[2, p]
         v1 = m[0, 1] * jacobian[0, p] + m[1, 1] * jacobian[1, p] + m[1, 2] * jacobian[2, p]
         v2 = m[0, 2] * jacobian[0, p] + m[1, 2] * jacobian[1, p] + m[2, 2] * jacobian[2, p]
         for q in range(12):
             local[q, p] = jacobian[0, q] * v0 + jacobian[1, q] * v1 + jacobian[2, q] * v2
-    _add_turning(local, 3, 1.0, arm, g)
-    _add_turning(local, 9, turning, lever, g)
+    of_arm, of_lever = 0.0, 0.0
+    for p in range(3):
+        of_arm += arm[p] * g[p]
+        of_lever += lever[p] * g[p]
+    for p in range(3):
+        for q in range(3):
+            local[3 + p, 3 + q] += 0.5 * (arm[p] * g[q] + g[p] * arm[q])
+            local[9 + p, 9 + q] += 0.5 * turning * (lever[p] * g[q] + g[p] * lever[q])
+        local[3 + p, 3 + p] -= of_arm
+        local[9 + p, 9 + p] -= turning * of_lever
     if turning > 0.0:
-        _add_skew(local, 0, 9, -1.0, g)
-        _add_skew(local, 9, 0, 1.0, g)
-        _add_skew(local, 6, 9, 1.0, g)
-        _add_skew(local, 9, 6, -1.0, g)
-        # −[a]× [g]× = (a·g) 1 − g aᵀ
-        product = arm[0] * g[0] + arm[1] * g[1] + arm[2] * g[2]
+        _skew(g, crossed)
         for p in range(3):
             for q in range(3):
-                value = (product if p == q else 0.0) - g[p] * arm[q]
+                local[p, 9 + q] -= crossed[p, q]
+                local[9 + p, q] += crossed[p, q]
+                local[6 + p, 9 + q] += crossed[p, q]
+                local[9 + p, 6 + q] -= crossed[p, q]
+                # −[a]× [g]× = (a·g) 1 − g aᵀ
+                value = (of_arm if p == q else 0.0) - g[p] * arm[q]
                 local[3 + p, 9 + q] += value
                 local[9 + q, 3 + p] += value
 
@@ -88,10 +85,10 @@ def add_coupled(
     arm,
     lever,
     turning,
-    node,
-    free_a,
-    free_b,
-    scratch,
+    i,
+    a,
+    b,
+    free_index,
     node_hessian_out,
     body_hessian_out,
     links,
@@ -111,10 +108,10 @@ def add_coupled(
         a and ρ [m]; a counts only where the carrier is on a free body.
     turning : float
         1 if g turns with the surface's body, −1 if it is frozen.
-    node, free_a, free_b : int
-        Node that is the carrier, free body that carries it, free body of the surface; −1 for none.
-    scratch : Array
-        Shape (15, 12).
+    i, a, b : int
+        The carrier; the body that carries it, −1 if it is a node with unknowns of its own; the surface's body.
+    free_index : Array or None
+        Places of all bodies among the free ones or −1; None if no body is free.
     node_hessian_out : Array
         Of nodes, upper triangles, shape (n_node, 3, 3); added to.
     body_hessian_out : Array
@@ -124,14 +121,17 @@ def add_coupled(
     link_node_out, link_body_out, link_hessian_out : Array
         Written: node, free body and block of each link, shapes (·,), (·,), (·, 3, 6).
     """
-    if node >= 0:
+    if a < 0:
         for p in range(3):
             for q in range(p, 3):
-                node_hessian_out[node, p, q] += m[p, q]
+                node_hessian_out[i, p, q] += m[p, q]
+    if free_index is None:
+        return links
+    free_a, free_b = free_index[a] if a >= 0 else -1, free_index[b]
     if free_a < 0 and free_b < 0:
         return links
-    local = scratch[:12]
-    _local_hessian(m, g, arm, lever, turning, scratch[12:], local)
+    local = stack_matrix(12, 12)
+    _local_hessian(m, g, arm, lever, turning, local)
     if free_a >= 0:
         row = 6 * free_a
         for p in range(6):
@@ -148,8 +148,8 @@ def add_coupled(
             for q in range(6):
                 body_hessian_out[row + p, column + q] += local[p, 6 + q]
                 body_hessian_out[column + q, row + p] += local[p, 6 + q]
-    if node >= 0 and free_b >= 0:
-        link_node_out[links] = node
+    if a < 0 and free_b >= 0:
+        link_node_out[links] = i
         link_body_out[links] = free_b
         for p in range(3):
             for q in range(6):

@@ -204,7 +204,7 @@ def friction(
     energy = 0.0
     arm_a, arm_b, u = stack_vector(3), stack_vector(3), stack_vector(3)
     g, q, across = stack_vector(3), stack_vector(3), stack_vector(3)
-    f, scratch = stack_matrix(3, 3), stack_matrix(15, 12)
+    f = stack_matrix(3, 3)
     arm_a[0] = arm_a[1] = arm_a[2] = 0.0
     for k in range(count):
         i = first[k]
@@ -252,10 +252,10 @@ def friction(
             arm_a,
             arm_b,
             -1.0,
-            i if a < 0 else -1,
-            free_index[a] if a >= 0 else -1,
-            free_index[b],
-            scratch,
+            i,
+            a,
+            b,
+            free_index,
             node_hessian_out,
             body_hessian_out,
             links,

@@ -183,6 +183,7 @@ def surfaces_of(model: Model, near: Neighbours) -> Surfaces:
         radius=carriers.radius,
         weight=carriers.weight,
         carrier_body=carriers.body,
+        free_index=model.bodies.free_index if model.free_count else None,
         follows=carriers.follows,
         node_free=near.node_free,
         group=carriers.group,

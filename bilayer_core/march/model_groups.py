@@ -153,6 +153,7 @@ class Surfaces:
     radius: Array
     weight: Array
     carrier_body: Array
+    free_index: Array | None  # places of all bodies among the free ones; None if none is free
     follows: Array
     node_free: Array
     group: Array
