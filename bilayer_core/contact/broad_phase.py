@@ -1,7 +1,8 @@
-"""Which points of rods are near which segments, at a cost linear in the number of edges.
+"""Which points of rods are near which segments.
 
-Edges are sorted into cubic cells by their midpoints; the cells are as wide as two edges that just reach each other are
-apart, so an edge looks into its own cell and the 26 around it. Cells are kept in a hash table with chains.
+Edges are the leaves of a binary tree in the order of their numbers: neighbours along a rod are neighbours in the tree.
+Every node of it has the box that holds its edges over their whole motion, so a search for what reaches an edge costs
+the logarithm of the number of edges, and what it finds.
 """
 
 from __future__ import annotations
@@ -11,23 +12,16 @@ import math
 import numpy as np
 
 from ..jit import allocating, kernel
-from .segment import distance_at, fraction_along
+from .segment import square_distance
 
 
 @kernel
-def _bucket(cx, cy, cz, mask):
-    """Place of a cell in a table of mask + 1 places."""
-    return (cx * 73856093 ^ cy * 19349663 ^ cz * 83492791) & mask
-
-
-@kernel
-def _gap(position, i, s, j, radii):
-    """Gap [m] between the point at s on edge (i, i+1) and the segment (j, j+1), given the sum of their radii."""
+def _square_distance(position, i, s, j):
+    """Square of the distance of the point at s on edge (i, i+1) from the segment (j, j+1) [m²]."""
     p0 = (1.0 - s) * position[i, 0] + s * position[i + 1, 0]
     p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
     p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]
-    t = min(max(fraction_along(p0, p1, p2, position, j), 0.0), 1.0)
-    return distance_at(p0, p1, p2, position, j, t) - radii
+    return square_distance(p0, p1, p2, position, j)
 
 
 @kernel
@@ -37,7 +31,7 @@ def _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, t
     """
     if max(edge_arc[k, 0] - arc, arc - edge_arc[k, 1]) < exclusion:
         return False
-    return not joined or _gap(start_position, i, s, j, radii) > touch
+    return not joined or _square_distance(start_position, i, s, j) > (radii + touch) ** 2
 
 
 @allocating
@@ -84,40 +78,33 @@ def near_pairs(
         Written: whether the point also sees the segments before and after on the same strand, bool.
     """
     edges = edge_node.shape[0]
+    leaves = 1
+    while leaves < edges:
+        leaves *= 2
+    box = np.empty((2 * leaves, 6))  # of the tree: children of b are 2 b and 2 b + 1, leaves come last
     middle, motion = np.empty((edges, 3)), np.empty((edges, 3))
     half = np.empty(edges)  # of the length and, where the ends move differently, of the difference
-    longest, thickest = 0.0, 0.0
-    m0, m1, m2 = 0.0, 0.0, 0.0
-    for k in range(edges):
-        j = edge_node[k]
+    for k in range(leaves):
+        b = leaves + k
+        if k >= edges:
+            for c in range(3):
+                box[b, c], box[b, 3 + c] = math.inf, -math.inf
+            continue
+        j, radius = edge_node[k], edge_radius[k]
         size, turn = 0.0, 0.0
         for c in range(3):
-            first, last = tip[j, c] - position[j, c], tip[j + 1, c] - position[j + 1, c]
-            middle[k, c] = 0.5 * (position[j, c] + position[j + 1, c])
-            motion[k, c] = 0.5 * (first + last)
-            size += (position[j + 1, c] - position[j, c]) ** 2
-            turn += (last - first) ** 2
-        half[k] = 0.5 * (math.sqrt(size) + math.sqrt(turn))
-        longest = max(longest, half[k])
-        thickest = max(thickest, edge_radius[k])
-        m0, m1, m2 = m0 + motion[k, 0] / edges, m1 + motion[k, 1] / edges, m2 + motion[k, 2] / edges
-    fastest = 0.0
-    for k in range(edges):
-        fastest = max(fastest, (motion[k, 0] - m0) ** 2 + (motion[k, 1] - m1) ** 2 + (motion[k, 2] - m2) ** 2)
-    width = 2.0 * (longest + thickest + math.sqrt(fastest)) + reach
-    mask = 1
-    while mask < 2 * edges:
-        mask *= 2
-    mask -= 1
-    head = np.full(mask + 1, -1, np.int64)
-    following = np.empty(edges, np.int64)
-    cell = np.empty((edges, 3), np.int64)
-    for k in range(edges):
+            p, q, u, v = position[j, c], position[j + 1, c], tip[j, c], tip[j + 1, c]
+            box[b, c] = min(min(p, q), min(u, v)) - radius
+            box[b, 3 + c] = max(max(p, q), max(u, v)) + radius
+            middle[k, c] = 0.5 * (p + q)
+            motion[k, c] = 0.5 * (u - p + v - q)
+            size += (q - p) ** 2
+            turn += (v - q - u + p) ** 2
+        half[k] = 0.5 * (math.sqrt(size) + math.sqrt(turn)) + radius
+    for b in range(leaves - 1, 0, -1):
         for c in range(3):
-            cell[k, c] = math.floor(middle[k, c] / width)
-        place = _bucket(cell[k, 0], cell[k, 1], cell[k, 2], mask)
-        following[k] = head[place]
-        head[place] = k
+            box[b, c] = min(box[2 * b, c], box[2 * b + 1, c])
+            box[b, 3 + c] = max(box[2 * b, 3 + c], box[2 * b + 1, 3 + c])
     near = np.empty(edges, np.int64)
     found = 0
     room = point_out.shape[0]
@@ -126,29 +113,30 @@ def near_pairs(
             continue
         count = 0
         own, i = edge_rod[a], edge_node[a]
-        for cx in range(cell[a, 0] - 1, cell[a, 0] + 2):
-            for cy in range(cell[a, 1] - 1, cell[a, 1] + 2):
-                for cz in range(cell[a, 2] - 1, cell[a, 2] + 2):
-                    k = head[_bucket(cx, cy, cz, mask)]
-                    while k >= 0:
-                        other = edge_rod[k]
-                        same = cell[k, 0] == cx and cell[k, 1] == cy and cell[k, 2] == cz
-                        along = max(edge_arc[k, 1] - edge_arc[a, 0], edge_arc[a, 1] - edge_arc[k, 0])
-                        apart = own != other or along >= rod_exclusion[own]
-                        if same and apart and rod_meets[own, other]:
-                            away, moved = 0.0, 0.0
-                            for c in range(3):
-                                away += (middle[a, c] - middle[k, c]) ** 2
-                                moved += (motion[a, c] - motion[k, c]) ** 2
-                            reached = half[a] + half[k] + edge_radius[a] + edge_radius[k] + reach + math.sqrt(moved)
-                            if away < reached * reached:
-                                place = count
-                                while place > 0 and near[place - 1] > k:
-                                    near[place] = near[place - 1]
-                                    place -= 1
-                                near[place] = k
-                                count += 1
-                        k = following[k]
+        least0, least1, least2 = box[leaves + a, 0] - reach, box[leaves + a, 1] - reach, box[leaves + a, 2] - reach
+        most0, most1, most2 = box[leaves + a, 3] + reach, box[leaves + a, 4] + reach, box[leaves + a, 5] + reach
+        b = 1
+        while b > 0:
+            meets = box[b, 0] < most0 and box[b, 3] > least0 and box[b, 1] < most1 and box[b, 4] > least1
+            meets = meets and box[b, 2] < most2 and box[b, 5] > least2
+            if meets and b < leaves:
+                b *= 2
+                continue
+            k = b - leaves
+            if meets and rod_meets[own, edge_rod[k]]:
+                along = max(edge_arc[k, 1] - edge_arc[a, 0], edge_arc[a, 1] - edge_arc[k, 0])
+                if own != edge_rod[k] or along >= rod_exclusion[own]:
+                    away, moved = 0.0, 0.0
+                    for c in range(3):
+                        away += (middle[a, c] - middle[k, c]) ** 2
+                        moved += (motion[a, c] - motion[k, c]) ** 2
+                    reached = half[a] + half[k] + reach + math.sqrt(moved)
+                    if away < reached * reached:
+                        near[count] = k
+                        count += 1
+            while b & 1:
+                b >>= 1
+            b += b > 0
         if count == 0:
             continue
         for p in range(first_point[a], first_point[a + 1]):
@@ -162,7 +150,7 @@ def near_pairs(
                     way = (1.0 - s) * (tip[i, c] - position[i, c]) + s * (tip[i + 1, c] - position[i + 1, c])
                     left += (way - tip[j, c] + position[j, c]) ** 2
                     right += (way - tip[j + 1, c] + position[j + 1, c]) ** 2
-                if _gap(position, i, s, j, radii) - math.sqrt(max(left, right)) >= reach:
+                if _square_distance(position, i, s, j) >= (radii + reach + math.sqrt(max(left, right))) ** 2:
                     continue
                 exclusion, joined = rod_exclusion[own] if own == other else -math.inf, rod_joined[own, other]
                 if not _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, touch):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
+from .segment import SLACK
 from .step_bound import KEPT_FRACTION
 
 TOUCH = 0.05  # of the gap: nearer to the distance to keep than this, the search ends
@@ -40,15 +41,17 @@ def rod_step_bound(
         p, k = pair_point[c], pair_edge[c]
         a = point_edge[p]
         i, j, s = edge_node[a], edge_node[k], point_fraction[p]
+        radii = edge_radius[a] + edge_radius[k]
         left, right = 0.0, 0.0
         for m in range(3):
             own = (1.0 - s) * step[i, m] + s * step[i + 1, m]
             left += (own - step[j, m]) ** 2
             right += (own - step[j + 1, m]) ** 2
         speed = math.sqrt(max(left, right))
-        radii = edge_radius[a] + edge_radius[k]
-        gone = 0.0
-        gap = _distance(position, step, 0.0, i, s, j) - radii
+        square = _square_distance(position, step, 0.0, i, s, j)
+        if square > (radii + speed * alpha / (1.0 - KEPT_FRACTION)) ** 2 * SLACK:
+            continue  # even head-on
+        gone, gap = 0.0, math.sqrt(square) - radii
         keep = KEPT_FRACTION * min(gap, FAR * d_hat)
         near = TOUCH * min(gap, NEAR * d_hat)
         room = gap - keep
@@ -60,14 +63,14 @@ def rod_step_bound(
                 break
             gone += room / speed
             if gone < alpha:
-                room = _distance(position, step, gone, i, s, j) - radii - keep
+                room = math.sqrt(_square_distance(position, step, gone, i, s, j)) - radii - keep
             part += 1
     return alpha, blocking
 
 
 @kernel
-def _distance(position, step, fraction, i, s, j):
-    """Distance [m] of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step."""
+def _square_distance(position, step, fraction, i, s, j):
+    """Square of the distance of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step [m²]."""
     p0 = (1.0 - s) * (position[i, 0] + fraction * step[i, 0]) + s * (position[i + 1, 0] + fraction * step[i + 1, 0])
     p1 = (1.0 - s) * (position[i, 1] + fraction * step[i, 1]) + s * (position[i + 1, 1] + fraction * step[i + 1, 1])
     p2 = (1.0 - s) * (position[i, 2] + fraction * step[i, 2]) + s * (position[i + 1, 2] + fraction * step[i + 1, 2])
@@ -82,26 +85,4 @@ def _distance(position, step, fraction, i, s, j):
     p0, p1, p2 = p0 - x0, p1 - x1, p2 - x2
     t = min(max((p0 * e0 + p1 * e1 + p2 * e2) / (e0 * e0 + e1 * e1 + e2 * e2), 0.0), 1.0)
     p0, p1, p2 = p0 - t * e0, p1 - t * e1, p2 - t * e2
-    return math.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
-
-
-@kernel
-def largest_spread(position, step, fraction, base):
-    """Largest distance of a node at x + fraction · step from its place in `base`, the mean of all taken off [m].
-
-    A translation common to all nodes brings none of them nearer to another.
-    """
-    count = position.shape[0]
-    m0, m1, m2 = 0.0, 0.0, 0.0
-    for i in range(count):
-        m0 += position[i, 0] + fraction * step[i, 0] - base[i, 0]
-        m1 += position[i, 1] + fraction * step[i, 1] - base[i, 1]
-        m2 += position[i, 2] + fraction * step[i, 2] - base[i, 2]
-    m0, m1, m2 = m0 / count, m1 / count, m2 / count
-    largest = 0.0
-    for i in range(count):
-        d0 = position[i, 0] + fraction * step[i, 0] - base[i, 0] - m0
-        d1 = position[i, 1] + fraction * step[i, 1] - base[i, 1] - m1
-        d2 = position[i, 2] + fraction * step[i, 2] - base[i, 2] - m2
-        largest = max(largest, d0 * d0 + d1 * d1 + d2 * d2)
-    return math.sqrt(largest)
+    return p0 * p0 + p1 * p1 + p2 * p2

@@ -44,6 +44,21 @@ def distance_at(p0, p1, p2, position, j, t):
 
 
 @kernel
+def square_distance(p0, p1, p2, position, j):
+    """Square of the distance of a point from the segment (j, j+1) [m²]: what is far needs no root."""
+    d0, d1, d2 = p0 - position[j, 0], p1 - position[j, 1], p2 - position[j, 2]
+    e0, e1 = position[j + 1, 0] - position[j, 0], position[j + 1, 1] - position[j, 1]
+    e2 = position[j + 1, 2] - position[j, 2]
+    t = min(max((d0 * e0 + d1 * e1 + d2 * e2) / (e0 * e0 + e1 * e1 + e2 * e2), 0.0), 1.0)
+    d0, d1, d2 = d0 - t * e0, d1 - t * e1, d2 - t * e2
+    return d0 * d0 + d1 * d1 + d2 * d2
+
+
+SLACK = 1.0 + 1e-9
+"""Of squares that are compared before a root is taken: larger than any rounding."""
+
+
+@kernel
 def facing_contacts(
     position,
     pair_count,
@@ -63,7 +78,7 @@ def facing_contacts(
     count_out,
     gap_out,
 ):
-    """List the contacts nearer than `reach` [m]; return how many, and the smallest gap [m] (infinite if there is none).
+    """List the contacts nearer than `reach` [m]; return how many, and their smallest gap [m] (infinite without any).
 
     If there are more than the outputs have room for, the rest is counted but not written.
 
@@ -94,6 +109,8 @@ def facing_contacts(
         p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
         p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]
         radii = edge_radius[a] + edge_radius[k]
+        if square_distance(p0, p1, p2, position, j) > (radii + reach) ** 2 * SLACK:
+            continue
         along = fraction_along(p0, p1, p2, position, j)
         at_start = 1 if along <= 0.0 else 0
         if pair_before[c]:
@@ -114,8 +131,8 @@ def facing_contacts(
                     continue
                 times, t = 1, 1.0
             gap = distance_at(p0, p1, p2, position, j, t) - radii
-            smallest = min(smallest, gap)
             if gap < reach:
+                smallest = min(smallest, gap)
                 found += 1
                 if found > point_out.shape[0]:
                     continue

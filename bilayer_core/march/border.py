@@ -157,7 +157,9 @@ def factorise_border(wide, strands, band):
     if wide is None:
         return True
     if wide.coupled[0] == 1:
-        copy(wide.border, wide.solution)
+        for row in range(wide.border.shape[0]):
+            for a in range(wide.width[0]):
+                wide.solution[row, a] = wide.border[row, a]
         solve_columns(band, strands.size, strands.bandwidth, wide.width[0], wide.solution)
         eliminate(wide.border, wide.solution, strands.size, wide.width[0], wide.schur)
     return factor_dense(wide.schur, wide.width[0])

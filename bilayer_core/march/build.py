@@ -243,7 +243,7 @@ def threads_of(model: Model, rods: RodContact) -> Threads:
         threshold=law.speed_threshold if law is not None else 1.0,
         unit=rods.unit,
         **{name: getattr(surfaces, name) for name in (*surface, *points, *between)},
-        **{name: getattr(rods, name) for name in ("start_position", "base", "tip", "listed", "no_step", "scratch")},
+        **{name: getattr(rods, name) for name in ("start_position", "base", "tip", "margin", "no_step", "scratch")},
         counted=pairs.counted,
         pair_point=pairs.point,
         pair_edge=pairs.edge,

@@ -247,7 +247,7 @@ class Threads:
     rod_exclusion: Array
     base: Array
     tip: Array
-    listed: Array  # shape (1,)
+    margin: Array  # shape (1,)
     counted: Array  # shape (1,)
     pair_point: Array
     pair_edge: Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..contact.rod_bound import rod_step_bound
-from ..contact.rod_list import largest_fraction, list_rods
+from ..contact.rod_list import list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
 from ..jit import inner
@@ -13,12 +13,15 @@ from .terms import ROD_BARRIER, ROD_FRICTION
 
 
 @inner
-def _list(threads, strands, position, step, fraction):
-    """Have a list of near pairs for a part of a step of nodes from `position`; false if there is no room for it."""
+def _list(threads, strands, position, step, fraction, move):
+    """Have a list of near pairs for a part of a step of nodes from `position`, in which they move by `move` [m]; false
+    if there is no room for it.
+    """
     return list_rods(
         position,
         step,
         fraction,
+        move,
         threads.unit,
         threads.d_hat,
         threads.start_position,
@@ -35,7 +38,7 @@ def _list(threads, strands, position, step, fraction):
         threads.rod_exclusion,
         threads.base,
         threads.tip,
-        threads.listed,
+        threads.margin,
         threads.counted,
         threads.pair_point,
         threads.pair_edge,
@@ -49,7 +52,7 @@ def find_contacts(threads, strands, position):
     """Find where rods are nearer to each other than the barrier distance; false if there is no room for that."""
     if threads is None:
         return True
-    if not _list(threads, strands, position, threads.no_step, 0.0):
+    if not _list(threads, strands, position, threads.no_step, 0.0, 0.0):
         return False
     contacts = threads.contacts
     contacts.counted[0] = 0
@@ -93,9 +96,11 @@ def bound_between_rods(threads, strands, system, at):
     """Largest fraction of `System.node_step` that keeps rods apart, and whether there is room for the pairs near it."""
     if threads is None:
         return 1.0, True
-    limit = largest_fraction(system.node_step, threads.no_step, threads.unit)
-    if not _list(threads, strands, at.position, system.node_step, limit):
+    move, limit = reachable(system.node_step, threads.no_step, threads.unit)
+    if not _list(threads, strands, at.position, system.node_step, limit, limit * move):
         return 0.0, False
+    if threads.counted[0] == 0:
+        return limit, True
     fraction, _ = rod_step_bound(
         at.position,
         system.node_step,

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..contact.rod_bound import rod_step_bound
-from ..contact.rod_list import largest_fraction, list_rods
+from ..contact.rod_list import list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
 from ..model.model import Model
@@ -67,7 +67,7 @@ class RodContact:
     ----------
     contacts, sliding : Contacts
         Those of the last `barrier`, and those that `start_step` froze for friction.
-    pairs, base, tip, listed : NearPairs, Array, Array, Array
+    pairs, base, tip, margin : NearPairs, Array, Array, Array
         The list of near pairs, and for which motion it was made; see `contact.rod_list.list_rods`.
     unit : float
         Barrier distance and thickest layer together [m].
@@ -89,7 +89,7 @@ class RodContact:
         points = len(surfaces.point_edge)
         self.pairs = NearPairs(surfaces, model.edge_node, PAIRS_PER_POINT * points)
         self.base, self.tip = np.zeros((2, model.node_count, 3))
-        self.listed = np.zeros(1, dtype=np.int64)
+        self.margin = np.zeros(1)
         self.start_position = np.array(model.start_position)
         self.no_step, self.scratch = np.zeros((2, model.node_count, 3))
         self.contacts, self.sliding = Contacts(points), Contacts(points)
@@ -110,20 +110,21 @@ class RodContact:
         if self.sliding.room < self.contacts.room:
             self.sliding = self.sliding.grown(self.contacts.room)
 
-    def _list(self, position: Array, step: Array, fraction: float) -> None:
-        """Have a list for a part of a step of nodes [m] from `position`."""
+    def _list(self, position: Array, step: Array, fraction: float, move: float) -> None:
+        """Have a list for a part of a step of nodes [m] from `position`, in which they move by `move`."""
         pairs = self.pairs
         while not list_rods(
             position,
             step,
             fraction,
+            move,
             self.unit,
             self._d_hat,
             self.start_position,
             *pairs.geometry,
             self.base,
             self.tip,
-            self.listed,
+            self.margin,
             pairs.counted,
             *pairs.outputs,
         ):
@@ -131,7 +132,7 @@ class RodContact:
 
     def _find(self, position: Array) -> float:
         """Contacts at `position`; returns the smallest gap [m]."""
-        self._list(position, self.no_step, 0.0)
+        self._list(position, self.no_step, 0.0, 0.0)
         pairs, surfaces = self.pairs, self._surfaces
         while True:
             contacts = self.contacts
@@ -218,8 +219,8 @@ class RodContact:
         """Largest fraction of a step of nodes [m], shape (n_node, 3), that keeps all gaps open, and the node that sets
         it (−1: none).
         """
-        limit = largest_fraction(step, self.no_step, self.unit)
-        self._list(position, step, limit)
+        move, limit = reachable(step, self.no_step, self.unit)
+        self._list(position, step, limit, limit * move)
         pairs, surfaces = self.pairs, self._surfaces
         return rod_step_bound(
             position,
