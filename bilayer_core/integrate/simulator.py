@@ -96,9 +96,9 @@ class Simulator:
 
     def _begin_budget(self) -> None:
         if self._ledger is not None:
-            self._ledger.begin(
-                self._state, self._stepper.rest_strains, self._stepper.surroundings.load_factor(self.time)
-            )
+            surroundings = self._stepper.surroundings
+            rest = surroundings.rest_strains_of(self._state.transduction)
+            self._ledger.begin(self._state, rest, surroundings.load_factor(self.time))
             self._stepper.ledger = self._ledger
 
     @property

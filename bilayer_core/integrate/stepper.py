@@ -99,7 +99,6 @@ class Stepper:
         self._touched = self.engine.touched
         self.loops = method.weights is None
         self.stimulus = np.zeros(len(model.scene.stimuli))
-        self.rest_strains = RestStrains(model.rest_strain, model.joint_rest)
         self.ledger: EnergyLedger | None = None
 
     def rest(self, state: State) -> None:
@@ -107,8 +106,8 @@ class Stepper:
         time = float(state.time[0])
         self.end.take_state(state)
         self.stimulus = self.surroundings.stimulus_at(state, time)
-        self.rest_strains = self.surroundings.rest_strains_of(state.transduction)
-        self._look_at(state, self.rest_strains, self.surroundings.load_factor(time))
+        rest = self.surroundings.rest_strains_of(state.transduction)
+        self._look_at(state, rest, self.surroundings.load_factor(time))
 
     def _look_at(self, state: State, rest: RestStrains, load_factor: Array) -> None:
         """Evaluate the potential at `end` with the velocities of the state."""
@@ -201,7 +200,8 @@ class Stepper:
         if not report.converged:
             return replace(report, detail=self.solver.who_blocks(found.pair)) if found.pair >= 0 else report
         if self.ledger is not None:
-            self.ledger.record(state, self.rest_strains, self.surroundings.load_factor(time, h), h)
+            rest = self.surroundings.rest_strains_of(state.transduction)
+            self.ledger.record(state, rest, self.surroundings.load_factor(time, h), h)
         return report
 
     def _loop(
@@ -221,7 +221,6 @@ class Stepper:
         self._start, self._trial = (self._places[k] for k in range(3) if k != found.place)
         if found.done > 0:
             self.stimulus = self.surroundings.stimulus_at(state, times[found.done - 1], h)
-            self.rest_strains = self.surroundings.rest_strains_of(state.transduction)
         return found
 
     def _attempt_by_terms(self, state: State, h: float, time: float) -> NewtonReport:
@@ -278,7 +277,7 @@ class Stepper:
             state.kept[0] = np.array_equal(touching, self._touched)
             self._touched[:] = touching
         state.transduction[:] = drive.transduction
-        self.stimulus, self.rest_strains = drive.stimulus, drive.rest
+        self.stimulus = drive.stimulus
         if self.ledger is not None:
             self.ledger.record(state, drive.rest, drive.load_factor, h)
         return report

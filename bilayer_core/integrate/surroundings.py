@@ -41,6 +41,8 @@ class Surroundings:
         self.model = model
         self._prescribed = np.flatnonzero(model.bodies.free_index[:-1] < 0)
         self._channels = list(model.scene.stimuli.values())
+        self._moves = any(len(model.bodies.times[index]) for index in self._prescribed)
+        self._courses: dict[tuple[int, int], Course] = {}
 
     def prescribed(self, state: State, time: float) -> Prescribed:
         """Motion of prescribed bodies at `time`, of free ones as they are, without rates."""
@@ -95,36 +97,45 @@ class Surroundings:
         return Drive(stimulus, transduction, self.rest_strains_of(transduction), load_factor)
 
     def course(self, state: State, method: Method, times: list[float], h: float) -> Course:
-        """What acts from outside at the stages of steps of length `h` [s] that end at `times` [s]."""
+        """What acts from outside at the stages of steps of length `h` [s] that end at `times` [s].
+
+        It is good until the next one is asked for with as many steps and stages, which is made in its place.
+        """
         elapsed = [node * h for node in method.nodes]
-        shape = len(times), len(elapsed)
         begins = [time - h for time in times]
         stages = [begin + part for begin in begins for part in elapsed]
         parts = elapsed * len(times)
         loads = self.model.scene.loads
-        factors = np.array([[_value(load.factor, *when) for load in loads] for when in zip(stages, parts, strict=True)])
-        jumps = np.zeros(len(times), dtype=bool)
-        if loads and method.history is not None:
-            jumps[:] = [self.loads_jump(begin, h) for begin in begins]
-        placed = self._when_placed(times)
+        course = self._courses.get((len(times), len(elapsed)))
+        if course is None or self._moves:
+            course = self._courses[len(times), len(elapsed)] = self._new_course(state, method, times, h)
+        course.time[:], course.elapsed[:] = times, elapsed
+        course.first[:] = self._stimuli(state, begins, [0.0] * len(begins))
+        course.stimulus[:] = self._stimuli(state, stages, parts).reshape(course.stimulus.shape)
+        if loads:
+            factors = [[_value(load.factor, *when) for load in loads] for when in zip(stages, parts, strict=True)]
+            course.load_factor[:] = np.reshape(factors, course.load_factor.shape)
+            if method.history is not None:
+                course.jumps[:] = [self.loads_jump(begin, h) for begin in begins]
+        return course
+
+    def _new_course(self, state: State, method: Method, times: list[float], h: float) -> Course:
+        """A course with the poses of prescribed bodies, of which it has one row if none of them moves."""
+        steps, stages = len(times), len(method.nodes)
+        placed = times if self._moves else times[:1]
         poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.nodes]
-        rows = len(placed), shape[1], len(self.model.bodies.names)
+        rows = len(placed), stages, len(self.model.bodies.names)
         return Course(
-            time=np.array(times),
-            elapsed=np.array(elapsed),
-            first=self._stimuli(state, begins, [0.0] * len(begins)),
-            jumps=jumps,
-            stimulus=self._stimuli(state, stages, parts).reshape(*shape, -1),
-            load_factor=factors.reshape(*shape, len(loads)),
+            time=np.empty(steps),
+            elapsed=np.empty(stages),
+            first=np.empty((steps, len(self._channels))),
+            jumps=np.zeros(steps, dtype=bool),
+            stimulus=np.empty((steps, stages, len(self._channels))),
+            load_factor=np.empty((steps, stages, len(self.model.scene.loads))),
             position=np.array([pose.position for pose in poses]).reshape(*rows, 3),
             rotation=np.array([pose.rotation for pose in poses]).reshape(*rows, 3, 3),
             rates=np.array([pose.rates for pose in poses]).reshape(*rows, 6),
         )
-
-    def _when_placed(self, times: list[float]) -> list[float]:
-        """The times of which the poses of prescribed bodies are needed: one if none of them moves."""
-        moves = any(len(self.model.bodies.times[index]) for index in self._prescribed)
-        return times if moves else times[:1]
 
     def _stimuli(self, state: State, times: list[float], ended: list[float]) -> Array:
         """`stimulus_at` for several times, shape (n_time, n_channel)."""
