@@ -120,7 +120,7 @@ def test_a_ramp_in_real_time_needs_no_clock(start, domain, subscriber):
 
 
 def test_a_waiting_controller_can_be_interrupted(start, domain):
-    controller = start("ramp_controller", domain, {"connection_timeout": 8.0})
+    controller = start("ramp_controller", domain, {"connection_timeout": 100})
     controller.wait_for("waiting for a subscriber")
     controller.send(signal.SIGINT)
     assert controller.wait(10) == 130
