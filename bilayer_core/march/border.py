@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..jit import inner
-from ..solve.band import solve_columns
+from ..solve.band import eliminate_band
 from ..solve.clamps import hand_nodes_to_bodies, hand_rows_to_bodies, hand_walls_to_bodies
-from ..solve.dense import eliminate, factor_dense, solve_dense
+from ..solve.dense import factor_dense, solve_dense
 from ..solve.newton_matrix import add_links
 from ..solve.planar_matrix import hand_walls_to_bodies_in_plane
 from .copying import copy
@@ -141,39 +141,36 @@ def take_border(border, wide, bodies, held, dimension, size, shift):
     if wide.coupled[0] == 0:
         return
     _clear_held_rows(held, dimension, rows)
-    for row in range(size):
-        for a in range(n):
-            columns[row, a] = 0.0
+    for a in range(n):
+        for row in range(columns.shape[1]):
+            columns[a, row] = 0.0
         for i in range(m):
-            value = rows[row, i]
-            if value != 0.0:
-                for a in range(n):
-                    columns[row, a] += value * freedom[i, a]
+            part = freedom[i, a]
+            if part != 0.0:
+                for row in range(size):
+                    columns[a, row] += part * rows[row, i]
 
 
 @inner
 def factorise_border(wide, strands, band):
-    """S = D − Uᵀ A⁻¹ U, factorised; false if it is not positive definite."""
+    """S = D − Uᵀ A⁻¹ U, factorised, and L⁻¹ U in place of U; false if S is not positive definite."""
     if wide is None:
         return True
     if wide.coupled[0] == 1:
-        for row in range(wide.border.shape[0]):
-            for a in range(wide.width[0]):
-                wide.solution[row, a] = wide.border[row, a]
-        solve_columns(band, strands.size, strands.bandwidth, wide.width[0], wide.solution)
-        eliminate(wide.border, wide.solution, strands.size, wide.width[0], wide.schur)
+        eliminate_band(band, strands.size, strands.bandwidth, wide.width[0], wide.border, wide.scaled, wide.schur)
     return factor_dense(wide.schur, wide.width[0])
 
 
 @inner
 def solve_border(wide, bodies, body_gradient, size, right, body_step):
-    """The step of free bodies and of nodes that left the band, and what it changes in that of all others.
+    """The step of free bodies and of nodes that left the band; what it changes is taken off `right`, L⁻¹ times that of
+    all others.
 
     In `Wide.load` is what is wanted of nodes that left.
     """
     if wide is None:
         return
-    freedom, load, columns, solution = bodies.freedom, wide.load, wide.border, wide.solution
+    freedom, load, columns, scaled = bodies.freedom, wide.load, wide.border, wide.scaled
     n, width, free = freedom.shape[1], wide.width[0], body_step.shape[0]
     for a in range(n):
         load[a] = 0.0
@@ -181,14 +178,17 @@ def solve_border(wide, bodies, body_gradient, size, right, body_step):
             for c in range(6):
                 load[a] -= freedom[6 * f + c, a] * body_gradient[f, c]
     if wide.coupled[0] == 1:
-        for j in range(size):
-            for a in range(width):
-                load[a] -= columns[j, a] * right[j]
+        for a in range(width):
+            total = 0.0
+            for j in range(size):
+                total += scaled[a, j] * right[j]
+            load[a] -= total
     solve_dense(wide.schur, width, load)
     if wide.coupled[0] == 1:
-        for j in range(size):
-            for a in range(width):
-                right[j] -= solution[j, a] * load[a]
+        for a in range(width):
+            part = load[a]
+            for j in range(size):
+                right[j] -= columns[a, j] * part
     for f in range(free):
         for c in range(6):
             body_step[f, c] = 0.0

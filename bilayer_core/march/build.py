@@ -140,8 +140,8 @@ def wide_of(model: Model, columns: int, width: Array) -> Wide:
     """A border with room for so many columns."""
     rows = model.solved_layout.size + model.solved_layout.half_bandwidth
     return Wide(
-        border=np.zeros((rows, columns)),
-        solution=np.zeros((rows, columns)),
+        border=np.zeros((columns, rows)),
+        scaled=np.zeros((columns, rows)),
         schur=np.zeros((columns, columns)),
         load=np.zeros(columns),
         width=width,

@@ -96,9 +96,9 @@ def leave(leaving, wide, strands, band):
         return False
     if wide.coupled[0] == 0:
         wide.coupled[0] = 1
-        for i in range(wide.border.shape[0]):
-            for a in range(base):
-                wide.border[i, a] = 0.0
+        for a in range(base):
+            for i in range(wide.border.shape[1]):
+                wide.border[a, i] = 0.0
     leave_band(
         nodes,
         leaving.unknown,
@@ -107,7 +107,7 @@ def leave(leaving, wide, strands, band):
         len(strands.bandwidth),
         strands.size,
         base,
-        wide.border,
+        wide.border.T,
         wide.schur,
         band,
     )
@@ -122,7 +122,7 @@ def leave(leaving, wide, strands, band):
         strands.row,
         leaving.place,
         base,
-        wide.border,
+        wide.border.T,
         wide.schur,
     )
     return True

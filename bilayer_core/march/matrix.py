@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..jit import inner, part
 from ..solve.assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
-from ..solve.band import factor_band, solve_band
+from ..solve.band import backward_band, factor_band, forward_band
 from ..solve.newton_matrix import FIRST_SHIFT, LARGEST_SHIFT, SHIFT_GROWTH
 from ..solve.planar_assembly import expand_in_plane, expand_pairs_in_plane, put_in_space, take_in_plane
 from .border import assemble_border, factorise_border, solve_border, start_border, take_border
@@ -147,8 +147,9 @@ def solve(space, plane, wide, leaving, strands, bodies, sums, system):
     for j in range(size, right.shape[0]):
         right[j] = 0.0
     take_leaving(leaving, wide, right)
-    solve_band(system.band, size, strands.bandwidth, right)
+    forward_band(system.band, size, strands.bandwidth, right)
     solve_border(wide, bodies, sums.body, size, right, system.body_step)
+    backward_band(system.band, size, strands.bandwidth, right)
     put_leaving(leaving, wide, right)
     _put_step(space, right, system.step)
     _put_step_in_plane(plane, strands, right, system.step)

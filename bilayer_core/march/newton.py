@@ -172,8 +172,9 @@ def first_guess(p, start, position, rotation, stage, guess):
     return READY, -1
 
 
-FACTORISE, REFRESH, SEARCH = 0, 1, 2
-"""What an evaluation is for: a new matrix, a gradient for the old one, a step of the line search."""
+FACTORISE, REFRESH, FOLLOW, SEARCH = 0, 1, 2, 3
+"""What an evaluation is for: a new matrix, a gradient for the old one, one in which only what follows the configuration
+has changed, a step of the line search."""
 
 
 @part
@@ -204,10 +205,10 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
             step, body_step = p.system.step, p.system.body_step
             move(p.bodies, p.held, p.surfaces, p.space, p.plane, p.strands, at, step, body_step, alpha, trial)
         place = trial if task == SEARCH else at
-        if not find_contacts(p.threads, p.strands, place.position):
+        if task != FOLLOW and not find_contacts(p.threads, p.strands, place.position):
             status = NO_ROOM_FOR_RODS
             break
-        value, new_gap = evaluate(p, place, stage, task == FACTORISE)
+        value, new_gap = evaluate(p, place, stage, task == FACTORISE, task == FOLLOW)
         if task == SEARCH:
             if not value <= energy + ARMIJO * alpha * slope + noise:
                 alpha *= BACKTRACKING
@@ -226,10 +227,10 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
             fresh = False
             at, trial, swapped = trial, at, not swapped
             if follow(p, at, stage):
-                task = REFRESH
+                task = FOLLOW
                 continue
         else:
-            energy, gap = value, new_gap
+            energy, gap = value, gap if task == FOLLOW else new_gap
             if task == FACTORISE:
                 if factorisations == 0 and not math.isfinite(energy):
                     status = NOT_FINITE

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from ..jit import inner, part
 from ..solve.assembly import expand_gradient
 from ..solve.clamps import hand_gradient_to_bodies
 from .contact import add_contact, clear_contact, hand_on_contact, lag_sliding, list_pairs
+from .copying import copy
 from .elasticity import add_in_plane, add_in_space
 from .fluid import add_drag, add_fluid, turn_drag, turn_fluid
 from .inertia import add_inertia
@@ -39,29 +42,36 @@ def follow(p, at, stage):
 
 
 @part
-def evaluate(p, at, stage, with_hessian):
+def evaluate(p, at, stage, with_hessian, again):
     """Potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface or a rod [m].
 
-    Gradients always, second derivatives on request, are left in `Sums`. The contacts of rods are those found last.
+    Gradients always, second derivatives on request, are left in `Sums`. The contacts of rods are those found last. With
+    `again` the configuration is that of the last evaluation, and only what `follow` has changed since is found anew,
+    without second derivatives and the gap.
     """
     strands, bodies, sums = p.strands, p.bodies, p.sums
-    sums.energy[:] = 0.0
-    sums.first[:] = 0.0
-    if with_hessian:
-        sums.second[:] = 0.0
-        sums.links[0] = 0
-    add_in_space(p.space, p.off_axis, p.bonds, strands, at, stage, sums, with_hessian)
-    add_in_plane(p.plane, p.off_axis, p.bonds, strands, at, stage, sums, with_hessian)
-    add_inertia(p.gravity, p.damping, p.border, strands, bodies, at, stage, sums, with_hessian)
-    add_loads(p.loads, at, sums, LOADS)
+    gap = math.inf
+    if again:
+        copy(sums.lasting, sums.first)
+    else:
+        sums.energy[:] = 0.0
+        sums.first[:] = 0.0
+        if with_hessian:
+            sums.second[:] = 0.0
+            sums.links[0] = 0
+        add_in_space(p.space, p.off_axis, p.bonds, strands, at, stage, sums, with_hessian)
+        add_in_plane(p.plane, p.off_axis, p.bonds, strands, at, stage, sums, with_hessian)
+        add_inertia(p.gravity, p.damping, p.border, strands, bodies, at, stage, sums, with_hessian)
+        add_loads(p.loads, at, sums, LOADS)
+        clear_contact(p.meets, sums)
+        gap = add_contact(p.surfaces, p.sliding, bodies, at, stage, sums, with_hessian)
+        gap = min(gap, add_threads(p.threads, strands, at, stage, sums))
+        hand_on_contact(p.meets, bodies, sums)
+        copy(sums.first, sums.lasting)
     add_loads(p.followers, at, sums, FOLLOWERS)
     add_moments(p.moments, at, stage, sums, with_hessian)
     add_drag(p.flow, at, stage, sums, with_hessian)
     add_fluid(p.fluid, strands, at, stage, sums, with_hessian)
-    clear_contact(p.meets, sums)
-    gap = add_contact(p.surfaces, p.sliding, bodies, at, stage, sums, with_hessian)
-    gap = min(gap, add_threads(p.threads, strands, at, stage, sums))
-    hand_on_contact(p.meets, bodies, sums)
     _expand(p.bonds, p.held, strands, at, sums)
     energy = 0.0
     for k in range(sums.energy.shape[0]):

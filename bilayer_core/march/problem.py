@@ -32,6 +32,7 @@ Array = np.ndarray
 class Sums:
     """First and second derivatives to which forces add; see `solve.terms.term.Accumulators`."""
 
+    lasting: Array  # the part of `first` that stays as it is when other parts follow the configuration
     energy: Array  # of each term, in the order of `march.terms` [J]
     first: Array  # node, edge, pair and body in one piece, for clearing
     node: Array
@@ -81,8 +82,8 @@ class Wide:
     Rooms for columns are larger than what is in use; see `solve.newton_matrix`.
     """
 
-    border: Array
-    solution: Array
+    border: Array  # U by columns, then L⁻¹ U, shape (room, size + half-bandwidth)
+    scaled: Array  # D⁻¹ L⁻¹ U likewise
     schur: Array
     load: Array
     width: Array  # columns in use, shape (1,)

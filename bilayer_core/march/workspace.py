@@ -21,6 +21,7 @@ def sums_of(model: Model, potential: IncrementalPotential, energy: Array, links:
     return Sums(
         energy=energy,
         first=out.all_but_carriers,
+        lasting=np.zeros_like(out.all_but_carriers),
         **{name: getattr(out, name) for name in ("node", "edge", "pair", "body", "carrier", "contact")},
         gradient=potential.gradient,
         attached=potential.attached_gradient,

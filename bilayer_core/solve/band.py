@@ -55,13 +55,19 @@ def factor_signed(band, n, bandwidth):
 
 
 @kernel
-def solve_band(band, n, bandwidth, right):
-    """Overwrite `right`, of n + b values whose last b are zero, with the solution of the factorised system."""
+def forward_band(band, n, bandwidth, right):
+    """Overwrite `right`, of n + b values whose last b are zero, with L⁻¹ times it."""
     b = len(bandwidth)
     for j in range(n):
         value = right[j]
         for r in range(1, b + 1):
             right[j + r] -= band[j, r] * value
+
+
+@kernel
+def backward_band(band, n, bandwidth, right):
+    """Overwrite `right`, of n + b values whose last b are zero, with (D Lᵀ)⁻¹ times it."""
+    b = len(bandwidth)
     for j in range(n - 1, -1, -1):
         value = right[j] / band[j, 0]
         for r in range(b, 0, -1):  # what was found last is needed last
@@ -70,20 +76,50 @@ def solve_band(band, n, bandwidth, right):
 
 
 @kernel
-def solve_columns(band, n, bandwidth, m, right):
-    """As `solve_band` for each of the first m columns of `right`, shape (n + b, ≥ m): those of a border."""
+def solve_band(band, n, bandwidth, right):
+    """Overwrite `right`, of n + b values whose last b are zero, with the solution of the factorised system."""
+    forward_band(band, n, bandwidth, right)
+    backward_band(band, n, bandwidth, right)
+
+
+@kernel
+def eliminate_band(band, n, bandwidth, m, border, scaled_out, corner):
+    """Eliminate the factorised band A = L D Lᵀ from a matrix with m more columns and rows,
+
+        [ A   U ]
+        [ Uᵀ  C ]
+
+    Parameters
+    ----------
+    m : int
+    border : Array
+        U by columns, shape (≥ m, n + b), zeros at the end; overwritten with L⁻¹ U.
+    scaled_out : Array
+        Written: D⁻¹ L⁻¹ U, shape (≥ m, n + b).
+    corner : Array
+        C, shape (≥ m, ≥ m); overwritten with the Schur complement C − Uᵀ A⁻¹ U.
+
+    Notes
+    -----
+    With z = L⁻¹ r, the solution for a right-hand side (r, s) is y = S⁻¹ (s − (D⁻¹ L⁻¹ U)ᵀ z) and
+    x = (D Lᵀ)⁻¹ (z − (L⁻¹ U) y), S being the Schur complement. Most of U is zero, and so is much of L⁻¹ U: a column
+    begins where U does, and blocks of A that it does not touch stay zero.
+    """
     b = len(bandwidth)
-    if right.shape[1] == 1:
-        solve_band(band, n, bandwidth, right.reshape(right.size))
-        return
-    for j in range(n):
-        for r in range(1, b + 1):
-            for c in range(m):
-                right[j + r, c] -= band[j, r] * right[j, c]
-    for j in range(n - 1, -1, -1):
-        inverse = 1.0 / band[j, 0]
-        for c in range(m):
-            right[j, c] *= inverse
-        for r in range(1, b + 1):
-            for c in range(m):
-                right[j, c] -= band[j, r] * right[j + r, c]
+    for a in range(m):
+        begin, end = n, 0
+        for j in range(n):
+            value = border[a, j]
+            scaled_out[a, j] = value / band[j, 0]
+            if value == 0.0:
+                continue
+            begin, end = min(begin, j), j + 1
+            for r in range(1, b + 1):
+                border[a, j + r] -= band[j, r] * value
+        for c in range(a + 1):
+            total = 0.0
+            for j in range(begin, end):
+                total += scaled_out[a, j] * border[c, j]
+            corner[a, c] -= total
+            if c < a:
+                corner[c, a] -= total

@@ -12,17 +12,6 @@ from ..jit import kernel
 
 
 @kernel
-def eliminate(border, solution, size, n, corner):
-    """D − Uᵀ (A⁻¹ U), in place of D; most entries of U, shape (≥ size, ≥ n), are zero."""
-    for k in range(size):
-        for i in range(n):
-            value = border[k, i]
-            if value != 0.0:
-                for j in range(n):
-                    corner[i, j] -= value * solution[k, j]
-
-
-@kernel
 def factor_dense(matrix, n):
     """Factorise the first n rows and columns of a symmetric matrix in place; false if they are not positive
     definite.

@@ -18,10 +18,10 @@ import numpy as np
 from ..jit import kernel
 from ..model.model import Model
 from .assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
-from .band import factor_band, factor_signed, solve_band, solve_columns, width
+from .band import backward_band, eliminate_band, factor_band, factor_signed, forward_band, width
 from .clamps import hand_nodes_to_bodies, hand_rows_to_bodies, hand_walls_to_bodies
 from .configuration import Configuration
-from .dense import eliminate, factor_dense, solve_dense
+from .dense import factor_dense, solve_dense
 from .rod_border import RodBorder
 from .rod_contact import RodContact
 
@@ -104,7 +104,7 @@ class NewtonMatrix:
     def _make_room(self, columns: int) -> None:
         """Have room for a border of so many columns."""
         rows = self._layout.size + self._layout.half_bandwidth
-        self._wide, self._wide_solution = np.zeros((2, rows, columns))
+        self._wide, self._scaled = np.zeros((2, columns, rows))  # U, then L⁻¹ U, and D⁻¹ L⁻¹ U, by columns
         self._schur, self._load = np.zeros((columns, columns)), np.zeros(columns)
 
     def clear(self) -> None:
@@ -265,21 +265,19 @@ class NewtonMatrix:
         self._schur[:n, :n] = freedom.T @ corner @ freedom
         if self._coupled:
             self._border[self._held_unknowns] = 0.0
-            self._wide[:, :n] = self._border @ freedom
+            self._wide[:n] = (self._border @ freedom).T
         elif len(self._leaving):
-            self._wide[:, :n] = 0.0
+            self._wide[:n] = 0.0
         if len(self._leaving):
             self._coupled = True
-            self.rod_border.widen(self._band, n, self._wide, self._schur)
+            self.rod_border.widen(self._band, n, self._wide.T, self._schur)
 
     def _eliminate_band(self) -> None:
         """D − Uᵀ A⁻¹ U in place of D, given the factorised band."""
         if not self._coupled:
             return
-        size = self._layout.size
-        self._wide_solution[:] = self._wide
-        solve_columns(self._band, size, self._bandwidth, self._width, self._wide_solution)
-        eliminate(self._wide, self._wide_solution, size, self._width, self._schur)
+        size, border = self._layout.size, (self._wide, self._scaled, self._schur)
+        eliminate_band(self._band, size, self._bandwidth, self._width, *border)
 
     def count_negative(self, factor: float, at: Configuration, edge_gradient: Array, attached_gradient: Array) -> int:
         """Number of negative eigenvalues of the matrix of the last evaluation plus `factor` times the masses [1/s²].
@@ -301,16 +299,17 @@ class NewtonMatrix:
         np.negative(gradient, out=right[:size])
         right[size:] = 0.0
         right[leaving] = 0.0
-        solve_band(self._band, size, self._bandwidth, right)
-        step = right[:size].copy()
+        forward_band(self._band, size, self._bandwidth, right)
         freedom, load, width = self._model.bodies.freedom, self._load, self._width
         bodies = freedom.shape[1]
         load[:bodies] = -freedom.T @ body_gradient.ravel()
         load[bodies:width] = -gradient[leaving]
         if self._coupled:
-            load[:width] -= step @ self._wide[:size, :width]
+            load[:width] -= self._scaled[:width] @ right
         solve_dense(self._schur, width, load)
         if self._coupled:
-            step -= self._wide_solution[:size, :width] @ load[:width]
+            right -= load[:width] @ self._wide[:width]
+        backward_band(self._band, size, self._bandwidth, right)
+        step = right[:size].copy()
         step[leaving] = load[bodies:width]
         return step, (freedom @ load[:bodies]).reshape(-1, 6)

@@ -11,7 +11,7 @@ from bilayer_core.contact.friction_law import friction_over_speed, friction_pote
 from bilayer_core.forces.bend_twist import bend_twist
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
-from bilayer_core.solve.band import factor_band, factor_signed, solve_band, solve_columns, width
+from bilayer_core.solve.band import backward_band, eliminate_band, factor_band, factor_signed, solve_band, width
 
 
 def random_frames(rng, count):
@@ -121,9 +121,15 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     expected = np.linalg.solve(dense, right[:n])
     one = right[:, 2].copy()
     solve_band(band, n, width(b), one)
-    solve_columns(band, n, width(b), 6, right)
     assert one[:n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
-    assert right[:n] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+    right[:25] = 0.0  # where columns of a border begin
+    expected = np.linalg.solve(dense, right[:n])
+    columns, scaled, corner = right.T.copy(), np.ones((6, n + b)), np.eye(6)
+    eliminate_band(band, n, width(b), 6, columns, scaled, corner)
+    assert corner == pytest.approx(np.eye(6) - right[:n].T @ expected, rel=1e-10, abs=1e-12)
+    assert scaled[:, :n] == pytest.approx(columns[:, :n] / band[:n, 0], rel=1e-10, abs=1e-12)
+    backward_band(band, n, width(b), columns[2])
+    assert columns[2, :n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
     assert factor_band(indefinite, n, width(b)) == 41
 
 
