@@ -60,6 +60,7 @@ from ..kinematics.vector import (
     add_upper_outer,
     add_upper_projector,
     add_upper_symmetric,
+    angle,
     combine,
     combine3,
     cross,
@@ -128,7 +129,7 @@ def bend_twist(
         kappa2 = (b_m2a - a_m2b) * ic
         cosine = dot(m1a, m1b) - b_m1a * a_m1b * ic
         sine = dot(m2a, m1b) - b_m2a * a_m1b * ic
-        psi = math.atan2(sine, cosine)
+        psi = angle(cosine, sine)
         psi += TWO_PI * math.floor((previous_twist[k] - psi) / TWO_PI + 0.5)
         strain_out[k, 0] = kappa1
         strain_out[k, 1] = kappa2

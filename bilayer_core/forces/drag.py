@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
-from ..kinematics.vector import combine, cross, dot, row, scaled
+from ..kinematics.vector import add_row, add_upper_outer, combine, cross, dot, row, scaled
 
 
 @kernel
@@ -81,18 +81,17 @@ def drag(
     energy = 0.0
     for k in range(node.shape[0]):
         i = node[k]
+        v0 = (position[i, 0] - origin[i, 0]) / step_length - flow[0]
+        v1 = (position[i, 1] - origin[i, 1]) / step_length - flow[1]
+        v2 = (position[i, 2] - origin[i, 2]) / step_length - flow[2]
+        force = (0.0, 0.0, 0.0)
         for d in range(3):
-            speed = 0.0
-            for c in range(3):
-                speed += direction[k, d, c] * ((position[i, c] - origin[i, c]) / step_length - flow[c])
+            n = (direction[k, d, 0], direction[k, d, 1], direction[k, d, 2])
+            speed = v0 * n[0] + v1 * n[1] + v2 * n[2]
             size = abs(speed)
-            energy += step_length * coefficient[k, d] * size**3 / 6.0
-            force = 0.5 * coefficient[k, d] * size * speed
-            for c in range(3):
-                node_gradient_out[i, c] += force * direction[k, d, c]
+            energy += step_length * coefficient[k, d] * size * size * size / 6.0
+            force = combine(1.0, force, 0.5 * coefficient[k, d] * size * speed, n)
             if with_hessian:
-                curve = coefficient[k, d] * size / step_length
-                for m in range(3):
-                    for n in range(m, 3):
-                        node_hessian_out[i, m, n] += curve * direction[k, d, m] * direction[k, d, n]
+                add_upper_outer(node_hessian_out, i, coefficient[k, d] * size / step_length, n)
+        add_row(node_gradient_out, i, 1.0, force)
     return energy

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from ..jit import kernel
+
+SMALL_ANGLE = 0.05
+"""Tangent up to which six terms of the series of the inverse tangent are exact to rounding."""
 
 
 @kernel
@@ -21,6 +26,16 @@ def dot(a, b):
 def cross(a, b):
     """a × b"""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def angle(cosine, sine):
+    """Angle of the direction (cosine, sine) from (1, 0) [rad], −π to π: `math.atan2`, faster where it is small."""
+    if abs(sine) < SMALL_ANGLE * cosine:
+        x = sine / cosine
+        y = x * x
+        return x - x * y * (1.0 / 3.0 - y * (1.0 / 5.0 - y * (1.0 / 7.0 - y * (1.0 / 9.0 - y / 11.0))))
+    return math.atan2(sine, cosine)
 
 
 @kernel

@@ -11,6 +11,7 @@ from bilayer_core.contact.friction_law import friction_over_speed, friction_pote
 from bilayer_core.forces.bend_twist import bend_twist
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
+from bilayer_core.kinematics.vector import angle
 from bilayer_core.solve.band import backward_band, eliminate_band, factor_band, factor_signed, solve_band, width
 
 
@@ -186,3 +187,8 @@ def test_quaternions_and_rotation_vectors_describe_the_same_rotation():
             expected = math.sin(np.linalg.norm(vector) / 2) * axis
             quaternion = quaternion_from_matrix(matrix)
             assert quaternion[:3] == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("expected", [0.0, 1e-9, -0.049, 0.0499, 0.0501, 1.0, -2.0, 3.1, -3.1])
+def test_the_angle_of_a_direction_is_the_inverse_tangent_to_rounding(expected):
+    assert angle(2.0 * np.cos(expected), 2.0 * np.sin(expected)) == pytest.approx(expected, rel=4e-16, abs=1e-300)
