@@ -21,13 +21,25 @@ FAR, NEAR = 8.0, 2.0  # barrier distances: `KEPT_FRACTION` of one and `TOUCH` of
 
 @kernel
 def rod_step_bound(
-    position, step, limit, d_hat, pair_count, pair_point, pair_edge, edge_node, edge_radius, point_edge, point_fraction
+    position,
+    step,
+    limit,
+    d_hat,
+    pair_count,
+    pair_point,
+    pair_edge,
+    until,
+    path,
+    edge_node,
+    edge_radius,
+    point_edge,
+    point_fraction,
 ):
     """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
 
-    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3). A pair that
-    stays beyond the barrier distance `d_hat` [m] sets no bound: of large gaps less is kept. So what is found does not
-    depend on which of these pairs are listed.
+    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3), and `path` is
+    that at its end. A pair that stays beyond the barrier distance `d_hat` [m] sets no bound: of large gaps
+    less is kept. So what is found does not depend on which of these pairs are listed, or looked at.
 
     Returns
     -------
@@ -38,6 +50,8 @@ def rod_step_bound(
     alpha = limit
     blocking = -1
     for c in range(pair_count):
+        if until[c] > path:
+            continue
         p, k = pair_point[c], pair_edge[c]
         a = point_edge[p]
         i, j, s = edge_node[a], edge_node[k], point_fraction[p]

@@ -3,7 +3,12 @@
 A list is made for a straight motion of all nodes, from x₀ to x₁, with a margin m. It holds every pair that can come
 nearer than the barrier distance while nodes are no farther than m/2 from that motion, the mean displacement taken off
 (a Verlet list; Verlet 1967). So one list serves a fast step as well as a slow one: what counts is how pairs move
-towards each other, not how far they go, and lists are short.
+towards each other, not how far they go, and lists are short. A short motion is prolonged, so that the list serves the
+steps to come if they go on as straight as that.
+
+A gap closes by no more than twice what nodes go, the mean taken off. The sum of that over all moves since a list was
+made is its *path*; a pair whose gap has been found is not looked at again before the path is longer by what the gap was
+above the barrier distance. So most pairs cost a comparison.
 """
 
 from __future__ import annotations
@@ -15,8 +20,12 @@ from .broad_phase import near_pairs
 
 MARGIN = 0.5
 """Of a list, in units of the barrier distance and the thickest layer together."""
+AHEAD, MOST_AHEAD = 1.0, 32.0
+"""How far a motion is prolonged, in the same units, and in lengths of its own at most."""
 LARGEST_MOVE = 8.0
-"""Likewise; longer steps are cut short."""
+"""In the same units; longer steps are cut short."""
+MADE, ROOM, PATH = 0, 1, 2
+"""Places in `ways`."""
 
 
 @kernel
@@ -52,18 +61,29 @@ def reachable(step, no_step, unit):
 
 
 @kernel
-def _is_listed(position, step, fraction, move, base, tip, half):
-    """Whether nodes stay within `half` [m] of a list's motion while they go by `move` from x to x + fraction · step."""
-    from_base = _departure(position, step, 0.0, base)
-    if from_base + move <= half:
-        return True
-    from_tip = _departure(position, step, 0.0, tip)
-    if min(from_base, from_tip) + move <= half:
-        return True
-    if move == 0.0 or min(from_base, from_tip) > half:
-        return False
-    at_end = _departure(position, step, fraction, tip)
-    return min(at_end, _departure(position, step, fraction, base)) <= half
+def _stray(position, step, fraction, base, tip):
+    """Largest distance of a node at x + fraction · step from a list's motion, at the moment of this that is nearest to
+    all [m], the mean of all taken off, as in `base` and `tip`.
+    """
+    count = position.shape[0]
+    m0, m1, m2, along, square = 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(count):
+        x0 = position[i, 0] + fraction * step[i, 0]
+        x1 = position[i, 1] + fraction * step[i, 1]
+        x2 = position[i, 2] + fraction * step[i, 2]
+        way0, way1, way2 = tip[i, 0] - base[i, 0], tip[i, 1] - base[i, 1], tip[i, 2] - base[i, 2]
+        m0, m1, m2 = m0 + x0, m1 + x1, m2 + x2
+        along += (x0 - base[i, 0]) * way0 + (x1 - base[i, 1]) * way1 + (x2 - base[i, 2]) * way2
+        square += way0 * way0 + way1 * way1 + way2 * way2
+    m0, m1, m2 = m0 / count, m1 / count, m2 / count
+    moment = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+    largest = 0.0
+    for i in range(count):
+        d0 = position[i, 0] + fraction * step[i, 0] - m0 - base[i, 0] - moment * (tip[i, 0] - base[i, 0])
+        d1 = position[i, 1] + fraction * step[i, 1] - m1 - base[i, 1] - moment * (tip[i, 1] - base[i, 1])
+        d2 = position[i, 2] + fraction * step[i, 2] - m2 - base[i, 2] - moment * (tip[i, 2] - base[i, 2])
+        largest = max(largest, d0 * d0 + d1 * d1 + d2 * d2)
+    return math.sqrt(largest)
 
 
 @kernel
@@ -100,12 +120,14 @@ def list_rods(
     rod_exclusion,
     base,
     tip,
-    margin,
+    last,
+    ways,
     count,
     point_out,
     edge_out,
     before_out,
     after_out,
+    until_out,
 ):
     """Have a list that holds all pairs nearer than the barrier distance at x + β step, 0 ≤ β ≤ `fraction`; false if
     there is no room for it, and then there is none.
@@ -122,21 +144,39 @@ def list_rods(
         Barrier distance [m].
     start_position, edge_node … rod_exclusion, point_out … after_out
         As for `near_pairs`.
-    base, tip, margin, count : Array
-        Positions from which to which the list was made, their mean taken off [m], its margin [m] (0: there is none),
-        and how many pairs it has, shapes (n_node, 3), (n_node, 3), (1,), (1,). Changed.
+    base, tip, last : Array
+        Positions from which to which the list was made, and where nodes were last, their mean taken off [m], shape
+        (n_node, 3). Changed.
+    ways : Array
+        Margin of the list [m] (0: there is none), how far nodes may go on in any direction for it to serve, and its
+        path [m], shape (3,). Changed.
+    count : Array
+        How many pairs the list has, shape (1,). Changed.
+    until_out : Array
+        Path before which each pair stays beyond the barrier distance [m]; −∞ in a new list.
     """
-    if margin[0] > 0.0 and _is_listed(position, step, fraction, move, base, tip, 0.5 * margin[0]):
+    if move == 0.0:
+        gone = _departure(position, step, 0.0, last)
+        ways[ROOM] -= gone
+        ways[PATH] += 2.0 * gone
+        _centre(position, step, 0.0, last)
+    if move <= ways[ROOM]:
         return True
+    if ways[MADE] > 0.0:
+        ways[ROOM] = 0.5 * ways[MADE] - _stray(position, step, 0.0, base, tip)
+        if ways[ROOM] >= 0.0:
+            if move <= ways[ROOM] or _stray(position, step, fraction, base, tip) <= 0.5 * ways[MADE]:
+                return True
+    ahead = min(max(AHEAD * unit / move, 1.0), MOST_AHEAD) if move > 0.0 else 1.0
     _centre(position, step, 0.0, base)
-    _centre(position, step, fraction, tip)
-    margin[0] = MARGIN * unit
+    _centre(position, step, ahead * fraction, tip)
+    ways[MADE], ways[ROOM], ways[PATH] = MARGIN * unit, 0.5 * MARGIN * unit, 0.0
     count[0] = near_pairs(
         base,
         tip,
         start_position,
         touch,
-        touch + margin[0],
+        touch + ways[MADE],
         edge_node,
         edge_radius,
         edge_rod,
@@ -154,6 +194,8 @@ def list_rods(
         after_out,
     )
     if count[0] > point_out.shape[0]:
-        margin[0] = 0.0
+        ways[MADE], ways[ROOM] = 0.0, -1.0
         return False
+    for c in range(count[0]):
+        until_out[c] = -math.inf
     return True

@@ -66,6 +66,8 @@ def facing_contacts(
     pair_edge,
     pair_before,
     pair_after,
+    until,
+    path,
     edge_node,
     edge_radius,
     point_edge,
@@ -88,6 +90,9 @@ def facing_contacts(
         Of nodes [m], shape (n_node, 3).
     pair_count, pair_point, pair_edge, pair_before, pair_after
         From `broad_phase.near_pairs`: points, segments, and whether the point sees the segments before and after.
+    until, path : Array, float
+        Path before which each pair stays beyond `reach`, changed for those that are looked at, and the present one [m];
+        see `rod_list`.
     edge_node, edge_radius : Array
         First node and radius [m] of each edge, shape (n_edge,).
     point_edge, point_fraction : Array
@@ -102,6 +107,8 @@ def facing_contacts(
     found = 0
     smallest = math.inf
     for c in range(pair_count):
+        if until[c] > path:
+            continue
         p, k = pair_point[c], pair_edge[c]
         a = point_edge[p]
         i, j, s = edge_node[a], edge_node[k], point_fraction[p]
@@ -109,7 +116,9 @@ def facing_contacts(
         p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
         p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]
         radii = edge_radius[a] + edge_radius[k]
-        if square_distance(p0, p1, p2, position, j) > (radii + reach) ** 2 * SLACK:
+        square = square_distance(p0, p1, p2, position, j)
+        until[c] = path + math.sqrt(square) - radii - reach
+        if square > (radii + reach) ** 2 * SLACK:
             continue
         along = fraction_along(p0, p1, p2, position, j)
         at_start = 1 if along <= 0.0 else 0

@@ -247,12 +247,14 @@ class Threads:
     rod_exclusion: Array
     base: Array
     tip: Array
-    margin: Array  # shape (1,)
+    last: Array
+    ways: Array  # shape (3,)
     counted: Array  # shape (1,)
     pair_point: Array
     pair_edge: Array
     pair_before: Array
     pair_after: Array
+    pair_until: Array
     no_step: Array
     scratch: Array  # a gradient that nobody wants
     gap: Array  # the smallest below the barrier distance, shape (1,)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..contact.rod_bound import rod_step_bound
-from ..contact.rod_list import list_rods, reachable
+from ..contact.rod_list import PATH, list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
 from ..jit import inner
@@ -38,12 +38,14 @@ def _list(threads, strands, position, step, fraction, move):
         threads.rod_exclusion,
         threads.base,
         threads.tip,
-        threads.margin,
+        threads.last,
+        threads.ways,
         threads.counted,
         threads.pair_point,
         threads.pair_edge,
         threads.pair_before,
         threads.pair_after,
+        threads.pair_until,
     )
 
 
@@ -57,8 +59,6 @@ def find_contacts(threads, strands, position):
     contacts = threads.contacts
     contacts.counted[0] = 0
     threads.gap[0] = math.inf
-    if threads.counted[0] == 0:
-        return True
     contacts.counted[0], gap = facing_contacts(
         position,
         threads.counted[0],
@@ -66,6 +66,8 @@ def find_contacts(threads, strands, position):
         threads.pair_edge,
         threads.pair_before,
         threads.pair_after,
+        threads.pair_until,
+        threads.ways[PATH],
         strands.edge_node,
         threads.edge_radius,
         threads.point_edge,
@@ -109,6 +111,8 @@ def bound_between_rods(threads, strands, system, at):
         threads.counted[0],
         threads.pair_point,
         threads.pair_edge,
+        threads.pair_until,
+        threads.ways[PATH] + 2.0 * limit * move,
         strands.edge_node,
         threads.edge_radius,
         threads.point_edge,

@@ -149,6 +149,8 @@ class NearPairs:
         Number of pairs, as compiled loops share it, shape (1,).
     point, edge, before, after : Array
         The pairs, see `contact.broad_phase.near_pairs`; only the first `count` count.
+    until : Array
+        Path before which each stays beyond the barrier distance [m], see `contact.rod_list`.
     geometry : tuple
         What `near_pairs` takes of the rods.
     """
@@ -171,6 +173,7 @@ class NearPairs:
         """Have room for so many pairs, none of which is listed then."""
         self.point, self.edge = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
         self.before, self.after = np.empty(room, dtype=bool), np.empty(room, dtype=bool)
+        self.until = np.full(room, -math.inf)
 
     @property
     def outputs(self) -> tuple[Array, Array, Array, Array]:
@@ -216,6 +219,8 @@ def refuse_meeting_rods(model: Model) -> None:
         pairs.edge,
         pairs.before,
         pairs.after,
+        pairs.until,
+        0.0,
         model.edge_node,
         surfaces.edge_radius,
         surfaces.point_edge,

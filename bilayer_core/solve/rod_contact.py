@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..contact.rod_bound import rod_step_bound
-from ..contact.rod_list import list_rods, reachable
+from ..contact.rod_list import PATH, list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
 from ..model.model import Model
@@ -67,8 +67,8 @@ class RodContact:
     ----------
     contacts, sliding : Contacts
         Those of the last `barrier`, and those that `start_step` froze for friction.
-    pairs, base, tip, margin : NearPairs, Array, Array, Array
-        The list of near pairs, and for which motion it was made; see `contact.rod_list.list_rods`.
+    pairs, base, tip, last, ways : NearPairs, Array, Array, Array, Array
+        The list of near pairs, for which motion it was made, and the path since; see `contact.rod_list.list_rods`.
     unit : float
         Barrier distance and thickest layer together [m].
     room : int
@@ -88,8 +88,8 @@ class RodContact:
         self.unit = self._d_hat + 2.0 * float(surfaces.edge_radius.max())
         points = len(surfaces.point_edge)
         self.pairs = NearPairs(surfaces, model.edge_node, PAIRS_PER_POINT * points)
-        self.base, self.tip = np.zeros((2, model.node_count, 3))
-        self.margin = np.zeros(1)
+        self.base, self.tip, self.last = np.zeros((3, model.node_count, 3))
+        self.ways = np.array([0.0, -1.0, 0.0])
         self.start_position = np.array(model.start_position)
         self.no_step, self.scratch = np.zeros((2, model.node_count, 3))
         self.contacts, self.sliding = Contacts(points), Contacts(points)
@@ -124,9 +124,11 @@ class RodContact:
             *pairs.geometry,
             self.base,
             self.tip,
-            self.margin,
+            self.last,
+            self.ways,
             pairs.counted,
             *pairs.outputs,
+            pairs.until,
         ):
             self.make_room()
 
@@ -140,6 +142,8 @@ class RodContact:
                 position,
                 pairs.count,
                 *pairs.outputs,
+                pairs.until,
+                self.ways[PATH],
                 self._model.edge_node,
                 surfaces.edge_radius,
                 surfaces.point_edge,
@@ -220,6 +224,7 @@ class RodContact:
         it (−1: none).
         """
         move, limit = reachable(step, self.no_step, self.unit)
+        self._list(position, self.no_step, 0.0, 0.0)
         self._list(position, step, limit, limit * move)
         pairs, surfaces = self.pairs, self._surfaces
         return rod_step_bound(
@@ -230,6 +235,8 @@ class RodContact:
             pairs.count,
             pairs.point,
             pairs.edge,
+            pairs.until,
+            self.ways[PATH] + 2.0 * limit * move,
             self._model.edge_node,
             surfaces.edge_radius,
             surfaces.point_edge,

@@ -284,3 +284,31 @@ def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_
         found = list(zip(pairs.point[: pairs.count].tolist(), pairs.edge[: pairs.count].tolist(), strict=True))
         assert found == sorted(expected) and len(found) > 1000
     assert counts[2] - counts[1] == 2 * (counts[1] - counts[0])
+
+
+@pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3])
+def test_contacts_and_the_bound_of_a_step_do_not_depend_on_the_way_that_led_there(size):
+    rng = np.random.default_rng(5)
+    model, position = folded_rod(rng)
+    rods, nodes = RodContact(model), position.shape
+    made, touching, bounded = 0, 0, 0
+    drift = np.zeros(nodes)
+    for move in range(200):
+        if move % 20 == 0:  # straight on for a while, then elsewhere
+            drift = size * rng.standard_normal(nodes)
+        step = drift + 0.1 * size * rng.standard_normal(nodes) + np.array([1e-2, 0.0, 0.0])
+        fresh, base = RodContact(model), rods.base.copy()
+        assert rods.barrier(position, np.zeros(nodes)) == fresh.barrier(position, np.zeros(nodes))
+        assert rods.min_gap == fresh.min_gap
+        assert rods.contacts.count == fresh.contacts.count
+        for ours, theirs in zip(rods.contacts.found, fresh.contacts.found, strict=True):
+            np.testing.assert_array_equal(ours[: fresh.contacts.count], theirs[: fresh.contacts.count])
+        fraction, node = fresh.step_bound(position, step)
+        assert rods.step_bound(position, step) == (fraction, node)
+        made += not np.array_equal(base, rods.base)
+        touching += fresh.contacts.count > 0
+        bounded += fraction < 1.0
+        position = position + 0.8 * fraction * step
+        if move % 5 == 4:  # as a line search that returns
+            position = position - 0.4 * fraction * step
+    assert made < 200 and touching > 20 and (bounded > 5 or size < 1e-4)
