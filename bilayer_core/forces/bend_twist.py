@@ -3,8 +3,7 @@
     B = ½ k₁ (κ₁ − κ̄₁)² + ½ k₂ (κ₂ − κ̄₂)² + ½ k₃ (ψ − ψ̄)²        (paper, eqs. 10 to 13)
 
 At an inner node k₁ = EI₁/Δl, k₂ = EI₂/Δl, k₃ = GJ/Δl and κ₁ = χ Δl, κ₂ = ξ Δl, ψ = τ Δl with the Voronoi length Δl.
-The same
-element with other stiffnesses ties the frames of two bonded layers together (`coupling`).
+The same element with other stiffnesses ties the frames of two bonded layers together (`coupling`).
 
 Strains. With unit tangents a, b, directors mα of either edge, and c = 1 + a·b, the curvature binormal 2 a×b/c projected
 on the mean of the directors is
@@ -12,37 +11,38 @@ on the mean of the directors is
     κ_α = (b·mα_a − a·mα_b)/c,   α = 1, 2,
 
 because (a×b)·m2_a = b·m1_a and so on (κ₁ belongs to bending through the thickness, χ = m1·t′). ψ is the angle about b
-from the
-parallel-transported m1_a to m1_b.
+from the parallel-transported m1_a to m1_b.
 
 Derivatives. An increment (ε, θ) of an edge of length l moves its frame by parallel transport and turns it by θ; to
-second order, with
-ε⊥ = P ε, P = I − a aᵀ, and m′ = ∂m/∂θ (m1′ = m2, m2′ = −m1):
+second order, with ε⊥ = P ε, P = I − a aᵀ, and m′ = ∂m/∂θ (m1′ = m2, m2′ = −m1):
 
     a → a + ε⊥/l − (a·ε) ε⊥/l² − ½ |ε⊥|² a/l²
     m → m − a (m·ε)/l + θ m′ + a (m·ε)(a·ε)/l² − ½ (m·ε) ε⊥/l² − θ a (m′·ε)/l − ½ θ² m
 
-Insert both into f = (b·M_a − a·M_b)/c for any fixed combination M = G₁ m1 + G₂ m2 (M′ = G₁ m2 − G₂ m1), write a_p =
-P_b a,
-b_p = P_a b, f = (b·M_a − a·M_b)/c and collect:
+Only ε⊥ and θ change the strains, so all derivatives live in the plane of the two directors: below, vectors of edge a
+have two components along m1_a, m2_a, those of edge b along m1_b, m2_b, and stand for derivatives with respect to
+ε/l. With
 
-    u = (a·b) M_a + P_a M_b + f b_p,        ∂f/∂ε_a = −u/(c l_a)
-    w = (a·b) M_b + P_b M_a − f a_p,        ∂f/∂ε_b = +w/(c l_b)
-    f_a = b·M′_a/c = ∂f/∂θ_a,               f_b = −a·M′_b/c = ∂f/∂θ_b
-    ∂²f/∂ε_a²  = [a uᵀ + u aᵀ + b_p vᵀ + v b_pᵀ + (a·M_b + f a·b) P_a]/(c l_a²),      v = u/c − ½ M_a
-    ∂²f/∂ε_b²  = [−b wᵀ − w bᵀ + a_p zᵀ + z a_pᵀ − (b·M_a − f a·b) P_b]/(c l_b²),     z = ½ M_b − w/c
-    ∂²f/∂ε_a∂ε_b = [(u/c − M_a) a_pᵀ + b_p (M_b − w/c)ᵀ − f (I − a aᵀ − b bᵀ + (a·b) a bᵀ)]/(c l_a l_b)
-    ∂²f/∂θ_a∂ε_a = −[(a·b) M′_a + f_a b_p]/(c l_a),    ∂²f/∂θ_a∂ε_b = [P_b M′_a − f_a a_p]/(c l_b)
-    ∂²f/∂θ_b∂ε_b =  [(a·b) M′_b − f_b a_p]/(c l_b),    ∂²f/∂θ_b∂ε_a = −[P_a M′_b + f_b b_p]/(c l_a)
-    ∂²f/∂θ_a²    = −b·M_a/c,    ∂²f/∂θ_b² = a·M_b/c,    ∂²f/∂θ_a∂θ_b = 0
+    p_i = b·mi_a,   q_i = a·mi_b,   R_ij = mi_a·mj_b,   s = a·b,   Gα = kα (κα − κ̄α),   M = (G₁, G₂),   M′ = (−G₂, G₁)
 
-With G_α = k_α (κ_α − κ̄_α) this f gives all of Σ G_α ∇²κ_α at once, and u = Σ G_α u_α. For the twist, with the
-curvature binormal
-k = 2 a×b/c and T = (a + b)/c (Bergou et al. 2010; Panetta et al. 2019):
+insert both into f = Σ Gα κα for fixed Gα, and collect:
 
-    ∂ψ/∂ε_a = k/(2 l_a),  ∂ψ/∂ε_b = k/(2 l_b),  ∂ψ/∂θ_b = −∂ψ/∂θ_a = 1
-    ∂²ψ/∂ε_a² = −[k (a+T)ᵀ + (a+T) kᵀ]/(4 l_a²),   ∂²ψ/∂ε_b² = −[k (b+T)ᵀ + (b+T) kᵀ]/(4 l_b²)
-    ∂²ψ/∂ε_a∂ε_b = (2 [a]×/c − k Tᵀ)/(2 l_a l_b)
+    ∂κα/∂a = −(s eα + R eα + κα p)/c,       ∂κα/∂b = (s eα + Rᵀ eα − κα q)/c,       eα the unit vectors
+    ∂κ₁/∂θ_a = p₂/c,  ∂κ₂/∂θ_a = −p₁/c,     ∂κ₁/∂θ_b = −q₂/c,  ∂κ₂/∂θ_b = q₁/c
+    ∂²f/∂a²  = −[p (∂f/∂a + ½ M)ᵀ + (∂f/∂a + ½ M) pᵀ − (q·M + f s) I]/c
+    ∂²f/∂b²  = −[q (∂f/∂b − ½ M)ᵀ + (∂f/∂b − ½ M) qᵀ + (p·M − f s) I]/c
+    ∂²f/∂a∂b = −[(∂f/∂a + M) qᵀ + p (∂f/∂b − M)ᵀ + f R]/c
+    ∂²f/∂a∂θ_a = −[s M′ + f_a p]/c,         ∂²f/∂b∂θ_a = [Rᵀ M′ − f_a q]/c,         f_a = ∂f/∂θ_a
+    ∂²f/∂b∂θ_b =  [s M′ − f_b q]/c,         ∂²f/∂a∂θ_b = −[R M′ + f_b p]/c,         f_b = ∂f/∂θ_b
+    ∂²f/∂θ_a² = −p·M/c,    ∂²f/∂θ_b² = q·M/c,    ∂²f/∂θ_a∂θ_b = 0
+
+The second derivatives of bending are Σ kα ∂κα ∂καᵀ + ∂²f. For the twist (Bergou et al. 2010; Panetta et al. 2019),
+with J a quarter turn, J (x, y) = (−y, x):
+
+    ∂ψ/∂a = J p/c = h,   ∂ψ/∂b = −J q/c = j,   ∂ψ/∂θ_b = −∂ψ/∂θ_a = 1
+    ∂²ψ/∂a² = −(h pᵀ + p hᵀ)/(2 c),   ∂²ψ/∂b² = −(j qᵀ + q jᵀ)/(2 c),   ∂²ψ/∂a∂b = (J R − h qᵀ)/c
+
+The tangent comes in only where ε turns the plane: with g = ∂B/∂a, ∂²B/∂ε_a² has −(a gᵀ + g aᵀ)/l_a² beside the above.
 
 All is exact where θ = 0, that is at the configuration whose own frames are given.
 """
@@ -54,16 +54,12 @@ import math
 from ..jit import kernel
 from ..kinematics.vector import (
     add_column,
-    add_identity,
-    add_outer,
+    add_outer_sum,
     add_row,
-    add_upper_outer,
-    add_upper_projector,
-    add_upper_symmetric,
+    add_upper_outer_sum,
     angle,
     combine,
     combine3,
-    cross,
     dot,
     row,
     scaled,
@@ -120,16 +116,13 @@ def bend_twist(
         m1a, m2a = row(director1, ka), row(director2, ka)
         m1b, m2b = row(director1, kb), row(director2, kb)
         ila, ilb = 1.0 / length[ka], 1.0 / length[kb]
-        ab = dot(a, b)
-        ic = 1.0 / (1.0 + ab)
+        s = dot(a, b)
+        ic = 1.0 / (1.0 + s)
+        p1, p2, q1, q2 = dot(b, m1a), dot(b, m2a), dot(a, m1b), dot(a, m2b)
+        r11, r12, r21, r22 = dot(m1a, m1b), dot(m1a, m2b), dot(m2a, m1b), dot(m2a, m2b)
 
-        b_m1a, b_m2a = dot(b, m1a), dot(b, m2a)
-        a_m1b, a_m2b = dot(a, m1b), dot(a, m2b)
-        kappa1 = (b_m1a - a_m1b) * ic
-        kappa2 = (b_m2a - a_m2b) * ic
-        cosine = dot(m1a, m1b) - b_m1a * a_m1b * ic
-        sine = dot(m2a, m1b) - b_m2a * a_m1b * ic
-        psi = angle(cosine, sine)
+        kappa1, kappa2 = (p1 - q1) * ic, (p2 - q2) * ic
+        psi = angle(r11 - p1 * q1 * ic, r21 - p2 * q1 * ic)
         psi += TWO_PI * math.floor((previous_twist[k] - psi) / TWO_PI + 0.5)
         strain_out[k, 0] = kappa1
         strain_out[k, 1] = kappa2
@@ -141,88 +134,72 @@ def bend_twist(
         energy_bend += 0.5 * (g1 * d1 + g2 * d2)
         energy_twist += 0.5 * g3 * d3
 
-        ap = combine(1.0, a, -ab, b)
-        bp = combine(1.0, b, -ab, a)
-        u1 = combine3(ab, m1a, 1.0, combine(1.0, m1b, -a_m1b, a), kappa1, bp)
-        u2 = combine3(ab, m2a, 1.0, combine(1.0, m2b, -a_m2b, a), kappa2, bp)
-        w1 = combine3(ab, m1b, 1.0, combine(1.0, m1a, -b_m1a, b), -kappa1, ap)
-        w2 = combine3(ab, m2b, 1.0, combine(1.0, m2a, -b_m2a, b), -kappa2, ap)
-        u = combine(g1, u1, g2, u2)
-        w = combine(g1, w1, g2, w2)
-        binormal = scaled(2.0 * ic, cross(a, b))
-        ca, cb = ic * ila, ic * ilb
-        fa = (g1 * b_m2a - g2 * b_m1a) * ic
-        fb = -(g1 * a_m2b - g2 * a_m1b) * ic
-
-        add_row(edge_gradient_out, ka, 1.0, combine(-ca, u, 0.5 * g3 * ila, binormal))
-        add_row(edge_gradient_out, kb, 1.0, combine(cb, w, 0.5 * g3 * ilb, binormal))
+        # of κ₁, κ₂ and ψ, components 1 and 2: u, v, h with respect to a, w, z, j to b
+        u1, u2 = -(s + r11 + kappa1 * p1) * ic, -(r21 + kappa1 * p2) * ic
+        v1, v2 = -(r12 + kappa2 * p1) * ic, -(s + r22 + kappa2 * p2) * ic
+        w1, w2 = (s + r11 - kappa1 * q1) * ic, (r12 - kappa1 * q2) * ic
+        z1, z2 = (r21 - kappa2 * q1) * ic, (s + r22 - kappa2 * q2) * ic
+        h1, h2, j1, j2 = -p2 * ic, p1 * ic, q2 * ic, -q1 * ic
+        fa1, fa2 = g1 * u1 + g2 * v1, g1 * u2 + g2 * v2
+        fb1, fb2 = g1 * w1 + g2 * z1, g1 * w2 + g2 * z2
+        ga1, ga2, gb1, gb2 = fa1 + g3 * h1, fa2 + g3 * h2, fb1 + g3 * j1, fb2 + g3 * j2
+        fa = -g1 * h1 - g2 * h2  # ∂κ/∂θ_a = −h
+        fb = -g1 * j1 - g2 * j2  # ∂κ/∂θ_b = −j
+        gradient_a, gradient_b = combine(ga1, m1a, ga2, m2a), combine(gb1, m1b, gb2, m2b)
+        add_row(edge_gradient_out, ka, ila, gradient_a)
+        add_row(edge_gradient_out, kb, ilb, gradient_b)
         edge_gradient_out[ka, 3] += fa - g3
         edge_gradient_out[kb, 3] += fb + g3
         if not with_hessian:
             continue
 
-        # G-weighted second derivatives of the two curvatures
-        ma, mb = combine(g1, m1a, g2, m2a), combine(g1, m1b, g2, m2b)
-        pa, pb = combine(g1, m2a, -g2, m1a), combine(g1, m2b, -g2, m1b)  # M′
-        f = (dot(b, ma) - dot(a, mb)) * ic
-        add_upper_symmetric(edge_hessian_out, ka, ca * ila, a, u)
-        add_upper_symmetric(edge_hessian_out, ka, ca * ila, bp, combine(ic, u, -0.5, ma))
-        add_upper_projector(edge_hessian_out, ka, ca * ila * (dot(a, mb) + f * ab), a)
-        add_upper_symmetric(edge_hessian_out, kb, -cb * ilb, b, w)
-        add_upper_symmetric(edge_hessian_out, kb, cb * ilb, ap, combine(0.5, mb, -ic, w))
-        add_upper_projector(edge_hessian_out, kb, -cb * ilb * (dot(b, ma) - f * ab), b)
-        add_column(edge_hessian_out, ka, 3, -ca, combine(ab, pa, fa, bp))
-        add_column(edge_hessian_out, kb, 3, cb, combine(ab, pb, -fb, ap))
-        edge_hessian_out[ka, 3, 3] += k3 - dot(b, ma) * ic
-        edge_hessian_out[kb, 3, 3] += k3 + dot(a, mb) * ic
+        f = g1 * kappa1 + g2 * kappa2
+        pm, qm = (p1 * g1 + p2 * g2) * ic, (q1 * g1 + q2 * g2) * ic
 
-        # twist: G₃ ∇²ψ and k₃ ∇ψ ∇ψᵀ
-        t_sum = combine(ic, a, ic, b)
-        ha, hb = scaled(0.5 * ila, binormal), scaled(0.5 * ilb, binormal)  # ∂ψ/∂ε
-        add_upper_symmetric(edge_hessian_out, ka, -0.25 * g3 * ila * ila, binormal, combine(1.0, a, 1.0, t_sum))
-        add_upper_symmetric(edge_hessian_out, kb, -0.25 * g3 * ilb * ilb, binormal, combine(1.0, b, 1.0, t_sum))
-        add_upper_outer(edge_hessian_out, ka, k3, ha)
-        add_upper_outer(edge_hessian_out, kb, k3, hb)
-        add_column(edge_hessian_out, ka, 3, -k3, ha)
-        add_column(edge_hessian_out, kb, 3, k3, hb)
+        # edge a with itself
+        x1, x2 = -ic * (fa1 + 0.5 * (g1 + g3 * h1)), -ic * (fa2 + 0.5 * (g2 + g3 * h2))
+        own = qm + f * s * ic
+        s11 = own + 2.0 * p1 * x1 + k1 * u1 * u1 + k2 * v1 * v1 + k3 * h1 * h1
+        s12 = p1 * x2 + p2 * x1 + k1 * u1 * u2 + k2 * v1 * v2 + k3 * h1 * h2
+        s22 = own + 2.0 * p2 * x2 + k1 * u2 * u2 + k2 * v2 * v2 + k3 * h2 * h2
+        rows = combine3(s11, m1a, s12, m2a, -ga1, a), combine3(s12, m1a, s22, m2a, -ga2, a)
+        add_upper_outer_sum(edge_hessian_out, ka, ila * ila, m1a, rows[0], m2a, rows[1], scaled(-1.0, a), gradient_a)
+        t1 = -k1 * h1 * u1 - k2 * h2 * v1 - k3 * h1 + ic * (s * g2 - fa * p1)
+        t2 = -k1 * h1 * u2 - k2 * h2 * v2 - k3 * h2 - ic * (s * g1 + fa * p2)
+        add_column(edge_hessian_out, ka, 3, ila, combine(t1, m1a, t2, m2a))
+        edge_hessian_out[ka, 3, 3] += k1 * h1 * h1 + k2 * h2 * h2 + k3 - pm
 
-        # k_α ∇κ_α ∇κ_αᵀ
-        t1a, t1b = b_m2a * ic, -a_m2b * ic  # ∂κ₁/∂θ
-        t2a, t2b = -b_m1a * ic, a_m1b * ic  # ∂κ₂/∂θ
-        add_upper_outer(edge_hessian_out, ka, k1 * ca * ca, u1)
-        add_upper_outer(edge_hessian_out, ka, k2 * ca * ca, u2)
-        add_upper_outer(edge_hessian_out, kb, k1 * cb * cb, w1)
-        add_upper_outer(edge_hessian_out, kb, k2 * cb * cb, w2)
-        add_column(edge_hessian_out, ka, 3, 1.0, combine(-k1 * ca * t1a, u1, -k2 * ca * t2a, u2))
-        add_column(edge_hessian_out, kb, 3, 1.0, combine(k1 * cb * t1b, w1, k2 * cb * t2b, w2))
-        edge_hessian_out[ka, 3, 3] += k1 * t1a * t1a + k2 * t2a * t2a
-        edge_hessian_out[kb, 3, 3] += k1 * t1b * t1b + k2 * t2b * t2b
+        # edge b with itself
+        x1, x2 = -ic * (fb1 - 0.5 * (g1 - g3 * j1)), -ic * (fb2 - 0.5 * (g2 - g3 * j2))
+        own = f * s * ic - pm
+        s11 = own + 2.0 * q1 * x1 + k1 * w1 * w1 + k2 * z1 * z1 + k3 * j1 * j1
+        s12 = q1 * x2 + q2 * x1 + k1 * w1 * w2 + k2 * z1 * z2 + k3 * j1 * j2
+        s22 = own + 2.0 * q2 * x2 + k1 * w2 * w2 + k2 * z2 * z2 + k3 * j2 * j2
+        rows = combine3(s11, m1b, s12, m2b, -gb1, b), combine3(s12, m1b, s22, m2b, -gb2, b)
+        add_upper_outer_sum(edge_hessian_out, kb, ilb * ilb, m1b, rows[0], m2b, rows[1], scaled(-1.0, b), gradient_b)
+        t1 = -k1 * j1 * w1 - k2 * j2 * z1 + k3 * j1 - ic * (s * g2 + fb * q1)
+        t2 = -k1 * j1 * w2 - k2 * j2 * z2 + k3 * j2 + ic * (s * g1 - fb * q2)
+        add_column(edge_hessian_out, kb, 3, ilb, combine(t1, m1b, t2, m2b))
+        edge_hessian_out[kb, 3, 3] += k1 * j1 * j1 + k2 * j2 * j2 + k3 + qm
 
-        # cross block, rows (e, θ) of a, columns of b
-        cab = ic * ila * ilb
-        add_outer(cross_hessian_out, k, cab, combine(ic, u, -1.0, ma), ap)
-        add_outer(cross_hessian_out, k, cab, bp, combine(1.0, mb, -ic, w))
-        add_identity(cross_hessian_out, k, -cab * f)
-        add_outer(cross_hessian_out, k, cab * f, a, combine(1.0, a, -ab, b))
-        add_outer(cross_hessian_out, k, cab * f, b, b)
-        add_outer(cross_hessian_out, k, -k1 * ca * cb, u1, w1)
-        add_outer(cross_hessian_out, k, -k2 * ca * cb, u2, w2)
-        add_outer(cross_hessian_out, k, 1.0, ha, combine(k3, hb, -g3 * ilb, t_sum))
-        s = g3 * cab
-        cross_hessian_out[k, 0, 1] -= s * a[2]
-        cross_hessian_out[k, 0, 2] += s * a[1]
-        cross_hessian_out[k, 1, 0] += s * a[2]
-        cross_hessian_out[k, 1, 2] -= s * a[0]
-        cross_hessian_out[k, 2, 0] -= s * a[1]
-        cross_hessian_out[k, 2, 1] += s * a[0]
-        # e of a, θ of b
-        add_column(cross_hessian_out, k, 3, -ca, combine(1.0, combine(1.0, pb, -dot(a, pb), a), fb, bp))
-        add_column(cross_hessian_out, k, 3, 1.0, combine3(-k1 * ca * t1b, u1, -k2 * ca * t2b, u2, k3, ha))
-        # θ of a, e of b
-        theta_row = combine3(cb, combine(1.0, pa, -dot(b, pa), b), -cb * fa, ap, -k3, hb)
-        theta_row = combine3(1.0, theta_row, k1 * cb * t1a, w1, k2 * cb * t2a, w2)
-        cross_hessian_out[k, 3, 0] += theta_row[0]
-        cross_hessian_out[k, 3, 1] += theta_row[1]
-        cross_hessian_out[k, 3, 2] += theta_row[2]
-        cross_hessian_out[k, 3, 3] += k1 * t1a * t1b + k2 * t2a * t2b - k3
+        # rows of a, columns of b
+        x1, x2 = -ic * (fa1 + g1 + g3 * h1), -ic * (fa2 + g2 + g3 * h2)
+        y1, y2 = -ic * (fb1 - g1), -ic * (fb2 - g2)
+        fc, gc = f * ic, g3 * ic
+        s11 = x1 * q1 + p1 * y1 - fc * r11 - gc * r21 + k1 * u1 * w1 + k2 * v1 * z1 + k3 * h1 * j1
+        s12 = x1 * q2 + p1 * y2 - fc * r12 - gc * r22 + k1 * u1 * w2 + k2 * v1 * z2 + k3 * h1 * j2
+        s21 = x2 * q1 + p2 * y1 - fc * r21 + gc * r11 + k1 * u2 * w1 + k2 * v2 * z1 + k3 * h2 * j1
+        s22 = x2 * q2 + p2 * y2 - fc * r22 + gc * r12 + k1 * u2 * w2 + k2 * v2 * z2 + k3 * h2 * j2
+        rows = combine(s11, m1b, s12, m2b), combine(s21, m1b, s22, m2b)
+        add_outer_sum(cross_hessian_out, k, ila * ilb, m1a, rows[0], m2a, rows[1])
+        t1 = -k1 * j1 * u1 - k2 * j2 * v1 + k3 * h1 - ic * (g1 * r12 - g2 * r11 + fb * p1)
+        t2 = -k1 * j1 * u2 - k2 * j2 * v2 + k3 * h2 - ic * (g1 * r22 - g2 * r21 + fb * p2)
+        add_column(cross_hessian_out, k, 3, ila, combine(t1, m1a, t2, m2a))
+        t1 = -k1 * h1 * w1 - k2 * h2 * z1 - k3 * j1 + ic * (g1 * r21 - g2 * r11 - fa * q1)
+        t2 = -k1 * h1 * w2 - k2 * h2 * z2 - k3 * j2 + ic * (g1 * r22 - g2 * r12 - fa * q2)
+        theta_row = combine(t1, m1b, t2, m2b)
+        cross_hessian_out[k, 3, 0] += ilb * theta_row[0]
+        cross_hessian_out[k, 3, 1] += ilb * theta_row[1]
+        cross_hessian_out[k, 3, 2] += ilb * theta_row[2]
+        cross_hessian_out[k, 3, 3] += k1 * h1 * j1 + k2 * h2 * j2 - k3
     return energy_bend, energy_twist

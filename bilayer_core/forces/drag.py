@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
-from ..kinematics.vector import add_row, add_upper_outer, combine, cross, dot, row, scaled
+from ..kinematics.vector import add_row, add_upper_outer_sum, combine, combine3, cross, dot, row, scaled
 
 
 @kernel
@@ -81,17 +81,17 @@ def drag(
     energy = 0.0
     for k in range(node.shape[0]):
         i = node[k]
-        v0 = (position[i, 0] - origin[i, 0]) / step_length - flow[0]
-        v1 = (position[i, 1] - origin[i, 1]) / step_length - flow[1]
-        v2 = (position[i, 2] - origin[i, 2]) / step_length - flow[2]
-        force = (0.0, 0.0, 0.0)
-        for d in range(3):
-            n = (direction[k, d, 0], direction[k, d, 1], direction[k, d, 2])
-            speed = v0 * n[0] + v1 * n[1] + v2 * n[2]
-            size = abs(speed)
-            energy += step_length * coefficient[k, d] * size * size * size / 6.0
-            force = combine(1.0, force, 0.5 * coefficient[k, d] * size * speed, n)
-            if with_hessian:
-                add_upper_outer(node_hessian_out, i, coefficient[k, d] * size / step_length, n)
-        add_row(node_gradient_out, i, 1.0, force)
+        v = (
+            (position[i, 0] - origin[i, 0]) / step_length - flow[0],
+            (position[i, 1] - origin[i, 1]) / step_length - flow[1],
+            (position[i, 2] - origin[i, 2]) / step_length - flow[2],
+        )
+        t, m, n = row(direction[k], 0), row(direction[k], 1), row(direction[k], 2)
+        vt, vm, vn = dot(v, t), dot(v, m), dot(v, n)
+        ct, cm, cn = coefficient[k, 0] * abs(vt), coefficient[k, 1] * abs(vm), coefficient[k, 2] * abs(vn)
+        energy += step_length * (ct * vt * vt + cm * vm * vm + cn * vn * vn) / 6.0
+        add_row(node_gradient_out, i, 0.5, combine3(ct * vt, t, cm * vm, m, cn * vn, n))
+        if with_hessian:
+            t_, m_, n_ = scaled(ct, t), scaled(cm, m), scaled(cn, n)
+            add_upper_outer_sum(node_hessian_out, i, 1.0 / step_length, t_, t, m_, m, n_, n)
     return energy

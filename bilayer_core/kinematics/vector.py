@@ -118,3 +118,24 @@ def add_upper_projector(array, k, s, a):
     """Upper triangle of array[k, :3, :3] += s (I − a aᵀ), a a unit vector"""
     add_identity(array, k, s)
     add_upper_outer(array, k, -s, a)
+
+
+@kernel
+def add_upper_outer_sum(array, k, s, a, x, b, y, c, z):
+    """Upper triangle of array[k, :3, :3] += s (a xᵀ + b yᵀ + c zᵀ), a sum that is symmetric"""
+    array[k, 0, 0] += s * (a[0] * x[0] + b[0] * y[0] + c[0] * z[0])
+    array[k, 0, 1] += s * (a[0] * x[1] + b[0] * y[1] + c[0] * z[1])
+    array[k, 0, 2] += s * (a[0] * x[2] + b[0] * y[2] + c[0] * z[2])
+    array[k, 1, 1] += s * (a[1] * x[1] + b[1] * y[1] + c[1] * z[1])
+    array[k, 1, 2] += s * (a[1] * x[2] + b[1] * y[2] + c[1] * z[2])
+    array[k, 2, 2] += s * (a[2] * x[2] + b[2] * y[2] + c[2] * z[2])
+
+
+@kernel
+def add_outer_sum(array, k, s, a, x, b, y):
+    """array[k, :3, :3] += s (a xᵀ + b yᵀ)"""
+    for j in range(3):
+        xj, yj = (x[0], y[0]) if j == 0 else ((x[1], y[1]) if j == 1 else (x[2], y[2]))
+        array[k, 0, j] += s * (a[0] * xj + b[0] * yj)
+        array[k, 1, j] += s * (a[1] * xj + b[1] * yj)
+        array[k, 2, j] += s * (a[2] * xj + b[2] * yj)
