@@ -35,13 +35,16 @@ def _on_stack(context, builder, array_type, shape):
 
 @intrinsic(prefer_literal=True)
 def stack_vector(typingctx, n):
-    """An uninitialised array of `n` floats, a literal; it ends with the function that asked for it."""
-    if not isinstance(n, types.IntegerLiteral):
+    """An uninitialised array of `n` floats, a literal, or as many as the tuple `n` has entries; it ends with the
+    function that asked for it.
+    """
+    if not isinstance(n, (types.IntegerLiteral, types.UniTuple)):
         return None
+    size = n.count if isinstance(n, types.UniTuple) else n.literal_value
     array_type = types.Array(types.float64, 1, "C")
 
     def make(context, builder, signature, arguments):
-        return _on_stack(context, builder, array_type, [n.literal_value])
+        return _on_stack(context, builder, array_type, [size])
 
     return signature(array_type, n), make
 

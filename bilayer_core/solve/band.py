@@ -1,14 +1,14 @@
 """L D Lᵀ of a symmetric band matrix, and solution for one or several right-hand sides.
 
 Storage is by columns of the lower triangle: ``band[j, r] = A[j + r, j]``, 0 ≤ r ≤ half-bandwidth, with as many rows
-of padding at the end
-as the half-bandwidth. It is given as the length of a tuple, which is a compile-time constant: inner loops have fixed
-lengths. Cost: n b² and 4 n b per right-hand side.
+of padding at the end as the half-bandwidth. It is given as the length of a tuple, which is a compile-time constant:
+inner loops have fixed lengths. Cost: n b² and 4 n b per right-hand side.
 """
 
 from __future__ import annotations
 
 from ..jit import kernel
+from ..kinematics.stack import stack_vector
 
 
 def width(half_bandwidth: int) -> tuple[int, ...]:
@@ -56,22 +56,40 @@ def factor_signed(band, n, bandwidth):
 
 @kernel
 def forward_band(band, n, bandwidth, right):
-    """Overwrite `right`, of n + b values whose last b are zero, with L⁻¹ times it."""
+    """Overwrite `right`, of n + b values whose last b are zero, with L⁻¹ times it.
+
+    The last b found are kept in registers: they would not be in memory in time for the next.
+    """
     b = len(bandwidth)
-    for j in range(n):
-        value = right[j]
-        for r in range(1, b + 1):
-            right[j + r] -= band[j, r] * value
+    found = stack_vector(bandwidth)
+    for j in range(b):
+        for r in range(1, b - j):
+            right[j + r] -= band[j, r] * right[j]
+        found[b - 1 - j] = right[j]
+    for first in range(n - b):
+        value = right[first + b]
+        for s in range(b):
+            value -= band[first + s, b - s] * found[b - 1 - s]
+        for r in range(b - 1, 0, -1):
+            found[r] = found[r - 1]
+        found[0] = value
+        right[first + b] = value
 
 
 @kernel
 def backward_band(band, n, bandwidth, right):
-    """Overwrite `right`, of n + b values whose last b are zero, with (D Lᵀ)⁻¹ times it."""
+    """Overwrite the first n values of `right` with (D Lᵀ)⁻¹ times them."""
     b = len(bandwidth)
+    found = stack_vector(bandwidth)
+    for r in range(b):
+        found[r] = 0.0
     for j in range(n - 1, -1, -1):
         value = right[j] / band[j, 0]
         for r in range(b, 0, -1):  # what was found last is needed last
-            value -= band[j, r] * right[j + r]
+            value -= band[j, r] * found[r - 1]
+        for r in range(b - 1, 0, -1):
+            found[r] = found[r - 1]
+        found[0] = value
         right[j] = value
 
 
