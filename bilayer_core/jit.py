@@ -12,6 +12,8 @@ import os
 
 import numba
 
+from . import indexing  # noqa: F401 (its lowering is for every kernel)
+
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 _log = logging.getLogger(__name__)
 

@@ -11,6 +11,7 @@ holds what its fields refer to, so its addresses are good as long as it is.
 
 from __future__ import annotations
 
+import hashlib
 from typing import Any, dataclass_transform
 
 import numpy as np
@@ -32,12 +33,16 @@ WORD = 8
 
 
 class GroupType(types.Type):
-    """Type of a group in kernels: the name of its class, and name and type of every field."""
+    """Type of a group in kernels: the name of its class, and name and type of every field.
+
+    Its own name, which is part of that of every function that takes it, has the fields as a digest alone.
+    """
 
     def __init__(self, declared: str, fields: tuple[tuple[str, types.Type], ...]):
         self.fields = fields
         listed = ", ".join(f"{name}: {type_of_field}" for name, type_of_field in fields)
-        super().__init__(f"{declared}({listed})")
+        digest = hashlib.blake2b(listed.encode(), digest_size=8).hexdigest()
+        super().__init__(f"{declared}({digest})")
 
 
 class Group:
