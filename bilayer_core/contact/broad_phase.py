@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ..jit import allocating, kernel
+from ..jit import allocating, inner, kernel
 from .segment import square_distance
 
 
@@ -24,7 +24,7 @@ def _square_distance(position, i, s, j):
     return square_distance(p0, p1, p2, position, j)
 
 
-@kernel
+@inner
 def _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, touch):
     """Whether a point at `arc` [m] may touch the segment k of a rod that its own meets: it is far enough along that rod
     (`exclusion`, −inf for another rod), and where bodies join the two they do not touch by construction.

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from ..jit import inner, kernel
 from .broad_phase import near_pairs
 
 MARGIN = 0.5
@@ -28,7 +28,7 @@ MADE, ROOM, PATH = 0, 1, 2
 """Places in `ways`."""
 
 
-@kernel
+@inner
 def _departure(position, step, fraction, base):
     """Largest distance of a node at x + fraction · step from its place in `base` [m], the mean of all taken off, as in
     `base`.
@@ -60,7 +60,7 @@ def reachable(step, no_step, unit):
     return move, largest / move if move > largest else 1.0
 
 
-@kernel
+@inner
 def _stray(position, step, fraction, base, tip):
     """Largest distance of a node at x + fraction · step from a list's motion, at the moment of this that is nearest to
     all [m], the mean of all taken off, as in `base` and `tip`.
@@ -86,7 +86,7 @@ def _stray(position, step, fraction, base, tip):
     return math.sqrt(largest)
 
 
-@kernel
+@inner
 def _centre(position, step, fraction, out):
     """x + fraction · step, the mean taken off."""
     count = position.shape[0]

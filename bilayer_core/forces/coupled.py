@@ -13,11 +13,11 @@ Blocks between a node and a free body ("links") are listed: the node, the body, 
 
 from __future__ import annotations
 
-from ..jit import kernel
+from ..jit import inner
 from ..kinematics.stack import stack_matrix
 
 
-@kernel
+@inner
 def add_force(contact_out, body, sign, arm, g):
     """Add ± (g, arm × g) to the gradient of a body's (X, φ)."""
     contact_out[body, 0] += sign * g[0]
@@ -28,7 +28,7 @@ def add_force(contact_out, body, sign, arm, g):
     contact_out[body, 5] += sign * (arm[0] * g[1] - arm[1] * g[0])
 
 
-@kernel
+@inner
 def _skew(a, out):
     """out = [a]×, shape (3, 3)."""
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
@@ -36,7 +36,7 @@ def _skew(a, out):
     out[1, 0], out[2, 0], out[2, 1] = a[2], -a[1], a[0]
 
 
-@kernel
+@inner
 def _local_hessian(m, g, arm, lever, turning, local):
     """The Hessian with respect to (x or X_A, φ_A, X_B, φ_B), shape (12, 12)."""
     jacobian = stack_matrix(3, 12)
@@ -78,7 +78,7 @@ def _local_hessian(m, g, arm, lever, turning, local):
                 local[9 + q, 3 + p] += value
 
 
-@kernel
+@inner
 def add_coupled(
     m,
     g,

@@ -28,7 +28,7 @@ import math
 from ..contact.barrier import barrier_gradient
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from ..contact.near import gap_normal
-from ..jit import kernel
+from ..jit import inner, kernel
 from ..kinematics.stack import stack_matrix, stack_vector
 from .coupled import add_coupled, add_force
 
@@ -124,7 +124,7 @@ def lag_axes(count, first, normal, node_edges, node_axis, tangent, director1, ax
         axis_out[k, 0], axis_out[k, 1], axis_out[k, 2] = x, y, z
 
 
-@kernel
+@inner
 def _slip(body, turn, origin_turn, place, origin_place, arm, k, sign, arm_now, slip):
     """Add ± the displacement of a point of a body since the origin, and write its arm now."""
     for i in range(3):

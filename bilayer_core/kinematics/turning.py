@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from ..jit import inner
 
 
-@kernel
+@inner
 def turn_by(v0, v1, v2, matrix, b, out, c):
     """out[c] = exp([v]×) matrix[b] for a rotation vector v [rad], by Rodrigues' formula; `out[c]` is not `matrix[b]`.
 
@@ -30,7 +30,7 @@ def turn_by(v0, v1, v2, matrix, b, out, c):
         out[c, 2, j] = u2 + s * w2 + k * (v0 * w1 - v1 * w0)
 
 
-@kernel
+@inner
 def turn_between(first, a, last, b):
     """Rotation vector [rad] of last[b] first[a]ᵀ, by less than half a turn, as a tuple."""
     q00 = q11 = q22 = q21 = q12 = q02 = q20 = q10 = q01 = 0.0
@@ -50,7 +50,7 @@ def turn_between(first, a, last, b):
     return factor * x, factor * y, factor * z
 
 
-@kernel
+@inner
 def product_transposed(left, a, right, b, out, c):
     """out[c] = left[a] right[b]ᵀ"""
     for i in range(3):
@@ -60,7 +60,7 @@ def product_transposed(left, a, right, b, out, c):
             )
 
 
-@kernel
+@inner
 def inertia_tensor(second_moment, f, rotation, b, out):
     """R (tr(J) 1 − J) Rᵀ in the world's axes [kg m²], J the second moment of free body f, R = rotation[b]; (3, 3)."""
     trace = second_moment[f, 0, 0] + second_moment[f, 1, 1] + second_moment[f, 2, 2]
@@ -73,7 +73,7 @@ def inertia_tensor(second_moment, f, rotation, b, out):
             out[i, j] = total
 
 
-@kernel
+@inner
 def solve_three(matrix, x, y, z):
     """Solution of a regular 3 × 3 system by Cramer's rule, as a tuple."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]

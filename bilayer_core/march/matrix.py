@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..jit import inner, part
+from ..jit import inner
 from ..solve.assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
 from ..solve.band import backward_band, factor_band, forward_band
 from ..solve.newton_matrix import FIRST_SHIFT, LARGEST_SHIFT, SHIFT_GROWTH
@@ -105,7 +105,7 @@ def _hold(held, strands, band):
     hold_unknowns(held.row, strands.dimension, len(strands.bandwidth), band)
 
 
-@part
+@inner
 def factorise(p, at, stage):
     """Assemble and factorise the matrix of the last evaluation, that of `at`; returns a status.
 

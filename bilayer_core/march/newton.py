@@ -6,7 +6,7 @@ import math
 
 from ..contact.near import largest_motion
 from ..contact.step_bound import step_bound
-from ..jit import inner, part
+from ..jit import inner
 from ..kinematics.turning import turn_between, turn_by
 from ..solve.newton import ARMIJO, BACKTRACKING, KEEP_FACTOR_BELOW, MAX_BACKTRACKS, ROUNDING, largest_move
 from .contact import list_pairs
@@ -117,7 +117,7 @@ def _move_prescribed(bodies, start, position, rotation, motion):
             motion[b, 3], motion[b, 4], motion[b, 5] = turn_between(start.rotation, b, rotation, b)
 
 
-@part
+@inner
 def first_guess(p, start, position, rotation, stage, guess):
     """Set `guess` to `start` moved by its velocity, prescribed bodies to the given poses.
 
@@ -177,7 +177,7 @@ FACTORISE, REFRESH, FOLLOW, SEARCH = 0, 1, 2, 3
 has changed, a step of the line search."""
 
 
-@part
+@inner
 def minimise(p, at, trial, stage, tolerance, max_iterations):
     """Move `at` to the minimum of the potential; `trial` is scratch.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner, part
+from ..jit import inner
 from ..solve.assembly import expand_gradient
 from ..solve.clamps import hand_gradient_to_bodies
 from .contact import add_contact, clear_contact, hand_on_contact, lag_sliding, list_pairs
@@ -18,7 +18,7 @@ from .terms import FOLLOWERS, LOADS
 from .threads import add_threads, lag_threads
 
 
-@part
+@inner
 def start_stage(p, start, stage):
     """Freeze what a stage depends on: near pairs, friction's contacts, loads. Returns whether a loop can go on."""
     status = list_pairs(p.surfaces, start, 0.0)
@@ -41,7 +41,7 @@ def follow(p, at, stage):
     return moved
 
 
-@part
+@inner
 def evaluate(p, at, stage, with_hessian, again):
     """Potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface or a rod [m].
 

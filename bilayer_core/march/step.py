@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner, kernel, part
+from ..jit import inner, kernel
 from ..scene.transduction import grown, lagged
 from .copying import copy
 from .newton import first_guess, minimise
@@ -26,7 +26,7 @@ def grow(drives, law_strain, rest_edge_out, rest_joint_out):
         rest_joint_out[drives.driven_joint[k], 0] += bent
 
 
-@part
+@inner
 def _compare_touched(sums, touched):
     """Note which carriers something pushes; whether they are those of before."""
     same = True
@@ -37,7 +37,7 @@ def _compare_touched(sums, touched):
     return same
 
 
-@part
+@inner
 def _has_jumped(drives, state, first, range_of_channel, h):
     """Whether a stimulus has jumped that some layer follows at once, or a step before did not leave its slopes."""
     if state.kept[0] == 0.0:
@@ -57,7 +57,7 @@ NO_JUMP = 1e-9
 """Part of a channel's range below which a change at once is rounding."""
 
 
-@part
+@inner
 def _drive(drives, state, course, k, n, work, stage):
     """What acts from outside at stage n of step k."""
     transduction, strain = work.transduction, work.strain
@@ -72,7 +72,7 @@ def _drive(drives, state, course, k, n, work, stage):
         stage.load_factor[i] = course.load_factor[k, n, i]
 
 
-@part
+@inner
 def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterations):
     """Advance a state by a step of length h [s]; it changes only if every stage converged.
 

@@ -8,7 +8,7 @@ numbers of unknowns.
 
 from __future__ import annotations
 
-from ..jit import kernel
+from ..jit import inner, kernel
 from ..kinematics.stack import stack_matrix
 
 
@@ -44,7 +44,7 @@ def expand_gradient(
             gradient_out[node_unknown[i] + c] = node_gradient[i, c]
 
 
-@kernel
+@inner
 def _add(band, row, column, value):
     """A[row, column] += value in either triangle."""
     if row >= column:
@@ -53,15 +53,7 @@ def _add(band, row, column, value):
         band[row, column - row] += value
 
 
-@kernel
-def _add_block(band, row, column, s, block, k):
-    """A[row:row+3, column:column+3] += s block[k, :3, :3], for row > column."""
-    for n in range(3):
-        for m in range(3):
-            band[column + n, row + m - column - n] += s * block[k, m, n]
-
-
-@kernel
+@inner
 def _add_transposed_block(band, row, column, s, block, k):
     """A[row:row+3, column:column+3] += s block[k, :3, :3]ᵀ, for row > column."""
     for n in range(3):
@@ -69,7 +61,7 @@ def _add_transposed_block(band, row, column, s, block, k):
             band[column + n, row + m - column - n] += s * block[k, n, m]
 
 
-@kernel
+@inner
 def _add_own_block(band, start, s, block, k):
     """A[start:start+3, start:start+3] += s (upper triangle of block[k])."""
     for m in range(3):
@@ -77,7 +69,7 @@ def _add_own_block(band, start, s, block, k):
             band[start + m, n - m] += s * block[k, m, n]
 
 
-@kernel
+@inner
 def _add_symmetrised_block(band, start, s, block, k):
     """A[start:start+3, start:start+3] += s (block + blockᵀ)."""
     for m in range(3):

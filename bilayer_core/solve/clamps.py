@@ -14,10 +14,10 @@ for the border.
 
 from __future__ import annotations
 
-from ..jit import kernel
+from ..jit import inner, kernel
 
 
-@kernel
+@inner
 def _turning(base, arm, k, g0, g1, g2, body_hessian):
     """½ (a gᵀ + g aᵀ) − (a·g) I on a body's rotation block."""
     product = arm[k, 0] * g0 + arm[k, 1] * g1 + arm[k, 2] * g2
@@ -29,7 +29,7 @@ def _turning(base, arm, k, g0, g1, g2, body_hessian):
         body_hessian[base + 3 + m, base + 3 + m] -= product
 
 
-@kernel
+@inner
 def arm_jacobian(axes, arm, k, c, n):
     """Entry (c, n) of ∂(a_c·x)/∂(X, φ) = [a_cᵀ, (ρ × a_c)ᵀ] for the direction a_c of an unknown."""
     if n < 3:
@@ -142,7 +142,7 @@ def hand_nodes_to_bodies(
         )
 
 
-@kernel
+@inner
 def _wall_jacobian(axes, tangent, w, m, n):
     """Entry (m, n) of ∂(e, θ)/∂φ = [−[t]×; tᵀ]."""
     if m == 3:

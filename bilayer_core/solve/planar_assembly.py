@@ -13,10 +13,10 @@ is what is solved for.
 
 from __future__ import annotations
 
-from ..jit import kernel
+from ..jit import inner, kernel
 
 
-@kernel
+@inner
 def _node_block(axes, node_hessian, mass, i):
     """Block (pp, pq, qq) of a node by itself: its mass, and what acts on it in space, by an upper triangle."""
     if node_hessian.shape[0] == 0:
@@ -30,7 +30,7 @@ def _node_block(axes, node_hessian, mass, i):
     return mass + p0 * v0 + p1 * v1 + p2 * v2, q0 * v0 + q1 * v1 + q2 * v2, mass + q0 * w0 + q1 * w1 + q2 * w2
 
 
-@kernel
+@inner
 def _put_own_block(band, d, pp, pq, qq):
     """Write a symmetric block of one node."""
     band[d, 0] = pp
@@ -38,7 +38,7 @@ def _put_own_block(band, d, pp, pq, qq):
     band[d + 1, 0] = qq
 
 
-@kernel
+@inner
 def _put_block(band, row, column, pp, pq, qp, qq):
     """Write a block of two nodes, row > column: rows p, q of the first, columns p, q of the second."""
     r = row - column

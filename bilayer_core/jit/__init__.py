@@ -12,7 +12,8 @@ import os
 
 import numba
 
-from . import indexing  # noqa: F401 (its lowering is for every kernel)
+from . import indexing  # noqa: F401 (what it registers serves every kernel)
+from .inner_compiler import InnerCompiler
 
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 _log = logging.getLogger(__name__)
@@ -44,7 +45,7 @@ OPTIONS = dict(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, 
 def kernel(function):
     """Compile `function`: nopython, GIL released, cached, NaN-preserving fast arithmetic.
 
-    Small scalar functions take it too; LLVM inlines them into the kernels that call them.
+    For what the interpreter calls; other kernels may call it too.
     """
     return numba.njit(**OPTIONS)(function)
 
@@ -55,10 +56,5 @@ def allocating(function):
 
 
 def inner(function):
-    """A kernel that only other kernels call: without what would let the interpreter do so."""
-    return numba.njit(**OPTIONS, no_cpython_wrapper=True)(function)
-
-
-def part(function):
-    """A kernel that one other kernel calls, once: compiled there, as if it were written there, and not by itself."""
-    return numba.njit(**OPTIONS, inline="always")(function)
+    """A function that only kernels call, and the interpreter cannot: it is compiled within each of them."""
+    return numba.njit(**OPTIONS, no_cpython_wrapper=True, pipeline_class=InnerCompiler)(function)

@@ -1,8 +1,8 @@
-"""Shorter machine code, before optimisation, for one element of a contiguous array.
+"""Shorter code, before optimisation, for one element of a contiguous array.
 
-Nearly everything that kernels do is to read and write elements, and nearly all that LLVM has to read is numba's code for
-it: 45 instructions for `a[i, j]`, which it then brings down to 5. Here they are 12, with the same meaning: negative
-indices count from the end. What is no single element of a C-contiguous array, and whatever has bounds checked, is left to
+Nearly all that kernels do is to read and write elements, and nearly all that LLVM has to read is numba's code for it:
+45 instructions for `a[i, j]`, which it then brings down to 5. Here they are 12, with the same meaning: negative indices
+count from the end. What is no single element of a C-contiguous array, and whatever has its bounds checked, is left to
 numba. Registered through numba's extension interface, it serves all that is compiled in the process.
 """
 
