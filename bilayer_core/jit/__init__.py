@@ -13,7 +13,7 @@ import os
 import numba
 
 from . import indexing  # noqa: F401 (what it registers serves every kernel)
-from .inner_compiler import InnerCompiler
+from .inner_compiler import InnerCompiler, InnerFunction
 
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 _log = logging.getLogger(__name__)
@@ -57,4 +57,6 @@ def allocating(function):
 
 def inner(function):
     """A function that only kernels call, and the interpreter cannot: it is compiled within each of them."""
-    return numba.njit(**OPTIONS, no_cpython_wrapper=True, pipeline_class=InnerCompiler)(function)
+    compiled = numba.njit(**OPTIONS, no_cpython_wrapper=True, pipeline_class=InnerCompiler)(function)
+    compiled.__class__ = InnerFunction
+    return compiled

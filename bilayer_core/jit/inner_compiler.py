@@ -15,7 +15,15 @@ from numba import _dynfunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
+
+
+class InnerFunction(CPUDispatcher):
+    """A function that only kernels call."""
+
+    def __call__(self, *arguments):
+        raise TypeError(f"{self.py_func.__qualname__} is called by kernels alone (`jit.inner`), not by the interpreter")
 
 
 class _Library(JITCodeLibrary):

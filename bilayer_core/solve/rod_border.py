@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..jit import inner, kernel
+from ..jit import kernel
 from ..model.model import Model
 from .assembly import hold_unknowns
 from .clamps import arm_jacobian
@@ -164,7 +164,7 @@ def choose_leaving(count, node, strand, attached, mark, met, node_unknown, dimen
     return leaving
 
 
-@inner
+@kernel
 def add_to_bodies(
     axes,
     count,
