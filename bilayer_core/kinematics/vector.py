@@ -120,7 +120,7 @@ def add_upper_projector(array, k, s, a):
     add_upper_outer(array, k, -s, a)
 
 
-@kernel
+@inner
 def add_upper_outer_sum(array, k, s, a, x, b, y, c, z):
     """Upper triangle of array[k, :3, :3] += s (a xᵀ + b yᵀ + c zᵀ), a sum that is symmetric"""
     array[k, 0, 0] += s * (a[0] * x[0] + b[0] * y[0] + c[0] * z[0])
@@ -131,7 +131,7 @@ def add_upper_outer_sum(array, k, s, a, x, b, y, c, z):
     array[k, 2, 2] += s * (a[2] * x[2] + b[2] * y[2] + c[2] * z[2])
 
 
-@kernel
+@inner
 def add_outer_sum(array, k, s, a, x, b, y):
     """array[k, :3, :3] += s (a xᵀ + b yᵀ)"""
     for j in range(3):

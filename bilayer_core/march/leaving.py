@@ -10,7 +10,8 @@ CONTACTS, NODES = 0, 1
 
 
 @inner
-def _take_part(leaving, strands, simplified, begin, part):
+def _take_part(leaving, strands, simplified, part):
+    begin = leaving.counts[CONTACTS]
     take_contacts(
         strands.axes,
         simplified,
@@ -30,7 +31,7 @@ def _take_part(leaving, strands, simplified, begin, part):
         leaving.side,
         leaving.turn,
     )
-    return begin + part.counted[0]
+    leaving.counts[CONTACTS] = begin + part.counted[0]
 
 
 @inner
@@ -38,9 +39,10 @@ def take_contacts_of(threads, leaving, strands, simplified, band):
     """Add each edge's own blocks to the band, and choose the nodes that leave it."""
     if threads is None:
         return
-    count = _take_part(leaving, strands, simplified, 0, threads.contacts)
-    count = _take_part(leaving, strands, simplified, count, threads.sliding)
-    leaving.counts[CONTACTS], leaving.counts[NODES] = count, 0
+    leaving.counts[CONTACTS], leaving.counts[NODES] = 0, 0
+    _take_part(leaving, strands, simplified, threads.contacts)
+    _take_part(leaving, strands, simplified, threads.sliding)
+    count = leaving.counts[CONTACTS]
     if count == 0:
         return
     blocks = leaving.node, leaving.weight, leaving.matrix, leaving.side, leaving.turn

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..jit import inner
 from ..solve.assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
 from ..solve.band import backward_band, factor_band, forward_band
@@ -105,6 +107,11 @@ def _hold(held, strands, band):
     hold_unknowns(held.row, strands.dimension, len(strands.bandwidth), band)
 
 
+EXACT = np.int64(0)
+"""How far contacts of rods are simplified at first. (The literal 0 has a type of its own, for which numba would compile
+all that takes it once more.)"""
+
+
 @inner
 def factorise(p, at, stage):
     """Assemble and factorise the matrix of the last evaluation, that of `at`; returns a status.
@@ -114,7 +121,7 @@ def factorise(p, at, stage):
     """
     strands, band = p.strands, p.system.band
     factor = 1.0 / (stage.lengths[0] * stage.lengths[1]) + p.damping / stage.lengths[0]
-    shift, simplified = 0.0, 0
+    shift, simplified = 0.0, EXACT
     while True:
         band[:] = 0.0
         _assemble_in_space(p.space, p.bonds, strands, p.sums, factor * (1.0 + shift), band)

@@ -10,6 +10,7 @@ from pathlib import Path
 SURVEY = """
 import importlib, json, pkgutil
 from numba.core.registry import CPUDispatcher
+from bilayer_core.jit.inner_compiler import InnerFunction
 from planar_scenes import AHEAD, everything_in_plane
 from sample_scenes import contact, everything, layer, rod, scene
 from bilayer_core import Simulator, load_scene
@@ -39,8 +40,8 @@ for part in ("kinematics", "contact", "forces", "solve", "integrate"):
     package = importlib.import_module(f"bilayer_core.{part}")
     for info in pkgutil.iter_modules(package.__path__):
         for name, value in vars(importlib.import_module(f"bilayer_core.{part}.{info.name}")).items():
-            # small functions whose names begin with _ are inlined
-            if isinstance(value, CPUDispatcher) and not name.startswith("_") and value.signatures:
+            # what only kernels call is compiled within them
+            if isinstance(value, CPUDispatcher) and not isinstance(value, InnerFunction) and value.signatures:
                 if value.py_func.__module__.endswith(".band"):  # one for each half-bandwidth
                     continue
                 used[f"{value.py_func.__module__}.{name}"] = len(value.signatures)
