@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -41,30 +43,21 @@ class Run:
     cost: dict[str, float | int]
 
 
-def run(problem: Problem, configuration: Configuration, longest: float = LONGEST) -> Run:
-    """Run a problem, several times where it is short; what it finds is the same each time."""
+def run(problem: Problem, configuration: Configuration, longest: float = LONGEST, timed: bool = True) -> Run:
+    """Run a problem: watched step by step for what it finds, then, if `timed`, as users run it, for what it costs.
+
+    The first of them also compiles whatever a run of this kind calls. Short runs are timed several times.
+    """
     try:
-        warm_up(problem, configuration)
-        once = _run(problem, configuration, longest)
+        found = _run(problem, configuration, longest, watched=True)
+        if timed and found.outcome == "done":
+            costs = [_run(problem, configuration, math.inf).cost]
+            if costs[0]["cpu_time"] < SHORT:
+                costs += [_run(problem, configuration, math.inf).cost for _ in range(REPEATS - 1)]
+            return replace(found, cost=min(costs, key=itemgetter("cpu_time")))
     except (SceneError, SimulationError) as error:
         return Run(str(error), None, {})
-    if once.outcome == "done" and once.cost["cpu_time"] < SHORT:
-        for _ in range(REPEATS - 1):
-            again = _run(problem, configuration, longest)
-            once.cost["cpu_time"] = min(once.cost["cpu_time"], again.cost["cpu_time"])
-    return once
-
-
-_warm: set[tuple[str, str, int]] = set()
-"""Problem, model and dimension of what has run in this process."""
-
-
-def warm_up(problem: Problem, configuration: Configuration) -> None:
-    """Let everything that a run of this kind calls be compiled: not all of it is called in the first step."""
-    kind = problem.name, configuration.family.model, configuration.family.dimension
-    if kind not in _warm:
-        _warm.add(kind)
-        _run(problem, configuration, LONGEST)
+    return found
 
 
 def simulator_of(problem: Problem, configuration: Configuration) -> Simulator:
@@ -75,14 +68,15 @@ def simulator_of(problem: Problem, configuration: Configuration) -> Simulator:
     return Simulator(config, dt=configuration.dt, tolerance=configuration.tolerance, **choice)
 
 
-def _run(problem: Problem, configuration: Configuration, longest: float) -> Run:
+def _run(problem: Problem, configuration: Configuration, longest: float, watched: bool = False) -> Run:
     simulator = simulator_of(problem, configuration)
     simulator.compile()
     track, load = Track(simulator), os.getloadavg()[0]
+    look, limit = (track.look, lambda: simulator.cpu_time > longest) if watched else (None, None)
     for end in sorted({*problem.measure.stops, problem.duration}):
-        result = simulator.run(end - simulator.time, stop=lambda: simulator.cpu_time > longest, progress=track.look)
+        result = simulator.run(end - simulator.time, stop=limit, each_step=look)
         if result.termination is Termination.INTERRUPTED:
-            break
+            return Run(f"ended after {longest:g} s of CPU at t = {simulator.time:.3g} s", None, {})
     statistics = simulator.statistics
     cost = {
         "cpu_time": simulator.cpu_time,
@@ -92,6 +86,4 @@ def _run(problem: Problem, configuration: Configuration, longest: float) -> Run:
         "dof": simulator.model.unknowns,
         "load": load,
     }
-    if simulator.time < problem.duration * (1.0 - 1e-9):
-        return Run(f"ended after {longest:g} s of CPU at t = {simulator.time:.3g} s", None, cost)
-    return Run("done", problem.measure.values(track), cost)
+    return Run("done", problem.measure.values(track) if watched else None, cost)

@@ -41,7 +41,6 @@ JUDGE = "two_rod"
 """Whose reference other programs are judged by, where the models have one layer and are one."""
 BLURRED = 2e-2
 """A problem whose reference has a larger error bar does not count when families are compared."""
-NO_LIMIT = math.inf
 DIGITS = 9
 
 
@@ -146,7 +145,7 @@ def _limit(problem: Problem, family: Family, tell: Callable[[str], None]) -> tup
     found = []
     for stations, dt in problem.reference_levels[-3:]:
         tell(f"{problem.name}, {family.label}: {stations} stations, {1e3 * dt:g} ms")
-        result = run(problem, Configuration(family, stations, dt), longest=NO_LIMIT)
+        result = run(problem, Configuration(family, stations, dt), longest=math.inf, timed=False)
         if result.values is None:
             raise SimulationError(f"{problem.name}: no reference: {result.outcome}", 0.0)
         found.append(_thinned(problem, result.values))

@@ -59,7 +59,7 @@ def measure(simulator: Simulator, duration: float, progress: Callable[[float], N
         if progress is not None:
             progress(time)
 
-    simulator.run(duration, progress=look)
+    simulator.run(duration, each_step=look)
     summary = simulator.summary()
     found = _by_axis("com", simulator.com - com)
     rise, when = peak(np.array(times), np.array(heights))

@@ -286,6 +286,7 @@ class Simulator:
         observers: Sequence[Observer] = (),
         stop: Callable[[], bool] | None = None,
         progress: Callable[[float], None] | None = None,
+        each_step: Callable[[float], None] | None = None,
     ) -> RunResult:
         """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
 
@@ -300,6 +301,8 @@ class Simulator:
             Asked every few steps; true ends the run as interrupted.
         progress : callable, optional
             Called every few steps with the simulated time [s].
+        each_step : callable, optional
+            Called with the simulated time [s] after each step, which is then made alone: that takes a little longer.
 
         Raises
         ------
@@ -317,13 +320,16 @@ class Simulator:
         begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
         end = begin + left if adaptive else math.inf
         termination = Termination.INTERRUPTED
+        most = STEPS_AT_ONCE if each_step is None else 1
         schedule = Schedule(observers, self)
         try:
             schedule.start()
             while done < steps and self.time < end:
-                at_once = schedule.steps_until_due(min(steps - done, STEPS_AT_ONCE))
+                at_once = schedule.steps_until_due(min(steps - done, most))
                 done += self._march(at_once) or self._step_once(schedule.next_stop(end))
                 schedule.observe_due()
+                if each_step is not None:
+                    each_step(self.time)
                 if progress is not None:
                     progress(self.time)
                 if stop is not None and done < steps and self.time < end and stop():

@@ -130,9 +130,16 @@ def test_a_problem_that_changed_asks_for_a_new_reference(monkeypatch):
         references.stored(problem, "two_rod")
 
 
+def test_a_way_has_a_point_for_every_step():
+    problem = problems.problem("cantilever")
+    found = measuring.run(problem, Configuration(FAMILY, 6, 4e-3))
+    assert found.values[:, 0] == pytest.approx(4e-3 * np.arange(126))
+    assert found.cost["cpu_time"] > 0.0
+
+
 def test_a_run_that_takes_too_long_is_ended_and_says_so():
     problem = problems.problem("cantilever")
-    found = measuring._run(problem, Configuration(FAMILY, 6, 4e-3), longest=0.0)
+    found = measuring.run(problem, Configuration(FAMILY, 6, 4e-3), longest=0.0)
     assert found.values is None and "ended after 0 s of CPU" in found.outcome
 
 

@@ -65,7 +65,7 @@ def test_a_trajectory_counts_until_its_end_alone_whatever_the_steps():
     track = Track(simulator)
     measure = Trajectory("tip", until=0.011, spacing=1e-3, length=0.1)
     for end in (*measure.stops, 0.02):
-        simulator.run(end - simulator.time, progress=track.look)
+        simulator.run(end - simulator.time, each_step=track.look)
     found = measure.values(track)
     assert found[0, 0] == 0.0 and found[-1, 0] == pytest.approx(0.011, abs=1e-12)
     assert len(found) < len(track.times)

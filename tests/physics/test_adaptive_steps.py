@@ -96,7 +96,7 @@ def test_a_ball_bounces_ever_nearer_to_where_it_fell_from(integrator):
     for tolerance in (1e-4, 1e-5) if integrator == "implicit_euler" else (1e-4, 1e-5, 1e-6):
         simulator, heights = Simulator(load_scene(falling()), tolerance=tolerance, integrator=integrator), []
         simulator.run(
-            0.2, progress=lambda time, of=simulator, to=heights: to.append((time, of.bodies["ball"].position))
+            0.2, each_step=lambda time, of=simulator, to=heights: to.append((time, of.bodies["ball"].position))
         )
         # at 0.152 s it would be at its highest again; its energy there, gravity's potential being 0 on top
         top = max(place[2] for time, place in heights if time > 0.1)

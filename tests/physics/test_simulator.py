@@ -119,6 +119,16 @@ def test_observers_see_the_first_frame_the_last_and_their_rate_between(simulator
     assert fast.frames[-1].substeps == slow.frames[-1].substeps == simulator.statistics.substeps
 
 
+def test_whoever_asks_for_each_step_sees_every_one_and_changes_none(simulator):
+    times = []
+    simulator.run(0.05, each_step=times.append)
+    assert times == pytest.approx(simulator.dt * np.arange(1, round(0.05 / simulator.dt) + 1), abs=1e-12)
+    watched = simulator.save_state()
+    simulator.reset()
+    simulator.run(0.05)
+    np.testing.assert_array_equal(simulator.save_state(), watched)
+
+
 def test_an_interrupted_run_tells_its_observers(simulator):
     recorder = Recorder(100.0)
     result = simulator.run(0.05, observers=[recorder], stop=lambda: simulator.time > 0.0225)
