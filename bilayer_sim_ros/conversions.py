@@ -8,11 +8,13 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from std_msgs.msg import Header
 
-from bilayer_sim_ros.worker import Status
+from bilayer_sim_ros.status import Status
 
 NANOSECONDS = 1_000_000_000
 # A run that reaches less than this part of the requested real-time factor is reported as late.
 ON_TIME = 0.95
+PATIENCE = 5.0
+"""Real time after which a controller that does not answer is missed [s]."""
 
 
 def to_time(seconds: float) -> Time:
@@ -37,8 +39,11 @@ def to_diagnostics(status: Status, name: str, real_time_factor: float) -> Diagno
     real_time_factor : float
         The factor asked for; 0 for as fast as possible.
     """
-    late = not status.paused and status.real_time_factor < ON_TIME * real_time_factor
-    if status.paused:
+    waiting = status.waited > 0.0
+    late = not (status.paused or waiting) and status.real_time_factor < ON_TIME * real_time_factor
+    if waiting:
+        message = f"waiting for a stimulus at t = {status.time:.6g} s"
+    elif status.paused:
         message = "paused"
     elif late:
         message = f"slower than asked for: {status.real_time_factor:.3g} not {real_time_factor:g}"
@@ -52,9 +57,10 @@ def to_diagnostics(status: Status, name: str, real_time_factor: float) -> Diagno
         "steps taken": str(status.substeps),
         "Newton iterations per step": f"{per_step:.3g}",
         "largest residual [m/s]": f"{status.residual:.3g}",
+        "waited for a stimulus [s]": f"{status.waited:.3g}",
     }
     report = DiagnosticStatus(
-        level=DiagnosticStatus.WARN if late else DiagnosticStatus.OK,
+        level=DiagnosticStatus.WARN if late or status.waited >= PATIENCE else DiagnosticStatus.OK,
         name=f"{name}: simulation",
         message=message,
         hardware_id=name,

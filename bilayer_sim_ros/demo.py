@@ -101,12 +101,19 @@ def process(command: list[str]):
 def simulate(log: Path, duration: float, console: Console) -> None:
     """Run simulation node and controller side by side until the simulated `duration` [s] is over."""
     simulation = node_command(
-        "sim_node", scene=SCENE, log=log, duration=duration, real_time_factor=0.0, start_paused=True
+        "sim_node",
+        scene=SCENE,
+        log=log,
+        duration=duration,
+        real_time_factor=0.0,
+        start_paused=True,
+        lockstep=True,
     )
     controller = node_command(
         "ramp_controller",
         channel=CHANNEL,
         duration=RAMP_DURATION,
+        hold=True,
         resume=True,
         connection_timeout=COMPILATION,
     )
@@ -126,8 +133,8 @@ def simulate(log: Path, duration: float, console: Console) -> None:
             task = progress.add_task("starting two nodes", total=duration, time="")
             while sim.poll() is None:
                 rclpy.spin_once(node, timeout_sec=0.2)
-                if ramp.poll():
-                    raise SimulationError("the controller failed", simulated)
+                if ramp.poll() is not None:
+                    raise SimulationError("the controller ended", simulated)
                 if simulated > 0.0:
                     state = "closing" if simulated < RAMP_DURATION else "holding and lifting"
                     progress.update(task, completed=simulated, description=state, time=f"{simulated:.1f} s simulated")

@@ -100,6 +100,10 @@ SIM_NODE = (
         "what acts before the first message and after the timeout: the value there is, zero, or the scene's schedule",
         choices=("hold", "zero", "schedule"),
     ),
+    NodeParameter("lockstep", False, "simulated time goes on only when a controller has answered the time on /clock"),
+    NodeParameter(
+        "control_period", 0.0, "simulated time between two answers in lockstep [s]; 0 = that between two frames", 0.0
+    ),
     NodeParameter("log", "", "MCAP file to write; empty = none"),
     NodeParameter("rerun", "off", "rerun recording: off, or an .rrd file to write when the run ends"),
     NodeParameter("model", "auto", "auto, or a model's name"),
@@ -116,8 +120,15 @@ RAMP_CONTROLLER = (
     NodeParameter("start_value", 0.0, "value at the start, in the channel's unit"),
     NodeParameter("end_value", 1.0, "value at the end, in the channel's unit"),
     NodeParameter("duration", 1.0, "time from the start value to the end value [s]", 0.0, above_minimum=True),
-    NodeParameter("rate", 50.0, "messages per second [Hz]", 0.0, above_minimum=True),
     NodeParameter("simulated_time", True, "ramp in the simulation's time, that of /clock; false = in real time"),
+    NodeParameter(
+        "rate",
+        50.0,
+        "messages per second in real time [Hz]; in simulated time each time on /clock is answered once",
+        0.0,
+        above_minimum=True,
+    ),
+    NodeParameter("hold", False, "go on sending the end value until interrupted"),
     NodeParameter("resume", False, "call the simulation's service ~/resume once the stimulus topic is connected"),
     NodeParameter("connection_timeout", 180.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
 )

@@ -7,10 +7,12 @@ import importlib
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
 
 from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec
+from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec, output_topics
+from bilayer_sim_ros.conversions import to_time
 
 CLOCK_TOPIC = "/clock"
 
@@ -36,7 +38,7 @@ class FramePublisher:
     rate, marker_rate : float
         Of frames, and of the topics made to be looked at [Hz]; the smaller one counts for those.
     clock : bool
-        Whether to publish /clock.
+        Whether to publish /clock with every frame.
     """
 
     def __init__(self, node: Node, description: Description, rate: float, marker_rate: float, clock: bool):
@@ -59,3 +61,22 @@ class FramePublisher:
         for spec, publisher in self._topics:
             if (display or spec.rate is not Rate.DISPLAY) and publisher.get_subscription_count() > 0:
                 publisher.publish(self._encoder.encode(spec.name, frame))
+
+
+class ClockPublisher:
+    """Publishes times on /clock that are not those of frames.
+
+    Parameters
+    ----------
+    node : Node
+    description : Description
+    """
+
+    def __init__(self, node: Node, description: Description):
+        (spec,) = (spec for spec in output_topics(description) if spec.name == CLOCK_TOPIC)
+        self._publisher = node.create_publisher(Clock, spec.name, quality_of_service(spec))
+
+    def publish(self, time: float) -> None:
+        """Publish simulated time `time` [s]."""
+        if self._publisher.get_subscription_count() > 0:
+            self._publisher.publish(Clock(clock=to_time(time)))

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
 
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from bilayer_core.errors import InputError
+from bilayer_sim_ros.conversions import NANOSECONDS
 from bilayer_sim_ros.parameters import Value
 
-BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+CLOCK_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 POLL_PERIOD = 0.05
 """Real time between two looks at whether something is connected [s]."""
 FINAL_MESSAGES = 5
@@ -31,11 +29,53 @@ def ramp(elapsed: float, duration: float, start_value: float, end_value: float) 
     return (1.0 - part) * start_value + part * end_value
 
 
+class RampSender:
+    """Sends the value of each new time; the ramp begins at the first one.
+
+    Parameters
+    ----------
+    send : callable
+        Sends a value.
+    finished : callable
+        Called when the end value has been sent often enough.
+    parameters : mapping
+        Of `control`.
+    """
+
+    def __init__(self, send: Callable[[float], None], finished: Callable[[], None], parameters: Mapping[str, Value]):
+        self._send = send
+        self._finished = finished
+        self._duration, self._hold = parameters["duration"], parameters["hold"]
+        self._values = parameters["start_value"], parameters["end_value"]
+        self._start: int | None = None
+        self._last: int | None = None
+        self._final = 0
+
+    @property
+    def begun(self) -> bool:
+        """Whether there has been a time."""
+        return self._start is not None
+
+    def hear(self, now: int) -> None:
+        """It is `now` [ns]; nothing is sent for the same time again."""
+        if now == self._last:
+            return
+        self._last = now
+        if self._start is None:
+            self._start = now
+        elapsed = (now - self._start) / NANOSECONDS
+        self._send(ramp(elapsed, self._duration, *self._values))
+        self._final += elapsed >= self._duration
+        if self._final >= FINAL_MESSAGES and not self._hold:
+            self._finished()
+
+
 def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
     """Connect, ramp in simulated time or, if `simulated_time` is false, in that of the node's own clock, and end.
 
     Which of the two is never guessed from what has been discovered so far: a publisher of /clock may be found
-    later than the subscriber of the stimulus in the same process.
+    later than the subscriber of the stimulus in the same process. In simulated time each time on /clock is answered
+    once, as a simulation in lockstep expects it.
     """
     target, channel = parameters["node"].rstrip("/"), parameters["channel"]
     topic = f"{target}/stimulus/{channel}"
@@ -44,35 +84,24 @@ def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) 
     node.get_logger().info(f"waiting for a subscriber of {topic}")
     if not _wait(lambda: publisher.get_subscription_count() > 0, stop, limit, f"nobody subscribes to {topic}"):
         return
-    clock = node.get_clock()
+    sender = RampSender(lambda value: publisher.publish(Float64(data=value)), stop.set, parameters)
     if parameters["simulated_time"]:
-        node.set_parameters([Parameter("use_sim_time", value=True)])
-        heard: deque[Clock] = deque(maxlen=1)
-        node.create_subscription(Clock, "/clock", lambda message: heard.append(message), BEST_EFFORT)
-        # A paused simulation repeats its time once a second.
-        if not _wait(lambda: heard, stop, limit, "/clock is silent, and simulated_time is true"):
+        node.create_subscription(Clock, "/clock", lambda message: sender.hear(_nanoseconds(message)), CLOCK_QOS)
+        # Where time stands still it is repeated once a second.
+        if not _wait(lambda: sender.begun, stop, limit, "/clock is silent, and simulated_time is true"):
             return
-        start = Time.from_msg(heard[-1].clock, clock_type=clock.clock_type)
     else:
-        start = clock.now()
-    final = 0
-
-    def send() -> None:
-        nonlocal final
-        elapsed = (clock.now() - start).nanoseconds * 1e-9
-        duration = parameters["duration"]
-        publisher.publish(Float64(data=ramp(elapsed, duration, parameters["start_value"], parameters["end_value"])))
-        final += elapsed >= duration
-        if final >= FINAL_MESSAGES:
-            stop.set()
-
+        clock = node.get_clock()
+        node.create_timer(1.0 / parameters["rate"], lambda: sender.hear(clock.now().nanoseconds))
     node.get_logger().info(f"ramping {topic}")
-    send()
-    node.create_timer(1.0 / parameters["rate"], send)
     if parameters["resume"] and not _resume(node, f"{target}/resume", stop, limit):
         return
     stop.wait()
     node.get_logger().info("done")
+
+
+def _nanoseconds(message: Clock) -> int:
+    return message.clock.sec * NANOSECONDS + message.clock.nanosec
 
 
 def _wait(condition: Callable[[], bool], stop: threading.Event, limit: float, failure: str) -> bool:

@@ -5,26 +5,25 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Mapping
-from concurrent.futures import Future
 from functools import partial
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray
-from std_srvs.srv import Trigger
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.errors import BilayerError, InputError
-from bilayer_sim_ros.conversions import to_diagnostics
+from bilayer_core.errors import InputError
+from bilayer_sim_ros.conversions import PATIENCE, to_diagnostics
+from bilayer_sim_ros.lockstep import SHORTEST_PERIOD, Asynchronous, Lockstep, tick_rate
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.parameters import Value
-from bilayer_sim_ros.publishing import FramePublisher
+from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
+from bilayer_sim_ros.services import Services
+from bilayer_sim_ros.status import Status
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
-from bilayer_sim_ros.worker import SimulationWorker, Status
+from bilayer_sim_ros.worker import SimulationWorker
 
-# Longest wait of a service for the simulation: one output period may take many steps [s].
-SERVICE_TIMEOUT = 60.0
 WARNING_PERIOD = 1.0
 """Real time between two warnings about refused messages [s]."""
 
@@ -42,6 +41,10 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         dt=parameters["dt"] or None,
         tolerance=parameters["tolerance"] or None,
     )
+    lockstep, clock = parameters["lockstep"], parameters["publish_clock"]
+    if lockstep:
+        shortest = simulator.dt if simulator.tolerance is None else SHORTEST_PERIOD
+        ticks = tick_rate(parameters["control_period"], rate, clock, shortest)
     node.get_logger().info("compiling, the first start on a machine may take two minutes ...")
     seconds = simulator.compile()
     description = simulator.description
@@ -53,10 +56,13 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         parameters["stimulus_timeout"],
         parameters["stimulus_fallback"],
     )
+    control = Asynchronous(inputs)
+    if lockstep:
+        control = Lockstep(inputs, ticks, ClockPublisher(node, description).publish)
     worker = SimulationWorker(
         simulator,
-        inputs=inputs,
-        publisher=FramePublisher(node, description, rate, scene.output.marker_rate, parameters["publish_clock"]),
+        control=control,
+        publisher=FramePublisher(node, description, rate, scene.output.marker_rate, clock and not lockstep),
         recording=recording,
         rate=rate,
         pacer=Pacer(parameters["real_time_factor"]),
@@ -65,8 +71,10 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         report=_diagnostics(node, parameters["real_time_factor"]),
         finished=stop.set,
     )
+    if lockstep:
+        inputs.notify = worker.wake
     _subscribe(node, inputs, description.channels)
-    _serve(node, worker)
+    services = Services(node, {name: getattr(worker, name) for name in ("pause", "resume", "step", "reset")})
     state = "paused" if parameters["start_paused"] else "running"
     node.get_logger().info(f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}")
     worker.start()
@@ -74,17 +82,26 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         stop.wait()
     finally:
         worker.stop()
+        services.finish()
     if worker.error is not None:
         raise worker.error
     node.get_logger().info(f"ended at t = {simulator.time:.6g} s; CPU time of the steps: {simulator.cpu_time:.3f} s")
 
 
 def _diagnostics(node: Node, real_time_factor: float) -> Callable[[Status], None]:
-    """What publishes a status on /diagnostics."""
+    """What publishes a status on /diagnostics, and says once if no controller answers."""
     publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
     name = node.get_fully_qualified_name()
+    missed = False
 
     def publish(status: Status) -> None:
+        nonlocal missed
+        if status.waited >= PATIENCE and not missed:
+            node.get_logger().warning(
+                f"lockstep: simulated time stands still at t = {status.time:.6g} s, as no stimulus has come for "
+                f"{status.waited:.0f} s; a controller has to answer each time on /clock"
+            )
+        missed = status.waited >= PATIENCE
         if publisher.get_subscription_count() > 0:
             publisher.publish(to_diagnostics(status, name, real_time_factor))
 
@@ -106,19 +123,3 @@ def _subscribe(node: Node, inputs: StimulusInputs, channels: tuple[str, ...]) ->
     for channel in channels:
         receive = partial(take, partial(inputs.receive, channel))
         node.create_subscription(Float64, f"~/stimulus/{channel}", receive, 10)
-
-
-def _serve(node: Node, worker: SimulationWorker) -> None:
-    """Offer the services; each answers when the simulation has done what was asked."""
-
-    def answer(ask: Callable[[], Future], _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        try:
-            response.message = ask().result(timeout=SERVICE_TIMEOUT)
-            response.success = True
-        except (BilayerError, TimeoutError) as error:
-            response.message = str(error) or "the simulation did not answer in time"
-            response.success = False
-        return response
-
-    for name in ("pause", "resume", "step", "reset"):
-        node.create_service(Trigger, f"~/{name}", partial(answer, getattr(worker, name)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -49,6 +49,13 @@ class StimulusInputs:
     fallback : str
         What acts before a channel's first message and after the timeout: ``hold`` (the last value, at first that of
         the schedule's start), ``zero`` (or the value of the range nearest to it), ``schedule``.
+
+    Attributes
+    ----------
+    answered : bool
+        Whether a message has come since `ask`.
+    notify : callable
+        Called after each message, in the thread that received it.
     """
 
     def __init__(self, channels: Sequence[Channel], timeout: float, fallback: str):
@@ -56,6 +63,8 @@ class StimulusInputs:
         self._timeout = timeout
         self._fallback = fallback
         self._lock = threading.Lock()
+        self.answered = False
+        self.notify: Callable[[], None] = lambda: None
         self.reset()
 
     def reset(self) -> None:
@@ -64,6 +73,10 @@ class StimulusInputs:
             self._received: dict[str, float] = {}
         self._heard: dict[str, float] = {}
         self._acting: dict[str, float | None] = {}
+
+    def ask(self) -> None:
+        """Let `answered` say from now on whether a message has come."""
+        self.answered = False
 
     def receive(self, name: str, value: float) -> None:
         """Take the value of one channel; InputError leaves the last good one in force."""
@@ -82,6 +95,8 @@ class StimulusInputs:
     def _keep(self, values: Mapping[str, float]) -> None:
         with self._lock:
             self._received.update(values)
+            self.answered = True
+        self.notify()
 
     def changes(self, time: float) -> dict[str, float | None]:
         """What to set for the step that begins at `time` [s]: channels that a message or the fallback changes.

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass
 from typing import Protocol
 
 from bilayer_core.errors import InputError
@@ -16,18 +15,19 @@ from bilayer_core.integrate.frame import Frame
 from bilayer_core.integrate.observer import TIME_ROUNDING
 from bilayer_core.integrate.result import Termination
 from bilayer_core.integrate.simulator import Simulator
+from bilayer_sim_ros.lockstep import Control
 from bilayer_sim_ros.pacing import Pacer
+from bilayer_sim_ros.periods import Periods
 from bilayer_sim_ros.recording import Recording
-from bilayer_sim_ros.stimulus import StimulusInputs
+from bilayer_sim_ros.requests import Requests
+from bilayer_sim_ros.status import Status, StatusReporter
 
 # Shorter waits cost more than they are worth: the simulation may be this far ahead of the clock [s].
 SHORTEST_WAIT = 0.01
 # In a log, this stimulus says that the scene's schedule acts again.
 SCHEDULE = math.nan
-# Real time between two status reports, and between two showings of a paused frame [s].
-STATUS_PERIOD = 1.0
-# Output times are compared in output periods; times of steps have rounding.
-PERIOD_ROUNDING = 1e-6
+# Real time between two showings of what stands still [s].
+SHOWING_PERIOD = 1.0
 
 
 class Publisher(Protocol):
@@ -41,32 +41,6 @@ class Publisher(Protocol):
         """Send what somebody listens to: what is due, or everything."""
 
 
-@dataclass
-class Status:
-    """How the run is doing: since the status before, except for `time` and `paused`.
-
-    Attributes
-    ----------
-    time : float
-        Simulated time [s].
-    paused : bool
-    real_time_factor : float
-        Simulated seconds per second.
-    steps, substeps, iterations : int
-        Steps, the parts in which they were taken, and Newton iterations.
-    residual : float
-        Largest velocity correction left at the end of a step [m/s].
-    """
-
-    time: float
-    paused: bool
-    real_time_factor: float = 0.0
-    steps: int = 0
-    substeps: int = 0
-    iterations: int = 0
-    residual: float = 0.0
-
-
 class SimulationWorker:
     """Steps a simulator in a thread of its own, paced on a steady clock, and hands out frames.
 
@@ -74,8 +48,8 @@ class SimulationWorker:
     ----------
     simulator : Simulator
         Compiled, at its start.
-    inputs : StimulusInputs
-        Asked before each step.
+    control : Control
+        Stimuli from outside; asked before each step.
     publisher : Publisher
     recording : Recording
         Files of the first run.
@@ -101,7 +75,7 @@ class SimulationWorker:
         self,
         simulator: Simulator,
         *,
-        inputs: StimulusInputs,
+        control: Control,
         publisher: Publisher,
         recording: Recording,
         rate: float,
@@ -112,19 +86,20 @@ class SimulationWorker:
         finished: Callable[[], None],
     ):
         self._simulator = simulator
-        self._inputs = inputs
+        self._control = control
         self._publisher = publisher
         self._recording = recording
-        self._rate = rate
+        self._frames = Periods(rate)
         self._pacer = pacer
         self._duration = duration
         self._paused = paused
-        self._report = report
+        self._reporter = StatusReporter(report)
         self._finished = finished
         self._stopping = threading.Event()
-        self._ended = threading.Event()
-        self._requests: queue.SimpleQueue[tuple[Future, Callable[[], str]] | None] = queue.SimpleQueue()
+        self._requests = Requests()
         self._frame_is_out = True
+        # Single steps asked for while paused that have not ended.
+        self._single_steps: deque[Future] = deque()
         self._thread = threading.Thread(target=self._work, name="simulation")
         self.error: Exception | None = None
 
@@ -135,41 +110,28 @@ class SimulationWorker:
     def stop(self) -> None:
         """End after the present step, finish the files, and return when that is done."""
         self._stopping.set()
-        self._requests.put(None)
+        self._requests.wake()
         self._thread.join()
+
+    def wake(self) -> None:
+        """Look at once whether what was waited for has come."""
+        self._requests.wake()
 
     def pause(self) -> Future:
         """Ask for a pause. The future's result says what happened; InputError if it could not be done."""
-        return self._ask(self._do_pause)
+        return self._requests.ask(self._do_pause)
 
     def resume(self) -> Future:
         """Ask to go on."""
-        return self._ask(self._do_resume)
+        return self._requests.ask(self._do_resume)
 
     def step(self) -> Future:
-        """Ask for one output period while paused."""
-        return self._ask(self._do_step)
+        """Ask for the steps to the next frame while paused; the answer comes when it is out."""
+        return self._requests.ask(self._do_step)
 
     def reset(self) -> Future:
         """Ask to go back to the start of the scene; paused stays paused."""
-        return self._ask(self._do_reset)
-
-    def _ask(self, action: Callable[[], str]) -> Future:
-        future: Future = Future()
-        self._requests.put((future, action))
-        if self._ended.is_set():
-            self._refuse_requests()
-        return future
-
-    def _refuse_requests(self) -> None:
-        """Answer what nobody will do any more."""
-        while True:
-            try:
-                request = self._requests.get_nowait()
-            except queue.Empty:
-                return
-            if request is not None:
-                request[0].set_exception(InputError("the simulation has ended"))
+        return self._requests.ask(self._do_reset)
 
     # The rest runs in the worker's thread.
 
@@ -179,9 +141,10 @@ class SimulationWorker:
             self._begin()
             while not self._stopping.is_set() and not self._is_over():
                 self._serve_requests()
-                if not self._paused:
+                if self._may_advance:
                     self._advance()
-                self._report_when_due()
+                waiting = self._wants_to_advance and self._control.waiting
+                self._reporter.report_when_due(self._simulator.time, self._paused, waiting)
                 self._show_again_when_due()
             if not self._stopping.is_set():
                 complete, termination = True, Termination.COMPLETED.value
@@ -196,8 +159,8 @@ class SimulationWorker:
         except Exception as error:
             self.error = self.error or error
         finally:
-            self._ended.set()
-            self._refuse_requests()
+            self._drop_single_steps(str(self.error or "the simulation has ended"))
+            self._requests.close()
             self._finished()
 
     def _finish_recording(self, complete: bool, termination: str) -> None:
@@ -210,66 +173,59 @@ class SimulationWorker:
 
     def _begin(self) -> None:
         """Start a run at the simulator's present state, and hand out its first frame."""
-        self._begun = self._simulator.time
+        self._frames.start(self._simulator.time)
         self._pacer.restart(self._simulator.time)
-        self._status = Status(self._simulator.time, self._paused)
-        self._status_since = time.monotonic()
+        self._reporter.start(self._simulator.time)
         self._recording.start(self._simulator.description)
         self._hand_out()
+        self._control.start(self._simulator.time)
 
     def _is_over(self) -> bool:
         left = self._duration - self._simulator.time
         return left < (0.5 if self._simulator.tolerance is None else TIME_ROUNDING) * self._simulator.dt
 
+    @property
+    def _wants_to_advance(self) -> bool:
+        return not self._paused or bool(self._single_steps)
+
+    @property
+    def _may_advance(self) -> bool:
+        return self._wants_to_advance and not self._control.waiting
+
     def _serve_requests(self) -> None:
-        """Wait until the next step is due (or, when paused, the next status), and do what is asked meanwhile."""
-        while not self._stopping.is_set():
-            wait = self._time_to_wait()
-            try:
-                request = self._requests.get(timeout=wait) if wait > 0.0 else self._requests.get_nowait()
-            except queue.Empty:
-                return
-            if request is not None:
-                future, action = request
-                try:
-                    future.set_result(action())
-                except Exception as error:
-                    future.set_exception(error)
-                    if not isinstance(error, InputError):
-                        raise
+        """Do what is asked until the next step is due, or, where time stands still, the next status."""
+        while not self._stopping.is_set() and self._requests.serve(self._time_to_wait()):
+            pass
 
     def _time_to_wait(self) -> float:
+        if not self._may_advance:
+            return max(min(self._reporter.due_at, self._shown_at + SHOWING_PERIOD) - time.monotonic(), 0.0)
         if self._paused:
-            return max(min(self._status_since, self._shown_at) + STATUS_PERIOD - time.monotonic(), 0.0)
+            return 0.0
         delay = self._pacer.delay(self._simulator.time)
         return delay if delay >= SHORTEST_WAIT else 0.0
 
-    def _advance(self) -> bool:
-        """Take one step; whether a frame was due at its end."""
+    def _advance(self) -> None:
+        """Take one step, and show what is due at its end."""
         start = self._simulator.time
-        for channel, value in self._inputs.changes(start).items():
+        for channel, value in self._control.changes(start).items():
             self._simulator.set_stimulus(channel, value)
             self._recording.log_stimulus(channel, SCHEDULE if value is None else value, start)
-        report = self._simulator.step(until=self._next_stop())
+        self._reporter.add(self._simulator.step(until=self._next_stop()))
         self._frame_is_out = False
-        status = self._status
-        status.steps += 1
-        status.substeps += report.substeps
-        status.iterations += report.iterations
-        status.residual = max(status.residual, report.residual)
-        frame_is_due = self._periods(self._simulator.time) > self._periods(start)
+        now = self._simulator.time
+        frame_is_due = self._frames.complete(now) > self._frames.complete(start)
         if frame_is_due:
             self._hand_out()
-        return frame_is_due
+        self._control.reach(now)
+        if self._single_steps and (frame_is_due or self._is_over()):
+            self._single_steps.popleft().set_result(f"paused at t = {now:.6g} s")
 
     def _next_stop(self) -> float:
-        """When a frame is due, or the run ends [s]: where adaptive steps end at the latest."""
-        due = self._begun + (self._periods(self._simulator.time) + 1) / self._rate
+        """When a frame or a controller is due, or the run ends [s]: where adaptive steps end at the latest."""
+        now = self._simulator.time
+        due = min(self._frames.next_end(now), self._control.next_stop(now))
         return due if due < self._duration - TIME_ROUNDING * self._simulator.dt else self._duration
-
-    def _periods(self, time: float) -> int:
-        """Output periods of this run that are complete at a time [s]."""
-        return math.floor((time - self._begun) * self._rate + PERIOD_ROUNDING)
 
     def _hand_out(self) -> None:
         """Show the present frame to all who look."""
@@ -282,46 +238,42 @@ class SimulationWorker:
                 self._publisher.publish(frame, everything=self._paused)
             self._recording.observe(frame)
 
-    def _report_when_due(self) -> None:
-        now = time.monotonic()
-        real = now - self._status_since
-        if real >= STATUS_PERIOD:
-            status = self._status
-            status.real_time_factor = (self._simulator.time - status.time) / real
-            status.time, status.paused = self._simulator.time, self._paused
-            self._report(status)
-            self._status = Status(self._simulator.time, self._paused)
-            self._status_since = now
-
     def _show_again_when_due(self) -> None:
-        """Send the present frame of a paused simulation to those who came late."""
-        if self._paused and time.monotonic() - self._shown_at >= STATUS_PERIOD:
+        """Show what stands still to those who came late."""
+        stands_still = self._paused or self._control.waiting
+        if stands_still and time.monotonic() - self._shown_at >= SHOWING_PERIOD:
             self._shown_at = time.monotonic()
-            if self._publisher.wanted:
+            if self._paused and self._publisher.wanted:
                 self._publisher.publish(self._simulator.frame(), everything=True)
+            self._control.repeat(self._simulator.time)
 
-    def _do_pause(self) -> str:
+    def _do_pause(self, answer: Future) -> None:
+        self._drop_single_steps("the simulation was paused before the next frame")
         self._paused = True
-        return f"paused at t = {self._simulator.time:.6g} s"
+        answer.set_result(f"paused at t = {self._simulator.time:.6g} s")
 
-    def _do_resume(self) -> str:
+    def _do_resume(self, answer: Future) -> None:
+        self._drop_single_steps("the simulation was resumed before the next frame")
         if self._paused:
             self._paused = False
             self._pacer.restart(self._simulator.time)
-        return f"running from t = {self._simulator.time:.6g} s"
+        answer.set_result(f"running from t = {self._simulator.time:.6g} s")
 
-    def _do_step(self) -> str:
+    def _do_step(self, answer: Future) -> None:
         if not self._paused:
             raise InputError("the simulation is running: call pause first")
-        while not self._advance() and not self._is_over():
-            pass
-        return f"paused at t = {self._simulator.time:.6g} s"
+        self._single_steps.append(answer)
 
-    def _do_reset(self) -> str:
+    def _do_reset(self, answer: Future) -> None:
         following = self._recording.of_next_run()
+        self._drop_single_steps("the simulation was reset before the next frame")
         self._finish_recording(False, "reset")
         self._recording = following
         self._simulator.reset()
-        self._inputs.reset()
+        self._control.reset()
         self._begin()
-        return "reset to t = 0 s"
+        answer.set_result("reset to t = 0 s")
+
+    def _drop_single_steps(self, reason: str) -> None:
+        while self._single_steps:
+            self._single_steps.popleft().set_exception(InputError(reason))

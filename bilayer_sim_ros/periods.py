@@ -1,0 +1,34 @@
+"""Equal periods of simulated time."""
+
+from __future__ import annotations
+
+import math
+
+# Ends of periods are compared in periods; times of steps have rounding.
+ROUNDING = 1e-6
+
+
+class Periods:
+    """Periods of a run that follow one another from its start.
+
+    Parameters
+    ----------
+    rate : float
+        Periods per simulated second [Hz].
+    """
+
+    def __init__(self, rate: float):
+        self._rate = rate
+        self._start = 0.0
+
+    def start(self, time: float) -> None:
+        """Let the first period begin at `time` [s]."""
+        self._start = time
+
+    def complete(self, time: float) -> int:
+        """How many have ended at `time` [s], to rounding."""
+        return math.floor((time - self._start) * self._rate + ROUNDING)
+
+    def next_end(self, time: float) -> float:
+        """When the one that has not ended at `time` [s] does [s]."""
+        return self._start + (self.complete(time) + 1) / self._rate
