@@ -167,7 +167,7 @@ def tick_rate(control_period: float, rate: float, clock: bool, shortest: float) 
     """
     if not clock:
         raise InputError(
-            "parameter 'publish_clock' is False; with 'lockstep' allowed is True, as controllers answer what is on /clock"
+            "parameter 'publish_clock' is False; with 'lockstep' allowed is True: controllers answer the time on /clock"
         )
     if control_period == 0.0:
         return rate

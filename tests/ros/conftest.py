@@ -115,11 +115,23 @@ class Client:
         self.spin_until(lambda: publisher.get_subscription_count() > 0, f"a subscriber of {topic}")
         return publisher.publish
 
-    def call(self, name) -> Trigger.Response:
-        """Call the node's service `name`."""
+    def spin_to_the_end(self):
+        """Serve callbacks until the process has ended, and then what is on its way."""
+        deadline = time.monotonic() + LIMIT
+        while self._process.running:
+            assert time.monotonic() < deadline, f"the node does not end:\n{self._process.output}"
+            self._executor.spin_once(timeout_sec=0.05)
+        self.drain()
+
+    def request(self, name):
+        """Call the node's service `name`; the future of its answer."""
         client = self.node.create_client(Trigger, f"{NODE}/{name}")
         self.spin_until(client.service_is_ready, f"the service {name}")
-        future = client.call_async(Trigger.Request())
+        return client.call_async(Trigger.Request())
+
+    def call(self, name) -> Trigger.Response:
+        """Call the node's service `name`; its answer."""
+        future = self.request(name)
         self.spin_until(future.done, f"an answer of {name}")
         return future.result()
 

@@ -2,7 +2,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from bilayer_sim_ros.conversions import to_diagnostics, to_seconds, to_time
-from bilayer_sim_ros.worker import Status
+from bilayer_sim_ros.status import Status
 
 
 @pytest.mark.parametrize(
@@ -21,6 +21,9 @@ def test_simulated_time_becomes_a_stamp_to_the_nanosecond(seconds, expected):
         (Status(1.0, False, real_time_factor=0.5), 1.0, DiagnosticStatus.WARN, "slower than asked for: 0.5 not 1"),
         (Status(1.0, False, real_time_factor=0.01), 0.0, DiagnosticStatus.OK, "running"),
         (Status(1.0, True), 1.0, DiagnosticStatus.OK, "paused"),
+        (Status(1.0, False, waited=1.0), 1.0, DiagnosticStatus.OK, "waiting for a stimulus at t = 1 s"),
+        (Status(1.0, False, waited=5.0), 1.0, DiagnosticStatus.WARN, "waiting for a stimulus at t = 1 s"),
+        (Status(1.0, True, waited=1.0), 1.0, DiagnosticStatus.OK, "waiting for a stimulus at t = 1 s"),
     ],
 )
 def test_diagnostics_warn_when_the_simulation_is_slower_than_asked_for(status, asked, level, message):

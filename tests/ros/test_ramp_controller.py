@@ -15,7 +15,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from bilayer_core.record.log_reader import read_log
-from bilayer_sim_ros.ramp import ramp
+from bilayer_sim_ros.ramp import FINAL_MESSAGES, RampSender, ramp
 
 DURATION = 1.0
 
@@ -23,6 +23,35 @@ DURATION = 1.0
 @pytest.mark.parametrize(("elapsed", "value"), [(-1.0, 2.0), (0.0, 2.0), (2.5, 5.0), (10.0, 14.0), (99.0, 14.0)])
 def test_a_ramp_is_linear_and_constant_before_and_after(elapsed, value):
     assert ramp(elapsed, 10.0, 2.0, 14.0) == value
+
+
+@pytest.mark.parametrize("hold", [False, True])
+def test_each_time_is_answered_once_until_the_end_value_has_been_sent_often_enough(hold):
+    sent, ended = [], []
+    parameters = {"duration": 1.0, "start_value": 0.0, "end_value": 1.0, "hold": hold}
+    sender = RampSender(sent.append, lambda: ended.append(len(sent)), parameters)
+    start = 4_000_000_000
+    assert not sender.begun
+    for now in (0, 0, 500_000_000, 500_000_000, *range(1_000_000_000, 1_000_000_000 + FINAL_MESSAGES)):
+        sender.hear(start + now)
+    assert sender.begun
+    assert sent == [0.0, 0.5] + [1.0] * FINAL_MESSAGES
+    assert ended == ([] if hold else [len(sent)])
+
+
+def test_in_lockstep_the_ramp_acts_exactly_at_each_time_and_holds_until_interrupted(start, domain, tmp_path):
+    path = tmp_path / "run.mcap"
+    parameters = {"scene": "bending", "log": path, "duration": 0.4, "lockstep": True, "real_time_factor": 0.0}
+    simulation = start("sim_node", domain, parameters | {"start_paused": True, "rate": 50.0})
+    controller = start(
+        "ramp_controller", domain, {"channel": "swelling", "duration": 0.2, "hold": True, "resume": True}
+    )
+    assert simulation.wait() == 0, simulation.output
+    # A frame shows the stimulus of the step that ends with it.
+    assert read_log(path).stimulus[1:, 0].tolist() == [ramp(k / 50, 0.2, 0.0, 1.0) for k in range(20)]
+    assert controller.running
+    controller.send(signal.SIGINT)
+    assert controller.wait(10) == 130, controller.output
 
 
 @pytest.fixture(scope="module")

@@ -25,6 +25,11 @@ FAST = {"scene": "bending", "real_time_factor": 0}
         ({"scene": "griping"}, "gripping"),
         ({"model": "three_rod"}, "three_rod"),
         ({"log": "missing/run.mcap"}, "missing"),
+        ({"scene": "bending", "lockstep": True, "publish_clock": False}, "'publish_clock' is False; with 'lockstep'"),
+        (
+            {"scene": "bending", "lockstep": True, "dt": 2e-3, "control_period": 1e-3},
+            "'control_period' is 0.001; allowed is a finite number >= 0.002",
+        ),
         ({"rerun": "serve"}, "serve: the name of a rerun recording ends in .rrd"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",

@@ -1,0 +1,199 @@
+"""Real nodes in lockstep: a controller that is late by chance, and none at all."""
+
+import math
+import random
+import signal
+import time
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64
+
+from bilayer_core.record.log_reader import read_info
+from bilayer_sim_ros.conversions import to_seconds
+
+CHANNEL = "/bilayer_sim/stimulus/swelling"
+LOCKSTEP = {"scene": "bending", "real_time_factor": 0, "lockstep": True}
+LONGEST_DELAY = 0.02
+"""Of the controller's answers, in real time [s]."""
+
+
+def control_law(now):
+    """Stimulus at simulated time `now` [s]; it uses all bits."""
+    return 0.5 - 0.5 * math.cos(7.0 * now)
+
+
+def run_with_a_late_controller(start, connect, domain, log, seed, **parameters):
+    """Run a node to its end with a controller that answers each time once, after a random delay."""
+    node = start("sim_node", domain, LOCKSTEP | {"log": log} | parameters)
+    client = connect(node)
+    delays = random.Random(seed)
+    send = client.sender(Float64, CHANNEL)
+    answered = set()
+
+    def answer(message):
+        now = to_seconds(message.clock)
+        if now not in answered:
+            answered.add(now)
+            time.sleep(LONGEST_DELAY * delays.random())
+            send(Float64(data=control_law(now)))
+
+    client.node.create_subscription(Clock, "/clock", answer, 10)
+    client.spin_to_the_end()
+    assert node.wait() == 0, node.output
+    return answered
+
+
+def messages(log, topic):
+    """Simulated times [ns] and bytes of all messages of a topic."""
+    with log.open("rb") as file:
+        return [(message.log_time, message.data) for _, _, message in make_reader(file).iter_messages(topics=[topic])]
+
+
+def stimuli(log):
+    """Since when [s] each stimulus acts, and its value."""
+    with log.open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        return [
+            (m.log_time * 1e-9, decoded.data) for _, _, m, decoded in reader.iter_decoded_messages(topics=[CHANNEL])
+        ]
+
+
+@pytest.mark.parametrize(
+    ("parameters", "ticks"),
+    [
+        ({"duration": 0.3}, [k / 50 for k in range(15)]),
+        ({"duration": 0.3, "control_period": 0.03}, [k * 0.03 for k in range(10)]),
+        ({"duration": 0.1, "control_period": 0.02, "dt": 0.003}, [0.0, 0.021, 0.042, 0.06, 0.081]),
+    ],
+    ids=["with frames", "between frames", "fixed steps"],
+)
+def test_a_run_does_not_depend_on_when_the_controller_answers(start, connect, domain, tmp_path, parameters, ticks):
+    logs = [tmp_path / f"{seed}.mcap" for seed in (1, 2)]
+    for seed, log in enumerate(logs):
+        heard = run_with_a_late_controller(start, connect, domain, log, seed, **parameters)
+        assert sorted(heard)[: len(ticks)] == pytest.approx(ticks, abs=1e-9)
+        acting = stimuli(log)
+        assert [since for since, _ in acting] == pytest.approx(ticks, abs=1e-9)
+        assert [value for _, value in acting] == [control_law(now) for now in sorted(heard)[: len(ticks)]]
+    for topic in ("/bilayer_sim/state", CHANNEL, "/bilayer_sim/stimulus_applied"):
+        first, second = (messages(log, topic) for log in logs)
+        assert len(first) >= len(ticks)
+        assert first == second
+
+
+def test_without_a_controller_time_stands_still_and_the_node_says_so(start, connect, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    node = start("sim_node", domain, LOCKSTEP | {"log": log})
+    client = connect(node)
+    clock, diagnostics = client.listen(Clock, "/clock"), client.listen(DiagnosticArray, "/diagnostics")
+    client.spin_until(lambda: diagnostics[-1].status[0].level == DiagnosticStatus.WARN, "a warning", limit=15.0)
+    assert diagnostics[-1].status[0].message == "waiting for a stimulus at t = 0 s"
+    values = {value.key: value.value for value in diagnostics[-1].status[0].values}
+    assert float(values["waited for a stimulus [s]"]) == pytest.approx(5.5, abs=0.6)
+    client.spin_until(lambda: len(clock) >= 3, "three repetitions", limit=10.0)
+    assert {to_seconds(message.clock) for message in clock} == {0.0}
+    client.spin_until(lambda: to_seconds(diagnostics[-1].header.stamp) == 0.0 and len(diagnostics) > 8, "more of them")
+    assert node.output.count("simulated time stands still at t = 0 s") == 1
+    node.send(signal.SIGINT)
+    assert node.wait(30) == 130, node.output
+    assert "Traceback" not in node.output
+    info = read_info(log)
+    assert (info.complete, info.termination, info.last_time) == (False, "interrupted", 0.0)
+    assert info.topics["/bilayer_sim/state"]["count"] == 1
+
+
+@pytest.fixture(scope="module")
+def waiting(domain_of_module, start, connect):
+    """A client of a node that waits for its first stimulus."""
+    return connect(start("sim_node", domain_of_module, LOCKSTEP | {"rate": 50.0}))
+
+
+@pytest.fixture
+def client(waiting):
+    """The same, reset to its start, where it waits again, and paused."""
+    assert waiting.call("pause").success
+    assert waiting.call("reset").success
+    return waiting
+
+
+def test_a_step_ends_at_the_next_frame_once_there_is_an_answer(client):
+    send = client.sender(Float64, CHANNEL)
+    step = client.request("step")
+    client.drain(quiet=0.3)
+    assert not step.done()
+    send(Float64(data=math.nan))
+    client.drain(quiet=0.3)
+    assert not step.done(), "a refused message is no answer"
+    send(Float64(data=0.5))
+    client.spin_until(step.done, "the end of the step", limit=10.0)
+    assert (step.result().success, step.result().message) == (True, "paused at t = 0.02 s")
+
+
+@pytest.mark.parametrize(
+    ("service", "reason"), [("pause", "paused"), ("resume", "resumed"), ("reset", "reset"), ("step", None)]
+)
+def test_what_comes_before_a_step_has_ended_refuses_it(client, service, reason):
+    step = client.request("step")
+    client.drain()
+    if reason:
+        assert client.call(service).success
+        client.spin_until(step.done, "an answer", limit=10.0)
+        assert (step.result().success, step.result().message) == (
+            False,
+            f"the simulation was {reason} before the next frame",
+        )
+    else:
+        again = client.request(service)
+        send = client.sender(Float64, CHANNEL)
+        for each, time_reached in ((step, 0.02), (again, 0.04)):
+            client.drain()
+            send(Float64(data=0.5))
+            client.spin_until(each.done, "an answer", limit=10.0)
+            assert each.result().message == f"paused at t = {time_reached} s"
+
+
+def test_a_waiting_simulation_that_runs_refuses_a_step_and_can_be_paused(client):
+    assert client.call("resume").success
+    assert client.call("step").message == "the simulation is running: call pause first"
+    assert client.call("pause").message == "paused at t = 0 s"
+
+
+def test_an_answer_counts_though_the_simulation_is_paused(client):
+    client.sender(Float64, CHANNEL)(Float64(data=0.5))
+    client.drain()
+    assert client.call("step").message == "paused at t = 0.02 s"
+
+
+def test_an_interrupted_node_answers_the_step_that_waits(start, connect, domain):
+    node = start("sim_node", domain, LOCKSTEP | {"start_paused": True})
+    client = connect(node)
+    step = client.request("step")
+    client.drain()
+    node.send(signal.SIGINT)
+    client.spin_to_the_end()
+    assert node.wait(30) == 130
+    assert (step.result().success, step.result().message) == (False, "the simulation has ended")
+
+
+def test_an_answer_takes_no_polling_period(start, connect, domain, tmp_path):
+    node = start("sim_node", domain, LOCKSTEP | {"control_period": 1e-3, "start_paused": True})
+    client = connect(node)
+    send = client.sender(Float64, CHANNEL)
+    heard = []
+
+    def answer(message):
+        if not heard or message.clock != heard[-1][0]:
+            heard.append((message.clock, time.monotonic()))
+            send(Float64(data=0.5))
+
+    client.node.create_subscription(Clock, "/clock", answer, 10)
+    client.spin_until(lambda: heard, "the start")
+    assert client.call("resume").success
+    client.spin_until(lambda: len(heard) >= 300, "300 answers")
+    moments = [moment for _, moment in heard]
+    trips = sorted(b - a for a, b in zip(moments[:-1], moments[1:], strict=True))
+    assert trips[len(trips) // 2] < 0.01, "half of the round trips, each with a step"
