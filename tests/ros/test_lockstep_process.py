@@ -107,9 +107,14 @@ def test_without_a_controller_time_stands_still_and_the_node_says_so(start, conn
 
 
 @pytest.fixture(scope="module")
-def waiting(domain_of_module, start, connect):
+def node(domain_of_module, start):
+    return start("sim_node", domain_of_module, LOCKSTEP | {"rate": 50.0})
+
+
+@pytest.fixture(scope="module")
+def waiting(node, connect):
     """A client of a node that waits for its first stimulus."""
-    return connect(start("sim_node", domain_of_module, LOCKSTEP | {"rate": 50.0}))
+    return connect(node)
 
 
 @pytest.fixture
@@ -120,40 +125,43 @@ def client(waiting):
     return waiting
 
 
-def test_a_step_ends_at_the_next_frame_once_there_is_an_answer(client):
-    send = client.sender(Float64, CHANNEL)
+def begun_step(client):
+    """A step that waits for a stimulus; the future of its answer."""
+    diagnostics = client.listen(DiagnosticArray, "/diagnostics")
     step = client.request("step")
-    client.drain(quiet=0.3)
-    assert not step.done()
+    client.spin_until(lambda: "waiting" in diagnostics[-1].status[0].message, "a step that waits", limit=10.0)
+    return step
+
+
+def test_a_step_ends_at_the_next_frame_once_there_is_an_answer(client, node):
+    send = client.sender(Float64, CHANNEL)
+    step = begun_step(client)
     send(Float64(data=math.nan))
-    client.drain(quiet=0.3)
-    assert not step.done(), "a refused message is no answer"
+    client.spin_until(lambda: "refused: stimulus 'swelling' is nan" in node.output, "a refusal", limit=10.0)
+    client.drain()
+    assert not step.done()
     send(Float64(data=0.5))
     client.spin_until(step.done, "the end of the step", limit=10.0)
     assert (step.result().success, step.result().message) == (True, "paused at t = 0.02 s")
 
 
-@pytest.mark.parametrize(
-    ("service", "reason"), [("pause", "paused"), ("resume", "resumed"), ("reset", "reset"), ("step", None)]
-)
+def test_steps_end_in_the_order_in_which_they_were_asked_for(client):
+    steps = [begun_step(client), client.request("step")]
+    send = client.sender(Float64, CHANNEL)
+    for step, now in zip(steps, (0.02, 0.04), strict=True):
+        client.drain()
+        send(Float64(data=0.5))
+        client.spin_until(step.done, "the end of the step", limit=10.0)
+        assert step.result().message == f"paused at t = {now} s"
+
+
+@pytest.mark.parametrize(("service", "reason"), [("pause", "paused"), ("resume", "resumed"), ("reset", "reset")])
 def test_what_comes_before_a_step_has_ended_refuses_it(client, service, reason):
-    step = client.request("step")
-    client.drain()
-    if reason:
-        assert client.call(service).success
-        client.spin_until(step.done, "an answer", limit=10.0)
-        assert (step.result().success, step.result().message) == (
-            False,
-            f"the simulation was {reason} before the next frame",
-        )
-    else:
-        again = client.request(service)
-        send = client.sender(Float64, CHANNEL)
-        for each, time_reached in ((step, 0.02), (again, 0.04)):
-            client.drain()
-            send(Float64(data=0.5))
-            client.spin_until(each.done, "an answer", limit=10.0)
-            assert each.result().message == f"paused at t = {time_reached} s"
+    step = begun_step(client)
+    assert client.call(service).success
+    client.spin_until(step.done, "an answer", limit=10.0)
+    answer = step.result()
+    assert (answer.success, answer.message) == (False, f"the simulation was {reason} before the next frame")
 
 
 def test_a_waiting_simulation_that_runs_refuses_a_step_and_can_be_paused(client):
@@ -171,8 +179,7 @@ def test_an_answer_counts_though_the_simulation_is_paused(client):
 def test_an_interrupted_node_answers_the_step_that_waits(start, connect, domain):
     node = start("sim_node", domain, LOCKSTEP | {"start_paused": True})
     client = connect(node)
-    step = client.request("step")
-    client.drain()
+    step = begun_step(client)
     node.send(signal.SIGINT)
     client.spin_to_the_end()
     assert node.wait(30) == 130
