@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..errors import InputError, SimulationError
 from ..model.model import Model
 from ..model.state import State
@@ -18,6 +20,8 @@ from .error_estimate import ErrorEstimate
 from .method import Method
 from .step_control import STRETCH, StepControl
 from .stepper import Stepper, StepReport
+
+Array = np.ndarray
 
 TIME_ROUNDING = 1e-9
 """Part of the first step by which two times are the same."""
@@ -69,6 +73,15 @@ class AdaptiveStepper(Stepper):
         self._control = StepControl(method.order, largest)
         self._estimate = ErrorEstimate(model)
         self._breakpoints = Breakpoints(model.scene)
+        self._kept: tuple[State, Array] | None = None
+
+    def compile(self, state: State) -> None:
+        """Make a step for its kernels, estimate its error and count it; `state` stays as it is."""
+        super().compile(state)
+        self._estimate.deviation(state, state, self._first)
+        highest = float(self.engine.figures[0])
+        self.engine.count_in(state, math.inf)
+        self.engine.start_over(highest)
 
     def advance(self, state: State, until: float = math.inf) -> StepReport:
         """One step, in place, that ends at `until` [s] at the latest.
@@ -81,7 +94,7 @@ class AdaptiveStepper(Stepper):
         begin = float(state.time[0])
         stop, breaks = self._next_stop(state, until)
         planned = float(state.next_step[0]) or self._first
-        kept, touched = state.copy(), self._touched.copy()
+        kept, touched = self._keep(state)
         if self.ledger is not None:
             self.ledger.mark()
         h, rejected, inaccurate, iterations, factorisations = planned, 0, 0, 0, 0
@@ -114,6 +127,15 @@ class AdaptiveStepper(Stepper):
         if breaks and self._jumps(state, time, h):
             self.restart(state)
         return StepReport(time, h, 1, rejected, iterations, factorisations, report.residual, inaccurate)
+
+    def _keep(self, state: State) -> tuple[State, Array]:
+        """A copy of a state, and of what touches there, until the next one."""
+        if self._kept is None:
+            self._kept = state.copy(), self._touched.copy()
+        kept, touched = self._kept
+        kept.take(state)
+        touched[:] = self._touched
+        return kept, touched
 
     def march(self, state: State, steps: int) -> None:
         """None: how long a step is depends on the one before."""

@@ -192,7 +192,7 @@ class Stepper:
 
     def _attempt_in_loop(self, state: State, h: float, time: float) -> NewtonReport | None:
         """`_attempt` in a compiled loop; None, and nothing is changed, if it is not for one."""
-        method = self.used = self._method_at(state, self.surroundings.stimulus_at(state, time - h), time - h, h)
+        method = self.used = self._method_at(state, time - h, h)
         found = self._loop(state, method, [time], h, changes=False, counts=False)
         if found is None:
             return None
@@ -220,7 +220,7 @@ class Stepper:
         self.end = self._places[found.place]
         self._start, self._trial = (self._places[k] for k in range(3) if k != found.place)
         if found.done > 0:
-            self.stimulus = self.surroundings.stimulus_at(state, times[found.done - 1], h)
+            self.stimulus = course.stimulus[found.done - 1, -1].copy()
         return found
 
     def _attempt_by_terms(self, state: State, h: float, time: float) -> NewtonReport:
@@ -229,7 +229,7 @@ class Stepper:
         self._start.take_state(state)
         first = start_point(model, state, self._start)
         first_stimulus = self.surroundings.stimulus_at(state, time - h)
-        method = self.used = self._method_at(state, first_stimulus, time - h, h)
+        method = self.used = self._method_at(state, time - h, h)
         slopes = slopes_of(model, state, first) if method.history else None
         turned = np.zeros(model.edge_count)
         length, momentum_length = method.diagonal * h, (method.momentum_diagonal or method.diagonal) * h
@@ -286,13 +286,14 @@ class Stepper:
         """Which carriers something pushed at the last evaluation, shape (n_carrier,)."""
         return np.any(self.potential.carrier_gradient != 0.0, axis=1)
 
-    def _method_at(self, state: State, stimulus: Array, time: float, h: float) -> Method:
+    def _method_at(self, state: State, time: float, h: float) -> Method:
         """The method for a step of length `h` [s] that begins at `time` [s]: one without history after a jump."""
         if self.method.history is None:
             return self.method
         model = self.model
         jumped = not state.kept[0] or self.surroundings.loads_jump(time, h)
         if len(state.transduction):
+            stimulus = self.surroundings.stimulus_at(state, time)
             way = stimulus[model.law_channel] - state.transduction
             lag = np.where(way > 0.0, model.law_rising, model.law_falling)
             seen = np.abs(way) > NO_JUMP * self.engine.ranges[model.law_channel]

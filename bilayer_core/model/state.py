@@ -48,20 +48,20 @@ class State:
 
     def copy(self) -> State:
         """A state of its own with the same values."""
-        return State(**{part.name: getattr(self, part.name).copy() for part in fields(self)})
+        return State(*(getattr(self, name).copy() for name in PARTS))
 
     def take(self, other: State) -> None:
         """Take all values of another state of the same model."""
-        for part in fields(self):
-            getattr(self, part.name)[...] = getattr(other, part.name)
+        for name in PARTS:
+            getattr(self, name)[...] = getattr(other, name)
 
     def flat(self) -> Array:
         """All parts in order, as one array of float64."""
-        return np.concatenate([getattr(self, part.name).ravel() for part in fields(self)])
+        return np.concatenate([getattr(self, name).ravel() for name in PARTS])
 
     def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
         """Name and shape of each part of `flat`."""
-        return tuple((part.name, getattr(self, part.name).shape) for part in fields(self))
+        return tuple((name, getattr(self, name).shape) for name in PARTS)
 
     def set_flat(self, flat: Array) -> None:
         """Take all parts from a flat array.
@@ -72,19 +72,21 @@ class State:
             If its length or a value does not fit this model; nothing is changed then.
         """
         flat = np.asarray(flat, dtype=float)
-        size = sum(getattr(self, part.name).size for part in fields(self))
+        size = sum(getattr(self, name).size for name in PARTS)
         if flat.shape != (size,):
             raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}")
         bad = np.flatnonzero(~np.isfinite(flat[: size - self.override.size]))
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
         start = 0
-        for part in fields(self):
-            array = getattr(self, part.name)
+        for name in PARTS:
+            array = getattr(self, name)
             array[...] = flat[start : start + array.size].reshape(array.shape)
             start += array.size
 
 
+PARTS = tuple(part.name for part in fields(State))
+"""Names of the parts of a state, in order."""
 OUT_OF_PLANE = 1e-9
 """Component along the normal of a plane, of the largest there is, that is rounding."""
 
