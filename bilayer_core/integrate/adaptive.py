@@ -124,7 +124,7 @@ class AdaptiveStepper(Stepper):
         self._plan(state, kept, h, planned, error, report.iterations / len(self.used.nodes), rejected > 0)
         state.time[0] = time
         state.step += 1.0
-        if breaks and self._jumps(state, time, h):
+        if breaks and time == stop and self._jumps(state, time, h):
             self.restart(state)
         return StepReport(time, h, 1, rejected, iterations, factorisations, report.residual, inaccurate)
 
