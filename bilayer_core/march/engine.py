@@ -13,6 +13,7 @@ from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
 from ..solve.potential import IncrementalPotential
 from .build import lasting_groups, leaving_of, sliding_of, surfaces_of, threads_of, wide_of
+from .loop import Counted, Loop
 from .problem import Problem
 from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
 from .step import count_step, take_steps
@@ -43,6 +44,8 @@ class Engine:
         self._problem: Problem | None = None
         self._rooms: tuple | None = None
         self._state: State | None = None
+        self._loop: Loop | None = None
+        self._counted: Counted | None = None
         self.ranges = np.array([c.maximum - c.minimum for c in model.scene.stimuli.values()], dtype=float)
         self._columns = model.bodies.freedom.shape[1]  # room in the border
         self._width = np.zeros(1, dtype=np.int64)  # of it in use
@@ -83,21 +86,26 @@ class Engine:
                 leaving=leaving_of(matrix) if rods else None,
                 sums=sums_of(model, potential, self._energy, 2 * room),
             )
-            self._rooms = rooms
+            self._rooms, self._counted = rooms, None
         return self._problem
 
     def _arrays_of(self, state: State) -> StateArrays:
         if state is not self._state:
-            self._state = state
+            self._state, self._counted = state, None
             self._state_arrays = StateArrays(**{name: getattr(state, name) for name in StateArrays.fields})
         return self._state_arrays
 
+    def _loop_of(self, state: State, method: Method, course: Course) -> Loop:
+        parts = {"problem": self._gather(), "state": self._arrays_of(state), "method": method, "course": course}
+        if self._loop is None or any(getattr(self._loop, name) is not part for name, part in parts.items()):
+            self._loop = Loop(**parts, work=self._work, tally=self.tally, ranges=self.ranges)
+        return self._loop
+
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:
         """Make the steps of a course, each of length `h` [s], as far as they succeed; `state` is that after them."""
-        arrays = self._arrays_of(state)
-        ways = settings.changes, course, self.ranges, self._work, settings.counts, self.tally
+        loop, flags = self._loop_of(state, method, course), (self._keeps, settings.changes, settings.counts)
         done, status, pair, place, iterations, factorisations, backtracks, residual, worst, gap = take_steps(
-            self._gather(), arrays, method, self._keeps, *ways, h, settings.tolerance, settings.max_iterations
+            loop, *flags, h, settings.tolerance, settings.max_iterations
         )
         if status == CONVERGED or status in FAILURES:
             self._potential.take_over(dict(zip(NAMES, self._energy.tolist(), strict=True)), gap)
@@ -127,8 +135,10 @@ class Engine:
 
     def count_in(self, state: State, gap: float) -> None:
         """Take the end of a step that no loop has made into the tally."""
-        p = self._gather()
-        count_step(p, self._arrays_of(state), gap, float(state.time[0]), self.tally)
+        p, arrays = self._gather(), self._arrays_of(state)
+        if self._counted is None:
+            self._counted = Counted(surfaces=p.surfaces, strands=p.strands, sums=p.sums, state=arrays, tally=self.tally)
+        count_step(self._counted, gap, float(state.time[0]))
 
 
 @dataclass(frozen=True)

@@ -193,18 +193,16 @@ def _count_contacts(surfaces, nodes, time, tally):
 
 
 @kernel
-def take_steps(p, state, method, keeps, changes, course, ranges, work, counts, tally, h, tolerance, max_iterations):
+def take_steps(loop, keeps, changes, counts, h, tolerance, max_iterations):
     """Advance a state by the steps of a course, as far as each succeeds; parameters beside those of `take_step`:
 
     Parameters
     ----------
+    loop : Loop
     changes : bool
         Whether `method` begins with slopes that the step before must have left: a jump ends the loop then.
-    ranges : Array
-        Of channels, in their units, shape (n_channel,).
     counts : bool
         Whether to take the steps into the tally.
-    tally : Tally
 
     Returns
     -------
@@ -216,15 +214,16 @@ def take_steps(p, state, method, keeps, changes, course, ranges, work, counts, t
         Of all attempts.
     residual, largest_residual, gap : float
     """
+    p, state, course, work = loop.problem, loop.state, loop.course, loop.work
     iterations = factorisations = backtracks = 0
     residual = worst = 0.0
     gap = math.inf
     status, pair, end = READY, -1, 1
     for k in range(course.time.shape[0]):
-        if changes and (course.jumps[k] or _has_jumped(p.drives, state, course.first[k], ranges, h)):
+        if changes and (course.jumps[k] or _has_jumped(p.drives, state, course.first[k], loop.ranges, h)):
             return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
         status, pair, e, more, factors, halvings, left, nearest = take_step(
-            p, state, method, keeps, course, k, work, h, tolerance, max_iterations
+            p, state, loop.method, keeps, course, k, work, h, tolerance, max_iterations
         )
         if status == CONVERGED or status >= MAX_ITERATIONS:  # what has to be begun again does not count
             iterations += more
@@ -235,11 +234,11 @@ def take_steps(p, state, method, keeps, changes, course, ranges, work, counts, t
         residual, gap, end = left, nearest, e
         worst = max(worst, residual)
         if counts:
-            count_in(p.surfaces, p.strands, p.sums, state, gap, course.time[k], tally)
+            count_in(p.surfaces, p.strands, p.sums, state, gap, course.time[k], loop.tally)
     return course.time.shape[0], status, pair, end, iterations, factorisations, backtracks, residual, worst, gap
 
 
 @kernel
-def count_step(p, state, gap, time, tally):
-    """Take the end of a step that no loop has made into the extremes of a run."""
-    count_in(p.surfaces, p.strands, p.sums, state, gap, time, tally)
+def count_step(counted, gap, time):
+    """Take the end of a step that no loop has made into the extremes of a run; `counted` is a `Counted`."""
+    count_in(counted.surfaces, counted.strands, counted.sums, counted.state, gap, time, counted.tally)
