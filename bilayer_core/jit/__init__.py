@@ -13,6 +13,7 @@ import os
 import numba
 
 from . import indexing  # noqa: F401 (what it registers serves every kernel)
+from .compiler import KernelCompiler
 from .inner_compiler import InnerCompiler, InnerFunction
 
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
@@ -47,7 +48,7 @@ def kernel(function):
 
     For what the interpreter calls; other kernels may call it too.
     """
-    return numba.njit(**OPTIONS)(function)
+    return numba.njit(**OPTIONS, pipeline_class=KernelCompiler)(function)
 
 
 def allocating(function):

@@ -4,19 +4,18 @@ Numba optimises every function and makes machine code for it, and does both agai
 that calls it, level by level. Here a function ends as what LLVM reads; what calls it is optimised with it. The loop
 over steps takes a third less time to compile for it.
 
-This replaces the last pass of numba's pipeline, `NativeLowering`, and the library that it fills, whose insides may
-change from release to release: `setup.py` names those for which this is tested.
+This replaces the last pass of the pipeline, `NativeLowering`, and the library that it fills.
 """
 
 from __future__ import annotations
 
 from llvmlite.binding import newpassmanagers
 from numba import _dynfunc
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
+
+from .compiler import KernelCompiler, KernelLibrary
 
 
 class InnerFunction(CPUDispatcher):
@@ -26,7 +25,7 @@ class InnerFunction(CPUDispatcher):
         raise TypeError(f"{self.py_func.__qualname__} is called by kernels alone (`jit.inner`), not by the interpreter")
 
 
-class _Library(JITCodeLibrary):
+class _Library(KernelLibrary):
     """Code that is linked into that of callers, and has no address of its own."""
 
     def _optimize_final_module(self):
@@ -67,13 +66,7 @@ class _InnerLowering(NativeLowering):
         return True
 
 
-class InnerCompiler(CompilerBase):
-    """Numba's pipeline with another end."""
+class InnerCompiler(KernelCompiler):
+    """Compiles what kernels alone call."""
 
-    def define_pipelines(self):
-        """The passes of a compilation, in order."""
-        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        pipeline.add_pass_after(_InnerLowering, NativeLowering)
-        pipeline.passes = [entry for entry in pipeline.passes if entry[0] is not NativeLowering]
-        pipeline.finalize()
-        return [pipeline]
+    lowering = _InnerLowering
