@@ -1,7 +1,7 @@
 """Shorter code, before optimisation, for one element of a contiguous array.
 
 Nearly all that kernels do is to read and write elements, and nearly all that LLVM has to read is numba's code for it:
-45 instructions for `a[i, j]`, which it then brings down to 5. Here they are 12, with the same meaning: negative indices
+45 instructions for `a[i, j]`, which it then brings down to 5. Here they are 10, with the same meaning: negative indices
 count from the end. What is no single element of a C-contiguous array, and whatever has its bounds checked, is left to
 numba. Registered through numba's extension interface, it serves all that is compiled in the process.
 """
@@ -11,9 +11,12 @@ from __future__ import annotations
 import operator
 
 from llvmlite import ir
+from llvmlite.ir.instructions import InsertValue
 from numba.core import types
 from numba.extending import lower_builtin
 from numba.np.arrayobj import getitem_array_tuple, getitem_arraynd_intp, load_item, setitem_array, store_item
+
+from .operators import is_element
 
 
 @lower_builtin(operator.getitem, types.Array, types.Integer)
@@ -43,15 +46,7 @@ def _write(context, builder, signature, arguments):
 
 
 def _is_element(context, array_type, index_type) -> bool:
-    """Whether an index denotes one number in a contiguous array."""
-    indices = index_type.types if isinstance(index_type, types.BaseTuple) else (index_type,)
-    return (
-        array_type.layout == "C"
-        and len(indices) == array_type.ndim
-        and all(isinstance(of, types.Integer) for of in indices)
-        and isinstance(array_type.dtype, (types.Number, types.Boolean))
-        and not context.enable_boundscheck
-    )
+    return is_element(array_type, index_type) and not context.enable_boundscheck
 
 
 def _place(context, builder, array_type, index_type, array, index):
@@ -60,17 +55,26 @@ def _place(context, builder, array_type, index_type, array, index):
     data = builder.extract_value(array, model.get_field_position("data"))
     shape = model.get_field_position("shape")
     if isinstance(index_type, types.BaseTuple):
-        parts = [(of, builder.extract_value(index, d)) for d, of in enumerate(index_type.types)]
+        parts = [(of, _item(builder, index, d)) for d, of in enumerate(index_type.types)]
     else:
         parts = [(index_type, index)]
     offset = None
     for d, (of, value) in enumerate(parts):
         value = context.cast(builder, value, of, types.intp)
         literal = of.literal_value if isinstance(of, types.IntegerLiteral) else None
-        if (of.signed and literal is None) or (literal is not None and literal < 0):
-            from_end = builder.add(value, builder.extract_value(array, (shape, d)))
-            value = builder.select(builder.icmp_signed("<", value, ir.Constant(value.type, 0)), from_end, value)
-        if offset is not None:
-            value = builder.add(builder.mul(offset, builder.extract_value(array, (shape, d))), value)
-        offset = value
+        from_end = of.signed if literal is None else literal < 0
+        length = builder.extract_value(array, (shape, d)) if from_end or offset is not None else None
+        if from_end:
+            negative = builder.icmp_signed("<", value, ir.Constant(value.type, 0))
+            value = builder.select(negative, builder.add(value, length), value)
+        offset = value if offset is None else builder.add(builder.mul(offset, length), value)
     return builder.gep(data, [offset])
+
+
+def _item(builder, whole, d):
+    """An item of a tuple: what was put there, if that was just now."""
+    while isinstance(whole, InsertValue):
+        if list(whole.indices) == [d]:
+            return whole.operands[1]
+        whole = whole.operands[0]
+    return builder.extract_value(whole, d)
