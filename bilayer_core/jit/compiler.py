@@ -1,8 +1,8 @@
 """A compiler for kernels: numba's pipeline without what serves nothing here.
 
-Left out are passes for closures, `with`, `raise`, `literal_unroll`, overloads to inline, expressions of whole arrays and
-parallel loops, all of which kernels do without; the record of types for people to read; and the ends of variables'
-lifetimes, which matter where references are counted. Compiled so, a kernel costs a third less.
+Left out are passes for closures, `with`, `raise`, `literal_unroll`, overloads to inline, expressions of whole arrays
+and parallel loops, all of which kernels do without; the record of types for people to read; and the ends of lifetimes
+of variables, which matter where references are counted.
 
 Passes and libraries are insides of numba that may change from release to release: `setup.py` names those for which this
 is tested.

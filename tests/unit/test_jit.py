@@ -1,9 +1,18 @@
 """What is special about how kernels are compiled: functions inside them, and elements of arrays."""
 
+import operator
+
 import numpy as np
 import pytest
+from numba.core import types
+from numba.core.compiler import Flags
+from numba.core.errors import TypingError
+from numba.core.registry import cpu_target
+from numba.core.typing.templates import signature
 
 from bilayer_core.jit import inner, kernel
+from bilayer_core.jit.flags import KernelFlags
+from bilayer_core.jit.operators import RESULTS, TARGET
 
 
 @inner
@@ -69,3 +78,55 @@ def test_strided_arrays_and_slices_mean_the_same():
     assert _row(m, 1) == m[1].sum() + m[:, 1].sum()
     strided = np.arange(24.0).reshape(3, 8)[:, ::2]
     assert _ends(np.arange(10.0)[::2], strided, np.arange(24.0).reshape(4, 3, 2).T, 1)[2] == strided[-2, 1]
+
+
+def _found_by_numba(operation, arguments):
+    """Signature that numba finds without what this package registers."""
+    context = cpu_target.typing_context
+    context.refresh()
+    templates = context.resolve_value_type(operation).templates
+    own = [of for of in templates if getattr(of, "metadata", None) is TARGET]
+    assert len(own) == 1
+    return types.Function([of for of in templates if of not in own]).get_call_type(context, arguments, {})
+
+
+@pytest.mark.parametrize("operation", RESULTS)
+def test_operations_have_the_types_that_numba_finds(operation):
+    for arguments, result in RESULTS[operation].items():
+        assert _found_by_numba(operation, arguments) == signature(result, *arguments)
+
+
+@pytest.mark.parametrize("index", [types.int64, types.UniTuple(types.int64, 2), types.UniTuple(types.int64, 3)])
+@pytest.mark.parametrize("number", [types.float64, types.int64, types.boolean])
+def test_elements_have_the_types_that_numba_finds(number, index):
+    array = types.Array(number, len(index) if isinstance(index, types.UniTuple) else 1, "C")
+    assert _found_by_numba(operator.getitem, (array, index)).return_type == number
+    for value in (number, types.int64):
+        found = _found_by_numba(operator.setitem, (array, index, value))
+        assert (
+            cpu_target.typing_context.resolve_value_type(operator.setitem).get_call_type(
+                cpu_target.typing_context, (array, index, value), {}
+            )
+            == found
+        )
+
+
+def test_read_only_arrays_are_not_written():
+    @kernel
+    def write(a):
+        a[0] = 1.0
+
+    values = np.zeros(2)
+    values.flags.writeable = False
+    with pytest.raises(TypingError, match="readonly"):
+        write(values)
+
+
+def test_flags_that_are_looked_up_are_one_object_for_equal_values_and_do_not_change():
+    flags = KernelFlags(Flags())
+    flags.nrt = False
+    first, again = flags.copy(), KernelFlags(flags).copy()
+    flags.nrt = True
+    assert first is again and first is not flags.copy() and not first.nrt
+    with pytest.raises(TypeError):
+        first.nrt = True
