@@ -38,7 +38,7 @@ class Engine:
     """
 
     def __init__(self, model: Model, potential: IncrementalPotential, places: list[Configuration], keeps_slopes: bool):
-        self._model, self._potential, self._keeps = model, potential, keeps_slopes
+        self._model, self._potential, self._keeps = model, potential, 1 if keeps_slopes else None
         self._energy = np.zeros(len(NAMES))
         self._groups = lasting_groups(model, potential)
         self._problem: Problem | None = None

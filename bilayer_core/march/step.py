@@ -38,8 +38,28 @@ def _compare_touched(sums, touched):
 
 
 @inner
-def _has_jumped(drives, state, first, range_of_channel, h):
+def _take_slopes(keeps, bodies, origin, state, first, h, method, n, scratch):
+    """Move the origin of stage n by what the slopes at the start of a step add to it."""
+    if keeps is None:
+        return
+    if method.history:
+        move_along(bodies, origin, state, first, h, method.along[n], method.bend, method.momenta[n], scratch)
+
+
+@inner
+def _keep_slopes(keeps, sums, state, origin, end, momentum_length, carry, touched):
+    """Leave slopes for the step after, and whether it can take them: not if something touches anew."""
+    if keeps is None:
+        return
+    keep_slopes(state, origin, end, momentum_length, carry)
+    state.kept[0] = _compare_touched(sums, touched)
+
+
+@inner
+def _has_jumped(keeps, drives, state, first, range_of_channel, h):
     """Whether a stimulus has jumped that some layer follows at once, or a step before did not leave its slopes."""
+    if keeps is None:
+        return False
     if state.kept[0] == 0.0:
         return True
     for k in range(drives.law_channel.shape[0]):
@@ -82,8 +102,8 @@ def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterat
     state : StateArrays
     method : Method
         For this step.
-    keeps : bool
-        Whether the integrator of the run keeps slopes.
+    keeps : int or None
+        None if the integrator of the run keeps no slopes.
     course : Course
     k : int
         Which step of the course.
@@ -119,8 +139,7 @@ def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterat
         copy_point(first, origin)
         for j in range(n):
             add_stage(origin, method.couplings[n, j], work.origins[j], work.ends[j], work.rotation)
-        if method.history:
-            move_along(bodies, origin, state, first, h, method.along[n], method.bend, method.momenta[n], work.rotation)
+        _take_slopes(keeps, bodies, origin, state, first, h, method, n, work.rotation)
         _drive(p.drives, state, course, k, n, work, stage)
         position, rotation = course.position[place, n], course.rotation[place, n]
         start = work.places[s]
@@ -152,9 +171,9 @@ def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterat
     write_state(bodies, held, p.fluid, strands, state, work.ends[last], work.places[e], course.rates[place, last])
     for i in range(state.transduction.shape[0]):
         state.transduction[i] = work.transduction[i]
-    if keeps:
-        keep_slopes(state, work.origins[last], work.ends[last], stage.lengths[1], method.carry)
-        state.kept[0] = _compare_touched(p.sums, work.touched)
+    _keep_slopes(
+        keeps, p.sums, state, work.origins[last], work.ends[last], stage.lengths[1], method.carry, work.touched
+    )
     return CONVERGED, -1, e, iterations, factorisations, backtracks, worst, gap
 
 
@@ -220,7 +239,7 @@ def take_steps(loop, keeps, changes, counts, h, tolerance, max_iterations):
     gap = math.inf
     status, pair, end = READY, -1, 1
     for k in range(course.time.shape[0]):
-        if changes and (course.jumps[k] or _has_jumped(p.drives, state, course.first[k], loop.ranges, h)):
+        if changes and (course.jumps[k] or _has_jumped(keeps, p.drives, state, course.first[k], loop.ranges, h)):
             return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
         status, pair, e, more, factors, halvings, left, nearest = take_step(
             p, state, loop.method, keeps, course, k, work, h, tolerance, max_iterations
