@@ -28,36 +28,46 @@ MADE, ROOM, PATH = 0, 1, 2
 """Places in `ways`."""
 
 
-@inner
-def _departure(position, step, fraction, base):
-    """Largest distance of a node at x + fraction · step from its place in `base` [m], the mean of all taken off, as in
-    `base`.
-    """
-    count = position.shape[0]
-    m0, m1, m2 = 0.0, 0.0, 0.0
-    for i in range(count):
-        m0 += position[i, 0] + fraction * step[i, 0]
-        m1 += position[i, 1] + fraction * step[i, 1]
-        m2 += position[i, 2] + fraction * step[i, 2]
-    m0, m1, m2 = m0 / count, m1 / count, m2 / count
-    largest = 0.0
-    for i in range(count):
-        d0 = position[i, 0] + fraction * step[i, 0] - base[i, 0] - m0
-        d1 = position[i, 1] + fraction * step[i, 1] - base[i, 1] - m1
-        d2 = position[i, 2] + fraction * step[i, 2] - base[i, 2] - m2
-        largest = max(largest, d0 * d0 + d1 * d1 + d2 * d2)
-    return math.sqrt(largest)
-
-
 @kernel
-def reachable(step, no_step, unit):
+def reachable(step, unit):
     """Largest motion of a node in a step [m], the mean of all taken off, and the part of the step for which there can
-    be a list; `no_step` is zero.
+    be a list.
 
     A translation common to all nodes brings none of them nearer to another.
     """
-    move, largest = _departure(no_step, step, 1.0, no_step), LARGEST_MOVE * unit
+    m0, m1, m2 = _mean(step)
+    square = 0.0
+    for i in range(step.shape[0]):
+        d0, d1, d2 = step[i, 0] - m0, step[i, 1] - m1, step[i, 2] - m2
+        square = max(square, d0 * d0 + d1 * d1 + d2 * d2)
+    move, largest = math.sqrt(square), LARGEST_MOVE * unit
     return move, largest / move if move > largest else 1.0
+
+
+@inner
+def _mean(vectors):
+    m0, m1, m2 = 0.0, 0.0, 0.0
+    count = vectors.shape[0]
+    for i in range(count):
+        m0 += vectors[i, 0]
+        m1 += vectors[i, 1]
+        m2 += vectors[i, 2]
+    return m0 / count, m1 / count, m2 / count
+
+
+@inner
+def _go_on(position, last):
+    """Take nodes, the mean of all taken off, to where they are; return the largest distance from where they were
+    last [m].
+    """
+    m0, m1, m2 = _mean(position)
+    square = 0.0
+    for i in range(position.shape[0]):
+        x0, x1, x2 = position[i, 0] - m0, position[i, 1] - m1, position[i, 2] - m2
+        d0, d1, d2 = x0 - last[i, 0], x1 - last[i, 1], x2 - last[i, 2]
+        last[i, 0], last[i, 1], last[i, 2] = x0, x1, x2
+        square = max(square, d0 * d0 + d1 * d1 + d2 * d2)
+    return math.sqrt(square)
 
 
 @inner
@@ -87,15 +97,16 @@ def _stray(position, step, fraction, base, tip):
 
 
 @inner
-def _centre(position, step, fraction, out):
-    """x + fraction · step, the mean taken off."""
-    count = position.shape[0]
-    for c in range(3):
-        mean = 0.0
-        for i in range(count):
-            mean += (position[i, c] + fraction * step[i, c]) / count
-        for i in range(count):
-            out[i, c] = position[i, c] + fraction * step[i, c] - mean
+def _set_out(position, step, length, base, tip):
+    """A motion from x to x + length · step, the mean of all taken off at either end."""
+    m0, m1, m2 = _mean(position)
+    w0, w1, w2 = _mean(step)
+    for i in range(position.shape[0]):
+        x0, x1, x2 = position[i, 0] - m0, position[i, 1] - m1, position[i, 2] - m2
+        base[i, 0], base[i, 1], base[i, 2] = x0, x1, x2
+        tip[i, 0] = x0 + length * (step[i, 0] - w0)
+        tip[i, 1] = x1 + length * (step[i, 1] - w1)
+        tip[i, 2] = x2 + length * (step[i, 2] - w2)
 
 
 @kernel
@@ -156,10 +167,9 @@ def list_rods(
         Path before which each pair stays beyond the barrier distance [m]; −∞ in a new list.
     """
     if move == 0.0:
-        gone = _departure(position, step, 0.0, last)
+        gone = _go_on(position, last)
         ways[ROOM] -= gone
         ways[PATH] += 2.0 * gone
-        _centre(position, step, 0.0, last)
     if move <= ways[ROOM]:
         return True
     if ways[MADE] > 0.0:
@@ -168,8 +178,7 @@ def list_rods(
             if move <= ways[ROOM] or _stray(position, step, fraction, base, tip) <= 0.5 * ways[MADE]:
                 return True
     ahead = min(max(AHEAD * unit / move, 1.0), MOST_AHEAD) if move > 0.0 else 1.0
-    _centre(position, step, 0.0, base)
-    _centre(position, step, ahead * fraction, tip)
+    _set_out(position, step, ahead * fraction, base, tip)
     ways[MADE], ways[ROOM], ways[PATH] = MARGIN * unit, 0.5 * MARGIN * unit, 0.0
     count[0] = near_pairs(
         base,

@@ -136,6 +136,78 @@ def _slip(body, turn, origin_turn, place, origin_place, arm, k, sign, arm_now, s
         slip[i] += sign * (place[body, i] - origin_place[body, i] + (now - before))
 
 
+@inner
+def _slip_rate(body, body_motion, arm, sign, rate):
+    """Add ± the displacement of a point of a body in a step of its position and rotation vector."""
+    p0, p1, p2 = body_motion[body, 3], body_motion[body, 4], body_motion[body, 5]
+    rate[0] += sign * (body_motion[body, 0] + p1 * arm[2] - p2 * arm[1])
+    rate[1] += sign * (body_motion[body, 1] + p2 * arm[0] - p0 * arm[2])
+    rate[2] += sign * (body_motion[body, 2] + p0 * arm[1] - p1 * arm[0])
+
+
+@kernel
+def slip_along(
+    count,
+    first,
+    surface,
+    load,
+    normal,
+    axis,
+    arm,
+    lever,
+    coefficient,
+    step_length,
+    position,
+    origin_position,
+    carrier_body,
+    surface_body,
+    place,
+    origin_place,
+    body_turn,
+    origin_turn,
+    node_step,
+    body_motion,
+    way_out,
+):
+    """Write the way of every lagged contact in a Newton step, see `forces.slip`.
+
+    Parameters
+    ----------
+    count … origin_turn
+        As for `friction`.
+    node_step, body_motion : Array
+        Displacement of nodes [m], and displacement [m] and rotation vector [rad] of bodies and of the world, shapes
+        (n_node, 3), (n_body + 1, 6).
+    way_out : Array
+        Written: shape (≥ count, `slip.WAY`).
+    """
+    arm_a, arm_b, u, rate = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    for k in range(count):
+        i = first[k]
+        a, b = carrier_body[i], surface_body[surface[k]]
+        for m in range(3):
+            u[m] = rate[m] = 0.0
+        if a >= 0:
+            _slip(a, body_turn, origin_turn, place, origin_place, arm, k, 1.0, arm_a, u)
+            _slip_rate(a, body_motion, arm_a, 1.0, rate)
+        else:
+            for m in range(3):
+                u[m], rate[m] = position[i, m] - origin_position[i, m], node_step[i, m]
+        _slip(b, body_turn, origin_turn, place, origin_place, lever, k, -1.0, arm_b, u)
+        _slip_rate(b, body_motion, arm_b, -1.0, rate)
+        a0, a1, a2 = axis[k, 0], axis[k, 1], axis[k, 2]
+        s0 = normal[k, 1] * a2 - normal[k, 2] * a1
+        s1 = normal[k, 2] * a0 - normal[k, 0] * a2
+        s2 = normal[k, 0] * a1 - normal[k, 1] * a0
+        way_out[k, 0], way_out[k, 1] = u[0] * a0 + u[1] * a1 + u[2] * a2, rate[0] * a0 + rate[1] * a1 + rate[2] * a2
+        way_out[k, 2], way_out[k, 3] = u[0] * s0 + u[1] * s1 + u[2] * s2, rate[0] * s0 + rate[1] * s1 + rate[2] * s2
+        largest = 0.0
+        for m in range(3):
+            way_out[k, 4 + m] = coefficient[i, m] ** 2
+            largest = max(largest, coefficient[i, m])
+        way_out[k, 7], way_out[k, 8] = (load[k], largest * step_length) if largest > 0.0 else (0.0, step_length)
+
+
 @kernel
 def friction(
     count,

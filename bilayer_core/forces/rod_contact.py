@@ -38,6 +38,7 @@ import math
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from ..jit import kernel
+from ..kinematics.stack import stack_vector
 
 
 @kernel
@@ -208,3 +209,61 @@ def rod_friction(
             matrix_out[c, m, 2] = excess * gm * g2 - ratio * nm * n2
             matrix_out[c, m, m] += ratio
     return energy
+
+
+@kernel
+def rod_slip_along(
+    coefficient,
+    step_length,
+    position,
+    origin_position,
+    contact_count,
+    node,
+    weight,
+    normal,
+    load,
+    node_step,
+    begin,
+    way_out,
+):
+    """Write the way of every lagged contact in a Newton step, see `forces.slip`: a is the direction of the slip.
+
+    Parameters
+    ----------
+    coefficient … load
+        As for `rod_friction`.
+    node_step : Array
+        Displacement of nodes [m], shape (n_node, 3).
+    begin : int
+        Row of the first contact.
+    way_out : Array
+        Written: shape (≥ begin + contact_count, `slip.WAY`).
+    """
+    slip, rate = stack_vector(3), stack_vector(3)
+    for c in range(contact_count):
+        i, j = node[c, 0], node[c, 1]
+        w0, w1, w2, w3 = weight[c, 0], weight[c, 1], weight[c, 2], weight[c, 3]
+        of_slip, of_rate = 0.0, 0.0
+        for m in range(3):
+            rate[m] = w0 * node_step[i, m] + w1 * node_step[i + 1, m] + w2 * node_step[j, m] + w3 * node_step[j + 1, m]
+            slip[m] = (
+                w0 * (position[i, m] - origin_position[i, m])
+                + w1 * (position[i + 1, m] - origin_position[i + 1, m])
+                + w2 * (position[j, m] - origin_position[j, m])
+                + w3 * (position[j + 1, m] - origin_position[j + 1, m])
+            )
+            of_slip += slip[m] * normal[c, m]
+            of_rate += rate[m] * normal[c, m]
+        square, together, total = 0.0, 0.0, 0.0
+        for m in range(3):
+            slip[m] -= of_slip * normal[c, m]
+            rate[m] -= of_rate * normal[c, m]
+            square += slip[m] * slip[m]
+            together += slip[m] * rate[m]
+            total += rate[m] * rate[m]
+        size, k = math.sqrt(square), begin + c
+        along = together / size if size > 0.0 else math.sqrt(total)
+        way_out[k, 0], way_out[k, 1] = size, along
+        way_out[k, 2], way_out[k, 3] = 0.0, math.sqrt(max(total - along * along, 0.0))
+        way_out[k, 4] = way_out[k, 5] = way_out[k, 6] = coefficient * coefficient
+        way_out[k, 7], way_out[k, 8] = load[c], coefficient * step_length

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..forces.slip import WAY
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
 from ..solve.band import width
@@ -28,6 +29,7 @@ from .model_groups import (
     Plane,
     PointForces,
     Sliding,
+    Slips,
     Space,
     Strands,
     Surfaces,
@@ -224,6 +226,14 @@ def sliding_of(model: Model, room: int) -> Sliding:
         **{name: np.zeros((room, 3)) for name in ("normal", "axis", "arm", "lever")},
         **{name: np.zeros((bodies, 3, 3)) for name in ("back", "turn", "origin_turn")},
     )
+
+
+def slips_of(model: Model, room: int) -> Slips | None:
+    """None if nothing slides against friction."""
+    law = model.scene.contact.friction if model.scene.contact else None
+    if law is None or not law.acts:
+        return None
+    return Slips(threshold=law.speed_threshold, way=np.zeros((room, WAY)))
 
 
 def _touches(contacts: Contacts) -> Touches:

@@ -58,11 +58,18 @@ def add_in_space(space, off_axis, bonds, strands, at, stage, sums, with_hessian)
 
 
 @inner
+def take_rest(off_axis, stage):
+    """Natural curvature of a stage, but for what strains off the axis add."""
+    if off_axis is None:
+        return
+    copy(stage.rest_joint, off_axis.rest_out)
+
+
+@inner
 def _bend_off_axis(off_axis, strands, at, stage):
     """Natural curvature of joints off the axis."""
     if off_axis is None:
         return
-    copy(stage.rest_joint, off_axis.rest_out)
     natural_curvature(
         off_axis.joint,
         off_axis.coupling,

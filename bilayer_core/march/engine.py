@@ -12,7 +12,7 @@ from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
 from ..solve.potential import IncrementalPotential
-from .build import lasting_groups, leaving_of, sliding_of, surfaces_of, threads_of, wide_of
+from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
 from .loop import Counted, Loop
 from .problem import Problem
 from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
@@ -83,6 +83,7 @@ class Engine:
                 surfaces=surfaces_of(model, near) if near else None,
                 sliding=sliding_of(model, room) if near else None,
                 threads=threads_of(model, rods) if rods else None,
+                slips=slips_of(model, room + (rods.sliding.room if rods else 0)),
                 leaving=leaving_of(matrix) if rods else None,
                 sums=sums_of(model, potential, self._energy, 2 * room),
             )

@@ -201,6 +201,14 @@ class Sliding:
 
 
 @group
+class Slips:
+    """Slip of all lagged contacts along a Newton step; see `forces.slip`."""
+
+    threshold: float
+    way: Array
+
+
+@group
 class Touches:
     """Contacts of rods; see `forces.rod_contact`."""
 

@@ -13,6 +13,7 @@ from .contact import list_pairs
 from .matrix import factorise, solve
 from .place import carry_frames, copy_prescribed, move, put_carried
 from .potential import evaluate, follow
+from .slip import hold_up
 from .status import (
     BLOCKED,
     CONVERGED,
@@ -172,9 +173,9 @@ def first_guess(p, start, position, rotation, stage, guess):
     return READY, -1
 
 
-FACTORISE, REFRESH, FOLLOW, SEARCH = 0, 1, 2, 3
-"""What an evaluation is for: a new matrix, a gradient for the old one, one in which only what follows the configuration
-has changed, a step of the line search."""
+FACTORISE, FOLLOW, SEARCH = 0, 1, 2
+"""What an evaluation is for: a new matrix, a gradient in which only what follows the configuration has changed, a step
+of the line search."""
 
 
 @inner
@@ -182,7 +183,8 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
     """Move `at` to the minimum of the potential; `trial` is scratch.
 
     The method is that of `solve.newton.NewtonSolver.minimise`, turned inside out: all evaluations are at one place,
-    because the compiler would make as many copies of them as there are places.
+    because the compiler would make as many copies of them as there are places. Where a new matrix is likely to be
+    needed at the end of a step, it is evaluated with second derivatives at once.
 
     Returns
     -------
@@ -196,7 +198,8 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
         Smallest gap to a surface or another rod [m].
     """
     follow(p, at, stage)
-    swapped, fresh, bounded, task = False, True, False, FACTORISE
+    swapped, fresh, bounded, short, task = False, True, False, False, FACTORISE
+    found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
     iterations = factorisations = backtracks = halvings = 0
     residual = previous = gap = math.inf
     energy = alpha = slope = noise = 0.0
@@ -204,11 +207,14 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
         if task == SEARCH:
             step, body_step = p.system.step, p.system.body_step
             move(p.bodies, p.held, p.surfaces, p.space, p.plane, p.strands, at, step, body_step, alpha, trial)
-        place = trial if task == SEARCH else at
-        if task != FOLLOW and not find_contacts(p.threads, p.strands, place.position):
-            status = NO_ROOM_FOR_RODS
-            break
-        value, new_gap = evaluate(p, place, stage, task == FACTORISE, task == FOLLOW)
+            found, curved = False, short or factorisations > 1
+        if task != FACTORISE or not curved:
+            place = trial if task == SEARCH else at
+            if not found and not find_contacts(p.threads, p.strands, place.position):
+                status = NO_ROOM_FOR_RODS
+                break
+            found, curved = True, curved or task == FACTORISE
+            value, new_gap = evaluate(p, place, stage, curved, task == FOLLOW)
         if task == SEARCH:
             if not value <= energy + ARMIJO * alpha * slope + noise:
                 alpha *= BACKTRACKING
@@ -218,16 +224,18 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
                 if fresh:
                     status = LINE_SEARCH
                     break
-                previous, task = 0.0, REFRESH  # a direction of an old matrix: try that of a new one
+                found, curved, task = False, False, FACTORISE  # a direction of an old matrix: try that of a new one
                 continue
             energy, gap = value, new_gap
             backtracks += halvings + bounded
             iterations += not fresh
-            previous = residual if halvings + bounded == 0 else 0.0
-            fresh = False
+            fresh, previous = False, residual
             at, trial, swapped = trial, at, not swapped
             if follow(p, at, stage):
-                task = FOLLOW
+                curved, task = False, FOLLOW
+            if short or halvings > 0:
+                task = FACTORISE
+            if task != SEARCH:
                 continue
         else:
             energy, gap = value, gap if task == FOLLOW else new_gap
@@ -240,7 +248,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
                 if status != READY:
                     break
                 iterations += 1
-                fresh, previous = True, math.inf
+                fresh = True
         solve(p.space, p.plane, p.wide, p.leaving, p.strands, p.bodies, p.sums, p.system)
         residual = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
         if not math.isfinite(residual):
@@ -260,6 +268,9 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
         if status != READY:
             break
         bounded, halvings, task = alpha < 1.0, 0, SEARCH
+        if fresh:
+            alpha = hold_up(p.slips, p.sliding, p.surfaces, p.threads, p.system, stage, at, slope, alpha)
+        short = alpha < 1.0
     return status, swapped, iterations, factorisations, backtracks, residual, gap
 
 

@@ -9,7 +9,7 @@ from ..solve.assembly import expand_gradient
 from ..solve.clamps import hand_gradient_to_bodies
 from .contact import add_contact, clear_contact, hand_on_contact, lag_sliding, list_pairs
 from .copying import copy
-from .elasticity import add_in_plane, add_in_space
+from .elasticity import add_in_plane, add_in_space, take_rest
 from .fluid import add_drag, add_fluid, turn_drag, turn_fluid
 from .inertia import add_inertia
 from .loads import add_loads, add_moments, scale_loads, turn_followers, turn_moments
@@ -28,6 +28,7 @@ def start_stage(p, start, stage):
         return NO_ROOM_FOR_RODS
     lag_sliding(p.sliding, p.surfaces, start, stage)
     scale_loads(p.loads, stage.load_factor)
+    take_rest(p.off_axis, stage)
     return READY
 
 

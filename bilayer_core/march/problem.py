@@ -19,6 +19,7 @@ from .model_groups import (
     Plane,
     PointForces,
     Sliding,
+    Slips,
     Space,
     Strands,
     Surfaces,
@@ -110,6 +111,7 @@ class Problem:
     surfaces: Surfaces | None
     sliding: Sliding | None
     threads: Threads | None
+    slips: Slips | None
     leaving: Leaving | None
     meets: int | None  # None if nothing touches anything
     flow: Flow | None

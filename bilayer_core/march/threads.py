@@ -98,7 +98,7 @@ def bound_between_rods(threads, strands, system, at):
     """Largest fraction of `System.node_step` that keeps rods apart, and whether there is room for the pairs near it."""
     if threads is None:
         return 1.0, True
-    move, limit = reachable(system.node_step, threads.no_step, threads.unit)
+    move, limit = reachable(system.node_step, threads.unit)
     if not _list(threads, strands, at.position, system.node_step, limit, limit * move):
         return 0.0, False
     if threads.counted[0] == 0:

@@ -131,17 +131,22 @@ class NewtonSolver:
         body_motion : Array
             Displacement [m] and rotation vector [rad] of bodies and of the world, shape (n_body + 1, 6).
         """
-        model, near, rods = self._model, self._potential.near, self._potential.matrix.rods
+        near, rods = self._potential.near, self._potential.matrix.rods
         alpha, blocking = near.bound(at, node_step, body_motion) if near else (1.0, -1)
         if rods is not None:
-            node_step, held = node_step.copy(), body_motion[model.attached_body]
-            node_step[model.attached_node] = held[:, :3]
-            if held[:, 3:].any():
-                node_step[model.attached_node] += np.cross(held[:, 3:], at.arm)
-            between, _ = rods.step_bound(at.position, node_step)
+            between, _ = rods.step_bound(at.position, self._with_held(at, node_step, body_motion))
             if between < alpha:
                 return between, -1
         return alpha, blocking
+
+    def _with_held(self, at: Configuration, node_step: Array, body_motion: Array) -> Array:
+        """`node_step` with the displacements of nodes that bodies hold."""
+        model, held = self._model, body_motion[self._model.attached_body]
+        node_step = node_step.copy()
+        node_step[model.attached_node] = held[:, :3]
+        if held[:, 3:].any():
+            node_step[model.attached_node] += np.cross(held[:, 3:], at.arm)
+        return node_step
 
     def bound_between(self, start: Configuration, end: Configuration) -> float:
         """`bound` from one configuration to another."""
@@ -213,17 +218,22 @@ class NewtonSolver:
         """
         potential = self._potential
         potential.follow(at)
-        energy = potential.evaluate(at, True)
-        backtracks = 0
-        fresh, previous = True, math.inf
+        stale, fresh, previous = True, False, math.inf
+        residual, energy = math.inf, math.inf
+        iterations = factorisations = backtracks = 0
         status = NewtonStatus.MAX_ITERATIONS
-        residual = math.inf
-        if not math.isfinite(energy):
-            return NewtonReport(NewtonStatus.NOT_FINITE, 0, 0, math.inf), at
-        if not potential.factorise(at):
-            return NewtonReport(NewtonStatus.INDEFINITE, 0, 1, math.inf), at
-        factorisations = iterations = 1
         while True:
+            if stale:
+                energy = potential.evaluate(at, True)
+                if factorisations == 0 and not math.isfinite(energy):
+                    status = NewtonStatus.NOT_FINITE
+                    break
+                factorisations += 1
+                if not potential.factorise(at):
+                    status = NewtonStatus.INDEFINITE
+                    break
+                iterations += 1
+                stale, fresh = False, True
             step, body_step = potential.newton_step()
             residual = self.speed(step, body_step)
             if not math.isfinite(residual):
@@ -235,44 +245,55 @@ class NewtonSolver:
             if iterations >= self._max_iterations:
                 break
             if not fresh and residual > KEEP_FACTOR_BELOW * previous:
-                energy = potential.evaluate(at, True)
-                factorisations += 1
-                iterations += 1
-                fresh, previous = True, math.inf
-                if not potential.factorise(at):
-                    status = NewtonStatus.INDEFINITE
-                    break
+                stale = True
                 continue
-            moved = self._search(at, trial, step, body_step, energy)
+            moved = self._search(at, trial, step, body_step, energy, fresh)
             if moved is None:
                 if fresh:
                     status = NewtonStatus.LINE_SEARCH
                     break
-                previous = 0.0  # a direction of an old matrix: try that of a new one
-                potential.evaluate(at, False)
+                stale = True  # a direction of an old matrix: try that of a new one
                 continue
-            energy, halvings = moved
+            energy, halvings, stale = moved
             backtracks += halvings
             iterations += not fresh
-            fresh, previous = False, (residual if halvings == 0 else 0.0)
+            fresh, previous = False, residual
             at, trial = trial, at
-            if potential.follow(at):
+            if potential.follow(at) and not stale:
                 energy = potential.evaluate(at, False)
         return NewtonReport(status, iterations, factorisations, residual, backtracks), at
 
-    def _search(self, at, trial, step: Array, body_step: Array, energy: float) -> tuple[float, int] | None:
-        """Backtrack from the bound that keeps gaps open until the potential falls; None if it never does."""
+    def _search(
+        self, at, trial, step: Array, body_step: Array, energy: float, fresh: bool
+    ) -> tuple[float, int, bool] | None:
+        """Backtrack from the bound that keeps gaps open, and from where friction holds up a step of a `fresh` matrix,
+        until the potential falls; None if it never does.
+
+        Returns
+        -------
+        energy : float
+            [J]
+        backtracks : int
+            Of the line search and of the bound on gaps.
+        short : bool
+            Whether the step was cut short.
+        """
         potential, model = self._potential, self._model
         slope = float(potential.gradient @ step) + float(np.sum(potential.body_gradient * body_step))
         noise = ROUNDING * sum(abs(value) for value in potential.terms.values())
         self._motion[self._prescribed] = 0.0
         self._motion[model.bodies.body_of_free] = body_step
-        alpha, _ = self.bound(at, step[self._node_unknown], self._motion)
+        node_step = step[self._node_unknown]
+        alpha, _ = self.bound(at, node_step, self._motion)
         bounded = alpha < 1.0
+        if fresh:
+            node_step = self._with_held(at, node_step, self._motion)
+            alpha = potential.held_up(at, node_step, self._motion, slope, alpha)
+        short = alpha < 1.0
         for halvings in range(MAX_BACKTRACKS):
             trial.set_moved(at, step, body_step, alpha)
             value = potential.evaluate(trial, False)
             if value <= energy + ARMIJO * alpha * slope + noise:
-                return value, halvings + bounded
+                return value, halvings + bounded, short or halvings > 0
             alpha *= BACKTRACKING
         return None

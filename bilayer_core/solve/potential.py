@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..forces.slip import held_up
 from ..model.model import Model
 from .assembly import expand_gradient
 from .clamps import hand_gradient_to_bodies
@@ -205,6 +206,27 @@ class IncrementalPotential:
     def newton_step(self) -> tuple[Array, Array]:
         """Minus the inverse of the factorised matrix times the present gradient; see `NewtonMatrix.newton_step`."""
         return self.matrix.newton_step(self.gradient, self.body_gradient)
+
+    def held_up(self, at: Configuration, node_step: Array, body_motion: Array, slope: float, bound: float) -> float:
+        """Fraction of a Newton step, at most `bound`, at which friction holds it up; see `forces.slip`.
+
+        Parameters
+        ----------
+        at : Configuration
+            That of the last evaluation and of the matrix.
+        node_step : Array
+            Displacement of nodes [m], shape (n_node, 3); those that bodies hold follow their bodies.
+        body_motion : Array
+            Displacement [m] and rotation vector [rad] of bodies and of the world, shape (n_body + 1, 6).
+        slope : float
+            Of the potential along the step [J].
+        bound : float
+        """
+        ways = [term.slip_along(at, node_step, body_motion) for term in self._of_carriers]
+        if sum(map(len, ways)) == 0:
+            return bound
+        way = np.concatenate(ways)
+        return held_up(len(way), way, self.model.scene.contact.friction.speed_threshold, slope, float(bound))
 
     def diagonal_factor(self) -> float:
         """Factor of the mass matrix in the Hessian: that of inertia and α/(γ h) of damping [1/s²]."""

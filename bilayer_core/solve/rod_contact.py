@@ -11,7 +11,8 @@ import numpy as np
 from ..contact.rod_bound import rod_step_bound
 from ..contact.rod_list import PATH, list_rods, reachable
 from ..contact.segment import facing_contacts
-from ..forces.rod_contact import rod_barrier, rod_friction
+from ..forces.rod_contact import rod_barrier, rod_friction, rod_slip_along
+from ..forces.slip import WAY
 from ..model.model import Model
 from ..model.rod_surfaces import NearPairs
 
@@ -219,11 +220,31 @@ class RodContact:
             sliding.matrix,
         )
 
+    def slip_along(self, position: Array, origin_position: Array, step_length: float, node_step: Array) -> Array:
+        """Way of the lagged contacts along a step of nodes [m], shape (n_node, 3); see `forces.slip`."""
+        sliding = self.sliding
+        way = np.empty((sliding.count, WAY))
+        rod_slip_along(
+            self._coefficient,
+            step_length,
+            position,
+            origin_position,
+            sliding.count,
+            sliding.node,
+            sliding.weight,
+            sliding.normal,
+            sliding.load,
+            node_step,
+            0,
+            way,
+        )
+        return way
+
     def step_bound(self, position: Array, step: Array) -> tuple[float, int]:
         """Largest fraction of a step of nodes [m], shape (n_node, 3), that keeps all gaps open, and the node that sets
         it (−1: none).
         """
-        move, limit = reachable(step, self.no_step, self.unit)
+        move, limit = reachable(step, self.unit)
         self._list(position, self.no_step, 0.0, 0.0)
         self._list(position, step, limit, limit * move)
         pairs, surfaces = self.pairs, self._surfaces

@@ -7,11 +7,14 @@ import math
 import numpy as np
 
 from ...forces.contact import surface_contact
-from ...forces.friction import friction, lag_axes, lag_friction
+from ...forces.friction import friction, lag_axes, lag_friction, slip_along
+from ...forces.slip import WAY
 from ...model.model import Model
 from ..configuration import Configuration
 from ..neighbours import Neighbours
 from .term import Accumulators, Kind, StepContext, Term
+
+Array = np.ndarray
 
 
 class Barrier(Term):
@@ -177,3 +180,30 @@ class Friction(Term):
         )
         if with_hessian:
             matrix.links = links
+
+    def slip_along(self, at: Configuration, node_step: Array, body_motion: Array) -> Array:
+        carriers, context, way = self.model.carriers, self.context, np.empty((self._count, WAY))
+        slip_along(
+            self._count,
+            self._first,
+            self._surface,
+            self._load,
+            self._normal,
+            self._axis,
+            self._arm,
+            self._lever,
+            carriers.friction,
+            context.length,
+            at.position,
+            context.origin_position,
+            carriers.body,
+            self.model.surfaces.body,
+            at.place,
+            context.origin_place,
+            self._turn,
+            self._origin_turn,
+            node_step,
+            body_motion,
+            way,
+        )
+        return way

@@ -4,8 +4,12 @@ contacts.
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..configuration import Configuration
 from .term import Kind, StepContext, Term
+
+Array = np.ndarray
 
 
 class RodBarrier(Term):
@@ -32,3 +36,7 @@ class RodFriction(Term):
         self.out.energy["rod friction"] = self.out.matrix.rods.friction(
             at.position, context.origin_position, context.length, self.out.carrier
         )
+
+    def slip_along(self, at: Configuration, node_step: Array, body_motion: Array) -> Array:
+        context = self.context
+        return self.out.matrix.rods.slip_along(at.position, context.origin_position, context.length, node_step)

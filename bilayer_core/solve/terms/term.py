@@ -8,6 +8,7 @@ from enum import Enum
 
 import numpy as np
 
+from ...forces.slip import WAY
 from ...model.model import Model
 from ..configuration import Configuration
 from ..newton_matrix import NewtonMatrix, zeros_in_one
@@ -184,6 +185,20 @@ class Term(ABC):
     def follow(self, at: Configuration) -> bool:
         """Take from the configuration that Newton moved to what is held fixed until the next move; false if nothing."""
         return False
+
+    def slip_along(self, at: Configuration, node_step: Array, body_motion: Array) -> Array:
+        """Way of every contact that slides against friction, along a step from `at`, where the last evaluation was; see
+        `forces.slip`.
+
+        Parameters
+        ----------
+        at : Configuration
+        node_step : Array
+            Displacement of nodes [m], shape (n_node, 3).
+        body_motion : Array
+            Displacement [m] and rotation vector [rad] of bodies and of the world, shape (n_body + 1, 6).
+        """
+        return np.empty((0, WAY))
 
     @abstractmethod
     def add(self, at: Configuration, with_hessian: bool) -> None:
