@@ -34,6 +34,40 @@ def _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, t
     return not joined or _square_distance(start_position, i, s, j) > (radii + touch) ** 2
 
 
+GROUP = 4
+"""Edges next to each other for which the tree is searched together, a power of two."""
+
+
+@inner
+def _come_near(box, a, b, reach):
+    """Whether two boxes of the tree are nearer than `reach` along each axis."""
+    for c in range(3):
+        if box[b, c] >= box[a, 3 + c] + reach or box[b, 3 + c] <= box[a, c] - reach:
+            return False
+    return True
+
+
+@inner
+def _meet(box, leaves, own, reach, met_out):
+    """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending; return how
+    many do.
+    """
+    count = 0
+    b = 1
+    while b > 0:
+        meets = _come_near(box, own, b, reach)
+        if meets and b < leaves:
+            b *= 2
+            continue
+        if meets:
+            met_out[count] = b - leaves
+            count += 1
+        while b & 1:
+            b >>= 1
+        b += b > 0
+    return count
+
+
 @allocating
 def near_pairs(
     position,
@@ -105,38 +139,36 @@ def near_pairs(
         for c in range(3):
             box[b, c] = min(box[2 * b, c], box[2 * b + 1, c])
             box[b, 3 + c] = max(box[2 * b, 3 + c], box[2 * b + 1, 3 + c])
-    near = np.empty(edges, np.int64)
+    met, near = np.empty(edges, np.int64), np.empty(edges, np.int64)
     found = 0
     room = point_out.shape[0]
+    group = min(GROUP, leaves)
+    meetings = 0
     for a in range(edges):
+        if a % group == 0:
+            meetings = _meet(box, leaves, (leaves + a) // group, reach, met)
         if first_point[a] == first_point[a + 1]:
             continue
         count = 0
         own, i = edge_rod[a], edge_node[a]
-        least0, least1, least2 = box[leaves + a, 0] - reach, box[leaves + a, 1] - reach, box[leaves + a, 2] - reach
-        most0, most1, most2 = box[leaves + a, 3] + reach, box[leaves + a, 4] + reach, box[leaves + a, 5] + reach
-        b = 1
-        while b > 0:
-            meets = box[b, 0] < most0 and box[b, 3] > least0 and box[b, 1] < most1 and box[b, 4] > least1
-            meets = meets and box[b, 2] < most2 and box[b, 5] > least2
-            if meets and b < leaves:
-                b *= 2
+        for m in range(meetings):
+            k = met[m]
+            if not rod_meets[own, edge_rod[k]]:
                 continue
-            k = b - leaves
-            if meets and rod_meets[own, edge_rod[k]]:
-                along = max(edge_arc[k, 1] - edge_arc[a, 0], edge_arc[a, 1] - edge_arc[k, 0])
-                if own != edge_rod[k] or along >= rod_exclusion[own]:
-                    away, moved = 0.0, 0.0
-                    for c in range(3):
-                        away += (middle[a, c] - middle[k, c]) ** 2
-                        moved += (motion[a, c] - motion[k, c]) ** 2
-                    reached = half[a] + half[k] + reach + math.sqrt(moved)
-                    if away < reached * reached:
-                        near[count] = k
-                        count += 1
-            while b & 1:
-                b >>= 1
-            b += b > 0
+            if own == edge_rod[k]:
+                along = max(edge_arc[k, 0] - edge_arc[a, 0], edge_arc[a, 1] - edge_arc[k, 1])
+                if along < rod_exclusion[own]:
+                    continue
+            away, moved = 0.0, 0.0
+            for c in range(3):
+                away += (middle[a, c] - middle[k, c]) ** 2
+                moved += (motion[a, c] - motion[k, c]) ** 2
+            near_enough = half[a] + half[k] + reach
+            if away >= near_enough * near_enough and away >= (near_enough + math.sqrt(moved)) ** 2:
+                continue
+            if _come_near(box, leaves + a, leaves + k, reach):
+                near[count] = k
+                count += 1
         if count == 0:
             continue
         for p in range(first_point[a], first_point[a + 1]):

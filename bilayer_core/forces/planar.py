@@ -134,13 +134,12 @@ def planar_bend(
 @kernel
 def planar_stretch_bend(
     joint,
-    coupling,
+    slope,
     edge_a,
     edge_b,
     stiffness,
     rest,
     strain,
-    rest_length,
     side,
     frame,
     polar_gradient_out,
@@ -155,22 +154,21 @@ def planar_stretch_bend(
     for i in range(joint.shape[0]):
         k = joint[i]
         a, b = edge_a[k], edge_b[k]
-        sa = coupling[i, 0] / rest_length[a] if coupling[i, 0] != 0.0 else 0.0
-        sb = coupling[i, 1] / rest_length[b] if coupling[i, 1] != 0.0 else 0.0
+        sa, sb = slope[i, 0], slope[i, 1]
         k1 = stiffness[k, 0]
         moment = k1 * (strain[k, 0] - rest[k, 0])
         polar_gradient_out[a, 0] -= moment * sa
         polar_gradient_out[b, 0] -= moment * sb
         if with_hessian:
             cosine = frame[a, 0] * frame[b, 0] + frame[a, 1] * frame[b, 1]
-            slope = 2.0 * side[a] * k1 / (1.0 + cosine)
+            turning = 2.0 * side[a] * k1 / (1.0 + cosine)
             polar_hessian_out[a, 0] += k1 * sa * sa
             polar_hessian_out[b, 0] += k1 * sb * sb
-            polar_hessian_out[a, 1] += slope * sa
-            polar_hessian_out[b, 1] -= slope * sb
+            polar_hessian_out[a, 1] += turning * sa
+            polar_hessian_out[b, 1] -= turning * sb
             cross_hessian_out[k, 0] += k1 * sa * sb
-            cross_hessian_out[k, 1] -= slope * sa
-            cross_hessian_out[k, 2] += slope * sb
+            cross_hessian_out[k, 1] -= turning * sa
+            cross_hessian_out[k, 2] += turning * sb
 
 
 @kernel

@@ -33,13 +33,13 @@ from ..kinematics.vector import (
 
 
 @kernel
-def natural_curvature(joint, coupling, edge_a, edge_b, rest_length, length, joint_rest, rest_out):
+def natural_curvature(joint, slope, edge_a, edge_b, rest_length, length, joint_rest, rest_out):
     """Write κ̄₁ of the coupled joints at the present strains into the first column of `rest_out` [rad].
 
     Parameters
     ----------
-    joint, coupling : Array
-        Coupled joints and b of their two edges [rad], 0 for a wall, shapes (n,), (n, 2).
+    joint, slope : Array
+        Coupled joints and b/|ē| of their two edges [rad/m], 0 for a wall, shapes (n,), (n, 2).
     edge_a, edge_b, joint_rest : Array
         Of all joints, shapes (n_joint,), (n_joint, 3).
     rest_length, length : Array
@@ -48,23 +48,22 @@ def natural_curvature(joint, coupling, edge_a, edge_b, rest_length, length, join
     for i in range(joint.shape[0]):
         k = joint[i]
         shift = 0.0
-        if coupling[i, 0] != 0.0:
-            shift += coupling[i, 0] * (length[edge_a[k]] / rest_length[edge_a[k]] - 1.0)
-        if coupling[i, 1] != 0.0:
-            shift += coupling[i, 1] * (length[edge_b[k]] / rest_length[edge_b[k]] - 1.0)
+        if slope[i, 0] != 0.0:
+            shift += slope[i, 0] * (length[edge_a[k]] - rest_length[edge_a[k]])
+        if slope[i, 1] != 0.0:
+            shift += slope[i, 1] * (length[edge_b[k]] - rest_length[edge_b[k]])
         rest_out[k, 0] = joint_rest[k, 0] + shift
 
 
 @kernel
 def stretch_bend(
     joint,
-    coupling,
+    slope,
     edge_a,
     edge_b,
     stiffness,
     rest,
     strain,
-    rest_length,
     length,
     tangent,
     director1,
@@ -78,7 +77,7 @@ def stretch_bend(
 
     Parameters
     ----------
-    joint, coupling, edge_a, edge_b, rest_length, length
+    joint, slope, edge_a, edge_b, length
         As for `natural_curvature`.
     stiffness, rest, strain : Array
         k₁ k₂ k₃ [N m]; κ̄₁ κ̄₂ ψ̄ at the present strains and κ₁ κ₂ ψ [rad] of all joints, shape (n_joint, 3).
@@ -91,9 +90,7 @@ def stretch_bend(
     for i in range(joint.shape[0]):
         k = joint[i]
         ka, kb = edge_a[k], edge_b[k]
-        # b/|ē|: ∂κ̄₁/∂e = s t
-        sa = coupling[i, 0] / rest_length[ka] if coupling[i, 0] != 0.0 else 0.0
-        sb = coupling[i, 1] / rest_length[kb] if coupling[i, 1] != 0.0 else 0.0
+        sa, sb = slope[i, 0], slope[i, 1]  # ∂κ̄₁/∂e = s t
         k1 = stiffness[k, 0]
         moment = k1 * (strain[k, 0] - rest[k, 0])
         a, b = row(tangent, ka), row(tangent, kb)

@@ -128,7 +128,7 @@ def _plane(model: Model, matrix: PlanarMatrix) -> Plane:
 
 def _off_axis(model: Model) -> OffAxis:
     rest = np.zeros_like(model.joint_rest)
-    return OffAxis(joint=model.coupled_joint, coupling=model.strain_coupling, rest_out=rest, rest=read_only(rest))
+    return OffAxis(joint=model.coupled_joint, slope=model.strain_slope, rest_out=rest, rest=read_only(rest))
 
 
 def read_only(array: Array) -> Array:

@@ -72,7 +72,7 @@ def _bend_off_axis(off_axis, strands, at, stage):
         return
     natural_curvature(
         off_axis.joint,
-        off_axis.coupling,
+        off_axis.slope,
         strands.joint_a,
         strands.joint_b,
         strands.rest_length,
@@ -88,13 +88,12 @@ def _add_off_axis(off_axis, strands, at, sums, with_hessian):
         return
     stretch_bend(
         off_axis.joint,
-        off_axis.coupling,
+        off_axis.slope,
         strands.joint_a,
         strands.joint_b,
         strands.joint_stiffness,
         off_axis.rest,
         at.joint_strain,
-        strands.rest_length,
         at.length,
         at.tangent,
         at.director1,
@@ -149,13 +148,12 @@ def _add_off_axis_in_plane(plane, off_axis, strands, at, sums, with_hessian):
         return
     planar_stretch_bend(
         off_axis.joint,
-        off_axis.coupling,
+        off_axis.slope,
         strands.joint_a,
         strands.joint_b,
         strands.joint_stiffness,
         off_axis.rest,
         at.joint_strain,
-        strands.rest_length,
         plane.side,
         plane.frame,
         plane.polar_gradient,

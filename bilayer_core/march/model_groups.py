@@ -86,7 +86,7 @@ class OffAxis:
     """Joints whose natural curvature depends on the strains of their edges; see `forces.stretch_bend`."""
 
     joint: Array
-    coupling: Array
+    slope: Array
     rest_out: Array
     rest: Array  # the same, read-only
 

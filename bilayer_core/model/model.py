@@ -199,6 +199,14 @@ class Model(ReadOnlyArrays):
     pair_rest: Array  # offset of the midpoints along m1, m2, m3 [m], shape (n_pair, 3)
 
     @property
+    def strain_slope(self) -> Array:
+        """b/|ē| of coupled joints [rad/m], 0 for a wall, shape (n_coupled, 2), read-only: ∂κ̄₁ by lengths of edges."""
+        edges = np.stack([self.joint_a, self.joint_b], axis=1)[self.coupled_joint]
+        slope = self.strain_coupling / np.concatenate([self.rest_length, np.ones(self.wall_count)])[edges]
+        slope.flags.writeable = False
+        return slope
+
+    @property
     def point_count(self) -> int:
         """Number of contact points of bodies, corners and rims of their surfaces among them."""
         return self.carriers.point_count

@@ -87,7 +87,7 @@ class BendingOffAxis(BendingAndTwisting):
 
     def __init__(self, model: Model, out: Accumulators):
         super().__init__(model, out)
-        self._coupled = (model.coupled_joint, model.strain_coupling, model.joint_a, model.joint_b)
+        self._coupled = (model.coupled_joint, model.strain_slope, model.joint_a, model.joint_b)
         self._rest = np.zeros_like(model.joint_rest)
         self._rest_read_only = self._rest.view()
         self._rest_read_only.flags.writeable = False  # as the model's: another type would be another specialisation
@@ -105,7 +105,6 @@ class BendingOffAxis(BendingAndTwisting):
             stiffness,
             rest,
             at.joint_strain,
-            model.rest_length,
             at.length,
             at.tangent,
             at.director1,

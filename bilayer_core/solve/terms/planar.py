@@ -23,7 +23,7 @@ class PlanarElasticity(Term):
 
     def __init__(self, model: Model, out: Accumulators, names: tuple[str, ...] | None = None):
         super().__init__(model, out)
-        self._coupled = (model.coupled_joint, model.strain_coupling, model.joint_a, model.joint_b)
+        self._coupled = (model.coupled_joint, model.strain_slope, model.joint_a, model.joint_b)
         self._rest = np.zeros_like(model.joint_rest)
         self._rest_read_only = self._rest.view()
         self._rest_read_only.flags.writeable = False  # as the model's: another type would be another specialisation
@@ -82,7 +82,6 @@ class PlanarElasticity(Term):
             model.joint_stiffness,
             rest,
             at.joint_strain,
-            model.rest_length,
             model.plane.side,
             matrix.frame,
             matrix.polar_gradient,
