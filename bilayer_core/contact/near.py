@@ -16,7 +16,8 @@ from .shapes import PLANE, shape_distance
 
 @kernel
 def gap_normal(kind, size, rounding, radius, place, turn, s, x0, x1, x2):
-    """Gap [m] between a carrier at x and surface s, its outward normal in the world, and x in the surface's frame.
+    """Gap [m] between a carrier at x and surface s, its outward normal in the world, and x in the surface's frame
+    (above a plane, its height alone).
 
     Parameters
     ----------
@@ -35,9 +36,11 @@ def gap_normal(kind, size, rounding, radius, place, turn, s, x0, x1, x2):
     gap, n0, n1, n2, p0, p1, p2 : float
     """
     z0, z1, z2 = x0 - place[s, 0], x1 - place[s, 1], x2 - place[s, 2]
+    p2 = turn[s, 0, 2] * z0 + turn[s, 1, 2] * z1 + turn[s, 2, 2] * z2
+    if kind[s] == PLANE:
+        return p2 - rounding[s] - radius, turn[s, 0, 2], turn[s, 1, 2], turn[s, 2, 2], 0.0, 0.0, p2
     p0 = turn[s, 0, 0] * z0 + turn[s, 1, 0] * z1 + turn[s, 2, 0] * z2
     p1 = turn[s, 0, 1] * z0 + turn[s, 1, 1] * z1 + turn[s, 2, 1] * z2
-    p2 = turn[s, 0, 2] * z0 + turn[s, 1, 2] * z1 + turn[s, 2, 2] * z2
     d, g0, g1, g2 = shape_distance(kind[s], size[s, 0], size[s, 1], size[s, 2], p0, p1, p2)
     n0 = turn[s, 0, 0] * g0 + turn[s, 0, 1] * g1 + turn[s, 0, 2] * g2
     n1 = turn[s, 1, 0] * g0 + turn[s, 1, 1] * g1 + turn[s, 1, 2] * g2

@@ -18,7 +18,7 @@ import math
 from ..jit import inner, kernel
 from .broad_phase import near_pairs
 
-MARGIN = 0.5
+MARGIN = 0.3
 """Of a list, in units of the barrier distance and the thickest layer together."""
 AHEAD, MOST_AHEAD = 1.0, 32.0
 """How far a motion is prolonged, in the same units, and in lengths of its own at most."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from sample_scenes import ball, contact, everything, layer, rod, scene
+from slips import dissipation
 
 from bilayer_core.integrate.integrators import INTEGRATORS
 from bilayer_core.integrate.stages import predict, start_point
@@ -213,6 +214,26 @@ def test_derivatives_of_a_laminate_off_its_neutral_axis_agree_with_differences(f
     slopes = problem.model.strain_coupling  # arms begin and end with one layer
     assert len(slopes) == 6 and np.abs(slopes).max() > 0.5
     check(problem)
+
+
+@pytest.mark.parametrize("hub", HUBS)
+def test_friction_along_a_step_is_that_of_the_ways_of_contacts(hub):
+    problem = of_everything(OTHERS, hub, 0)
+    model, potential = problem.model, problem.potential
+    vector = np.zeros(len(problem.scale))
+    vector[problem.free] = 2e-6 * np.random.default_rng(5).standard_normal(len(problem.free))
+    step = vector * problem.scale
+    motion = np.zeros((len(model.bodies.names) + 1, 6))
+    motion[model.bodies.body_of_free] = step[problem.size :].reshape(-1, 6)
+    node_step = step[model.layout.node[:, None] + np.arange(3)]
+    problem.value(0.0 * vector)
+    ways = [term.slip_along(problem.trial, node_step, motion) for term in potential._of_carriers]
+    way, threshold = np.concatenate(ways), model.scene.contact.friction.speed_threshold
+    assert len(way) >= 3
+    for fraction in (0.0, 0.5, 1.0):
+        problem.value(fraction * vector)
+        assert potential.terms["friction"] == pytest.approx(dissipation(way, fraction, threshold), rel=1e-4)
+    assert dissipation(way, 1.0, threshold) != pytest.approx(dissipation(way, 0.0, threshold), rel=1e-2)
 
 
 SHAPES = {

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from sample_scenes import contact, layer, rod, scene
+from slips import dissipation
 
 from bilayer_core import load_scene
 from bilayer_core.integrate.integrators import INTEGRATORS
@@ -132,6 +133,20 @@ def test_derivatives_of_rod_contact_agree_with_differences(case, term):
         )
     best = np.min(errors, axis=0)
     assert best[0] < 1e-7 and best[1] < 1e-6
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_friction_between_rods_along_a_step_is_that_of_the_ways_of_contacts(case):
+    model, position = CASES[case](np.random.default_rng(3))
+    rods, rng, length = RodContact(model), np.random.default_rng(4), 0.01
+    origin = position + 2e-6 * rng.standard_normal(position.shape)
+    step = 1e-5 * rng.standard_normal(position.shape)
+    rods.start_step(position)
+    way, threshold = rods.slip_along(position, origin, length, step), model.scene.contact.friction.speed_threshold
+    assert len(way) >= 4
+    for fraction in (0.0, 0.3, 1.0):
+        energy = rods.friction(position + fraction * step, origin, length, np.zeros_like(position))
+        assert energy == pytest.approx(dissipation(way, fraction, threshold), rel=1e-9)
 
 
 def moved_rigidly(position):
