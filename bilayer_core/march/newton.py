@@ -47,10 +47,11 @@ def bound(surfaces, threads, bodies, held, strands, system, at):
     """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open, the near pair that sets it
     (−1: none), and whether that could be found.
     """
+    _move_held(held, system, at)
     fraction, pair, status = _bound_at_surfaces(surfaces, bodies, system, at)
     if status != READY:
         return fraction, pair, status
-    between, status = _bound_between_rods(threads, strands, held, system, at)
+    between, status = _bound_between_rods(threads, strands, system, at)
     if between < fraction:
         return between, -1, status
     return fraction, pair, status
@@ -87,10 +88,9 @@ def _bound_at_surfaces(surfaces, bodies, system, at):
 
 
 @inner
-def _bound_between_rods(threads, strands, held, system, at):
+def _bound_between_rods(threads, strands, system, at):
     if threads is None:
         return 1.0, READY
-    _move_held(held, system, at)
     fraction, listed = bound_between_rods(threads, strands, system, at)
     return fraction, READY if listed else NO_ROOM_FOR_RODS
 

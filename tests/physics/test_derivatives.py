@@ -221,19 +221,24 @@ def test_friction_along_a_step_is_that_of_the_ways_of_contacts(hub):
     problem = of_everything(OTHERS, hub, 0)
     model, potential = problem.model, problem.potential
     vector = np.zeros(len(problem.scale))
-    vector[problem.free] = 2e-6 * np.random.default_rng(5).standard_normal(len(problem.free))
+    vector[problem.free] = 5e-6 * np.random.default_rng(5).standard_normal(len(problem.free))
     step = vector * problem.scale
     motion = np.zeros((len(model.bodies.names) + 1, 6))
     motion[model.bodies.body_of_free] = step[problem.size :].reshape(-1, 6)
-    node_step = step[model.layout.node[:, None] + np.arange(3)]
     problem.value(0.0 * vector)
+    node_step, held = step[model.layout.node[:, None] + np.arange(3)], motion[model.attached_body]
+    node_step[model.attached_node] = held[:, :3] + np.cross(held[:, 3:], problem.trial.arm)
     ways = [term.slip_along(problem.trial, node_step, motion) for term in potential._of_carriers]
     way, threshold = np.concatenate(ways), model.scene.contact.friction.speed_threshold
     assert len(way) >= 3
+    found, expected = [], []
     for fraction in (0.0, 0.5, 1.0):
         problem.value(fraction * vector)
-        assert potential.terms["friction"] == pytest.approx(dissipation(way, fraction, threshold), rel=1e-4)
-    assert dissipation(way, 1.0, threshold) != pytest.approx(dissipation(way, 0.0, threshold), rel=1e-2)
+        found.append(potential.terms["friction"])
+        expected.append(dissipation(way, fraction, threshold))
+    assert found[0] == pytest.approx(expected[0], rel=1e-12)
+    assert np.diff(found) == pytest.approx(np.diff(expected), rel=1e-2)
+    assert abs(found[2] - found[0]) > 1e-3 * found[0]
 
 
 SHAPES = {
