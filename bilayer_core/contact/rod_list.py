@@ -24,7 +24,7 @@ AHEAD, MOST_AHEAD = 1.0, 32.0
 """How far a motion is prolonged, in the same units, and in lengths of its own at most."""
 LARGEST_MOVE = 8.0
 """In the same units; longer steps are cut short."""
-MADE, ROOM, PATH = 0, 1, 2
+MADE, ROOM, PATH, FIRST = 0, 1, 2, 3
 """Places in `ways`."""
 
 
@@ -159,8 +159,8 @@ def list_rods(
         Positions from which to which the list was made, and where nodes were last, their mean taken off [m], shape
         (n_node, 3). Changed.
     ways : Array
-        Margin of the list [m] (0: there is none), how far nodes may go on in any direction for it to serve, and its
-        path [m], shape (3,). Changed.
+        Margin of the list [m] (0: there is none), how far nodes may go on in any direction for it to serve, its
+        path [m], and that before which none of its pairs comes to the barrier distance, shape (4,). Changed.
     count : Array
         How many pairs the list has, shape (1,). Changed.
     until_out : Array
@@ -207,4 +207,5 @@ def list_rods(
         return False
     for c in range(count[0]):
         until_out[c] = -math.inf
+    ways[FIRST] = -math.inf if count[0] > 0 else math.inf
     return True

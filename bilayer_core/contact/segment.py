@@ -80,7 +80,8 @@ def facing_contacts(
     count_out,
     gap_out,
 ):
-    """List the contacts nearer than `reach` [m]; return how many, and their smallest gap [m] (infinite without any).
+    """List the contacts nearer than `reach` [m]; return how many, their smallest gap [m] (infinite without any), and
+    the path before which no pair has one.
 
     If there are more than the outputs have room for, the rest is counted but not written.
 
@@ -106,8 +107,10 @@ def facing_contacts(
     """
     found = 0
     smallest = math.inf
+    first = math.inf
     for c in range(pair_count):
         if until[c] > path:
+            first = min(first, until[c])
             continue
         p, k = pair_point[c], pair_edge[c]
         a = point_edge[p]
@@ -118,6 +121,7 @@ def facing_contacts(
         radii = edge_radius[a] + edge_radius[k]
         square = square_distance(p0, p1, p2, position, j)
         until[c] = path + math.sqrt(square) - radii - reach
+        first = min(first, until[c])
         if square > (radii + reach) ** 2 * SLACK:
             continue
         along = fraction_along(p0, p1, p2, position, j)
@@ -151,4 +155,4 @@ def facing_contacts(
                 inner_out[found - 1] = kind == 0
                 count_out[found - 1] = times
                 gap_out[found - 1] = gap
-    return found, smallest
+    return found, smallest, first

@@ -256,7 +256,7 @@ class Threads:
     base: Array
     tip: Array
     last: Array
-    ways: Array  # shape (3,)
+    ways: Array  # shape (4,)
     counted: Array  # shape (1,)
     pair_point: Array
     pair_edge: Array

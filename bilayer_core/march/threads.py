@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..contact.rod_bound import rod_step_bound
-from ..contact.rod_list import PATH, list_rods, reachable
+from ..contact.rod_list import FIRST, PATH, list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
 from ..jit import inner
@@ -59,7 +59,9 @@ def find_contacts(threads, strands, position):
     contacts = threads.contacts
     contacts.counted[0] = 0
     threads.gap[0] = math.inf
-    contacts.counted[0], gap = facing_contacts(
+    if threads.ways[PATH] < threads.ways[FIRST]:
+        return True
+    contacts.counted[0], gap, threads.ways[FIRST] = facing_contacts(
         position,
         threads.counted[0],
         threads.pair_point,
@@ -101,7 +103,7 @@ def bound_between_rods(threads, strands, system, at):
     move, limit = reachable(system.node_step, threads.unit)
     if not _list(threads, strands, at.position, system.node_step, limit, limit * move):
         return 0.0, False
-    if threads.counted[0] == 0:
+    if threads.ways[PATH] + 2.0 * limit * move < threads.ways[FIRST]:
         return limit, True
     fraction, _ = rod_step_bound(
         at.position,

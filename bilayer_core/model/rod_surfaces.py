@@ -212,7 +212,7 @@ def refuse_meeting_rods(model: Model) -> None:
     room = 2 * pairs.count
     point, edge, times = (np.empty(room, dtype=np.int64) for _ in range(3))
     fraction, gap, inner = np.empty(room), np.empty(room), np.empty(room, dtype=bool)
-    found, _ = facing_contacts(
+    found, _, _ = facing_contacts(
         position,
         pairs.count,
         pairs.point,

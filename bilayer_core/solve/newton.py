@@ -35,19 +35,18 @@ ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the pote
 @kernel
 def largest_move(step, node_unknown, edge_unknown, half_width):
     """Largest displacement of a node, or of an edge's border by its turn [m]; NaN if any is."""
-    largest = 0.0
+    largest, total = 0.0, 0.0
     for i in range(node_unknown.shape[0]):
         d = node_unknown[i]
-        size = math.sqrt(step[d] ** 2 + step[d + 1] ** 2 + step[d + 2] ** 2)
-        if math.isnan(size):
-            return size
-        largest = max(largest, size)
+        square = step[d] ** 2 + step[d + 1] ** 2 + step[d + 2] ** 2
+        total += square
+        largest = max(largest, square)
+    largest = math.sqrt(largest)
     for k in range(edge_unknown.shape[0]):
         size = abs(step[edge_unknown[k]]) * half_width[k]
-        if math.isnan(size):
-            return size
+        total += size
         largest = max(largest, size)
-    return largest
+    return total if math.isnan(total) else largest
 
 
 class NewtonStatus(Enum):

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from ..contact.rod_bound import rod_step_bound
-from ..contact.rod_list import PATH, list_rods, reachable
+from ..contact.rod_list import FIRST, PATH, list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction, rod_slip_along
 from ..forces.slip import WAY
@@ -90,7 +90,7 @@ class RodContact:
         points = len(surfaces.point_edge)
         self.pairs = NearPairs(surfaces, model.edge_node, PAIRS_PER_POINT * points)
         self.base, self.tip, self.last = np.zeros((3, model.node_count, 3))
-        self.ways = np.array([0.0, -1.0, 0.0])
+        self.ways = np.array([0.0, -1.0, 0.0, -math.inf])
         self.start_position = np.array(model.start_position)
         self.no_step, self.scratch = np.zeros((2, model.node_count, 3))
         self.contacts, self.sliding = Contacts(points), Contacts(points)
@@ -139,7 +139,7 @@ class RodContact:
         pairs, surfaces = self.pairs, self._surfaces
         while True:
             contacts = self.contacts
-            contacts.counted[0], gap = facing_contacts(
+            contacts.counted[0], gap, self.ways[FIRST] = facing_contacts(
                 position,
                 pairs.count,
                 *pairs.outputs,
