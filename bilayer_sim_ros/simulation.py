@@ -45,7 +45,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     if lockstep:
         shortest = simulator.dt if simulator.tolerance is None else SHORTEST_PERIOD
         ticks = tick_rate(parameters["control_period"], rate, clock, shortest)
-    node.get_logger().info("compiling, the first start on a machine may take two minutes ...")
+    node.get_logger().info("compiling, the first start on a machine takes about half a minute ...")
     seconds = simulator.compile()
     description = simulator.description
     inputs = StimulusInputs(
