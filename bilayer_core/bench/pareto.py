@@ -60,22 +60,23 @@ def scores(by_problem: Mapping[str, Mapping[Family, float]]) -> dict[Family, flo
     for family in candidates:
         ratios = []
         for costs in reached.values():
-            stand_in = _stand_in(family, costs)
-            if stand_in is None:
+            substitute = stand_in(family, costs)
+            if substitute is None:
                 break
             finite = [cost for cost in costs.values() if math.isfinite(cost)]
-            cost = costs[stand_in] if math.isfinite(costs[stand_in]) else PENALTY * max(finite)
+            cost = costs[substitute] if math.isfinite(costs[substitute]) else PENALTY * max(finite)
             ratios.append(cost / min(finite))
         else:
             found[family] = math.exp(sum(map(math.log, ratios)) / len(ratios)) if ratios else math.inf
     return dict(sorted(found.items(), key=lambda item: item[1]))
 
 
-def _stand_in(family: Family, costs: Mapping[Family, float]) -> Family | None:
+def stand_in(family: Family, there: Iterable[Family]) -> Family | None:
     """The family itself, or that the same in the other dimension that a scene accepts."""
-    if family in costs:
+    there = list(there)
+    if family in there:
         return family
-    return next((f for f in costs if replace(f, dimension=family.dimension) == family), None)
+    return next((f for f in there if replace(f, dimension=family.dimension) == family), None)
 
 
 def recommended(runs: Sequence[dict]) -> Family | None:

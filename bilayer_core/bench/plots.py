@@ -61,7 +61,8 @@ def work_precision_figure(problem: Problem, runs: list[dict], chosen: Family | N
         axis.plot(*points, mark, color=colour, markersize=7, alpha=0.8, markerfacecolor=face)
     best = [runs[i] for i in pareto.front([(run["cpu_time"], run["error"]) for run in runs])]
     axis.plot(*_columns(best), color=INK, linewidth=1.6, zorder=1, label="Pareto front")
-    ours = [run for run in runs if chosen is not None and Family.of(run) == chosen]
+    here = None if chosen is None else pareto.stand_in(chosen, map(Family.of, runs))
+    ours = [run for run in runs if Family.of(run) == here]
     if ours:
         style = {"markersize": 13, "markerfacecolor": "none", "markeredgecolor": GOLD, "markeredgewidth": 2.2}
         axis.plot(*_columns(ours), "o", **style, label="recommended default")

@@ -156,7 +156,7 @@ PROBLEMS = (
         3.5,
         Trajectory("tip", until=3.5, spacing=2e-2, length=0.0539),
         levels=((25, (4e-3, 2e-3)), (50, (4e-3, 2e-3, 1e-3)), (99, (2e-3,))),
-        reference_levels=halved(50, 4e-3, 3),
+        reference_levels=halved(50, 1e-3, 3),
         integrators=OF_ROBOTS,
         tolerances=ROBOT_TOLERANCES,
     ),

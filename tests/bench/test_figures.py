@@ -50,6 +50,13 @@ def test_a_family_that_a_scene_refuses_is_judged_by_that_of_the_other_dimension(
     assert pareto.recommended(runs) == flat
 
 
+def test_where_a_scene_refuses_a_dimension_the_same_in_the_other_stands_in():
+    flat = Family("lean", 2, "sdirk2")
+    assert pareto.stand_in(flat, [RICH, LEAN, flat]) == flat
+    assert pareto.stand_in(flat, [RICH, LEAN]) == LEAN
+    assert pareto.stand_in(flat, [RICH]) is None
+
+
 def test_the_distance_of_two_ways_is_their_root_mean_square():
     times = np.linspace(0.0, 1.0, 201)
     way = np.column_stack([times, np.cos(times), np.zeros(201), np.sin(times)])
