@@ -26,6 +26,14 @@ def control_law(now):
     return 0.5 - 0.5 * math.cos(7.0 * now)
 
 
+@pytest.fixture(scope="module")
+def kernels(tmp_path_factory):
+    """A cache of kernels for nodes of this module alone: what two processes compile may differ in rounding."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("NUMBA_CACHE_DIR", str(tmp_path_factory.mktemp("kernels")))
+        yield
+
+
 def run_with_a_late_controller(start, connect, domain, log, seed, **parameters):
     """Run a node to its end with a controller that answers each time once, after a random delay."""
     node = start("sim_node", domain, LOCKSTEP | {"log": log} | parameters)
@@ -62,6 +70,7 @@ def stimuli(log):
         ]
 
 
+@pytest.mark.usefixtures("kernels")
 @pytest.mark.parametrize(
     ("parameters", "ticks"),
     [
