@@ -99,11 +99,14 @@ def test_without_a_controller_time_stands_still_and_the_node_says_so(start, conn
     node = start("sim_node", domain, LOCKSTEP | {"log": log})
     client = connect(node)
     clock, diagnostics = client.listen(Clock, "/clock"), client.listen(DiagnosticArray, "/diagnostics")
-    client.spin_until(lambda: diagnostics[-1].status[0].level == DiagnosticStatus.WARN, "a warning", limit=15.0)
-    assert diagnostics[-1].status[0].message == "waiting for a stimulus at t = 0 s"
-    values = {value.key: value.value for value in diagnostics[-1].status[0].values}
-    assert float(values["waited for a stimulus [s]"]) == pytest.approx(5.5, abs=0.6)
-    client.spin_until(lambda: len(clock) >= 3, "three repetitions", limit=10.0)
+    client.spin_until(lambda: diagnostics[-1].status[0].level == DiagnosticStatus.WARN, "a warning")
+    assert {status.message for message in diagnostics for status in message.status} == {
+        "waiting for a stimulus at t = 0 s"
+    }
+    for status in (message.status[0] for message in diagnostics):
+        waited = next(float(value.value) for value in status.values if value.key == "waited for a stimulus [s]")
+        assert (status.level == DiagnosticStatus.WARN) is (waited >= 5.0) or abs(waited - 5.0) < 0.01
+    client.spin_until(lambda: len(clock) >= 3, "three repetitions")
     assert {to_seconds(message.clock) for message in clock} == {0.0}
     client.spin_until(lambda: to_seconds(diagnostics[-1].header.stamp) == 0.0 and len(diagnostics) > 8, "more of them")
     assert node.output.count("simulated time stands still at t = 0 s") == 1
@@ -138,7 +141,7 @@ def begun_step(client):
     """A step that waits for a stimulus; the future of its answer."""
     diagnostics = client.listen(DiagnosticArray, "/diagnostics")
     step = client.request("step")
-    client.spin_until(lambda: "waiting" in diagnostics[-1].status[0].message, "a step that waits", limit=10.0)
+    client.spin_until(lambda: "waiting" in diagnostics[-1].status[0].message, "a step that waits")
     return step
 
 
@@ -146,11 +149,11 @@ def test_a_step_ends_at_the_next_frame_once_there_is_an_answer(client, node):
     send = client.sender(Float64, CHANNEL)
     step = begun_step(client)
     send(Float64(data=math.nan))
-    client.spin_until(lambda: "refused: stimulus 'swelling' is nan" in node.output, "a refusal", limit=10.0)
+    client.spin_until(lambda: "refused: stimulus 'swelling' is nan" in node.output, "a refusal")
     client.drain()
     assert not step.done()
     send(Float64(data=0.5))
-    client.spin_until(step.done, "the end of the step", limit=10.0)
+    client.spin_until(step.done, "the end of the step")
     assert (step.result().success, step.result().message) == (True, "paused at t = 0.02 s")
 
 
@@ -160,7 +163,7 @@ def test_steps_end_in_the_order_in_which_they_were_asked_for(client):
     for step, now in zip(steps, (0.02, 0.04), strict=True):
         client.drain()
         send(Float64(data=0.5))
-        client.spin_until(step.done, "the end of the step", limit=10.0)
+        client.spin_until(step.done, "the end of the step")
         assert step.result().message == f"paused at t = {now} s"
 
 
@@ -168,7 +171,7 @@ def test_steps_end_in_the_order_in_which_they_were_asked_for(client):
 def test_what_comes_before_a_step_has_ended_refuses_it(client, service, reason):
     step = begun_step(client)
     assert client.call(service).success
-    client.spin_until(step.done, "an answer", limit=10.0)
+    client.spin_until(step.done, "an answer")
     answer = step.result()
     assert (answer.success, answer.message) == (False, f"the simulation was {reason} before the next frame")
 
@@ -212,4 +215,5 @@ def test_an_answer_takes_no_polling_period(start, connect, domain, tmp_path):
     client.spin_until(lambda: len(heard) >= 300, "300 answers")
     moments = [moment for _, moment in heard]
     trips = sorted(b - a for a, b in zip(moments[:-1], moments[1:], strict=True))
-    assert trips[len(trips) // 2] < 0.01, "half of the round trips, each with a step"
+    # A worker that nobody wakes looks again after a second.
+    assert trips[len(trips) // 2] < 0.1, "half of the round trips, each with a step"
