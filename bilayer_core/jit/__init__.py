@@ -13,7 +13,7 @@ import os
 import numba
 
 from . import indexing  # noqa: F401 (what it registers serves every kernel)
-from .compiler import KernelCompiler
+from .entry_compiler import KernelFunction, renamed, with_entry
 from .inner_compiler import InnerCompiler, InnerFunction
 
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
@@ -43,12 +43,12 @@ CACHE = os.environ.get("BILAYER_JIT_CACHE", "1") != "0" and _cache_is_usable()
 OPTIONS = dict(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, no_cfunc_wrapper=True, _nrt=False)
 
 
-def kernel(function):
+def kernel(function) -> KernelFunction:
     """Compile `function`: nopython, GIL released, cached, NaN-preserving fast arithmetic.
 
     For what the interpreter calls; other kernels may call it too.
     """
-    return numba.njit(**OPTIONS, pipeline_class=KernelCompiler)(function)
+    return with_entry(function, inner(renamed(function, "inside")), OPTIONS)
 
 
 def allocating(function):
