@@ -18,7 +18,7 @@ from ..solve.newton import NewtonReport, NewtonSolver, NewtonStatus
 from ..solve.potential import IncrementalPotential
 from ..solve.terms.term import RestStrains, StepContext
 from .method import Method
-from .motion import momentary_context
+from .motion import MOMENT, momentary_context
 from .sdirk2 import METHOD as SELF_STARTING
 from .slopes import keep_slopes, move_along, slopes_of
 from .stages import Point, Prescribed, combine, end_point, predict, start_point, write_state
@@ -104,10 +104,17 @@ class Stepper:
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
         time = float(state.time[0])
-        self.end.take_state(state)
-        self.stimulus = self.surroundings.stimulus_at(state, time)
+        stimulus = self.surroundings.stimulus_at(state, time)
         rest = self.surroundings.rest_strains_of(state.transduction)
-        self._look_at(state, rest, self.surroundings.load_factor(time))
+        load_factor = self.surroundings.load_factor(time)
+        if self.loops:
+            self.engine.set_drive(rest, load_factor)
+            self._loop(state, self.method, [time + MOMENT], MOMENT, looks=True)
+            self._touched[:] = self._touching()
+        else:
+            self.end.take_state(state)
+            self._look_at(state, rest, load_factor)
+        self.stimulus = stimulus
 
     def _look_at(self, state: State, rest: RestStrains, load_factor: Array) -> None:
         """Evaluate the potential at `end` with the velocities of the state."""
@@ -176,7 +183,7 @@ class Stepper:
         if not self.loops or self.ledger is not None or state.halvings[0] or state.time[0] != count * self.dt:
             return None
         times = [(count + done) * self.dt for done in range(1, steps + 1)]
-        found = self._loop(state, self.method, times, self.dt, self.method.history is not None, counts=True)
+        found = self._loop(state, self.method, times, self.dt, changes=self.method.history is not None, counts=True)
         if found is None or found.done == 0:
             return None
         state.time[0], state.step[0] = times[found.done - 1], count + found.done
@@ -193,7 +200,7 @@ class Stepper:
     def _attempt_in_loop(self, state: State, h: float, time: float) -> NewtonReport | None:
         """`_attempt` in a compiled loop; None, and nothing is changed, if it is not for one."""
         method = self.used = self._method_at(state, time - h, h)
-        found = self._loop(state, method, [time], h, changes=False, counts=False)
+        found = self._loop(state, method, [time], h)
         if found is None:
             return None
         report = found.newton
@@ -205,11 +212,11 @@ class Stepper:
         return report
 
     def _loop(
-        self, state: State, method: Method, times: list[float], h: float, changes: bool, counts: bool
+        self, state: State, method: Method, times: list[float], h: float, *, looks=False, changes=False, counts=False
     ) -> MarchReport | None:
         """Steps that end at the given times, as many as succeed, in a compiled loop; None if none is for one."""
         solver = self.model.scene.solver
-        settings = Settings(self.solver.tolerance, solver.max_newton_iterations, changes, counts)
+        settings = Settings(self.solver.tolerance, solver.max_newton_iterations, looks, changes, counts)
         course = self.surroundings.course(state, method, times, h)
         while True:
             found = self.engine.march(state, self._arrays[method], course, h, settings)

@@ -12,6 +12,7 @@ from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
 from ..solve.potential import IncrementalPotential
+from ..solve.terms.term import RestStrains
 from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
 from .loop import Counted, Loop
 from .problem import Problem
@@ -104,7 +105,8 @@ class Engine:
 
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:
         """Make the steps of a course, each of length `h` [s], as far as they succeed; `state` is that after them."""
-        loop, flags = self._loop_of(state, method, course), (self._keeps, settings.changes, settings.counts)
+        loop = self._loop_of(state, method, course)
+        flags = self._keeps, settings.looks, settings.changes, settings.counts
         done, status, pair, place, iterations, factorisations, backtracks, residual, worst, gap = take_steps(
             loop, *flags, h, settings.tolerance, settings.max_iterations
         )
@@ -121,6 +123,11 @@ class Engine:
             ),
             worst,
         )
+
+    def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
+        """What acts on the state that is looked at next, by settings that say so."""
+        stage = self._work.stage
+        stage.rest_edge[:], stage.rest_joint_out[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
 
     def make_room(self, status: int) -> bool:
         """Have the room that a loop lacked; false if that is not what it lacked: something has jumped."""
@@ -151,6 +158,8 @@ class Settings:
     tolerance : float
         Of Newton [m/s].
     max_iterations : int
+    looks : bool
+        Whether to make no step, but to evaluate the potential at the state as it stands, in a moment of length h.
     changes : bool
         Whether a jump ends the loop, because another integrator has to step in.
     counts : bool
@@ -159,6 +168,7 @@ class Settings:
 
     tolerance: float
     max_iterations: int
+    looks: bool
     changes: bool
     counts: bool
 

@@ -179,8 +179,8 @@ of the line search."""
 
 
 @inner
-def minimise(p, at, trial, stage, tolerance, max_iterations):
-    """Move `at` to the minimum of the potential; `trial` is scratch.
+def minimise(p, at, trial, stage, tolerance, max_iterations, looks):
+    """Move `at` to the minimum of the potential, or look at the potential where it is; `trial` is scratch.
 
     The method is that of `solve.newton.NewtonSolver.minimise`, turned inside out: all evaluations are at one place,
     because the compiler would make as many copies of them as there are places. Where a new matrix is likely to be
@@ -213,8 +213,11 @@ def minimise(p, at, trial, stage, tolerance, max_iterations):
             if not found and not find_contacts(p.threads, p.strands, place.position):
                 status = NO_ROOM_FOR_RODS
                 break
-            found, curved = True, curved or task == FACTORISE
+            found, curved = True, curved or task == FACTORISE and not looks
             value, new_gap = evaluate(p, place, stage, curved, task == FOLLOW)
+            if looks:
+                gap, status = new_gap, CONVERGED
+                break
         if task == SEARCH:
             if not value <= energy + ARMIJO * alpha * slope + noise:
                 alpha *= BACKTRACKING

@@ -194,6 +194,32 @@ def predict(bodies, held, origin, start, turned, position, rotation, rates, stag
 
 
 @inner
+def stand_still(bodies, state, start, stage):
+    """Frozen data of a stage so short that nothing changes in it but what moves; inertia asks for nothing.
+
+    Forces at a state see its velocities as displacements; see `integrate.motion.momentary_context`.
+    """
+    length = stage.lengths[0]
+    for b in range(state.body_position.shape[0]):
+        w0, w1, w2 = row(state.body_angular_velocity, b)
+        for c in range(3):
+            stage.origin_place[b, c] = start.place[b, c] - length * state.body_velocity[b, c]
+        turn_by(-length * w0, -length * w1, -length * w2, start.rotation, b, stage.origin_rotation, b)
+    for f in range(bodies.body_of_free.shape[0]):
+        copy_row(stage.origin_place, bodies.body_of_free[f], stage.origin_body_position, f)
+    copy(start.body_position, stage.predicted_body_position)
+    copy(start.body_rotation, stage.predicted_body_rotation)
+    copy(start.position, stage.predicted_position)
+    copy(start.position, stage.origin_position)
+    add_scaled(stage.origin_position, -length, state.velocity)
+    stage.predicted_turn[:] = 0.0
+    stage.origin_turn[:] = 0.0
+    add_scaled(stage.origin_turn, -length, state.spin)
+    stage.origin_fluid_momentum[:] = 0.0
+    copy(state.twist, stage.twist)
+
+
+@inner
 def _set_back(rotation, b, length, w0, w1, w2, out, c):
     """out[c] = (1 − length [ω]×) rotation[b]"""
     for j in range(3):

@@ -10,7 +10,7 @@ from .copying import copy
 from .newton import first_guess, minimise
 from .place import take_state
 from .potential import start_stage
-from .stages import add_stage, copy_point, end_point, keep_slopes, move_along, predict, start_point, write_state
+from .stages import add_stage, copy_point, end_point, keep_slopes, move_along, predict, stand_still, start_point, write_state
 from .status import CONVERGED, JUMPED, MAX_ITERATIONS, READY
 
 
@@ -93,8 +93,11 @@ def _drive(drives, state, course, k, n, work, stage):
 
 
 @inner
-def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterations):
+def take_step(p, state, method, keeps, looks, course, k, work, h, tolerance, max_iterations):
     """Advance a state by a step of length h [s]; it changes only if every stage converged.
+
+    A look at a state is a step that ends with its first evaluation, at its start. It is made here and not by itself
+    because the compiler would make a copy of all that it needs.
 
     Parameters
     ----------
@@ -104,6 +107,9 @@ def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterat
         For this step.
     keeps : int or None
         None if the integrator of the run keeps no slopes.
+    looks : bool
+        Whether only to evaluate the potential at the state as it stands; h, and rest strains and factors of loads in
+        `work.stage`, are those of the look then.
     course : Course
     k : int
         Which step of the course.
@@ -127,38 +133,44 @@ def take_step(p, state, method, keeps, course, k, work, h, tolerance, max_iterat
     bodies, held, strands = p.bodies, p.held, p.strands
     s, e, t = 0, 1, 2
     take_state(bodies, held, p.surfaces, strands, state, work.places[s])
-    start_point(bodies, p.fluid, strands, state, work.places[s], first)
-    stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
-    work.turned[:] = 0.0
+    if looks:
+        e = s
+        stage.lengths[:] = h
+        stand_still(bodies, state, work.places[s], stage)
+    else:
+        start_point(bodies, p.fluid, strands, state, work.places[s], first)
+        stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
+        work.turned[:] = 0.0
     iterations = factorisations = backtracks = 0
     worst, gap = 0.0, math.inf
     stages = course.elapsed.shape[0]
     place = min(k, course.position.shape[0] - 1)
     for n in range(stages):
-        origin = work.origins[n]
-        copy_point(first, origin)
-        for j in range(n):
-            add_stage(origin, method.couplings[n, j], work.origins[j], work.ends[j], work.rotation)
-        _take_slopes(keeps, bodies, origin, state, first, h, method, n, work.rotation)
-        _drive(p.drives, state, course, k, n, work, stage)
+        start, origin = work.places[s], work.origins[n]
         position, rotation = course.position[place, n], course.rotation[place, n]
-        start = work.places[s]
-        predict(bodies, held, origin, start, work.turned, position, rotation, course.rates[place, n], stage)
+        if not looks:
+            copy_point(first, origin)
+            for j in range(n):
+                add_stage(origin, method.couplings[n, j], work.origins[j], work.ends[j], work.rotation)
+            _take_slopes(keeps, bodies, origin, state, first, h, method, n, work.rotation)
+            _drive(p.drives, state, course, k, n, work, stage)
+            predict(bodies, held, origin, start, work.turned, position, rotation, course.rates[place, n], stage)
         status = start_stage(p, start, stage)
         if status != READY:
             return status, -1, e, iterations, factorisations, backtracks, worst, gap
-        status, pair = first_guess(p, start, position, rotation, stage, work.places[e])
-        if status != READY:
-            return status, pair, e, iterations, factorisations, backtracks, math.inf, gap
+        if not looks:
+            status, pair = first_guess(p, start, position, rotation, stage, work.places[e])
+            if status != READY:
+                return status, pair, e, iterations, factorisations, backtracks, math.inf, gap
         status, swapped, more, factors, halvings, residual, gap = minimise(
-            p, work.places[e], work.places[t], stage, tolerance, max_iterations
+            p, work.places[e], work.places[t], stage, tolerance, max_iterations, looks
         )
         if swapped:
             e, t = t, e
         iterations += more
         factorisations += factors
         backtracks += halvings
-        if status != CONVERGED:
+        if looks or status != CONVERGED:
             return status, -1, e, iterations, factorisations, backtracks, residual, gap
         worst = max(worst, residual)
         end, ended = work.places[e], work.ends[n]
@@ -212,8 +224,9 @@ def _count_contacts(surfaces, nodes, time, tally):
 
 
 @kernel
-def take_steps(loop, keeps, changes, counts, h, tolerance, max_iterations):
-    """Advance a state by the steps of a course, as far as each succeeds; parameters beside those of `take_step`:
+def take_steps(loop, keeps, looks, changes, counts, h, tolerance, max_iterations):
+    """Advance a state by the steps of a course, as far as each succeeds, or look at it; parameters beside those of
+    `take_step`:
 
     Parameters
     ----------
@@ -242,8 +255,10 @@ def take_steps(loop, keeps, changes, counts, h, tolerance, max_iterations):
         if changes and (course.jumps[k] or _has_jumped(keeps, p.drives, state, course.first[k], loop.ranges, h)):
             return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
         status, pair, e, more, factors, halvings, left, nearest = take_step(
-            p, state, loop.method, keeps, course, k, work, h, tolerance, max_iterations
+            p, state, loop.method, keeps, looks, course, k, work, h, tolerance, max_iterations
         )
+        if looks:
+            return 0, status, pair, e, iterations, factorisations, backtracks, left, worst, nearest
         if status == CONVERGED or status >= MAX_ITERATIONS:  # what has to be begun again does not count
             iterations += more
             factorisations += factors
