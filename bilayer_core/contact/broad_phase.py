@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from ..jit import allocating, inner, kernel
+from ..jit import inner, kernel
 from .segment import square_distance
 
 
@@ -34,6 +34,12 @@ def _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, t
     return not joined or _square_distance(start_position, i, s, j) > (radii + touch) ** 2
 
 
+def scratch(edges: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What a search among so many edges writes to: shapes (2 n_leaf, 6), (n_edge, 7), and (2, n_edge), int64."""
+    leaves = 1 << max(edges - 1, 0).bit_length()
+    return np.empty((2 * leaves, 6)), np.empty((edges, 7)), np.empty((2, edges), dtype=np.int64)
+
+
 GROUP = 4
 """Edges next to each other for which the tree is searched together, a power of two."""
 
@@ -49,8 +55,8 @@ def _come_near(box, a, b, reach):
 
 @inner
 def _meet(box, leaves, own, reach, met_out):
-    """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending; return how
-    many do.
+    """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending, in the
+    first row of `met_out`; return how many do.
     """
     count = 0
     b = 1
@@ -60,7 +66,7 @@ def _meet(box, leaves, own, reach, met_out):
             b *= 2
             continue
         if meets:
-            met_out[count] = b - leaves
+            met_out[0, count] = b - leaves
             count += 1
         while b & 1:
             b >>= 1
@@ -68,7 +74,7 @@ def _meet(box, leaves, own, reach, met_out):
     return count
 
 
-@allocating
+@kernel
 def near_pairs(
     position,
     tip,
@@ -86,6 +92,9 @@ def near_pairs(
     rod_meets,
     rod_joined,
     rod_exclusion,
+    box,
+    sweep,
+    met,
     point_out,
     edge_out,
     before_out,
@@ -106,18 +115,16 @@ def near_pairs(
         See `model.rod_surfaces`; the points of edge k are first_point[k] … first_point[k + 1] − 1.
     rod_meets, rod_joined, rod_exclusion
         See `model.rod_surfaces`.
+    box, sweep, met : Array
+        Scratch, see `scratch`: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last; of edges
+        the middle, its motion, and half of the length and, where the ends move differently, of the difference; edges.
     point_out, edge_out : Array
         Written, int64.
     before_out, after_out : Array
         Written: whether the point also sees the segments before and after on the same strand, bool.
     """
     edges = edge_node.shape[0]
-    leaves = 1
-    while leaves < edges:
-        leaves *= 2
-    box = np.empty((2 * leaves, 6))  # of the tree: children of b are 2 b and 2 b + 1, leaves come last
-    middle, motion = np.empty((edges, 3)), np.empty((edges, 3))
-    half = np.empty(edges)  # of the length and, where the ends move differently, of the difference
+    leaves = box.shape[0] // 2
     for k in range(leaves):
         b = leaves + k
         if k >= edges:
@@ -130,16 +137,15 @@ def near_pairs(
             p, q, u, v = position[j, c], position[j + 1, c], tip[j, c], tip[j + 1, c]
             box[b, c] = min(min(p, q), min(u, v)) - radius
             box[b, 3 + c] = max(max(p, q), max(u, v)) + radius
-            middle[k, c] = 0.5 * (p + q)
-            motion[k, c] = 0.5 * (u - p + v - q)
+            sweep[k, c] = 0.5 * (p + q)
+            sweep[k, 3 + c] = 0.5 * (u - p + v - q)
             size += (q - p) ** 2
             turn += (v - q - u + p) ** 2
-        half[k] = 0.5 * (math.sqrt(size) + math.sqrt(turn)) + radius
+        sweep[k, 6] = 0.5 * (math.sqrt(size) + math.sqrt(turn)) + radius
     for b in range(leaves - 1, 0, -1):
         for c in range(3):
             box[b, c] = min(box[2 * b, c], box[2 * b + 1, c])
             box[b, 3 + c] = max(box[2 * b, 3 + c], box[2 * b + 1, 3 + c])
-    met, near = np.empty(edges, np.int64), np.empty(edges, np.int64)
     found = 0
     room = point_out.shape[0]
     group = min(GROUP, leaves)
@@ -152,7 +158,7 @@ def near_pairs(
         count = 0
         own, i = edge_rod[a], edge_node[a]
         for m in range(meetings):
-            k = met[m]
+            k = met[0, m]
             if not rod_meets[own, edge_rod[k]]:
                 continue
             if own == edge_rod[k]:
@@ -161,20 +167,20 @@ def near_pairs(
                     continue
             away, moved = 0.0, 0.0
             for c in range(3):
-                away += (middle[a, c] - middle[k, c]) ** 2
-                moved += (motion[a, c] - motion[k, c]) ** 2
-            near_enough = half[a] + half[k] + reach
+                away += (sweep[a, c] - sweep[k, c]) ** 2
+                moved += (sweep[a, 3 + c] - sweep[k, 3 + c]) ** 2
+            near_enough = sweep[a, 6] + sweep[k, 6] + reach
             if away >= near_enough * near_enough and away >= (near_enough + math.sqrt(moved)) ** 2:
                 continue
             if _come_near(box, leaves + a, leaves + k, reach):
-                near[count] = k
+                met[1, count] = k
                 count += 1
         if count == 0:
             continue
         for p in range(first_point[a], first_point[a + 1]):
             arc, s = point_arc[p], point_fraction[p]
             for n in range(count):
-                k = near[n]
+                k = met[1, n]
                 j, other = edge_node[k], edge_rod[k]
                 radii = edge_radius[a] + edge_radius[k]
                 left, right = 0.0, 0.0

@@ -129,6 +129,9 @@ def list_rods(
     rod_meets,
     rod_joined,
     rod_exclusion,
+    box,
+    sweep,
+    met,
     base,
     tip,
     last,
@@ -153,7 +156,7 @@ def list_rods(
         Barrier distance and thickest layer together [m].
     touch : float
         Barrier distance [m].
-    start_position, edge_node … rod_exclusion, point_out … after_out
+    start_position, edge_node … met, point_out … after_out
         As for `near_pairs`.
     base, tip, last : Array
         Positions from which to which the list was made, and where nodes were last, their mean taken off [m], shape
@@ -197,6 +200,9 @@ def list_rods(
         rod_meets,
         rod_joined,
         rod_exclusion,
+        box,
+        sweep,
+        met,
         point_out,
         edge_out,
         before_out,

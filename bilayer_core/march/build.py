@@ -245,6 +245,7 @@ def threads_of(model: Model, rods: RodContact) -> Threads:
     law, surface = contact.friction, ("edge_radius", "edge_rod", "edge_first", "edge_arc", "first_point")
     points = ("point_edge", "point_fraction", "point_arc", "point_weight")
     between = ("rod_meets", "rod_joined", "rod_exclusion")
+    box, sweep, met = pairs.scratch
     return Threads(
         d_hat=contact.barrier_distance,
         stiffness=contact.stiffness,
@@ -254,6 +255,9 @@ def threads_of(model: Model, rods: RodContact) -> Threads:
         unit=rods.unit,
         **{name: getattr(surfaces, name) for name in (*surface, *points, *between)},
         **{name: getattr(rods, name) for name in ("start_position", "base", "tip", "last", "ways")},
+        box=box,
+        sweep=sweep,
+        met=met,
         no_step=rods.no_step,
         scratch=rods.scratch,
         counted=pairs.counted,

@@ -253,6 +253,9 @@ class Threads:
     rod_meets: Array
     rod_joined: Array
     rod_exclusion: Array
+    box: Array  # scratch of a search, see `contact.broad_phase.scratch`
+    sweep: Array
+    met: Array
     base: Array
     tip: Array
     last: Array

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..contact.broad_phase import near_pairs
+from ..contact.broad_phase import near_pairs, scratch
 from ..contact.segment import facing_contacts
 from ..errors import PenetrationError
 from ..scene.config import SceneConfig
@@ -152,14 +152,17 @@ class NearPairs:
     until : Array
         Path before which each stays beyond the barrier distance [m], see `contact.rod_list`.
     geometry : tuple
-        What `near_pairs` takes of the rods.
+        What `near_pairs` takes of the rods, its scratch last.
+    scratch : tuple of Array
     """
 
     def __init__(self, surfaces: RodSurfaces, edge_node: Array, room: int = 0):
         s = surfaces
+        self.scratch = scratch(len(edge_node))
         self.geometry = (
             *(edge_node, s.edge_radius, s.edge_rod, s.edge_first, s.edge_arc),
             *(s.first_point, s.point_fraction, s.point_arc, s.rod_meets, s.rod_joined, s.rod_exclusion),
+            *self.scratch,
         )
         self.counted = np.zeros(1, dtype=np.int64)
         self.make_room(room)
