@@ -51,13 +51,11 @@ def kernel(function) -> KernelFunction:
     return with_entry(function, inner(renamed(function, "inside")), OPTIONS)
 
 
-def allocating(function):
-    """A kernel that makes arrays: alone among kernels it counts references."""
-    return numba.njit(**(OPTIONS | {"_nrt": True}))(function)
-
-
 def inner(function):
     """A function that only kernels call, and the interpreter cannot: it is compiled within each of them."""
-    compiled = numba.njit(**OPTIONS, no_cpython_wrapper=True, pipeline_class=InnerCompiler)(function)
+    options = OPTIONS | {"cache": False, "no_cpython_wrapper": True}
+    compiled = numba.njit(**options, pipeline_class=InnerCompiler)(function)
     compiled.__class__ = InnerFunction
+    if CACHE:
+        compiled.enable_caching()
     return compiled

@@ -14,9 +14,10 @@ from numba.core import types
 from numba.core.compiler import CompilerBase, compile_result
 from numba.core.registry import CPUDispatcher
 
-from .compiler import KernelLibrary
+from .collector import few_collections
 from .flags import KernelFlags
 from .inner_compiler import InnerFunction
+from .inner_library import EntryLibrary
 
 
 class KernelFunction(CPUDispatcher):
@@ -42,13 +43,15 @@ class _EntryCompiler(CompilerBase):
     def compile_extra(self, function):
         """Wrap the function inside; there is nothing else in `function`."""
         state = self.state
-        self._inside.compile(state.args)
+        with few_collections():
+            self._inside.compile(state.args)
         inside = self._inside.overloads[state.args]
         described, environment, target = inside.fndesc, inside.environment, state.targetctx
-        library = KernelLibrary(target.codegen(), described.qualname)
+        library = EntryLibrary(target.codegen(), described.qualname)
         library.enable_object_caching()
         library.add_linking_library(inside.library)
-        target.create_cpython_wrapper(library, described, environment, None, release_gil=state.flags.release_gil)
+        with target.push_code_library(library):
+            target.create_cpython_wrapper(library, described, environment, None, release_gil=state.flags.release_gil)
         entry = target.get_executable(library, described, environment)
         return compile_result(
             typing_context=state.typingctx,

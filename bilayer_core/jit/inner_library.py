@@ -1,0 +1,84 @@
+"""Code of a function that kernels call, by itself: what it calls in turn is linked when a kernel is, once for all.
+
+Numba links into the code of a function all that it calls, and what this calls: at every level a copy of all below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from llvmlite.binding import Linkage, newpassmanagers
+from numba.core.codegen import CodeLibrary
+
+from .compiler import KernelLibrary
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a library is the code of: a function of a module, compiled for some types, under a name in LLVM."""
+
+    module: str
+    name: str
+    types: tuple
+    mangled: str
+
+
+class InnerLibrary(KernelLibrary):
+    """Code that is linked into kernels, and has no address of its own.
+
+    Attributes
+    ----------
+    origin : Origin or None
+        None if it is numba's own.
+    """
+
+    origin: Origin | None = None
+
+    def finalize(self):
+        """Be ready for linking. The engine that makes machine code does not see this.
+
+        What nothing refers to is dropped, such as the addresses of functions that are called by name.
+        """
+        self._raise_if_finalized()
+        passes = newpassmanagers.create_new_module_pass_manager()
+        passes.add_global_dead_code_eliminate_pass()
+        passes.run(self._final_module, self._codegen._pass_builder())
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def _get_module_for_linking(self):
+        """The code itself: several kernels may have it, and leave out what they do not call."""
+        self._ensure_finalized()
+        if self._shared_module is None:
+            for function in self._final_module.functions:
+                if not function.is_declaration:
+                    function.linkage = Linkage.linkonce_odr
+            self._shared_module = self._final_module
+        return self._shared_module
+
+    @property
+    def called(self) -> list[CodeLibrary]:
+        """Libraries of what this calls directly."""
+        return list(dict.fromkeys(self._linking_libraries))
+
+
+class EntryLibrary(KernelLibrary):
+    """Code that the interpreter calls: that of a function, and of all that it calls."""
+
+    def finalize(self):
+        self._linking_libraries = list(dict.fromkeys(_with_all_that_is_called(self._linking_libraries)))
+        super().finalize()
+
+
+def _with_all_that_is_called(libraries: list[CodeLibrary]) -> Iterator[CodeLibrary]:
+    """Libraries, each before those that it calls."""
+    seen, stack = set(), libraries[::-1]
+    while stack:
+        library = stack.pop()
+        if library in seen:
+            continue
+        seen.add(library)
+        yield library
+        if isinstance(library, InnerLibrary):
+            stack.extend(library.called[::-1])
