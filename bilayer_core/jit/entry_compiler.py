@@ -1,7 +1,7 @@
 """A compiler for what the interpreter calls: machine code, and a wrapper for it, around the function inside.
 
-Kernels that call such a function take the function inside, too: most never get an entry for the interpreter, nor machine
-code of their own.
+Kernels that call such a function take the function inside, too: most never get an entry for the interpreter, nor
+machine code of their own.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numba.core.registry import CPUDispatcher
 from .collector import few_collections
 from .flags import KernelFlags
 from .inner_compiler import InnerFunction
-from .inner_library import EntryLibrary
+from .libraries import EntryLibrary
 
 
 class KernelFunction(CPUDispatcher):

@@ -6,19 +6,11 @@ from functools import reduce
 from importlib import import_module
 
 from llvmlite.binding import parse_bitcode
-from numba import _dynfunc
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import CodeLibrary
 from numba.core.compiler import CompileResult, compile_result
 
-from .inner_library import InnerLibrary, Origin
-
-
-def entry_point(described, environment, library: InnerLibrary):
-    """An object by which numba finds what to link; no machine code is at its address, which is 0."""
-    return _dynfunc.make_function(
-        described.lookup_module(), described.qualname, "", 0, environment, (library,)
-    )
+from .libraries import InnerLibrary, Origin, entry_point
 
 
 def _found(origin: Origin) -> InnerLibrary | None:
@@ -35,7 +27,9 @@ def _found(origin: Origin) -> InnerLibrary | None:
 class _InnerCacheImpl(CompileResultCacheImpl):
     def check_cachable(self, compiled: CompileResult) -> bool:
         """Whether it can be kept: not if it, or what it calls, cannot be found by name."""
-        return not any("<locals>" in of.origin.name for of in _within(compiled.library)) and super().check_cachable(compiled)
+        return not any("<locals>" in of.origin.name for of in _within(compiled.library)) and super().check_cachable(
+            compiled
+        )
 
     def reduce(self, compiled: CompileResult) -> tuple:
         """What goes into a file."""

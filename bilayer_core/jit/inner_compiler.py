@@ -3,19 +3,19 @@
 Numba optimises every function and makes machine code for it, and does both again for the copy of it in every function
 that calls it, level by level. Here a function ends as what LLVM reads; what calls it is optimised with it. The loop
 over steps takes a third less time to compile for it.
-
-This replaces the last pass of the pipeline, `NativeLowering`, and the library that it fills.
 """
 
 from __future__ import annotations
 
-from numba.core.compiler_machinery import register_pass
+from numba.core import sigutils
+from numba.core.compiler import CompilerBase
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.compiler_machinery import PassManager
 from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
 
-from .compiler import KernelCompiler
-from .inner_cache import InnerCache, entry_point
-from .inner_library import InnerLibrary, Origin
+from .flags import KernelFlags
+from .inner_cache import InnerCache
+from .passes import PASSES
 
 
 class InnerFunction(CPUDispatcher):
@@ -28,28 +28,38 @@ class InnerFunction(CPUDispatcher):
         """Keep what is compiled on disk."""
         self._cache = InnerCache(self.py_func)
 
+    def compile(self, sig):
+        """Compile for some types, or take that from the cache.
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _InnerLowering(NativeLowering):
-    """`NativeLowering` into an `InnerLibrary`."""
+        As numba does, but for the clocks that it starts for each function: they are told of every call of LLVM by all
+        functions that are being compiled.
+        """
+        arguments, returns = sigutils.normalize_signature(sig)
+        known = self.overloads.get(tuple(arguments))
+        if known is not None:
+            return known.entry_point
+        with global_compiler_lock, self._compiling_counter:
+            compiled = self._cache.load_overload(sig, self.targetctx)
+            if compiled is not None:
+                self.targetctx.insert_user_function(compiled.entry_point, compiled.fndesc, [compiled.library])
+                self.add_overload(compiled)
+            else:
+                compiled = self._compiler.compile(arguments, returns)
+                self.add_overload(compiled)
+                self._cache.save_overload(sig, compiled)
+        return compiled.entry_point
 
-    _name = "inner_lowering"
 
-    def run_pass(self, state):
-        state.library = library = InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.flags.no_compile = True
-        super().run_pass(state)
-        lowered = state["cr"]
-        described = lowered.fndesc
-        of = state.func_id
-        library.origin = Origin(of.modname, of.func_qualname, tuple(state.args), described.mangled_name)
-        entry = entry_point(described, lowered.env, library)
-        state.targetctx.insert_user_function(entry, described, [library])
-        state["cr"] = lowered._replace(cfunc=entry)
-        return True
-
-
-class InnerCompiler(KernelCompiler):
+class InnerCompiler(CompilerBase):
     """Compiles what kernels alone call."""
 
-    lowering = _InnerLowering
+    def __init__(self, typing, target, library, arguments, returns, flags, types_of_locals):
+        super().__init__(typing, target, library, arguments, returns, KernelFlags(flags), types_of_locals)
+
+    def define_pipelines(self):
+        """The passes of a compilation, in order."""
+        pipeline = PassManager("inner")
+        for each in PASSES:
+            pipeline.add_pass(each, each.__name__)
+        pipeline.finalize()
+        return [pipeline]

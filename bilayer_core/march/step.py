@@ -10,7 +10,17 @@ from .copying import copy
 from .newton import first_guess, minimise
 from .place import take_state
 from .potential import start_stage
-from .stages import add_stage, copy_point, end_point, keep_slopes, move_along, predict, stand_still, start_point, write_state
+from .stages import (
+    add_stage,
+    copy_point,
+    end_point,
+    keep_slopes,
+    move_along,
+    predict,
+    stand_still,
+    start_point,
+    write_state,
+)
 from .status import CONVERGED, JUMPED, MAX_ITERATIONS, READY
 
 

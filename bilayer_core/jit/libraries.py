@@ -9,9 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from llvmlite.binding import Linkage, newpassmanagers
-from numba.core.codegen import CodeLibrary
-
-from .compiler import KernelLibrary
+from numba import _dynfunc
+from numba.core.codegen import CodeLibrary, JITCodeLibrary
 
 
 @dataclass(frozen=True)
@@ -22,6 +21,22 @@ class Origin:
     name: str
     types: tuple
     mangled: str
+
+
+class KernelLibrary(JITCodeLibrary):
+    """Code of a function in LLVM's language."""
+
+    def _optimize_functions(self, module):
+        """Tidy each function before it is linked: one pass manager for those that a module has, none for others'."""
+        module.data_layout = self._codegen._data_layout
+        passes, builder = None, None
+        for function in module.functions:
+            if function.is_declaration:
+                continue
+            if passes is None:
+                builder = self._codegen._pass_builder()
+                passes = builder.getFunctionPassManager()
+            passes.run(function, builder)
 
 
 class InnerLibrary(KernelLibrary):
@@ -61,6 +76,11 @@ class InnerLibrary(KernelLibrary):
     def called(self) -> list[CodeLibrary]:
         """Libraries of what this calls directly."""
         return list(dict.fromkeys(self._linking_libraries))
+
+
+def entry_point(described, environment, library: InnerLibrary):
+    """An object by which numba finds what to link; no machine code is at its address, which is 0."""
+    return _dynfunc.make_function(described.lookup_module(), described.qualname, "", 0, environment, (library,))
 
 
 class EntryLibrary(KernelLibrary):
