@@ -116,8 +116,9 @@ def near_pairs(
     rod_meets, rod_joined, rod_exclusion
         See `model.rod_surfaces`.
     box, sweep, met : Array
-        Scratch, see `scratch`: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last; of edges
-        the middle, its motion, and half of the length and, where the ends move differently, of the difference; edges.
+        Scratch, see `scratch`: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last; of
+        edges the middle, its motion, and half of the length and, where the ends move differently, of the difference;
+        edges.
     point_out, edge_out : Array
         Written, int64.
     before_out, after_out : Array

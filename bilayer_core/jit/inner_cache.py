@@ -25,6 +25,10 @@ def _found(origin: Origin) -> InnerLibrary | None:
 
 
 class _InnerCacheImpl(CompileResultCacheImpl):
+    def get_filename_base(self, fullname: str, abiflags: str) -> str:
+        """Name of the files, another than numba's own have."""
+        return "inner-" + super().get_filename_base(fullname, abiflags)
+
     def check_cachable(self, compiled: CompileResult) -> bool:
         """Whether it can be kept: not if it, or what it calls, cannot be found by name."""
         return not any("<locals>" in of.origin.name for of in _within(compiled.library)) and super().check_cachable(

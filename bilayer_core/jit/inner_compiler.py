@@ -41,9 +41,11 @@ class InnerFunction(CPUDispatcher):
         with global_compiler_lock, self._compiling_counter:
             compiled = self._cache.load_overload(sig, self.targetctx)
             if compiled is not None:
+                self._cache_hits[sig] += 1
                 self.targetctx.insert_user_function(compiled.entry_point, compiled.fndesc, [compiled.library])
                 self.add_overload(compiled)
             else:
+                self._cache_misses[sig] += 1
                 compiled = self._compiler.compile(arguments, returns)
                 self.add_overload(compiled)
                 self._cache.save_overload(sig, compiled)

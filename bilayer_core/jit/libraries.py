@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from llvmlite.binding import Linkage, newpassmanagers
 from numba import _dynfunc
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
+from numba.core.types import Type
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,8 @@ class Origin:
 
     module: str
     name: str
-    types: tuple
+    types: tuple[Type, ...]
+    returns: Type
     mangled: str
 
 

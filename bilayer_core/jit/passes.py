@@ -107,7 +107,13 @@ class _InnerLowering(NativeLowering):
         super().run_pass(state)
         lowered = state["cr"]
         described = lowered.fndesc
-        library.origin = Origin(of.modname, of.func_qualname, tuple(state.args), described.mangled_name)
+        library.origin = Origin(
+            module=of.modname,
+            name=of.func_qualname,
+            types=tuple(state.args),
+            returns=state.return_type,
+            mangled=described.mangled_name,
+        )
         entry = entry_point(described, lowered.env, library)
         state.targetctx.insert_user_function(entry, described, [library])
         state["cr"] = lowered._replace(cfunc=entry)

@@ -148,8 +148,12 @@ class Configuration:
             self._surface_arm,
         )
         self._surfaces_move = bool((surfaces.body < bodies).any())
-        if len(surfaces.kind):
-            self._place_surfaces()
+        if not self._surfaces_move:
+            self.surface_place[:], self._surface_arm[:], self.surface_turn[:] = (
+                surfaces.position,
+                surfaces.position,
+                surfaces.turn,
+            )
 
     def take_state(self, state: State) -> None:
         """Start from a state."""

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import yaml
+from planar_scenes import AHEAD, everything_in_plane
 from sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
@@ -47,6 +48,36 @@ def test_a_saved_state_continues_bit_for_bit(simulator):
     other.run(0.03)
     assert np.array_equal(other.save_state(), expected, equal_nan=True)
     assert np.array_equal(other.contact_forces, simulator.contact_forces)
+
+
+@pytest.mark.parametrize(
+    ("description", "settings"),
+    [
+        (everything(), {"model": "two_rod"}),
+        (everything(), {"model": "laminate", "integrator": "generalised_alpha"}),
+        (everything_in_plane(AHEAD["oblique"]), {"dimension": 2}),
+    ],
+)
+def test_a_state_is_looked_at_in_the_loop_as_term_by_term(description, settings):
+    simulator = Simulator(load_scene(description), **settings)
+    simulator.run(0.02)
+    state, frames, potential = simulator.save_state(), [], simulator._stepper.potential
+    for loops in (True, False):
+        simulator._stepper.loops = loops
+        potential.carrier_gradient[:] = potential.contact_gradient[:] = math.nan
+        simulator.load_state(state)
+        frames.append((simulator.frame(), dict(potential.terms)))
+    (looped, terms), (by_terms, expected) = frames
+    assert {name: value for name, value in terms.items() if value} == pytest.approx(
+        {name: value for name, value in expected.items() if value}, rel=1e-9
+    )
+    assert looped.energy == pytest.approx(by_terms.energy, rel=1e-12)
+    force = np.abs(by_terms.contact_forces).max()
+    assert force > 0.0
+    assert looped.contact_forces == pytest.approx(by_terms.contact_forces, rel=0, abs=1e-9 * force)
+    assert looped.body_wrenches == pytest.approx(by_terms.body_wrenches, rel=0, abs=1e-9 * force)
+    for name in ("positions", "directors", "strain", "curvature", "stimulus", "min_gap"):
+        np.testing.assert_allclose(getattr(looped, name), getattr(by_terms, name), rtol=1e-12, atol=1e-15)
 
 
 def test_a_state_in_a_frame_is_enough_to_continue(simulator):
@@ -171,6 +202,7 @@ def test_a_duration_in_which_nothing_would_happen_is_refused(simulator):
 
 
 def test_a_correction_that_is_not_finite_is_never_small(simulator):
+    simulator._stepper.loops = False  # term by term
     simulator.step()
     solver, size = simulator._stepper.solver, simulator.model.layout.size
     for rods, body in ((np.nan, 0.0), (0.0, np.nan), (0.0, np.inf)):

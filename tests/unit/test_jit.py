@@ -1,6 +1,11 @@
 """What is special about how kernels are compiled: functions inside them, and elements of arrays."""
 
+import gc
 import operator
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +15,9 @@ from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
 from numba.core.typing.templates import signature
 
+from bilayer_core.errors import InputError
 from bilayer_core.jit import inner, kernel
+from bilayer_core.jit.collector import few_collections
 from bilayer_core.jit.flags import KernelFlags
 from bilayer_core.jit.operators import RESULTS, TARGET
 
@@ -40,6 +47,85 @@ def test_functions_within_functions_are_compiled_into_the_kernel():
 def test_the_interpreter_cannot_call_what_only_kernels_call():
     with pytest.raises(TypeError, match="_twice is called by kernels alone"):
         _twice(1.0)
+
+
+@kernel
+def _half(x):
+    return 0.5 * x
+
+
+@kernel
+def _sum_of_halves(values):
+    total = 0.0
+    for i in range(values.shape[0]):
+        total += _half(values[i])
+    return total
+
+
+def test_a_kernel_within_a_kernel_gets_an_entry_only_when_the_interpreter_calls_it():
+    assert _sum_of_halves(np.array([1.0, 2.0, 4.0])) == 3.5
+    assert _half.signatures == [] and len(_half.inside.signatures) == 1
+    assert _half(3.0) == 1.5
+    assert _half.signatures == _half.inside.signatures and len(_half.signatures) == 1
+
+
+def test_the_collector_is_left_as_it_was():
+    before = gc.get_threshold()
+    with pytest.raises(InputError), few_collections():
+        assert gc.get_threshold() != before
+        raise InputError("none")
+    assert gc.get_threshold() == before
+
+
+LEAF = """
+from bilayer_core.jit import inner
+
+@inner
+def leaf(x):
+    return {}
+"""
+MIDDLE = """
+from bilayer_core.jit import inner
+from leaf import leaf
+
+@inner
+def middle(x):
+    return 2 * leaf(x)
+"""
+ENTRY = """
+import sys
+from bilayer_core.jit import kernel
+from middle import middle
+
+@kernel
+def {0}(x):
+    return middle(x) + max(x, 0.0)
+
+print({0}(3.0), sum(middle._cache_hits.values()))
+"""
+
+
+def test_what_kernels_call_comes_from_the_cache_unless_it_calls_something_else_now(tmp_path):
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), str(tmp_path)]),
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+
+    def run(entry):
+        (tmp_path / f"{entry}.py").write_text(ENTRY.format(entry))
+        done = subprocess.run(
+            [sys.executable, "-m", entry], env=environment, capture_output=True, text=True, check=True
+        )
+        return done.stdout.split()
+
+    (tmp_path / "leaf.py").write_text(LEAF.format("x + 1"))
+    (tmp_path / "middle.py").write_text(MIDDLE)
+    assert run("first") == ["11.0", "0"]
+    assert run("second") == ["11.0", "1"]
+    (tmp_path / "leaf.py").write_text(LEAF.format("7"))  # an integer now
+    assert run("third") == ["17.0", "0"]
+    assert run("fourth") == ["17.0", "1"]
 
 
 @kernel

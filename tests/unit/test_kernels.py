@@ -48,11 +48,38 @@ for part in ("kinematics", "contact", "forces", "solve", "integrate"):
 print(json.dumps(used))
 """
 
+PLAIN_RUN = """
+import importlib, json, pkgutil
+from bilayer_core.jit import KernelFunction
+from sample_scenes import everything
+from bilayer_core import Simulator, load_scene
 
-def test_scenes_of_all_kinds_use_one_specialisation_of_each_kernel():
+simulator = Simulator(load_scene(everything()), dt=1e-3)
+simulator.run(0.003)
+simulator.contact_forces, simulator.curvatures
+entries = []
+for part in ("forces", "solve", "march"):
+    package = importlib.import_module(f"bilayer_core.{part}")
+    for info in pkgutil.iter_modules(package.__path__):
+        for name, value in vars(importlib.import_module(f"bilayer_core.{part}.{info.name}")).items():
+            if isinstance(value, KernelFunction) and value.signatures:
+                entries.append(name)
+print(json.dumps(entries))
+"""
+
+
+def _printed_by(program):
     tests = Path(__file__).parents[1]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tests.parent), str(tests)])}
-    found = subprocess.run([sys.executable, "-c", SURVEY], env=environment, capture_output=True, text=True, check=True)
-    used = json.loads(found.stdout)
+    found = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    return json.loads(found.stdout)
+
+
+def test_a_run_in_a_loop_enters_no_other_kernels():
+    assert set(_printed_by(PLAIN_RUN)) == {"take_steps"}
+
+
+def test_scenes_of_all_kinds_use_one_specialisation_of_each_kernel():
+    used = _printed_by(SURVEY)
     assert len(used) > 15
     assert {name: count for name, count in used.items() if count > 1} == {}
