@@ -1,27 +1,28 @@
 """Steps as long as their error allows.
 
-A step is attempted, its error estimated (`error_estimate`), and it is made again, shorter, where that exceeds the
-tolerance or Newton fails (`step_control`). It ends exactly where a stimulus, a load or a prescribed path has a corner
-or jumps (`breakpoints`) and where the caller asks; after a jump steps begin again with the first step's length. All
-that this remembers is in the state.
+A step is attempted, its error estimated (`march.error_estimate`), and it is made again, shorter, where that exceeds the
+tolerance or Newton fails (`march.step_control`), all in one compiled loop (`march.adapt`). It ends exactly where a
+stimulus, a load or a prescribed path has a corner or jumps (`stretch`) and where the caller asks; after a jump steps
+begin again with the first step's length. All that this remembers is in the state.
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
+from dataclasses import replace
 
 from ..errors import InputError, SimulationError
+from ..march.adapt import Control
+from ..march.adapter import Adapter
+from ..march.engine import MarchReport, Settings
+from ..march.status import JUMPED, TOO_INACCURATE
+from ..march.step_groups import Course
 from ..model.model import Model
 from ..model.state import State
-from .breakpoints import Breakpoints
-from .error_estimate import ErrorEstimate
 from .method import Method
-from .step_control import STRETCH, StepControl
+from .sdirk2 import METHOD as SELF_STARTING
 from .stepper import Stepper, StepReport
-
-Array = np.ndarray
+from .stretch import Stretch
 
 TIME_ROUNDING = 1e-9
 """Part of the first step by which two times are the same."""
@@ -40,7 +41,7 @@ class AdaptiveStepper(Stepper):
     newton_tolerance, max_iterations, max_halvings
         As for `Stepper`; the shortest step is ``first/2**max_halvings``.
     tolerance : float
-        Largest local error of a step: displacement over the length of the longest rod (`ErrorEstimate`).
+        Largest local error of a step: displacement over the length of the longest rod (`march.error_estimate`).
     largest : float
         Length of the longest step [s].
 
@@ -69,19 +70,18 @@ class AdaptiveStepper(Stepper):
         super().__init__(model, method, first, newton_tolerance, max_iterations, max_halvings)
         self.tolerance = tolerance
         self._first = min(first, largest)
-        self._shortest = self._first / 2**max_halvings
-        self._control = StepControl(method.order, largest)
-        self._estimate = ErrorEstimate(model)
-        self._breakpoints = Breakpoints(model.scene)
-        self._kept: tuple[State, Array] | None = None
+        self._stretch = Stretch(model)
+        shortest = self._first / 2**max_halvings
+        control = Control(
+            order=method.order, tolerance=tolerance, first=self._first, shortest=shortest, longest=largest
+        )
+        self._adapter = Adapter(model, self.engine, control, self._stretch.acting)
+        self._rooms: dict[Method, Course] = {}
 
     def compile(self, state: State) -> None:
-        """Make a step for its kernels, estimate its error and count it; `state` stays as it is."""
-        super().compile(state)
-        self._estimate.deviation(state, state, self._first)
-        highest = float(self.engine.figures[0])
-        self.engine.count_in(state, math.inf)
-        self.engine.start_over(highest)
+        """Make a step for its kernels; `state` stays as it is."""
+        copy = state.copy()
+        self._go(copy, 1, self._next_stop(copy, math.inf)[0], counts=False)
 
     def advance(self, state: State, until: float = math.inf) -> StepReport:
         """One step, in place, that ends at `until` [s] at the latest.
@@ -91,86 +91,98 @@ class AdaptiveStepper(Stepper):
         SimulationError
             If the shortest step does not converge or is not accurate enough; nothing is changed then.
         """
-        begin = float(state.time[0])
-        stop, breaks = self._next_stop(state, until)
-        planned = float(state.next_step[0]) or self._first
-        kept, touched = self._keep(state)
+        found = self._march(state, 1, until, counts=False)
+        if not found.done:
+            raise SimulationError(self._why(found, float(state.time[0])), float(state.time[0]))
+        report = StepReport.of(found, float(state.time[0]))
         if self.ledger is not None:
-            self.ledger.mark()
-        h, rejected, inaccurate, iterations, factorisations = planned, 0, 0, 0, 0
+            rest = self.surroundings.rest_strains_of(state.transduction)
+            self.ledger.record(state, rest, self.surroundings.load_factor(report.time, report.length), report.length)
+        return report
+
+    def march(self, state: State, steps: int, until: float = math.inf) -> MarchReport | None:
+        """At most so many steps, none of which passes `until` [s], taken into the tally. None if it made none: the next
+        step is one for `advance`, which says why it cannot be made.
+        """
+        if self.ledger is not None:
+            return None
+        found = self._march(state, steps, until, counts=True)
+        return found if found.done else None
+
+    def _march(self, state: State, steps: int, until: float, counts: bool) -> MarchReport:
+        """As many steps as succeed, from one corner to the next."""
+        found: MarchReport | None = None
+        while found is None or (not found.failed and found.done < steps and state.time[0] < until):
+            stop, breaks = self._next_stop(state, until)
+            more = self._go(state, steps - (found.done if found else 0), stop, counts)
+            if breaks and more.done and state.time[0] == stop:
+                self._begin_again_if_jumped(state)
+            found = more if found is None else found.followed_by(more)
+        if found.done and found.failed:
+            self.rest(state)  # what the last attempt left is not what the state is
+        return found
+
+    def _go(self, state: State, most: int, stop: float, counts: bool) -> MarchReport:
+        """At most so many steps up to `stop` [s], before which nothing has a corner."""
+        solver = self.model.scene.solver
+        method, changes = self.method, self.method.history is not None
         while True:
-            h = self._control.fit(h, stop - begin)
-            time = stop if h == stop - begin else begin + h
-            h = time - begin
-            report = self._attempt(state, h, time)
-            iterations += report.iterations
-            factorisations += report.factorisations
-            error = math.inf
-            if report.converged:
-                error = self.used.estimate * self._estimate.deviation(kept, state, h) / self.tolerance
-                if error <= 1.0:
-                    break
-                state.take(kept)
-                self._touched[:] = touched
-                if self.ledger is not None:
-                    self.ledger.roll_back()
-            if h <= STRETCH * self._shortest:
-                why = self._explain(report, time, h) if not report.converged else self._too_inaccurate(error, time, h)
-                raise SimulationError(why, begin)
-            rejected += 1
-            inaccurate += report.converged
-            shorter = self._control.after_rejection(h, error) if report.converged else self._control.after_failure(h)
-            h = max(shorter, self._shortest)
-        self._plan(state, kept, h, planned, error, report.iterations / len(self.used.nodes), rejected > 0)
-        state.time[0] = time
-        state.step += 1.0
-        if breaks and time == stop and self._jumps(state, time, h):
-            self.restart(state)
-        return StepReport(time, h, 1, rejected, iterations, factorisations, report.residual, inaccurate)
+            settings = Settings(self.solver.tolerance, solver.max_newton_iterations, changes, counts)
+            course = self._room_of(state, method)
+            found = self._adapter.adapt(state, self._arrays[method], course, stop, most, settings)
+            if found.status == JUMPED and not found.done:
+                method, most, changes = SELF_STARTING, 1, False
+            elif not self.engine.make_room(found.status) or found.done:
+                break
+        self.used = method
+        self.end = self._places[found.place]
+        self._start, self._trial = (self._places[k] for k in range(3) if k != found.place)
+        self.stimulus = course.stimulus[0, -1].copy()
+        return found
 
-    def _keep(self, state: State) -> tuple[State, Array]:
-        """A copy of a state, and of what touches there, until the next one."""
-        if self._kept is None:
-            self._kept = state.copy(), self._touched.copy()
-        kept, touched = self._kept
-        kept.take(state)
-        touched[:] = self._touched
-        return kept, touched
-
-    def march(self, state: State, steps: int) -> None:
-        """None: how long a step is depends on the one before."""
+    def _room_of(self, state: State, method: Method) -> Course:
+        """For what acts during a step of a method."""
+        if method not in self._rooms:
+            self._rooms[method] = self.surroundings.new_course(state, method, [float(state.time[0])], 0.0)
+        return self._rooms[method]
 
     def restart(self, state: State) -> None:
         """Begin again with short steps: something has jumped."""
         state.next_step[0] = min(float(state.next_step[0]), self._first)
         state.last_error[0] = 0.0
 
-    def _plan(
-        self, state: State, kept: State, h: float, planned: float, error: float, iterations: float, shortened: bool
-    ) -> None:
-        """Write the length of the next step into the state; one cut short by what it had to end at says little."""
-        following = self._control.after_success(h, error, float(kept.last_error[0]), iterations, shortened)
-        if h < (1.0 - TIME_ROUNDING) * planned and not shortened:
-            state.next_step[0] = max(following, min(planned, self._control.largest))
-        else:
-            state.next_step[0], state.last_error[0] = following, error
+    def _begin_again_if_jumped(self, state: State) -> None:
+        """At the end of a stretch."""
+        stimulus, load = self._stretch.jumps_at(self._after(state))
+        if stimulus or load:
+            self.restart(state)
+        if load and self.method.history is not None:
+            state.kept[0] = 0.0  # slopes from before are none of the step to come
+
+    def _after(self, state: State) -> float:
+        """The time of a state, or a little later, which makes no difference but at a corner [s]."""
+        return float(state.time[0]) + TIME_ROUNDING * self._first
 
     def _next_stop(self, state: State, until: float) -> tuple[float, bool]:
-        """Where the step has to end at the latest [s], and whether something has a corner or jumps there."""
-        rounding = TIME_ROUNDING * self._first
-        time = float(state.time[0])
-        if until <= time + rounding:
-            raise InputError(f"until: {until} is not allowed; it must be later than the present time, {time} s")
-        corner = self._breakpoints.after(time + rounding, state.override)
+        """Where steps have to end at the latest [s], and whether something has a corner or jumps there."""
+        rounding, after = TIME_ROUNDING * self._first, self._after(state)
+        if until <= after:
+            raise InputError(
+                f"until: {until} is not allowed; it must be later than the present time, {state.time[0]} s"
+            )
+        self._stretch.cover(after, state.override)
+        corner = self._stretch.until
         return (until, corner <= until + rounding) if corner >= until - rounding else (corner, True)
 
-    def _jumps(self, state: State, time: float, h: float) -> bool:
-        """Whether a stimulus or a load jumps at the end of a step of length `h` [s]."""
-        return self.surroundings.stimuli_jump(state, time, h) or self.surroundings.loads_jump(time, h)
-
-    def _too_inaccurate(self, error: float, time: float, h: float) -> str:
-        allowed = self.tolerance
+    def _why(self, found: MarchReport, begin: float) -> str:
+        """Why a step could not be made."""
+        time, h = begin + found.length, found.length
+        if found.status != TOO_INACCURATE:
+            report = found.newton
+            if found.pair >= 0:
+                report = replace(report, detail=self.solver.who_blocks(found.pair))
+            return self._explain(report, time, h)
         return (
             f"the error of the step to t = {time:.6g} s, tried down to {h:.3g} s, stays above the tolerance "
-            f"({error * allowed:.3g} of the longest rod, allowed {allowed:.3g})"
+            f"({found.error * self.tolerance:.3g} of the longest rod, allowed {self.tolerance:.3g})"
         )

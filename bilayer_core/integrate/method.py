@@ -69,7 +69,7 @@ class Method:
     history : History or None
         None if a step starts from positions and velocities alone.
     estimate : float or None
-        Local error of positions over |Δq − ½ h (vₙ + vₙ₊₁)| (`error_estimate`); None if that does not tell it.
+        Local error of positions over |Δq − ½ h (vₙ + vₙ₊₁)| (`march.error_estimate`); None if that does not tell it.
     """
 
     name: str
@@ -98,6 +98,8 @@ class Method:
             momenta=np.array(history.momenta if history else np.zeros(stages)),
             bend=history.bend if history else 0.0,
             carry=history.carry if history else 0.0,
+            nodes=np.array(self.nodes),
+            estimate=np.nan if self.estimate is None else float(self.estimate),
         )
 
 

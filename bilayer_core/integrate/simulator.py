@@ -254,6 +254,18 @@ class Simulator:
         """
         self.compile()
         begin, wall = clock.thread_time(), clock.perf_counter()
+        found = self._stepper.march(self._state, 1, until)
+        if found is not None:
+            self.statistics.update_with(found, self._stepper)
+            report = StepReport.of(found, self.time)
+        else:
+            report = self._advance(until)
+        self.cpu_time += clock.thread_time() - begin
+        self.wall_time += clock.perf_counter() - wall
+        return report
+
+    def _advance(self, until: float) -> StepReport:
+        """A step that is none for a compiled loop, or cannot be made."""
         try:
             report = self._stepper.advance(self._state, until)
         except SimulationError:
@@ -261,23 +273,19 @@ class Simulator:
             self.termination = Termination.FAILED.value
             raise
         self.statistics.update(report, self._stepper, self._state)
-        self.cpu_time += clock.thread_time() - begin
-        self.wall_time += clock.perf_counter() - wall
         return report
 
-    def _step_once(self, until: float) -> int:
-        self.step(until)
-        return 1
-
-    def _march(self, steps: int) -> int:
-        """Advance by as many steps, at most `steps`, as a compiled loop makes without help; returns how many."""
+    def _march(self, steps: int, until: float) -> int:
+        """Advance by at most so many steps, adaptive ones to `until` [s] at the latest; returns how many."""
         begin, wall = clock.thread_time(), clock.perf_counter()
-        report = self._stepper.march(self._state, steps)
-        if report is not None:
-            self.statistics.update_with(report, self._stepper)
+        found = self._stepper.march(self._state, steps, until)
+        if found is not None:
+            self.statistics.update_with(found, self._stepper)
+        else:
+            self._advance(until)
         self.cpu_time += clock.thread_time() - begin
         self.wall_time += clock.perf_counter() - wall
-        return report.done if report is not None else 0
+        return 1 if found is None else found.done
 
     def run(
         self,
@@ -325,8 +333,8 @@ class Simulator:
         try:
             schedule.start()
             while done < steps and self.time < end:
-                at_once = schedule.steps_until_due(min(steps - done, most))
-                done += self._march(at_once) or self._step_once(schedule.next_stop(end))
+                at_once = most if adaptive else schedule.steps_until_due(min(steps - done, most))
+                done += self._march(at_once, schedule.next_stop(end))
                 schedule.observe_due()
                 if each_step is not None:
                     each_step(self.time)

@@ -71,7 +71,9 @@ class RunStatistics:
         newton = report.newton
         self.steps += report.done
         self.substeps += report.done
-        self.shortest, self.longest = min(self.shortest, stepper.dt), max(self.longest, stepper.dt)
+        self.rejected += report.rejected
+        self.inaccurate += report.inaccurate
+        self.shortest, self.longest = min(self.shortest, report.shortest), max(self.longest, report.longest)
         self.iterations += newton.iterations
         self.factorisations += newton.factorisations
         self.last_residual = newton.residual if report.finished else report.largest_residual

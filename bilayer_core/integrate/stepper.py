@@ -59,6 +59,13 @@ class StepReport:
     residual: float
     inaccurate: int = 0
 
+    @classmethod
+    def of(cls, found: MarchReport, time: float) -> StepReport:
+        """That of the only step of a compiled loop, which ended at `time` [s]."""
+        newton = found.newton
+        counts = 1, found.rejected, newton.iterations, newton.factorisations
+        return cls(time, found.length, *counts, newton.residual, found.inaccurate)
+
 
 class Stepper:
     """Advances a `State` by fixed steps dt, halving where Newton fails and doubling again where it succeeds.
@@ -175,9 +182,9 @@ class Stepper:
         state.halvings[0] = level
         return StepReport(time, self.dt, substeps, rejected, iterations, factorisations, residual)
 
-    def march(self, state: State, steps: int) -> MarchReport | None:
-        """As many of the next fixed steps as a compiled loop makes without help, at most `steps`, each taken into the
-        tally. None if it made none: the next step is one for `advance`.
+    def march(self, state: State, steps: int, until: float = math.inf) -> MarchReport | None:
+        """As many of the next fixed steps as a compiled loop makes without help, at most `steps`, wherever they end,
+        each taken into the tally. None if it made none: the next step is one for `advance`.
         """
         count = float(state.step[0])
         if not self.loops or self.ledger is not None or state.halvings[0] or state.time[0] != count * self.dt:
@@ -222,7 +229,7 @@ class Stepper:
             found = self.engine.march(state, self._arrays[method], course, h, settings)
             if not self.engine.make_room(found.status) or found.done > 0:
                 break
-        if found.done == 0 and found.failure is None and not found.finished:
+        if found.done == 0 and not found.failed and not found.finished:
             return None
         self.end = self._places[found.place]
         self._start, self._trial = (self._places[k] for k in range(3) if k != found.place)

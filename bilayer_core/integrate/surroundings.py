@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from ..march.step_groups import Course
 from ..model.model import Model, scheduled_motion
 from ..model.state import State
-from ..scene.schedule import value_before
+from ..scene.piece import Pieces
 from ..scene.transduction import follow, free_strain
 from ..solve.terms.term import RestStrains
 from .method import Method
@@ -30,8 +29,8 @@ class Drive:
     load_factor: Array
 
 
-def _value(value: Callable[[float], float], time: float, ended: float) -> float:
-    return value_before(value, time, ended) if ended > 0.0 else value(time)
+def _value(schedule: Pieces, time: float, ended: float) -> float:
+    return schedule.value_before(time, ended) if ended > 0.0 else schedule.value(time)
 
 
 class Surroundings:
@@ -57,7 +56,7 @@ class Surroundings:
 
         At the end of a step of length `ended` [s], a schedule that jumps there still has its value from before.
         """
-        scheduled = [_value(channel.schedule.value, time, ended) for channel in self._channels]
+        scheduled = [_value(channel.schedule, time, ended) for channel in self._channels]
         return np.where(np.isnan(state.override), np.array(scheduled, dtype=float), state.override)
 
     def rest_strains_of(self, transduction: Array) -> RestStrains:
@@ -79,11 +78,7 @@ class Surroundings:
 
     def loads_jump(self, time: float, h: float) -> bool:
         """Whether a load jumps at `time`, seen from a step of length `h` [s]."""
-        return not np.array_equal(self.load_factor(time), self.load_factor(time, h))
-
-    def stimuli_jump(self, state: State, time: float, h: float) -> bool:
-        """Whether a stimulus does so."""
-        return not np.array_equal(self.stimulus_at(state, time), self.stimulus_at(state, time, h))
+        return any(load.factor.jumps_at(time, h) for load in self.model.scene.loads)
 
     def drive(self, state: State, first_stimulus: Array, begin: float, elapsed: float) -> Drive:
         """What acts from outside `elapsed` [s] after `begin` [s], the start of a step."""
@@ -108,19 +103,24 @@ class Surroundings:
         loads = self.model.scene.loads
         course = self._courses.get((len(times), len(elapsed)))
         if course is None or self._moves:
-            course = self._courses[len(times), len(elapsed)] = self._new_course(state, method, times, h)
+            course = self._courses[len(times), len(elapsed)] = self.new_course(state, method, times, h)
         course.time[:], course.elapsed[:] = times, elapsed
-        course.first[:] = self._stimuli(state, begins, [0.0] * len(begins))
-        course.stimulus[:] = self._stimuli(state, stages, parts).reshape(course.stimulus.shape)
+        for index, (channel, value) in enumerate(zip(self._channels, state.override.tolist(), strict=True)):
+            if math.isnan(value):
+                course.first[:, index] = channel.schedule.values_at(begins, h)
+                ends = channel.schedule.values_before(stages, parts)
+                course.stimulus[:, :, index] = np.reshape(ends, course.stimulus.shape[:2])
+            else:
+                course.first[:, index] = course.stimulus[:, :, index] = value
         if loads:
-            factors = [[_value(load.factor, *when) for load in loads] for when in zip(stages, parts, strict=True)]
-            course.load_factor[:] = np.reshape(factors, course.load_factor.shape)
+            factors = [load.factor.values_before(stages, parts) for load in loads]
+            course.load_factor[:] = np.transpose(factors).reshape(course.load_factor.shape)
             if method.history is not None:
                 course.jumps[:] = [self.loads_jump(begin, h) for begin in begins]
         return course
 
-    def _new_course(self, state: State, method: Method, times: list[float], h: float) -> Course:
-        """A course with the poses of prescribed bodies, of which it has one row if none of them moves."""
+    def new_course(self, state: State, method: Method, times: list[float], h: float) -> Course:
+        """Room for a course, with the poses of prescribed bodies, of which it has one row if none of them moves."""
         steps, stages = len(times), len(method.nodes)
         placed = times if self._moves else times[:1]
         poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.nodes]
@@ -136,13 +136,3 @@ class Surroundings:
             rotation=np.array([pose.rotation for pose in poses]).reshape(*rows, 3, 3),
             rates=np.array([pose.rates for pose in poses]).reshape(*rows, 6),
         )
-
-    def _stimuli(self, state: State, times: list[float], ended: list[float]) -> Array:
-        """`stimulus_at` for several times, shape (n_time, n_channel)."""
-        values = np.empty((len(times), len(self._channels)))
-        for index, (channel, fixed) in enumerate(zip(self._channels, state.override.tolist(), strict=True)):
-            value = channel.schedule.value
-            values[:, index] = (
-                [_value(value, *when) for when in zip(times, ended, strict=True)] if math.isnan(fixed) else fixed
-            )
-        return values

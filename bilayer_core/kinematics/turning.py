@@ -51,6 +51,23 @@ def turn_between(first, a, last, b):
 
 
 @inner
+def spin_of(v0, v1, v2, u0, u1, u2):
+    """Angular velocity of exp([v]×) while v changes at the rate u, as a tuple; see `kinematics.rotation`."""
+    angle2 = v0 * v0 + v1 * v1 + v2 * v2
+    if angle2 < 1e-8:
+        a, b = 0.5 - angle2 / 24.0, 1.0 / 6.0 - angle2 / 120.0
+    else:
+        angle = math.sqrt(angle2)
+        a, b = (1.0 - math.cos(angle)) / angle2, (1.0 - math.sin(angle) / angle) / angle2
+    w0, w1, w2 = v1 * u2 - v2 * u1, v2 * u0 - v0 * u2, v0 * u1 - v1 * u0
+    return (
+        u0 + a * w0 + b * (v1 * w2 - v2 * w1),
+        u1 + a * w1 + b * (v2 * w0 - v0 * w2),
+        u2 + a * w2 + b * (v0 * w1 - v1 * w0),
+    )
+
+
+@inner
 def product_transposed(left, a, right, b, out, c):
     """out[c] = left[a] right[b]ᵀ"""
     for i in range(3):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..solve.terms.term import RestStrains
 from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
 from .loop import Counted, Loop
 from .problem import Problem
-from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
+from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER, TOO_INACCURATE
 from .step import count_step, take_steps
 from .step_groups import Course, Method, StateArrays, Tally
 from .terms import NAMES
@@ -39,7 +39,8 @@ class Engine:
     """
 
     def __init__(self, model: Model, potential: IncrementalPotential, places: list[Configuration], keeps_slopes: bool):
-        self._model, self._potential, self._keeps = model, potential, 1 if keeps_slopes else None
+        self._model, self._potential = model, potential
+        self.keeps = 1 if keeps_slopes else None
         self._energy = np.zeros(len(NAMES))
         self._groups = lasting_groups(model, potential)
         self._problem: Problem | None = None
@@ -97,7 +98,8 @@ class Engine:
             self._state_arrays = StateArrays(**{name: getattr(state, name) for name in StateArrays.fields})
         return self._state_arrays
 
-    def _loop_of(self, state: State, method: Method, course: Course) -> Loop:
+    def loop_of(self, state: State, method: Method, course: Course) -> Loop:
+        """What compiled steps take, with the present rooms; the same object as long as all parts are."""
         parts = {"problem": self._gather(), "state": self._arrays_of(state), "method": method, "course": course}
         if self._loop is None or any(getattr(self._loop, name) is not part for name, part in parts.items()):
             self._loop = Loop(**parts, work=self._work, tally=self.tally, ranges=self.ranges)
@@ -105,24 +107,19 @@ class Engine:
 
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:
         """Make the steps of a course, each of length `h` [s], as far as they succeed; `state` is that after them."""
-        loop = self._loop_of(state, method, course)
-        flags = self._keeps, settings.looks, settings.changes, settings.counts
+        loop, flags = self.loop_of(state, method, course), (self.keeps, settings.looks, settings.changes, settings.counts)
         done, status, pair, place, iterations, factorisations, backtracks, residual, worst, gap = take_steps(
             loop, *flags, h, settings.tolerance, settings.max_iterations
         )
         if status == CONVERGED or status in FAILURES:
-            self._potential.take_over(dict(zip(NAMES, self._energy.tolist(), strict=True)), gap)
-        return MarchReport(
-            done,
-            FAILURES.get(status),
-            status,
-            place,
-            pair,
-            NewtonReport(
-                FAILURES.get(status, NewtonStatus.CONVERGED), iterations, factorisations, residual, backtracks
-            ),
-            worst,
-        )
+            self.take_over(gap)
+        how = FAILURES.get(status, NewtonStatus.CONVERGED)
+        newton = NewtonReport(how, iterations, factorisations, residual, backtracks)
+        return MarchReport(done, status, place, pair, newton, worst, h, h, h)
+
+    def take_over(self, gap: float) -> None:
+        """Leave the energies of the last configuration, and the smallest gap there [m], to the potential."""
+        self._potential.take_over(dict(zip(NAMES, self._energy.tolist(), strict=True)), gap)
 
     def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
         """What acts on the state that is looked at next, by settings that say so."""
@@ -181,8 +178,6 @@ class MarchReport:
     ----------
     done : int
         Number of steps made.
-    failure : NewtonStatus or None
-        Why the next one failed.
     status : int
         Why it ended, in the loop's own numbers.
     place : int
@@ -193,15 +188,52 @@ class MarchReport:
         Iterations of all attempts; the rest is that of the last one.
     largest_residual : float
         Of the steps made [m/s].
+    shortest, longest : float
+        Lengths of the steps made [s].
+    length : float
+        That of the last step, or of the attempt that failed [s].
+    rejected, inaccurate : int
+        Attempts that were made again, shorter, and those of them whose error was too large.
+    error : float
+        That of the attempt that failed, in tolerances.
     """
 
     done: int
-    failure: NewtonStatus | None
     status: int
     place: int
     pair: int
     newton: NewtonReport
     largest_residual: float
+    shortest: float
+    longest: float
+    length: float
+    rejected: int = 0
+    inaccurate: int = 0
+    error: float = 0.0
+
+    def followed_by(self, more: MarchReport) -> MarchReport:
+        """Both together; it ends as `more` does."""
+        newton = replace(
+            more.newton,
+            iterations=self.newton.iterations + more.newton.iterations,
+            factorisations=self.newton.factorisations + more.newton.factorisations,
+            backtracks=self.newton.backtracks + more.newton.backtracks,
+        )
+        return replace(
+            more,
+            done=self.done + more.done,
+            newton=newton,
+            largest_residual=max(self.largest_residual, more.largest_residual),
+            shortest=min(self.shortest, more.shortest),
+            longest=max(self.longest, more.longest),
+            rejected=self.rejected + more.rejected,
+            inaccurate=self.inaccurate + more.inaccurate,
+        )
+
+    @property
+    def failed(self) -> bool:
+        """Whether the step after those made failed; otherwise, if it was not made, it is not one for the loop."""
+        return self.status in FAILURES or self.status == TOO_INACCURATE
 
     @property
     def finished(self) -> bool:

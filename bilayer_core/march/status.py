@@ -15,6 +15,8 @@ JUMPED = 4
 """Something has jumped: another integrator has to make this step."""
 CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED = 5, 10, 11, 12, 13, 14
 """How Newton ended; from `MAX_ITERATIONS` on it failed."""
+TOO_INACCURATE = 20
+"""The error of a step exceeds its tolerance, however short it is."""
 
 FAILURES = {
     MAX_ITERATIONS: NewtonStatus.MAX_ITERATIONS,

@@ -66,7 +66,7 @@ def _keep_slopes(keeps, sums, state, origin, end, momentum_length, carry, touche
 
 
 @inner
-def _has_jumped(keeps, drives, state, first, range_of_channel, h):
+def has_jumped(keeps, drives, state, first, range_of_channel, h):
     """Whether a stimulus has jumped that some layer follows at once, or a step before did not leave its slopes."""
     if keeps is None:
         return False
@@ -262,7 +262,7 @@ def take_steps(loop, keeps, looks, changes, counts, h, tolerance, max_iterations
     gap = math.inf
     status, pair, end = READY, -1, 1
     for k in range(course.time.shape[0]):
-        if changes and (course.jumps[k] or _has_jumped(keeps, p.drives, state, course.first[k], loop.ranges, h)):
+        if changes and (course.jumps[k] or has_jumped(keeps, p.drives, state, course.first[k], loop.ranges, h)):
             return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
         status, pair, e, more, factors, halvings, left, nearest = take_step(
             p, state, loop.method, keeps, looks, course, k, work, h, tolerance, max_iterations

@@ -86,6 +86,8 @@ class Method:
     momenta: Array
     bend: float
     carry: float
+    nodes: Array  # of stages, as parts of a step, shape (n_stage,)
+    estimate: float  # of the error of a step, see `march.error_estimate`; NaN without
 
 
 @group

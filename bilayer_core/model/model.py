@@ -255,18 +255,24 @@ class Model(ReadOnlyArrays):
         return self.bodies.free_index[self.wall_body]
 
 
+def keyframes_about(times: Array, values: Array, time: float) -> tuple[float, float, Array, Array]:
+    """Time of the keyframe before `time`, time until the next [s], value there, way to the next, shape (3,) each;
+    the way is zero before the first, after the last, and without any.
+    """
+    if len(times) == 0 or len(values) == 0:
+        return 0.0, 1.0, np.zeros(3), np.zeros(3)
+    right = int(np.searchsorted(times, time, side="right"))
+    if right in (0, len(times)):
+        return 0.0, 1.0, values[max(right - 1, 0)], np.zeros(3)
+    begin = float(times[right - 1])
+    return begin, float(times[right]) - begin, values[right - 1], values[right] - values[right - 1]
+
+
 def between_keyframes(times: Array, values: Array, time: float) -> tuple[Array, Array]:
     """Value and rate of a schedule of vectors: cubic smoothstep between keyframes, constant outside them; (3,) each."""
-    if len(times) == 0 or len(values) == 0:
-        return np.zeros(3), np.zeros(3)
-    right = int(np.searchsorted(times, time, side="right"))
-    if right == 0:
-        return values[0], np.zeros(3)
-    if right == len(times):
-        return values[-1], np.zeros(3)
-    duration, way = times[right] - times[right - 1], values[right] - values[right - 1]
-    s = (time - times[right - 1]) / duration
-    return values[right - 1] + s * s * (3.0 - 2.0 * s) * way, 6.0 * s * (1.0 - s) / duration * way
+    begin, duration, value, way = keyframes_about(times, values, time)
+    s = (time - begin) / duration
+    return value + s * s * (3.0 - 2.0 * s) * way, 6.0 * s * (1.0 - s) / duration * way
 
 
 def scheduled_motion(bodies: Bodies, index: int, time: float) -> tuple[Array, Array, Array]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import InputError
-from ..scene.schedule import value_before
 from .model import Model
 
 Array = np.ndarray
@@ -124,7 +123,7 @@ def initial_state(model: Model, with_history: bool = False) -> State:
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
     channels = list(model.scene.stimuli.values())
-    before = np.array([value_before(channel.schedule.value, 0.0, MOMENT) for channel in channels])
+    before = np.array([channel.schedule.value_before(0.0, MOMENT) for channel in channels])
     return State(
         time=np.zeros(1),
         step=np.zeros(1),

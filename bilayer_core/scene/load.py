@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 from pydantic import model_validator
@@ -10,8 +9,11 @@ from pydantic import model_validator
 from bilayer_core.scene import checks
 from bilayer_core.scene.faults import refuse_all
 from bilayer_core.scene.part import Name, Part
-from bilayer_core.scene.schedule import Schedule
+from bilayer_core.scene.piece import Pieces
+from bilayer_core.scene.schedule import Hold, Schedule
 from bilayer_core.scene.units import Force, Moment, NonNegativeLength, PositiveMass
+
+ALWAYS = Hold(type="hold", value=1.0)
 
 
 class PointMass(Part):
@@ -53,10 +55,7 @@ class Load(Part):
         refuse_all("Load", checks.faults_of_load(self))
         return self
 
-    def factor(self, t: float) -> float:
-        """What force and moment are multiplied with at time `t` [s]."""
-        return 1.0 if self.schedule is None else self.schedule.value(t)
-
-    def breakpoint_after(self, t: float) -> float:
-        """First corner or jump of the factor after `t` [s], infinity if there is none."""
-        return math.inf if self.schedule is None else self.schedule.breakpoint_after(t)
+    @property
+    def factor(self) -> Pieces:
+        """What force and moment are multiplied with."""
+        return ALWAYS if self.schedule is None else self.schedule

@@ -4,43 +4,35 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.piece import ROUNDING, Piece, Pieces
 from bilayer_core.scene.table_file import TableFile, read_table_file
 from bilayer_core.scene.units import NonNegativeTime, PlainNumber, PositiveTime, Time
-from bilayer_core.scene.waveform import ROUNDING, PulseTrain, Sine, Square
+from bilayer_core.scene.waveform import PulseTrain, Sine, Square
 
 
-class Hold(BaseModel):
+class Hold(Pieces):
     """One value at all times."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     type: Literal["hold"]
     held_value: PlainNumber = Field(alias="value")
     """In the unit of the channel."""
 
-    def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
-        return self.held_value
-
-    def breakpoint_after(self, t: float) -> float:
-        """First corner or jump after `t` [s]: there is none, which is infinity."""
-        return math.inf
+    def piece(self, t: float) -> Piece:
+        """The only one."""
+        return Piece(math.inf, self.held_value)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
         return {("value",): self.held_value}
 
 
-class Ramp(BaseModel):
+class Ramp(Pieces):
     """From one value to another at a constant rate."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     type: Literal["ramp"]
     start: Time
@@ -58,24 +50,22 @@ class Ramp(BaseModel):
             refuse_all("Ramp", [(("end",), self.end, f"must be later than `start` ({self.start:g} s)")])
         return self
 
-    def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
-        part = min(max((t - self.start) / (self.end - self.start), 0.0), 1.0)
-        return (1.0 - part) * self.from_value + part * self.to_value
-
-    def breakpoint_after(self, t: float) -> float:
-        """First corner after `t` [s], infinity if there is none."""
-        return first_after(t, (self.start, self.end))
+    def piece(self, t: float) -> Piece:
+        """Before, on, or after the ramp."""
+        if t < self.start:
+            return Piece(self.start, self.from_value)
+        if t < self.end:
+            rate = (self.to_value - self.from_value) / (self.end - self.start)
+            return Piece(self.end, self.from_value, self.start, rate)
+        return Piece(math.inf, self.to_value)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
         return {("from",): self.from_value, ("to",): self.to_value}
 
 
-class Table(BaseModel):
+class Table(Pieces):
     """Values at given times, linear between them and constant outside."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     type: Literal["table"]
     times: list[NonNegativeTime] = Field(min_length=1)
@@ -88,20 +78,16 @@ class Table(BaseModel):
         refuse_all("Table", faults_of_times(self.times, ("values",), self.values))
         return self
 
-    def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
+    def piece(self, t: float) -> Piece:
+        """Between two of the times, before the first, or after the last."""
         right = bisect_right(self.times, t)
         if right == 0:
-            return self.values[0]
+            return Piece(self.times[0], self.values[0])
+        before = self.values[right - 1]
         if right == len(self.times):
-            return self.values[-1]
-        before, after = self.times[right - 1], self.times[right]
-        part = (t - before) / (after - before)
-        return (1.0 - part) * self.values[right - 1] + part * self.values[right]
-
-    def breakpoint_after(self, t: float) -> float:
-        """First corner after `t` [s], infinity if there is none."""
-        return first_after(t, self.times)
+            return Piece(math.inf, before)
+        begin, until = self.times[right - 1 : right + 1]
+        return Piece(until, before, begin, (self.values[right] - before) / (until - begin))
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
@@ -119,10 +105,8 @@ class SequencePart(BaseModel):
     """Its time begins with the part."""
 
 
-class Sequence(BaseModel):
+class Sequence(Pieces):
     """Schedules one after the other; after the last, its value at its end, or from the beginning again."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     type: Literal["sequence"]
     parts: list[SequencePart] = Field(min_length=1)
@@ -130,34 +114,20 @@ class Sequence(BaseModel):
     repeat: bool = False
     """Whether it begins again after the last part."""
 
-    def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
-        total = sum(part.duration for part in self.parts)
-        elapsed = max(t, 0.0) + ROUNDING * total
-        if self.repeat:
-            elapsed %= total
-        for part in self.parts[:-1]:
-            if elapsed < part.duration:
-                break
-            elapsed -= part.duration
-        else:
-            part = self.parts[-1]
-        return part.schedule.value(min(max(elapsed - ROUNDING * total, 0.0), part.duration))
-
-    def breakpoint_after(self, t: float) -> float:
-        """First corner or jump after `t` [s], infinity if there is none: those of the parts, and where a part ends."""
+    def piece(self, t: float) -> Piece:
+        """One of the present part; the next part begins with a corner."""
         if t < 0.0:
-            return 0.0
+            return Piece(0.0, self.parts[0].schedule.value(0.0))
         total = sum(part.duration for part in self.parts)
-        cycle = math.floor(t / total + ROUNDING) if self.repeat else 0
-        begin, early = cycle * total, ROUNDING * total
+        early = ROUNDING * total
+        begin = math.floor(t / total + ROUNDING) * total if self.repeat else 0.0
         for part in self.parts:
             end = begin + part.duration
             if t < end - early:
-                inside = begin + part.schedule.breakpoint_after(t - begin + early)
-                return inside if inside < end - early else end
+                inside = part.schedule.piece(max(t - begin, 0.0) + early).later(begin, end)
+                return inside if inside.until < end - early else inside._replace(until=end)
             begin = end
-        return math.inf
+        return Piece(math.inf, part.schedule.value(part.duration))
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
@@ -201,20 +171,3 @@ def first_after(t: float, times: list[float] | tuple[float, ...]) -> float:
     """The first of increasing times after `t` [s], infinity if there is none."""
     place = bisect_right(times, t)
     return times[place] if place < len(times) else math.inf
-
-
-NEARLY = 1e-3
-"""Part of a step by which a value is taken before its end to see a jump there; more than the early switch of waves."""
-JUMP = 1e3
-"""Ratio of two successive changes from which the second is a jump."""
-
-
-def value_before(value: Callable[[float], float], t: float, h: float) -> float:
-    """Value at the end `t` [s] of a step of length `h` [s]: the limit from within the step where it jumps at `t`.
-
-    A step that ends at a jump has its own value to its end; the next one begins with the new value.
-    """
-    here, before, earlier = value(t), value(t - NEARLY * h), value(t - 2.0 * NEARLY * h)
-    if abs(here - before) > JUMP * abs(before - earlier):
-        return 2.0 * before - earlier
-    return here

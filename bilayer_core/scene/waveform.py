@@ -5,19 +5,15 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import model_validator
 
 from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.piece import ROUNDING, Piece, Pieces
 from bilayer_core.scene.units import Angle, DutyCycle, NonNegativeTime, PlainNumber, PositiveTime, Time, whole
 
-ROUNDING = 1e-9
-"""Part of a period by which a wave switches early, so that rounding of the time never delays it by a step."""
 
-
-class Sine(BaseModel):
+class Sine(Pieces):
     """``mean + amplitude sin(2π (t − start)/period + phase)``; before `start` its value there."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     type: Literal["sine"]
     mean: PlainNumber
@@ -31,15 +27,15 @@ class Sine(BaseModel):
     start: Time = 0.0
     """Until then the value at the start."""
 
-    def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
-        turns = max(t - self.start, 0.0) / self.period
-        return self.mean + self.amplitude * math.sin(2.0 * math.pi * math.fmod(turns, 1.0) + self.phase)
-
-    def breakpoint_after(self, t: float) -> float:
-        """The start, then every quarter of a period after `t` [s]: a longer step would not see the wave."""
+    def piece(self, t: float) -> Piece:
+        """The start is a corner, and so is every quarter of a period: a longer step would not see the wave."""
         quarter = self.period / 4.0
-        return self.start + quarter * max(math.floor((t - self.start) / quarter + ROUNDING) + 1.0, 0.0)
+        number = math.floor((t - self.start) / quarter + ROUNDING)
+        if number < 0:
+            return Piece(self.start, self.mean + self.amplitude * math.sin(self.phase))
+        begin, until = (self.start + quarter * k for k in (number, number + 1))
+        phase = self.phase + 0.5 * math.pi * (number % 4)
+        return Piece(until, self.mean, begin, 0.0, self.amplitude, 0.5 * math.pi / quarter, phase)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
@@ -49,10 +45,8 @@ class Sine(BaseModel):
         }
 
 
-class _Pulses(BaseModel):
+class _Pulses(Pieces):
     """From `low` to `high` at the beginning of each period, and back; at once, or linearly over `rise_time`."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     low: PlainNumber
     """In the unit of the channel."""
@@ -65,33 +59,22 @@ class _Pulses(BaseModel):
     rise_time: NonNegativeTime = 0.0
     """Of each flank, up and down; 0 switches at once."""
 
-    def _value(self, t: float, width: float, last: float) -> float:
-        """Value at time `t` of pulses that begin to fall after `width` [s]; they end after `last` periods."""
-        cycles = (t - self.start) / self.period + ROUNDING
-        if not 0.0 <= cycles < last:
-            return self.low
-        elapsed = math.fmod(cycles, 1.0) * self.period
-        up = self._part(elapsed)
-        part = up - self._part(elapsed - width) if elapsed >= width else up
-        return (1.0 - part) * self.low + part * self.high
-
-    def _breakpoint_after(self, t: float, width: float, last: float) -> float:
-        """First corner or jump after `t` [s] of pulses that begin to fall after `width` [s], infinity if none."""
-        cycle = max(math.floor((t - self.start) / self.period + ROUNDING), 0.0)
-        while cycle < last:
-            begin = self.start + cycle * self.period
-            for flank in (0.0, width):
-                for corner in (begin + flank, begin + flank + self.rise_time):
-                    if corner > t + ROUNDING * self.period:
-                        return corner
-            cycle += 1.0
-        return math.inf
-
-    def _part(self, elapsed: float) -> float:
-        """How far a change has got that began `elapsed` before."""
-        if elapsed >= self.rise_time:
-            return 1.0
-        return max(elapsed - ROUNDING * self.period, 0.0) / self.rise_time
+    def _piece(self, t: float, width: float, last: float) -> Piece:
+        """Piece at time `t` of pulses that begin to fall after `width` [s]; they end after `last` periods."""
+        cycle, early = math.floor((t - self.start) / self.period + ROUNDING), ROUNDING * self.period
+        if cycle < 0:
+            return Piece(self.start, self.low)
+        if cycle >= last:
+            return Piece(math.inf, self.low)
+        begin = self.start + cycle * self.period
+        top, fall, bottom = begin + self.rise_time, begin + width, begin + width + self.rise_time
+        if t < top - early:
+            return Piece(top, self.low, begin, (self.high - self.low) / self.rise_time)
+        if t < fall - early:
+            return Piece(fall, self.high)
+        if t < bottom - early:
+            return Piece(bottom, self.high, fall, (self.low - self.high) / self.rise_time)
+        return Piece(self.start + (cycle + 1) * self.period if cycle + 1 < last else math.inf, self.low)
 
     def _faults(self, width: float, where: str) -> list[Fault]:
         """Whether both flanks fit into the period."""
@@ -118,13 +101,9 @@ class Square(_Pulses):
         refuse_all("Square", self._faults(self.duty * self.period, "duty"))
         return self
 
-    def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
-        return self._value(t, self.duty * self.period, math.inf)
-
-    def breakpoint_after(self, t: float) -> float:
-        """First corner or jump after `t` [s]."""
-        return self._breakpoint_after(t, self.duty * self.period, math.inf)
+    def piece(self, t: float) -> Piece:
+        """The piece that time `t` [s] lies in."""
+        return self._piece(t, self.duty * self.period, math.inf)
 
 
 class PulseTrain(_Pulses):
@@ -143,10 +122,6 @@ class PulseTrain(_Pulses):
         refuse_all("PulseTrain", self._faults(self.width, "width"))
         return self
 
-    def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
-        return self._value(t, self.width, self.count)
-
-    def breakpoint_after(self, t: float) -> float:
-        """First corner or jump after `t` [s], infinity if there is none."""
-        return self._breakpoint_after(t, self.width, self.count)
+    def piece(self, t: float) -> Piece:
+        """The piece that time `t` [s] lies in."""
+        return self._piece(t, self.width, self.count)

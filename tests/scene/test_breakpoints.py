@@ -7,7 +7,7 @@ from pydantic import TypeAdapter
 
 from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.load import Load
-from bilayer_core.scene.schedule import Schedule, value_before
+from bilayer_core.scene.schedule import Schedule
 
 RAMP = {"type": "ramp", "start": 0.3, "end": 1.1, "from": 0.2, "to": 1.0}
 TABLE = {"type": "table", "times": [0.1, 0.7, 0.8, 2.0], "values": [0.0, 1.0, 0.2, 0.2]}
@@ -73,7 +73,7 @@ def test_breakpoints_are_where_the_slope_or_the_value_changes_and_nowhere_else(c
 def test_at_a_jump_the_step_before_has_the_old_value_and_the_step_after_the_new_one(content):
     own = schedule(**content)
     for t in breakpoints(own):
-        before, after = value_before(own.value, t, 1e-3), own.value(t)
+        before, after = own.value_before(t, 1e-3), own.value(t)
         assert {before, after} == {content["low"], content["high"]}
 
 
@@ -99,7 +99,7 @@ def test_a_sine_is_seen_four_times_a_period_from_its_start_on():
 
 def test_loads_and_prescribed_bodies_have_those_of_what_drives_them():
     load = {"name": "pull", "rod": "arm", "position": 0.0, "force": [0, 0, 1]}
-    assert Load(**load).breakpoint_after(0.0) == math.inf
-    assert Load(**load, schedule=RAMP).breakpoint_after(0.3) == 1.1
+    assert Load(**load).factor.breakpoint_after(0.0) == math.inf
+    assert Load(**load, schedule=RAMP).factor.breakpoint_after(0.3) == 1.1
     path = Prescribed(type="prescribed", times=[0.0, 0.2, 0.5], displacements=[[0, 0, 0], [0, 0, 1], [0, 0, 0]])
     assert [path.breakpoint_after(t) for t in (0.0, 0.2, 0.5)] == [0.2, 0.5, math.inf]

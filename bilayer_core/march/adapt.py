@@ -1,0 +1,223 @@
+"""Steps as long as their error allows, many in one compiled function."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..jit import inner, kernel
+from .acting import Acting, look_ahead, look_back
+from .copying import copy
+from .error_estimate import Yardstick, deviation
+from .group import group
+from .loop import Loop
+from .status import CONVERGED, JUMPED, MAX_ITERATIONS, READY, TOO_INACCURATE
+from .step import count_in, has_jumped, take_step
+from .step_control import FAILURE_FACTOR, STRETCH, after_rejection, after_success, fit
+from .step_groups import StateArrays
+
+Array = np.ndarray
+TIME_ROUNDING = 1e-9
+"""Part of a step by which one that ended where it had to was as long as planned."""
+
+
+@group
+class Clock:
+    """Where in time a state is, and how its steps go on; arrays of `model.state.State`, shape (1,) each."""
+
+    time: Array
+    step: Array
+    next_step: Array
+    last_error: Array
+
+
+@group
+class Control:
+    """What decides on lengths of steps."""
+
+    order: int  # of the integrator
+    tolerance: float  # largest local error of a step
+    first: float  # length of the first step, and of the first after a jump [s]
+    shortest: float  # [s]
+    longest: float  # [s]
+
+
+@group
+class Counts:
+    """What came of steps, added up until they are cleared."""
+
+    numbers: Array  # iterations, factorisations, backtracks, attempts refused, and those refused for their error
+    lengths: Array  # shortest, longest, and last step [s]
+    residuals: Array  # of the last step, and the largest [m/s]
+    failure: Array  # length [s], residual [m/s], error, in tolerances, and iterations of the last attempt
+
+
+@group
+class Adaptation:
+    """All that adaptive steps read and write."""
+
+    loop: Loop
+    clock: Clock
+    acting: Acting
+    control: Control
+    yardstick: Yardstick
+    kept: StateArrays
+    kept_touched: Array
+    counts: Counts
+
+
+def room_for_counts() -> Counts:
+    """Counts of no steps."""
+    return Counts(numbers=np.zeros(5, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
+
+
+def clear(counts: Counts) -> None:
+    """Begin again to count."""
+    for name in Counts.fields:
+        getattr(counts, name)[:] = 0
+    counts.lengths[0] = math.inf
+
+
+@inner
+def _copy_state(keeps, source, target):
+    copy(source.position, target.position)
+    copy(source.velocity, target.velocity)
+    copy(source.director1, target.director1)
+    copy(source.spin, target.spin)
+    copy(source.fluid_excess, target.fluid_excess)
+    copy(source.twist, target.twist)
+    copy(source.body_position, target.body_position)
+    copy(source.body_rotation, target.body_rotation)
+    copy(source.body_velocity, target.body_velocity)
+    copy(source.body_angular_velocity, target.body_angular_velocity)
+    copy(source.transduction, target.transduction)
+    _copy_slopes(keeps, source, target)
+
+
+@inner
+def _copy_slopes(keeps, source, target):
+    if keeps is None:
+        return
+    copy(source.kept, target.kept)
+    copy(source.acceleration, target.acceleration)
+    copy(source.spin_acceleration, target.spin_acceleration)
+    copy(source.body_acceleration, target.body_acceleration)
+    copy(source.body_moment, target.body_moment)
+    copy(source.fluid_force, target.fluid_force)
+
+
+@inner
+def _plan(control, clock, h, planned, error, iterations, shortened):
+    """Write the length of the next step; one cut short by what it had to end at says little."""
+    following = after_success(control.order, h, error, clock.last_error[0], iterations, shortened)
+    following = min(following, control.longest)
+    if h < (1.0 - TIME_ROUNDING) * planned and not shortened:
+        clock.next_step[0] = max(following, min(planned, control.longest))
+    else:
+        clock.next_step[0], clock.last_error[0] = following, error
+
+
+@inner
+def _count(counts, h, iterations, factorisations, backtracks, rejected, inaccurate, residual):
+    """Take in a step, with all its attempts."""
+    numbers, lengths, residuals = counts.numbers, counts.lengths, counts.residuals
+    numbers[0] += iterations
+    numbers[1] += factorisations
+    numbers[2] += backtracks
+    numbers[3] += rejected
+    numbers[4] += inaccurate
+    lengths[0], lengths[1], lengths[2] = min(lengths[0], h), max(lengths[1], h), h
+    residuals[0], residuals[1] = residual, max(residuals[1], residual)
+
+
+@kernel
+def adapt(adaptation, keeps, changes, counts, until, most, newton_tolerance, max_iterations):
+    """Advance a state to `until` [s], by at most so many steps, as far as each succeeds.
+
+    Each is made again, shorter, where its error exceeds the tolerance or Newton fails.
+
+    Parameters
+    ----------
+    adaptation : Adaptation
+    keeps : int or None
+        None if the integrator of the run keeps no slopes.
+    changes : bool
+        Whether the method begins with slopes that the step before must have left: a jump ends the loop then.
+    counts : bool
+        Whether to take the steps into the tally.
+    until : float
+        Where the last step ends exactly, later than now and before any corner [s].
+    most : int
+    newton_tolerance : float
+        [m/s]
+    max_iterations : int
+
+    Returns
+    -------
+    done : int
+        Number of steps made; the rest is in `Counts`.
+    status : int
+        Why there are no more.
+    pair, end : int
+        Blocking pair of the last attempt, −1 if none; place of its configuration.
+    gap : float
+        Smallest gap at the end [m].
+    """
+    loop, clock, control, counted = adaptation.loop, adaptation.clock, adaptation.control, adaptation.counts
+    p, state, course, work, method = loop.problem, loop.state, loop.course, loop.work, loop.method
+    kept, kept_touched = adaptation.kept, adaptation.kept_touched
+    status, pair, end, gap = READY, -1, 1, math.inf
+    for k in range(most):
+        begin = clock.time[0]
+        planned = clock.next_step[0] if clock.next_step[0] > 0.0 else control.first
+        look_back(adaptation.acting, begin, course)
+        if changes and has_jumped(keeps, p.drives, state, course.first[0], loop.ranges, planned):
+            return k, JUMPED, -1, end, gap
+        _copy_state(keeps, state, kept)
+        copy(work.touched, kept_touched)
+        h, time, error = planned, begin, math.inf
+        rejected = inaccurate = iterations = factorisations = backtracks = 0
+        residual = 0.0
+        last_iterations = 0
+        while True:
+            h = fit(h, until - begin)
+            time = until if h == until - begin else begin + h
+            h = time - begin
+            look_ahead(adaptation.acting, method.nodes, begin, h, course)
+            status, pair, end, last_iterations, factors, halvings, residual, gap = take_step(
+                p, state, method, keeps, course, 0, work, h, newton_tolerance, max_iterations
+            )
+            if status != CONVERGED and status < MAX_ITERATIONS:
+                return k, status, pair, end, gap
+            iterations += last_iterations
+            factorisations += factors
+            backtracks += halvings
+            error = math.inf
+            if status == CONVERGED:
+                error = method.estimate * deviation(adaptation.yardstick, kept, state, h) / control.tolerance
+                if error <= 1.0:
+                    break
+                _copy_state(keeps, kept, state)
+                copy(kept_touched, work.touched)
+                status = TOO_INACCURATE
+            if h <= STRETCH * control.shortest:
+                counted.failure[0], counted.failure[1], counted.failure[2] = h, residual, error
+                counted.failure[3] = last_iterations
+                return k, status, pair, end, gap
+            rejected += 1
+            if status == TOO_INACCURATE:
+                inaccurate += 1
+                h = after_rejection(control.order, h, error)
+            else:
+                h = FAILURE_FACTOR * h
+            h = max(h, control.shortest)
+        _count(counted, h, iterations, factorisations, backtracks, rejected, inaccurate, residual)
+        _plan(control, clock, h, planned, error, last_iterations / method.nodes.shape[0], rejected > 0)
+        clock.time[0] = time
+        clock.step[0] += 1.0
+        if counts:
+            count_in(p.surfaces, p.strands, p.sums, state, gap, time, loop.tally)
+        if time == until:
+            return k + 1, CONVERGED, -1, end, gap
+    return most, status, pair, end, gap

@@ -1,0 +1,90 @@
+"""Compiled adaptive steps for the stepper: what they take, and what they leave."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.model import Model
+from ..model.state import State
+from ..solve.newton import NewtonReport, NewtonStatus
+from .acting import Acting
+from .adapt import Adaptation, Clock, Control, adapt, clear, room_for_counts
+from .engine import Engine, MarchReport, Settings
+from .error_estimate import Yardstick
+from .loop import Loop
+from .status import CONVERGED, FAILURES
+from .step_groups import Course, Method, StateArrays
+
+
+def yardstick_of(model: Model) -> Yardstick:
+    """What deviations of a model are measured on."""
+    ends = [strand.first_node for strand in model.strands] + [model.node_count]
+    shares = np.array(model.carriers.weight[: model.node_count])
+    return Yardstick(
+        length=float(max(rod.path.length for rod in model.scene.rods)),
+        first_node=np.array(ends, dtype=np.int64),
+        weight=shares / np.repeat(np.add.reduceat(shares, ends[:-1]), np.diff(ends)),
+        half_width=model.half_width if model.plane is None else None,
+        body_of_free=model.bodies.body_of_free,
+        reach=model.bodies.reach,
+    )
+
+
+class Adapter:
+    """Adaptive steps of an engine.
+
+    Parameters
+    ----------
+    model : Model
+    engine : Engine
+    control : Control
+    acting : Acting
+        What acts from outside until the next corner.
+    """
+
+    def __init__(self, model: Model, engine: Engine, control: Control, acting: Acting):
+        self._engine, self._control, self._acting = engine, control, acting
+        self._yardstick = yardstick_of(model)
+        self._counts = room_for_counts()
+        self._state: State | None = None
+        self._parts: Adaptation | None = None
+
+    def adapt(
+        self, state: State, method: Method, course: Course, until: float, most: int, settings: Settings
+    ) -> MarchReport:
+        """Make at most so many steps as long as their error allows; none passes `until` [s]."""
+        engine, counts = self._engine, self._counts
+        parts = self._parts_of(state, engine.loop_of(state, method, course))
+        clear(counts)
+        flags = engine.keeps, settings.changes, settings.counts
+        done, status, pair, place, gap = adapt(parts, *flags, until, most, settings.tolerance, settings.max_iterations)
+        if status == CONVERGED or status in FAILURES:
+            engine.take_over(gap)
+        iterations, factorisations, backtracks, rejected, inaccurate = counts.numbers.tolist()
+        shortest, longest, length = counts.lengths.tolist()
+        residual, largest_residual = counts.residuals.tolist()
+        error = 0.0
+        if status != CONVERGED and done == 0:
+            length, residual, error, iterations = counts.failure.tolist()
+        how = FAILURES.get(status, NewtonStatus.CONVERGED)
+        newton = NewtonReport(how, int(iterations), factorisations, residual, backtracks)
+        lengths = shortest, longest, length
+        return MarchReport(done, status, place, pair, newton, largest_residual, *lengths, rejected, inaccurate, error)
+
+    def _parts_of(self, state: State, loop: Loop) -> Adaptation:
+        if state is not self._state:
+            self._state, self._parts = state, None
+            self._clock = Clock(**{name: getattr(state, name) for name in Clock.fields})
+            self._kept = StateArrays(**{name: getattr(state, name).copy() for name in StateArrays.fields})
+        if self._parts is None or self._parts.loop is not loop:
+            self._parts = Adaptation(
+                loop=loop,
+                clock=self._clock,
+                acting=self._acting,
+                control=self._control,
+                yardstick=self._yardstick,
+                kept=self._kept,
+                kept_touched=self._engine.touched.copy(),
+                counts=self._counts,
+            )
+        return self._parts

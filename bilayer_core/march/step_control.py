@@ -1,0 +1,65 @@
+"""How long the next step is to be, from the errors of the last two and from what Newton did.
+
+With the error E of a step as a part of the tolerance, and E ∝ hᵏ, k one more than the order of the integrator:
+
+    accepted   h ← 0.9 h Eₙ^(−3/5k) Eₙ₋₁^(1/5k)      Söderlind's PI controller 4.2 (2003, ACM Trans. Math. Softw. 29)
+    rejected   h ← 0.9 h Eₙ^(−1/k)
+    no solution   h ← ½ h
+
+An accepted step is followed by one at most `LARGEST_GROWTH` times as long, and by none longer where Newton has needed
+many iterations, or where the step had to be shortened first.
+"""
+
+from __future__ import annotations
+
+from ..jit import kernel
+
+SAFETY = 0.9
+PROPORTIONAL, INTEGRAL = 0.6, 0.2
+SMALLEST_FACTOR, LARGEST_GROWTH = 0.2, 2.5
+LEAST_ERROR = 1e-4
+"""Part of the tolerance below which an error is no sign of how far the next step may reach."""
+FAILURE_FACTOR = 0.5
+MANY_ITERATIONS = 15
+"""Newton iterations of a stage that are no reason to lengthen steps; with twice as many they are halved."""
+STRETCH = 1.05
+"""By which a step is lengthened to end where it must; the safety above covers it."""
+
+
+@kernel
+def after_success(order, h, error, error_before, iterations, shortened):
+    """Length of the step after one that was accepted [s].
+
+    Parameters
+    ----------
+    order : int
+        Of the integrator.
+    h : float
+        Length of the step [s].
+    error, error_before : float
+        Its error, and that of the step before it, as parts of the tolerance; the latter is 0 if there is none.
+    iterations : float
+        Of Newton's in a stage.
+    shortened : bool
+        Whether it was tried with another length before.
+    """
+    k = order + 1
+    now = max(error, LEAST_ERROR)
+    before = max(error_before, LEAST_ERROR) if error_before > 0.0 else now
+    factor = SAFETY * now ** (-PROPORTIONAL / k) * before ** (INTEGRAL / k)
+    most = min(1.0 if shortened else LARGEST_GROWTH, max(MANY_ITERATIONS / max(iterations, 1.0), FAILURE_FACTOR))
+    return h * min(max(factor, SMALLEST_FACTOR), most)
+
+
+@kernel
+def after_rejection(order, h, error):
+    """Length of the next attempt after one whose error, as a part of the tolerance, exceeds 1 [s]."""
+    return h * max(SAFETY * error ** (-1.0 / (order + 1)), SMALLEST_FACTOR)
+
+
+@kernel
+def fit(h, left):
+    """A length near `h` with which steps end after exactly `left` [s], without a short one at last."""
+    if left <= STRETCH * h:
+        return left
+    return 0.5 * left if left < 2.0 * h else h

@@ -1,0 +1,110 @@
+"""Schedules piece by piece: between two corners or jumps each is one formula, which compiled loops evaluate, too."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from typing import NamedTuple
+
+from pydantic import BaseModel, ConfigDict
+
+ROUNDING = 1e-9
+"""Part of a period by which a wave switches early, so that rounding of the time never delays it by a step."""
+NEARLY = 1e-3
+"""Part of a step by which one looks back from its end for the piece that it lies in; more than any early switch."""
+SAME = 1e-6
+"""Part of a step by which two times are the same."""
+
+
+class Piece(NamedTuple):
+    """``level + rate s + amplitude sin(frequency s + phase)``, s = t − begin ≥ 0, until a corner or a jump.
+
+    Attributes
+    ----------
+    until : float
+        Time of the next corner or jump [s], infinity if there is none.
+    level : float
+        In the unit of the schedule, as `amplitude`.
+    begin : float
+        Time from which s counts [s].
+    rate : float
+        In that unit per s.
+    amplitude : float
+    frequency, phase : float
+        [rad/s], [rad]
+    """
+
+    until: float
+    level: float
+    begin: float = 0.0
+    rate: float = 0.0
+    amplitude: float = 0.0
+    frequency: float = 0.0
+    phase: float = 0.0
+
+    def value(self, t: float) -> float:
+        """Value at time `t` [s]; at the end, where the schedule may jump, that from before."""
+        s = max(t - self.begin, 0.0)
+        line = self.level + self.rate * s
+        return line + self.amplitude * math.sin(self.frequency * s + self.phase) if self.amplitude else line
+
+    def later(self, delay: float, until: float) -> Piece:
+        """The same `delay` [s] later, cut off at `until` [s]."""
+        return self._replace(begin=self.begin + delay, until=min(self.until + delay, until))
+
+    def jump_to(self, following: Piece) -> bool:
+        """Whether the value jumps, beyond rounding, where this piece ends and another follows."""
+        before, after = self.value(self.until), following.value(self.until)
+        largest = max(abs(self.level), abs(before), abs(self.amplitude), abs(after))
+        return abs(after - before) > ROUNDING * largest
+
+
+class Pieces(BaseModel):
+    """Something that goes from one piece to the next."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @abstractmethod
+    def piece(self, t: float) -> Piece:
+        """The piece that time `t` [s] lies in; where two meet, that which begins."""
+
+    def value(self, t: float) -> float:
+        """Value at time `t` [s], in the unit of the channel."""
+        return self.piece(t).value(t)
+
+    def breakpoint_after(self, t: float) -> float:
+        """First corner or jump after `t` [s], infinity if there is none."""
+        return self.piece(t).until
+
+    def value_before(self, t: float, h: float) -> float:
+        """Value at the end `t` [s] of a step of length `h` [s]: the limit from within the step where it jumps at `t`.
+
+        A step that ends at a jump has its own value to its end; the next one begins with the new value.
+        """
+        piece = self.piece(t - NEARLY * h)
+        return piece.value(t) if abs(piece.until - t) <= SAME * h else self.value(t)
+
+    def jumps_at(self, t: float, h: float) -> bool:
+        """Whether the value jumps at time `t` [s], where a step of length `h` [s] ends."""
+        piece = self.piece(t - NEARLY * h)
+        return abs(piece.until - t) <= SAME * h and piece.jump_to(self.piece(piece.until))
+
+    def values_at(self, times: list[float], h: float) -> list[float]:
+        """`value` at increasing times about `h` [s] apart."""
+        found, piece = [], self.piece(times[0])
+        for t in times:
+            if t >= piece.until - NEARLY * h:
+                piece = self.piece(t)
+            found.append(piece.value(t))
+        return found
+
+    def values_before(self, times: list[float], steps: list[float]) -> list[float]:
+        """`value_before` at increasing times, where steps of such lengths [s] end."""
+        found, piece = [], self.piece(times[0] - NEARLY * steps[0])
+        for t, h in zip(times, steps, strict=True):
+            if t > piece.until + SAME * h:
+                piece = self.piece(t - NEARLY * h)
+                if t > piece.until + SAME * h:
+                    piece = self.piece(t)
+            found.append(piece.value(t))
+        return found
