@@ -9,10 +9,12 @@ from sample_scenes import GROUND, PAPER, ball, contact, everything, fixed, layer
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SceneError, SimulationError
-from bilayer_core.integrate.breakpoints import Breakpoints
-from bilayer_core.integrate.error_estimate import ErrorEstimate
 from bilayer_core.integrate.integrators import INTEGRATORS
-from bilayer_core.integrate.step_control import LARGEST_GROWTH, StepControl
+from bilayer_core.march.adapter import yardstick_of
+from bilayer_core.march.error_estimate import deviation
+from bilayer_core.march.step_control import LARGEST_GROWTH, after_rejection, after_success, fit
+from bilayer_core.march.step_groups import StateArrays
+from bilayer_core.model.model import scheduled_motion
 from bilayer_core.record.memory import MemoryRecorder
 
 ADAPTIVE = [name for name, method in INTEGRATORS.items() if method.estimate is not None]
@@ -38,6 +40,12 @@ def falling(obstacles=(GROUND,), **solver):
     )
 
 
+def deviation_between(simulator, before, after, h):
+    """That of a step of length `h`, from its ends."""
+    ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.fields}) for state in (before, after))
+    return deviation(yardstick_of(simulator.model), *ends, h)
+
+
 # the error
 
 
@@ -52,14 +60,13 @@ def test_the_estimate_is_the_local_error_of_a_step(problem, integrator):
     before = start._state.copy()
     start.step()
     exact.run(h)
-    estimate = ErrorEstimate(start.model)
-    found = INTEGRATORS[integrator].estimate * estimate.deviation(before, start._state, h)
+    found = INTEGRATORS[integrator].estimate * deviation_between(start, before, start._state, h)
     # with the same velocities at both ends, D is the difference of the two ends
     apart = exact._state.copy()
     apart.velocity[:], apart.spin[:] = 0.0, 0.0
     other = start._state.copy()
     other.velocity[:], other.spin[:] = 0.0, 0.0
-    assert found == pytest.approx(estimate.deviation(apart, other, h), rel=0.2)
+    assert found == pytest.approx(deviation_between(start, apart, other, h), rel=0.2)
 
 
 @pytest.mark.parametrize("integrator", ADAPTIVE)
@@ -85,7 +92,7 @@ def test_the_estimate_does_not_depend_on_the_mesh():
         simulator = simulate({**cantilever(), "rods": [strip]}, 0.02, dt=5e-4, integrator="sdirk2")
         before = simulator._state.copy()
         simulator.step()
-        found.append(ErrorEstimate(simulator.model).deviation(before, simulator._state, 5e-4))
+        found.append(deviation_between(simulator, before, simulator._state, 5e-4))
     assert found[1] == pytest.approx(found[0], rel=0.1)
 
 
@@ -152,8 +159,8 @@ def test_steps_end_on_every_breakpoint_and_are_short_after_a_jump():
     while simulator.time < 0.2:
         reports.append(simulator.step(until=0.2))
         times.append(simulator.time)
-    breaks, points, t = Breakpoints(simulator.scene), [], 0.0
-    while (t := breaks.after(t + 1e-9, np.array([math.nan]))) < 0.2:
+    schedule, points, t = simulator.scene.stimuli["heat"].schedule, [], 0.0
+    while (t := schedule.breakpoint_after(t + 1e-9)) < 0.2:
         points.append(t)
     assert len(points) == 6 and set(points) <= set(times) and times[-1] == 0.2
     after = [reports[times.index(point)].length for point in points]
@@ -190,6 +197,84 @@ def test_a_step_does_not_pass_until_and_until_must_lie_ahead():
     assert (report.time, report.length, simulator.time) == (3e-4, 3e-4, 3e-4)
     with pytest.raises(InputError, match=r"until: 0\.0003 is not allowed; it must be later than the present time"):
         simulator.step(until=3e-4)
+
+
+# what acts during them
+
+WAVES = {
+    "ramp": {"type": "ramp", "start": 0.011, "end": 0.043, "from": 0.9, "to": 0.2},
+    "table": {"type": "table", "times": [0.01, 0.02, 0.06], "values": [0.1, 0.8, 0.3]},
+    "sine": {"type": "sine", "mean": 0.5, "amplitude": 0.4, "period": 0.037, "start": 0.013, "phase": "40 deg"},
+    "square": {"type": "square", "low": 0.1, "high": 0.9, "period": 0.021, "duty": 0.3, "start": 0.004},
+    "flanks": {"type": "pulse_train", "low": 0, "high": 1, "period": 0.03, "width": 0.01, "rise_time": 3e-3, "count": 2},
+}
+WAVES["sequence"] = {
+    "type": "sequence",
+    "repeat": True,
+    "parts": [{"duration": 0.017, "schedule": WAVES["sine"]}, {"duration": 0.023, "schedule": WAVES["table"]}],
+}
+
+
+@pytest.mark.parametrize("wave", WAVES)
+def test_stages_see_the_schedule(wave):
+    description = driven()
+    description["stimuli"]["heat"]["schedule"] = WAVES[wave]
+    simulator = Simulator(load_scene(description), tolerance=1e-3, dt=1e-3, integrator="sdirk2")
+    schedule = simulator.scene.stimuli["heat"].schedule
+    while simulator.time < 0.1:
+        report = simulator.step(until=0.1)
+        stages = simulator._stepper._rooms[simulator._stepper.method]
+        begin = report.time - report.length
+        assert stages.first[0, 0] == pytest.approx(schedule.value(begin + 1e-12), abs=1e-8)
+        for node, value in zip(INTEGRATORS["sdirk2"].nodes, stages.stimulus[0, :, 0], strict=True):
+            time = begin + node * report.length
+            assert value == pytest.approx(schedule.value_before(time, node * report.length), abs=1e-8)
+
+
+def test_a_body_on_a_path_is_where_the_path_leads_with_its_rates():
+    path = {"type": "prescribed", "times": [0.01, 0.05, 0.08]}
+    path["displacements"] = [[0, 0, 0], [0.01, 0.02, -0.01], [0.02, 0, 0]]
+    path["rotations"] = [[0, 0, 0], [0.5, -1.2, 0.3], [0.1, 0.4, 0]]
+    description = {**cantilever(), "gravity": [0, 0, -9.81]}
+    (description["bodies"][0],) = ({**body, "motion": path} for body in description["bodies"])
+    simulator = Simulator(load_scene(description), tolerance=1e-3, dt=1e-3)
+    moved = 0
+    while simulator.time < 0.1:
+        simulator.step(until=0.1)
+        state = simulator._state
+        position, rotation, rates = scheduled_motion(simulator.model.bodies, 0, simulator.time)
+        np.testing.assert_allclose(state.body_position[0], position, atol=1e-15)
+        np.testing.assert_allclose(state.body_rotation[0], rotation, atol=1e-14)
+        np.testing.assert_allclose(state.body_velocity[0], rates[:3], atol=1e-12)
+        np.testing.assert_allclose(state.body_angular_velocity[0], rates[3:], atol=1e-11)
+        moved += bool(rates.all())
+    assert moved > 10
+
+
+def test_after_a_jump_of_a_load_a_method_that_starts_itself_makes_one_step():
+    pulse = {"type": "pulse_train", "low": 0, "high": 1, "period": 1.0, "width": "10 ms", "start": 0.02, "count": 1}
+    pulled = cantilever()
+    pulled["loads"] = [{**pulled["loads"][0], "schedule": pulse}]
+    simulator = Simulator(load_scene(pulled), tolerance=1e-3, dt=1e-3, integrator="generalised_alpha")
+    used = []
+    while simulator.time < 0.05:
+        begin = simulator.time
+        simulator.step(until=0.05)
+        used.append((begin, simulator._stepper.used.name))
+    assert [begin for begin, name in used if name == "sdirk2"] == pytest.approx([0.0, 0.02, 0.03])
+
+
+def test_steps_made_one_by_one_and_many_at_once_are_the_same():
+    description = driven(added_mass=True)
+    description["stimuli"]["heat"]["schedule"] = WAVES["square"]
+    for integrator in ADAPTIVE:
+        runs = [Simulator(load_scene(description), tolerance=1e-4, integrator=integrator) for _ in range(2)]
+        runs[0].run(0.05)
+        while runs[1].time < 0.05:
+            runs[1].step(until=0.05)
+        np.testing.assert_array_equal(runs[0].save_state(), runs[1].save_state())
+        first, second = (vars(run.statistics) for run in runs)
+        assert first == second
 
 
 # what steps leave
@@ -303,26 +388,31 @@ def test_bad_values_of_a_scene_are_refused(solver, fault):
 
 def test_steps_settle_at_the_tolerance_where_the_error_goes_with_a_power_of_their_length():
     for order in (1, 2):
-        control, h, before, lengths = StepControl(order, 1.0), 1e-4, 0.0, []
+        h, before, lengths = 1e-4, 0.0, []
         for _ in range(40):
             error = (h / 1e-2) ** (order + 1)
             while error > 1.0:
-                h = control.after_rejection(h, error)
+                h = after_rejection(order, h, error)
                 error = (h / 1e-2) ** (order + 1)
             lengths.append(h)
-            h, before = control.after_success(h, error, before, 3.0, False), error
+            h, before = after_success(order, h, error, before, 3.0, False), error
         assert lengths[-1] == pytest.approx(lengths[-2], rel=1e-3)
         assert 0.7e-2 < lengths[-1] < 1e-2
 
 
-def test_steps_neither_grow_too_fast_nor_beyond_the_largest_nor_where_newton_works_hard():
-    control = StepControl(2, 5e-3)
-    assert control.after_success(1e-3, 1e-9, 0.0, 3.0, False) == pytest.approx(LARGEST_GROWTH * 1e-3)
-    assert control.after_success(4e-3, 1e-9, 0.0, 3.0, False) == 5e-3
-    assert control.after_success(1e-3, 1e-9, 0.0, 3.0, True) == 1e-3
-    assert control.after_success(1e-3, 1e-9, 0.0, 60.0, False) == 0.5e-3
+def test_steps_neither_grow_too_fast_nor_where_newton_works_hard():
+    assert after_success(2, 1e-3, 1e-9, 0.0, 3.0, False) == pytest.approx(LARGEST_GROWTH * 1e-3)
+    assert after_success(2, 1e-3, 1e-9, 0.0, 3.0, True) == 1e-3
+    assert after_success(2, 1e-3, 1e-9, 0.0, 60.0, False) == 0.5e-3
+
+
+def test_steps_do_not_grow_beyond_the_longest():
+    calm = Simulator(load_scene({**driven(), "solver": {**PAPER, "max_step": 4e-3}}), tolerance=1e-1)
+    calm.set_stimulus("heat", 0.3)
+    calm.run(0.1)
+    assert calm.statistics.longest == pytest.approx(4e-3, rel=0.05)
 
 
 @pytest.mark.parametrize(("left", "length"), [(1.04, 1.04), (0.3, 0.3), (1.5, 0.75), (2.5, 1.0)])
 def test_steps_come_to_an_end_without_a_short_last_one(left, length):
-    assert StepControl.fit(1.0, left) == pytest.approx(length)
+    assert fit(1.0, left) == pytest.approx(length)
