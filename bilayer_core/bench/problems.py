@@ -41,6 +41,9 @@ class Problem:
     tolerances : tuple of float
         Of adaptive steps; each finer mesh begins with the next of them.
     integrators : tuple of str
+    euler_levels : tuple of (int, tuple of float)
+        More levels for implicit Euler: it wants shorter steps where motion is fast, and does with longer ones where a
+        robot is all but at rest.
     quick_levels : tuple of (int, tuple of float)
         Those of a quick benchmark; none: the problem is not part of it.
     reference_levels : tuple of (int, float)
@@ -63,6 +66,7 @@ class Problem:
     second: str = "generalised_alpha"
     tolerances: tuple[float, ...] = TOLERANCES
     integrators: tuple[str, ...] = tuple(INTEGRATORS)
+    euler_levels: tuple[tuple[int, tuple[float, ...]], ...] = ()
     quick_levels: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
     def config(self, stations: int | None = None, *more: str) -> SceneConfig:
@@ -71,13 +75,15 @@ class Problem:
         return load_scene(self.scene, [*self.changes, *mesh, *more])
 
     def configurations(self, family: Family, quick: bool) -> list[Configuration]:
-        """Runs of a family, the cheapest first."""
+        """Runs of a family."""
         levels = self.quick_levels if quick else self.levels
         found = []
         for number, (stations, steps) in enumerate(levels):
             if family.adaptive:
                 steps = QUICK_TOLERANCES if quick else self.tolerances[number : number + TOLERANCES_OF_A_MESH]
             found += [Configuration(family, stations, step) for step in steps]
+        if family.integrator == "implicit_euler" and not (quick or family.adaptive):
+            found += [Configuration(family, stations, step) for stations, steps in self.euler_levels for step in steps]
         return found
 
 
@@ -117,6 +123,7 @@ PROBLEMS = (
             (81, (1e-3, 5e-4)),
             (101, (1e-3, 5e-4)),
         ),
+        euler_levels=((21, (2.5e-4, 1.25e-4)), (41, (2.5e-4, 1.25e-4))),
         reference_levels=halved(51, 5e-4, 3),
         quick_levels=((21, (4e-3,)), (41, (4e-3, 2e-3))),
     ),
@@ -133,6 +140,7 @@ PROBLEMS = (
             (21, (4e-3, 2e-3, 1e-3, 5e-4)),
             (41, (2e-3, 1e-3, 5e-4, 2.5e-4)),
         ),
+        euler_levels=((11, (2.5e-4, 1.25e-4)), (21, (2.5e-4, 1.25e-4)), (41, (1.25e-4,))),
         reference_levels=halved(21, 5e-4, 3),
         quick_levels=((11, (2e-3,)), (21, (2e-3, 1e-3))),
     ),
@@ -145,6 +153,7 @@ PROBLEMS = (
         0.2,
         Trajectory("com", until=0.2, spacing=1e-3, length=0.23),
         levels=((24, (4e-3, 2e-3, 1e-3)), (47, (2e-3, 1e-3, 5e-4)), (93, (1e-3, 5e-4))),
+        euler_levels=((24, (5e-4, 2.5e-4)), (47, (2.5e-4, 1.25e-4))),
         reference_levels=halved(24, 1e-3, 4),
     ),
     Problem(
@@ -156,6 +165,7 @@ PROBLEMS = (
         3.5,
         Trajectory("tip", until=3.5, spacing=2e-2, length=0.0539),
         levels=((25, (4e-3, 2e-3)), (50, (4e-3, 2e-3, 1e-3)), (99, (2e-3,))),
+        euler_levels=((25, (28e-3, 14e-3, 7e-3)), (50, (14e-3,))),
         reference_levels=halved(50, 1e-3, 3),
         integrators=OF_ROBOTS,
         tolerances=ROBOT_TOLERANCES,
@@ -169,6 +179,7 @@ PROBLEMS = (
         2 * STRIDE,
         Headline("the stride", "mm", 1e3, advance("com", 0, STRIDE, 2 * STRIDE), (STRIDE,)),
         levels=((40, (16e-3, 8e-3, 4e-3)), (80, (16e-3, 8e-3, 4e-3, 2e-3)), (159, (4e-3,))),
+        euler_levels=((80, (64e-3, 32e-3)),),
         reference_levels=halved(80, 4e-3, 3),
         integrators=OF_ROBOTS,
         tolerances=ROBOT_TOLERANCES,
@@ -183,6 +194,7 @@ PROBLEMS = (
         1.3,
         Headline("the rise", "mm", 1e3, rise),
         levels=((26, (2e-3, 1e-3)), (51, (2e-3, 1e-3, 5e-4)), (101, (5e-4,))),
+        euler_levels=((51, (2.5e-4, 6.25e-5)),),
         reference_levels=halved(51, 5e-4, 3),
         integrators=OF_ROBOTS,
         tolerances=ROBOT_TOLERANCES,
@@ -196,6 +208,7 @@ PROBLEMS = (
         2 * STROKE,
         Headline("the stroke", "mm", 1e3, advance("com", 2, STROKE, 2 * STROKE), (STROKE,)),
         levels=((20, (10e-3, 4e-3, 2e-3)), (40, (10e-3, 4e-3, 2e-3, 1e-3)), (79, (4e-3, 2e-3))),
+        euler_levels=((20, (5e-4, 2.5e-4, 1.25e-4)), (40, (5e-4, 2.5e-4, 1.25e-4))),
         reference_levels=halved(40, 2e-3, 3),
         integrators=OF_ROBOTS,
         tolerances=ROBOT_TOLERANCES,

@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
+from ..model.plan import RECOMMENDED, make_plan
 from . import cantilever, pareto, scaling, start, work_precision
 from .configurations import Family
 from .problems import PROBLEMS
@@ -42,6 +44,7 @@ def page(content: dict) -> str:
         *(["Quick: reduced problems, few points.", ""] if content["quick"] else []),
         *_section("Common cantilever", cantilever_table(content), cantilever.PART in _filled(content)),
         *_section("CPU time to an error of 1 %", costs_table(content), work_precision.PART in _filled(content)),
+        *_section("Adaptive steps beside implicit Euler", beside_table(content), bool(content[work_precision.PART])),
         *_section("References", references_table(content), work_precision.PART in _filled(content)),
         *_section("CPU time of a step against nodes", scaling_table(content), bool(content[scaling.PART])),
         *_section("First step of a new process", start_table(content), bool(content[start.PART])),
@@ -112,6 +115,39 @@ def costs_table(content: dict) -> list[str]:
             cells.append(f"**{text}**" if cost == best[name] and cost is not None and math.isfinite(cost) else text)
         rows.append([family.label, *cells, f"{score:.2g}"])
     return _table(["model, integrator", *names, "mean ratio to the best"], rows)
+
+
+def beside_table(content: dict) -> list[str]:
+    """CPU seconds to an error of 1 %, or to that of a blurred reference: the longest fixed steps of implicit Euler, and
+    adaptive ones of the default, with the model and the dimension of `auto`.
+    """
+    rows, bars = [], read_file()
+    for problem in PROBLEMS:
+        plan = make_plan(problem.config())
+        default = Family(plan.model, plan.dimension, plan.integrator, True)
+        families = replace(default, integrator="implicit_euler", adaptive=False), default
+        ran = [[run for run in _of(content, problem.name) if Family.of(run) == family] for family in families]
+        if not all(ran):
+            continue
+        error = max(pareto.AIM, bars[problem.name][plan.model]["bar"])
+        euler, adaptive = (pareto.cheapest(runs, error) for runs in ran)
+        ratio = f"{euler['cpu_time'] / adaptive['cpu_time']:.1f}" if euler and adaptive else NONE
+        cells = [_beside(run, runs) for run, runs in zip((euler, adaptive), ran, strict=True)]
+        rows.append([problem.name, f"{100 * error:.2g} %", *cells, ratio])
+    return _table(["problem", "error", "implicit Euler [s]", f"{RECOMMENDED[0]}, adaptive [s]", "ratio"], rows)
+
+
+def _of(content: dict, problem: str) -> list[dict]:
+    return [run for run in content[work_precision.PART] if run["problem"] == problem]
+
+
+def _beside(run: dict | None, tried: list[dict]) -> str:
+    """What a run costs, and its step or tolerance; where none is accurate enough, how near the best comes."""
+    if run is not None:
+        step = f"tolerance {run['tolerance']:g}" if run["dt"] is None else f"{1e3 * run['dt']:g} ms"
+        return f"{_seconds(run['cpu_time'])} ({step}, {run['stations']} stations)"
+    best = min(pareto.done(tried), key=lambda run: run["error"], default=None)
+    return NONE if best is None else f"not within {_seconds(best['cpu_time'])} ({100 * best['error']:.2g} %)"
 
 
 def references_table(content: dict) -> list[str]:

@@ -29,6 +29,7 @@ def small(monkeypatch):
                 "name": name,
                 "duration": 0.02,
                 "levels": ((6, (4e-3, 2e-3)),),
+                "euler_levels": ((6, (1e-3,)),),
                 "quick_levels": ((6, (4e-3,)),),
                 "tolerances": (1e-3,),
                 "measure": type(tip.measure)("tip", until=0.02, spacing=2e-3, length=0.1),
@@ -61,7 +62,8 @@ def test_two_problems_are_measured_into_json_tables_and_plots(small, tmp_path, c
     content = json.loads((out / "bench.json").read_text())
     runs = content["work_precision"]
     all_families = families(problems.PROBLEMS[0].config())
-    expected = 2 * sum(1 if family.adaptive else 2 for family in all_families)
+    further = sum(family.integrator == "implicit_euler" and not family.adaptive for family in all_families)
+    expected = 2 * (sum(1 if family.adaptive else 2 for family in all_families) + further)
     assert len(runs) == expected and {run["outcome"] for run in runs} == {"done"}
     assert all(0.0 < run["error"] < 1.0 and run["cpu_time"] > 0.0 for run in runs)
     assert content["machine"]["cores"] >= 1 and len(content["began"]["load"]) == 3
@@ -70,6 +72,8 @@ def test_two_problems_are_measured_into_json_tables_and_plots(small, tmp_path, c
         assert len(list(csv.DictReader(file))) == expected
     page = (out / "bench.md").read_text()
     assert content["machine"]["cpu"] in page and "## CPU time to an error of 1 %" in page
+    beside = [line for line in page.split("## Adaptive steps beside")[1].splitlines() if line.startswith("| ")][2:4]
+    assert [line.split(" | ")[0] for line in beside] == ["| cantilever", "| snap"]
     for name in ("cantilever", "snap"):
         pixels = np.asarray(Image.open(out / f"work_precision_{name}.png").convert("RGB")).reshape(-1, 3)
         assert len(np.unique(pixels[(pixels < 250).any(axis=1)] // 64, axis=0)) >= 5
@@ -117,7 +121,7 @@ def test_every_problem_has_a_reference_that_fits_it(problem):
 
 @pytest.mark.parametrize("problem", problems.PROBLEMS, ids=lambda problem: problem.name)
 def test_levels_are_meshes_and_steps_that_end_with_the_run(problem):
-    for stations, steps in problem.levels:
+    for stations, steps in [*problem.levels, *problem.euler_levels]:
         problem.config(stations)
         for dt in steps:
             assert problem.duration / dt == pytest.approx(round(problem.duration / dt), abs=1e-6)

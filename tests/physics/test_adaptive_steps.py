@@ -206,7 +206,15 @@ WAVES = {
     "table": {"type": "table", "times": [0.01, 0.02, 0.06], "values": [0.1, 0.8, 0.3]},
     "sine": {"type": "sine", "mean": 0.5, "amplitude": 0.4, "period": 0.037, "start": 0.013, "phase": "40 deg"},
     "square": {"type": "square", "low": 0.1, "high": 0.9, "period": 0.021, "duty": 0.3, "start": 0.004},
-    "flanks": {"type": "pulse_train", "low": 0, "high": 1, "period": 0.03, "width": 0.01, "rise_time": 3e-3, "count": 2},
+    "flanks": {
+        "type": "pulse_train",
+        "low": 0,
+        "high": 1,
+        "period": 0.03,
+        "width": 0.01,
+        "rise_time": 3e-3,
+        "count": 2,
+    },
 }
 WAVES["sequence"] = {
     "type": "sequence",
