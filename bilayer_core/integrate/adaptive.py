@@ -20,6 +20,7 @@ from ..march.step_groups import Course
 from ..model.model import Model
 from ..model.state import State
 from .method import Method
+from .motion import MOMENT
 from .sdirk2 import METHOD as SELF_STARTING
 from .stepper import Stepper, StepReport
 from .stretch import Stretch
@@ -122,12 +123,15 @@ class AdaptiveStepper(Stepper):
             self.rest(state)  # what the last attempt left is not what the state is
         return found
 
-    def _go(self, state: State, most: int, stop: float, counts: bool) -> MarchReport:
-        """At most so many steps up to `stop` [s], before which nothing has a corner."""
+    def _look(self, state: State) -> None:
+        self._go(state, 1, math.inf, counts=False, moment=MOMENT)
+
+    def _go(self, state: State, most: int, stop: float, counts: bool, moment: float = 0.0) -> MarchReport:
+        """At most so many steps up to `stop` [s], before which nothing has a corner, or a look at the state."""
         solver = self.model.scene.solver
-        method, changes = self.method, self.method.history is not None
+        method, changes = self.method, self.method.history is not None and not moment
         while True:
-            settings = Settings(self.solver.tolerance, solver.max_newton_iterations, changes, counts)
+            settings = Settings(self.solver.tolerance, solver.max_newton_iterations, moment, changes, counts)
             course = self._room_of(state, method)
             found = self._adapter.adapt(state, self._arrays[method], course, stop, most, settings)
             if found.status == JUMPED and not found.done:

@@ -116,12 +116,16 @@ class Stepper:
         load_factor = self.surroundings.load_factor(time)
         if self.loops:
             self.engine.set_drive(rest, load_factor)
-            self._loop(state, self.method, [time + MOMENT], MOMENT, looks=True)
+            self._look(state)
             self._touched[:] = self._touching()
         else:
             self.end.take_state(state)
             self._look_at(state, rest, load_factor)
         self.stimulus = stimulus
+
+    def _look(self, state: State) -> None:
+        """`_look_at` in a compiled loop, with what acts set before."""
+        self._loop(state, self.method, [float(state.time[0])], self.dt, moment=MOMENT)
 
     def _look_at(self, state: State, rest: RestStrains, load_factor: Array) -> None:
         """Evaluate the potential at `end` with the velocities of the state."""
@@ -219,11 +223,11 @@ class Stepper:
         return report
 
     def _loop(
-        self, state: State, method: Method, times: list[float], h: float, *, looks=False, changes=False, counts=False
+        self, state: State, method: Method, times: list[float], h: float, *, moment=0.0, changes=False, counts=False
     ) -> MarchReport | None:
         """Steps that end at the given times, as many as succeed, in a compiled loop; None if none is for one."""
         solver = self.model.scene.solver
-        settings = Settings(self.solver.tolerance, solver.max_newton_iterations, looks, changes, counts)
+        settings = Settings(self.solver.tolerance, solver.max_newton_iterations, moment, changes, counts)
         course = self.surroundings.course(state, method, times, h)
         while True:
             found = self.engine.march(state, self._arrays[method], course, h, settings)

@@ -92,6 +92,18 @@ class EntryLibrary(KernelLibrary):
         self._linking_libraries = list(dict.fromkeys(_with_all_that_is_called(self._linking_libraries)))
         super().finalize()
 
+    def _finalize_specific(self):
+        """Keep what is called to itself.
+
+        Several kernels have functions of the same name, each optimised with its kernel. The engine would take the first
+        that it meets for all of them: results would depend, in the last digit, on which kernels a process has compiled
+        or loaded before.
+        """
+        for function in self._final_module.functions:
+            if not function.is_declaration and function.linkage is Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._finalize_specific()
+
 
 def _with_all_that_is_called(libraries: list[CodeLibrary]) -> Iterator[CodeLibrary]:
     """Libraries, each before those that it calls."""

@@ -132,8 +132,8 @@ def _count(counts, h, iterations, factorisations, backtracks, rejected, inaccura
 
 
 @kernel
-def adapt(adaptation, keeps, changes, counts, until, most, newton_tolerance, max_iterations):
-    """Advance a state to `until` [s], by at most so many steps, as far as each succeeds.
+def adapt(adaptation, keeps, moment, changes, counts, until, most, newton_tolerance, max_iterations):
+    """Advance a state to `until` [s], by at most so many steps, as far as each succeeds, or look at it.
 
     Each is made again, shorter, where its error exceeds the tolerance or Newton fails.
 
@@ -142,6 +142,8 @@ def adapt(adaptation, keeps, changes, counts, until, most, newton_tolerance, max
     adaptation : Adaptation
     keeps : int or None
         None if the integrator of the run keeps no slopes.
+    moment : float
+        If above 0: make no step, but evaluate the potential at the state as it stands, in so short a time [s].
     changes : bool
         Whether the method begins with slopes that the step before must have left: a jump ends the loop then.
     counts : bool
@@ -185,10 +187,11 @@ def adapt(adaptation, keeps, changes, counts, until, most, newton_tolerance, max
             time = until if h == until - begin else begin + h
             h = time - begin
             look_ahead(adaptation.acting, method.nodes, begin, h, course)
+            looks, length = moment > 0.0, moment if moment > 0.0 else h
             status, pair, end, last_iterations, factors, halvings, residual, gap = take_step(
-                p, state, method, keeps, course, 0, work, h, newton_tolerance, max_iterations
+                p, state, method, keeps, looks, course, 0, work, length, newton_tolerance, max_iterations
             )
-            if status != CONVERGED and status < MAX_ITERATIONS:
+            if looks or (status != CONVERGED and status < MAX_ITERATIONS):
                 return k, status, pair, end, gap
             iterations += last_iterations
             factorisations += factors

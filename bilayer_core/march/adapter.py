@@ -56,7 +56,7 @@ class Adapter:
         engine, counts = self._engine, self._counts
         parts = self._parts_of(state, engine.loop_of(state, method, course))
         clear(counts)
-        flags = engine.keeps, settings.changes, settings.counts
+        flags = engine.keeps, settings.moment, settings.changes, settings.counts
         done, status, pair, place, gap = adapt(parts, *flags, until, most, settings.tolerance, settings.max_iterations)
         if status == CONVERGED or status in FAILURES:
             engine.take_over(gap)

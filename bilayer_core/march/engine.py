@@ -107,7 +107,8 @@ class Engine:
 
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:
         """Make the steps of a course, each of length `h` [s], as far as they succeed; `state` is that after them."""
-        loop, flags = self.loop_of(state, method, course), (self.keeps, settings.looks, settings.changes, settings.counts)
+        loop = self.loop_of(state, method, course)
+        flags = self.keeps, settings.moment, settings.changes, settings.counts
         done, status, pair, place, iterations, factorisations, backtracks, residual, worst, gap = take_steps(
             loop, *flags, h, settings.tolerance, settings.max_iterations
         )
@@ -155,8 +156,8 @@ class Settings:
     tolerance : float
         Of Newton [m/s].
     max_iterations : int
-    looks : bool
-        Whether to make no step, but to evaluate the potential at the state as it stands, in a moment of length h.
+    moment : float
+        If above 0: make no step, but evaluate the potential at the state as it stands, in so short a time [s].
     changes : bool
         Whether a jump ends the loop, because another integrator has to step in.
     counts : bool
@@ -165,7 +166,7 @@ class Settings:
 
     tolerance: float
     max_iterations: int
-    looks: bool
+    moment: float
     changes: bool
     counts: bool
 

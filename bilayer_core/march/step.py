@@ -234,13 +234,15 @@ def _count_contacts(surfaces, nodes, time, tally):
 
 
 @kernel
-def take_steps(loop, keeps, looks, changes, counts, h, tolerance, max_iterations):
+def take_steps(loop, keeps, moment, changes, counts, h, tolerance, max_iterations):
     """Advance a state by the steps of a course, as far as each succeeds, or look at it; parameters beside those of
     `take_step`:
 
     Parameters
     ----------
     loop : Loop
+    moment : float
+        If above 0: make no step, but evaluate the potential at the state as it stands, in so short a time [s].
     changes : bool
         Whether `method` begins with slopes that the step before must have left: a jump ends the loop then.
     counts : bool
@@ -261,11 +263,12 @@ def take_steps(loop, keeps, looks, changes, counts, h, tolerance, max_iterations
     residual = worst = 0.0
     gap = math.inf
     status, pair, end = READY, -1, 1
+    looks, length = moment > 0.0, moment if moment > 0.0 else h
     for k in range(course.time.shape[0]):
         if changes and (course.jumps[k] or has_jumped(keeps, p.drives, state, course.first[k], loop.ranges, h)):
             return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
         status, pair, e, more, factors, halvings, left, nearest = take_step(
-            p, state, loop.method, keeps, looks, course, k, work, h, tolerance, max_iterations
+            p, state, loop.method, keeps, looks, course, k, work, length, tolerance, max_iterations
         )
         if looks:
             return 0, status, pair, e, iterations, factorisations, backtracks, left, worst, nearest
