@@ -3,6 +3,12 @@
 Edges are the leaves of a binary tree in the order of their numbers: neighbours along a rod are neighbours in the tree.
 Every node of it has the box that holds its edges over their whole motion, so a search for what reaches an edge costs
 the logarithm of the number of edges, and what it finds.
+
+Neighbours on the same strand are always near each other, but do not meet where the strand goes straight enough: if
+every edge e between them keeps e·d ≥ c times its arc length for some unit vector d, then two places L apart on the path
+are c L apart at least (Volino & Magnenat-Thalmann 1994). So the search leaves out the *run* of such edges about those
+for which it is made, with c L their distance for the smallest L at which a rod sees itself. As e·d is linear in a
+straight motion, it is enough to look at both ends of that.
 """
 
 from __future__ import annotations
@@ -54,22 +60,80 @@ def _come_near(box, a, b, reach):
 
 
 @inner
-def _meet(box, leaves, own, reach, met_out):
-    """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending, in the
-    first row of `met_out`; return how many do.
+def _goes_on(position, tip, i, d0, d1, d2, least):
+    """Whether the edge (i, i+1) goes by `least` [m] at least along a unit vector, at either end of its motion."""
+    if _along(position, i, d0, d1, d2) < least:
+        return False
+    return _along(tip, i, d0, d1, d2) >= least
+
+
+@inner
+def _along(position, i, d0, d1, d2):
+    """Part of the edge (i, i+1) along a unit vector [m]."""
+    return (
+        d0 * (position[i + 1, 0] - position[i, 0])
+        + d1 * (position[i + 1, 1] - position[i, 1])
+        + d2 * (position[i + 1, 2] - position[i, 2])
+    )
+
+
+RUN = 4.0
+"""Half of the longest run that is looked for, in units of the arc distance from which a rod sees itself."""
+
+
+@inner
+def _run_about(first, last, position, tip, near, exclusion, edge_node, edge_first, edge_arc):
+    """The run [begin, end) of edges of one strand about those from `first` to `last`, no two of which come nearer to
+    each other than `near` [m], if they are `exclusion` [m] apart on the path; empty if there is none.
+    """
+    i, j = edge_node[first], edge_node[last] + 1
+    d0 = position[j, 0] - position[i, 0] + tip[j, 0] - tip[i, 0]
+    d1 = position[j, 1] - position[i, 1] + tip[j, 1] - tip[i, 1]
+    d2 = position[j, 2] - position[i, 2] + tip[j, 2] - tip[i, 2]
+    scale = 1.0 / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    d0, d1, d2 = d0 * scale, d1 * scale, d2 * scale
+    share = near / exclusion
+    for k in range(first, last + 1):
+        if k > first and edge_first[k]:
+            return 0, 0
+        if not _goes_on(position, tip, edge_node[k], d0, d1, d2, share * (edge_arc[k, 1] - edge_arc[k, 0])):
+            return 0, 0
+    begin, end = first, last + 1
+    reach = edge_arc[first, 0] - RUN * exclusion
+    while not edge_first[begin] and edge_arc[begin, 0] > reach:
+        least = share * (edge_arc[begin - 1, 1] - edge_arc[begin - 1, 0])
+        if not _goes_on(position, tip, edge_node[begin - 1], d0, d1, d2, least):
+            break
+        begin -= 1
+    reach = edge_arc[last, 1] + RUN * exclusion
+    while end < edge_node.shape[0] and not edge_first[end] and edge_arc[end, 0] < reach:
+        least = share * (edge_arc[end, 1] - edge_arc[end, 0])
+        if not _goes_on(position, tip, edge_node[end], d0, d1, d2, least):
+            break
+        end += 1
+    return begin, end
+
+
+@inner
+def _meet(box, leaves, own, reach, begin, end, met_out):
+    """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending, but for
+    those from `begin` to `end`, in the first row of `met_out`; return how many there are.
     """
     count = 0
-    b = 1
+    b, below = 1, leaves  # a node, and how many leaves are below it
     while b > 0:
-        meets = _come_near(box, own, b, reach)
+        from_leaf = b * below - leaves
+        meets = (from_leaf < begin or from_leaf + below > end) and _come_near(box, own, b, reach)
         if meets and b < leaves:
             b *= 2
+            below >>= 1
             continue
         if meets:
-            met_out[0, count] = b - leaves
+            met_out[0, count] = from_leaf
             count += 1
         while b & 1:
             b >>= 1
+            below <<= 1
         b += b > 0
     return count
 
@@ -99,6 +163,7 @@ def near_pairs(
     edge_out,
     before_out,
     after_out,
+    until_out,
 ):
     """List points and segments that may come to a gap below `reach` in a straight motion of nodes, ordered by point,
     then by segment; return how many there are.
@@ -123,6 +188,8 @@ def near_pairs(
         Written, int64.
     before_out, after_out : Array
         Written: whether the point also sees the segments before and after on the same strand, bool.
+    until_out : Array
+        Written: how far the gap at the beginning is above `touch` [m].
     """
     edges = edge_node.shape[0]
     leaves = box.shape[0] // 2
@@ -153,7 +220,10 @@ def near_pairs(
     meetings = 0
     for a in range(edges):
         if a % group == 0:
-            meetings = _meet(box, leaves, (leaves + a) // group, reach, met)
+            last, near_by = min(a + group, edges) - 1, 2.0 * edge_radius[a] + reach
+            exclusion = rod_exclusion[edge_rod[a]]
+            run = _run_about(a, last, position, tip, near_by, exclusion, edge_node, edge_first, edge_arc)
+            meetings = _meet(box, leaves, (leaves + a) // group, reach, run[0], run[1], met)
         if first_point[a] == first_point[a + 1]:
             continue
         count = 0
@@ -189,7 +259,12 @@ def near_pairs(
                     way = (1.0 - s) * (tip[i, c] - position[i, c]) + s * (tip[i + 1, c] - position[i + 1, c])
                     left += (way - tip[j, c] + position[j, c]) ** 2
                     right += (way - tip[j + 1, c] + position[j + 1, c]) ** 2
-                if _square_distance(position, i, s, j) >= (radii + reach + math.sqrt(max(left, right))) ** 2:
+                moved = math.sqrt(max(left, right))
+                square = _square_distance(position, i, s, j)
+                if square >= (radii + reach + moved) ** 2:
+                    continue
+                away = math.sqrt(square)  # and no less than half of what is left of this and of that at the end
+                if away + math.sqrt(_square_distance(tip, i, s, j)) >= 2.0 * (radii + reach) + moved:
                     continue
                 exclusion, joined = rod_exclusion[own] if own == other else -math.inf, rod_joined[own, other]
                 if not _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, touch):
@@ -197,6 +272,7 @@ def near_pairs(
                 if found < room:
                     point_out[found] = p
                     edge_out[found] = k
+                    until_out[found] = away - radii - touch
                     before_out[found] = not edge_first[k] and _sees(
                         arc, exclusion, joined, i, s, j - 1, start_position, edge_arc, k - 1, radii, touch
                     )

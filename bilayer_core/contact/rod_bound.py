@@ -20,6 +20,14 @@ FAR, NEAR = 8.0, 2.0  # barrier distances: `KEPT_FRACTION` of one and `TOUCH` of
 
 
 @kernel
+def path_to_look(path, way, d_hat):
+    """Path [m]: what stays beyond the barrier distance up to a longer one than this cannot set a bound in a step in
+    which gaps close by no more than `way` [m]. It keeps clear of the barrier, or keeps enough of its gap head-on.
+    """
+    return path + min(way, way / (1.0 - KEPT_FRACTION) - d_hat)
+
+
+@kernel
 def rod_step_bound(
     position,
     step,
@@ -30,6 +38,7 @@ def rod_step_bound(
     pair_edge,
     until,
     path,
+    way,
     edge_node,
     edge_radius,
     point_edge,
@@ -37,8 +46,8 @@ def rod_step_bound(
 ):
     """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
 
-    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3), and `path` is
-    that at its end. A pair that stays beyond the barrier distance `d_hat` [m] sets no bound: of large gaps
+    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3), and `way` by
+    how much gaps close in the part of it up to `limit` at most [m]. A pair that stays beyond the barrier distance `d_hat` [m] sets no bound: of large gaps
     less is kept. So what is found does not depend on which of these pairs are listed, or looked at.
 
     Returns
@@ -49,8 +58,9 @@ def rod_step_bound(
     """
     alpha = limit
     blocking = -1
+    looked = path_to_look(path, way, d_hat)
     for c in range(pair_count):
-        if until[c] > path:
+        if until[c] > looked:
             continue
         p, k = pair_point[c], pair_edge[c]
         a = point_edge[p]

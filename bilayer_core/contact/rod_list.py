@@ -7,8 +7,8 @@ towards each other, not how far they go, and lists are short. A short motion is 
 steps to come if they go on as straight as that.
 
 A gap closes by no more than twice what nodes go, the mean taken off. The sum of that over all moves since a list was
-made is its *path*; a pair whose gap has been found is not looked at again before the path is longer by what the gap was
-above the barrier distance. So most pairs cost a comparison.
+made is its *path*; a pair is not looked at again before the path is longer by what the gap was above the barrier
+distance when it was found, in making the list or later. So most pairs cost a comparison.
 """
 
 from __future__ import annotations
@@ -97,13 +97,14 @@ def _stray(position, step, fraction, base, tip):
 
 
 @inner
-def _set_out(position, step, length, base, tip):
-    """A motion from x to x + length · step, the mean of all taken off at either end."""
+def _set_out(position, step, length, base, tip, last):
+    """A motion from x to x + length · step, the mean of all taken off at either end; nodes go on from there."""
     m0, m1, m2 = _mean(position)
     w0, w1, w2 = _mean(step)
     for i in range(position.shape[0]):
         x0, x1, x2 = position[i, 0] - m0, position[i, 1] - m1, position[i, 2] - m2
         base[i, 0], base[i, 1], base[i, 2] = x0, x1, x2
+        last[i, 0], last[i, 1], last[i, 2] = x0, x1, x2
         tip[i, 0] = x0 + length * (step[i, 0] - w0)
         tip[i, 1] = x1 + length * (step[i, 1] - w1)
         tip[i, 2] = x2 + length * (step[i, 2] - w2)
@@ -167,7 +168,7 @@ def list_rods(
     count : Array
         How many pairs the list has, shape (1,). Changed.
     until_out : Array
-        Path before which each pair stays beyond the barrier distance [m]; −∞ in a new list.
+        Path before which each pair stays beyond the barrier distance [m].
     """
     if move == 0.0:
         gone = _go_on(position, last)
@@ -181,7 +182,7 @@ def list_rods(
             if move <= ways[ROOM] or _stray(position, step, fraction, base, tip) <= 0.5 * ways[MADE]:
                 return True
     ahead = min(max(AHEAD * unit / move, 1.0), MOST_AHEAD) if move > 0.0 else 1.0
-    _set_out(position, step, ahead * fraction, base, tip)
+    _set_out(position, step, ahead * fraction, base, tip, last)
     ways[MADE], ways[ROOM], ways[PATH] = MARGIN * unit, 0.5 * MARGIN * unit, 0.0
     count[0] = near_pairs(
         base,
@@ -207,11 +208,13 @@ def list_rods(
         edge_out,
         before_out,
         after_out,
+        until_out,
     )
     if count[0] > point_out.shape[0]:
         ways[MADE], ways[ROOM] = 0.0, -1.0
         return False
+    first = math.inf
     for c in range(count[0]):
-        until_out[c] = -math.inf
-    ways[FIRST] = -math.inf if count[0] > 0 else math.inf
+        first = min(first, until_out[c])
+    ways[FIRST] = first
     return True

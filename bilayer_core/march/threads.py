@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..contact.rod_bound import rod_step_bound
+from ..contact.rod_bound import path_to_look, rod_step_bound
 from ..contact.rod_list import FIRST, PATH, list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
@@ -106,7 +106,8 @@ def bound_between_rods(threads, strands, system, at):
     move, limit = reachable(system.node_step, threads.unit)
     if not _list(threads, strands, at.position, system.node_step, limit, limit * move):
         return 0.0, False
-    if threads.ways[PATH] + 2.0 * limit * move < threads.ways[FIRST]:
+    path, way = threads.ways[PATH], 2.0 * limit * move
+    if path_to_look(path, way, threads.d_hat) < threads.ways[FIRST]:
         return limit, True
     fraction, _ = rod_step_bound(
         at.position,
@@ -117,7 +118,8 @@ def bound_between_rods(threads, strands, system, at):
         threads.pair_point,
         threads.pair_edge,
         threads.pair_until,
-        threads.ways[PATH] + 2.0 * limit * move,
+        path,
+        way,
         strands.edge_node,
         threads.edge_radius,
         threads.point_edge,

@@ -176,12 +176,12 @@ class NearPairs:
         """Have room for so many pairs, none of which is listed then."""
         self.point, self.edge = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
         self.before, self.after = np.empty(room, dtype=bool), np.empty(room, dtype=bool)
-        self.until = np.full(room, -math.inf)
+        self.until = np.empty(room)
 
     @property
-    def outputs(self) -> tuple[Array, Array, Array, Array]:
-        """The pairs."""
-        return self.point, self.edge, self.before, self.after
+    def outputs(self) -> tuple[Array, ...]:
+        """The pairs, as `near_pairs` writes them."""
+        return self.point, self.edge, self.before, self.after, self.until
 
     def find(self, position: Array, start_position: Array, touch: float, reach: float) -> None:
         """List the pairs with a gap below `reach` [m] at positions of nodes [m], shape (n_node, 3); for `touch` see
@@ -218,11 +218,7 @@ def refuse_meeting_rods(model: Model) -> None:
     found, _, _ = facing_contacts(
         position,
         pairs.count,
-        pairs.point,
-        pairs.edge,
-        pairs.before,
-        pairs.after,
-        pairs.until,
+        *pairs.outputs,
         0.0,
         model.edge_node,
         surfaces.edge_radius,

@@ -129,7 +129,6 @@ class RodContact:
             self.ways,
             pairs.counted,
             *pairs.outputs,
-            pairs.until,
         ):
             self.make_room()
 
@@ -143,7 +142,6 @@ class RodContact:
                 position,
                 pairs.count,
                 *pairs.outputs,
-                pairs.until,
                 self.ways[PATH],
                 self._model.edge_node,
                 surfaces.edge_radius,
@@ -257,7 +255,8 @@ class RodContact:
             pairs.point,
             pairs.edge,
             pairs.until,
-            self.ways[PATH] + 2.0 * limit * move,
+            self.ways[PATH],
+            2.0 * limit * move,
             self._model.edge_node,
             surfaces.edge_radius,
             surfaces.point_edge,
