@@ -58,6 +58,7 @@ def step_bound(
     surface_body,
     body_position,
     body_motion,
+    motion,
 ):
     """Largest α ≤ 1 such that all gaps keep `KEPT_FRACTION` of themselves along β step, 0 ≤ β ≤ α.
 
@@ -76,6 +77,8 @@ def step_bound(
     body_position, body_motion : Array
         Of bodies and of the world: position [m], and displacement [m] and rotation vector [rad] in the step, shapes
         (n_body + 1, 3), (n_body + 1, 6).
+    motion : float
+        By how much gaps close at most [m], see `near.largest_motion`.
 
     Returns
     -------
@@ -88,26 +91,29 @@ def step_bound(
     for k in range(count):
         i, s = near_carrier[k], near_surface[k]
         x0, x1, x2 = carrier[i, 0], carrier[i, 1], carrier[i, 2]
+        gap, n0, n1, n2, _, _, _ = gap_normal(kind, size, rounding, radius[i], place, turn, s, x0, x1, x2)
+        kept = KEPT_FRACTION * gap
+        if gap - motion * alpha >= kept:
+            continue
         a, b = carrier_body[i], surface_body[s]
-        r0 = r1 = r2 = 0.0  # turn of the carrier's body
-        a0 = a1 = a2 = 0.0  # arm on it
+        r0 = r1 = r2 = turn_a = 0.0  # turn of the carrier's body
+        a0 = a1 = a2 = arm = 0.0  # arm on it
         if a >= 0:
             u0, u1, u2 = body_motion[a, 0], body_motion[a, 1], body_motion[a, 2]
             r0, r1, r2 = body_motion[a, 3], body_motion[a, 4], body_motion[a, 5]
             a0, a1, a2 = x0 - body_position[a, 0], x1 - body_position[a, 1], x2 - body_position[a, 2]
+            arm, turn_a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
         else:
             u0, u1, u2 = node_step[i, 0], node_step[i, 1], node_step[i, 2]
         u0, u1, u2 = u0 - body_motion[b, 0], u1 - body_motion[b, 1], u2 - body_motion[b, 2]
         f0, f1, f2 = body_motion[b, 3], body_motion[b, 4], body_motion[b, 5]
         if kind[s] == SPHERE:
             f0 = f1 = f2 = 0.0
-        arm, turn_a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-        turn_b = math.sqrt(f0 * f0 + f1 * f1 + f2 * f2)
         z0, z1, z2 = x0 - body_position[b, 0], x1 - body_position[b, 1], x2 - body_position[b, 2]
-        lever = math.sqrt(z0 * z0 + z1 * z1 + z2 * z2)
+        lever = turn_b = 0.0
+        if f0 != 0.0 or f1 != 0.0 or f2 != 0.0:
+            lever, turn_b = math.sqrt(z0 * z0 + z1 * z1 + z2 * z2), math.sqrt(f0 * f0 + f1 * f1 + f2 * f2)
         speed = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) + turn_a * arm
-        gap, n0, n1, n2, _, _, _ = gap_normal(kind, size, rounding, radius[i], place, turn, s, x0, x1, x2)
-        kept = KEPT_FRACTION * gap
         if gap - (speed + turn_b * (lever + speed)) * alpha >= kept:
             continue
         bend = turn_a * turn_a * arm + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)

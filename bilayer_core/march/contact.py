@@ -17,9 +17,12 @@ from .terms import BARRIER, FRICTION
 
 @inner
 def list_pairs(surfaces, at, motion):
-    """Make the list of near pairs valid at a configuration and whatever can be reached from it by `motion` [m]."""
+    """Make the list of near pairs valid at a configuration and whatever can be reached from it by `motion` [m].
+
+    Returns a status, and whether the list was made anew.
+    """
     if surfaces is None:
-        return READY
+        return READY, False
     moved = moved_since(
         at.carrier,
         surfaces.listed_carrier,
@@ -30,7 +33,7 @@ def list_pairs(surfaces, at, motion):
         surfaces.extent,
     )
     if moved + motion <= surfaces.margin[0]:
-        return READY
+        return READY, False
     margin = max(surfaces.d_hat, MOTION_MARGIN * motion)
     count = list_near(
         surfaces.d_hat,
@@ -52,13 +55,13 @@ def list_pairs(surfaces, at, motion):
     if count > surfaces.near_carrier.shape[0]:
         surfaces.margin[0] = -1.0
         surfaces.near_count[0] = 0
-        return NO_ROOM
+        return NO_ROOM, True
     surfaces.near_count[0] = count
     surfaces.margin[0] = margin
     copy(at.carrier, surfaces.listed_carrier)
     copy(at.surface_place, surfaces.listed_place)
     copy(at.surface_turn, surfaces.listed_turn)
-    return READY
+    return READY, True
 
 
 @inner

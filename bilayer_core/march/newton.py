@@ -61,12 +61,12 @@ def bound(surfaces, threads, bodies, held, strands, system, at):
 def _bound_at_surfaces(surfaces, bodies, system, at):
     if surfaces is None:
         return 1.0, -1, READY
-    motion = largest_motion(
-        system.node_step, surfaces.node_free, system.motion, bodies.reach, surfaces.body, surfaces.extent
-    )
-    status = list_pairs(surfaces, at, motion)
+    motion = _motion_at_surfaces(surfaces, bodies, system)
+    status, anew = list_pairs(surfaces, at, motion)
     if status != READY:
         return 0.0, -1, status
+    if anew:
+        motion = _motion_at_surfaces(surfaces, bodies, system)  # extents of surfaces are those of the list
     fraction, pair = step_bound(
         surfaces.near_count[0],
         surfaces.near_carrier,
@@ -83,8 +83,16 @@ def _bound_at_surfaces(surfaces, bodies, system, at):
         surfaces.body,
         at.place,
         system.motion,
+        motion,
     )
     return fraction, pair, READY
+
+
+@inner
+def _motion_at_surfaces(surfaces, bodies, system):
+    return largest_motion(
+        system.node_step, surfaces.node_free, system.motion, bodies.reach, surfaces.body, surfaces.extent
+    )
 
 
 @inner

@@ -21,7 +21,7 @@ from .threads import add_threads, lag_threads
 @inner
 def start_stage(p, start, stage):
     """Freeze what a stage depends on: near pairs, friction's contacts, loads. Returns whether a loop can go on."""
-    status = list_pairs(p.surfaces, start, 0.0)
+    status, _ = list_pairs(p.surfaces, start, 0.0)
     if status != READY:
         return status
     if not lag_threads(p.threads, p.strands, start):
@@ -68,7 +68,7 @@ def evaluate(p, at, stage, with_hessian, again):
         gap = add_contact(p.surfaces, p.sliding, bodies, at, stage, sums, with_hessian)
         gap = min(gap, add_threads(p.threads, strands, at, stage, sums))
         hand_on_contact(p.meets, bodies, sums)
-        copy(sums.first, sums.lasting)
+        _keep_lasting(p.followers, p.moments, p.flow, p.fluid, sums)
     add_loads(p.followers, at, sums, FOLLOWERS)
     add_moments(p.moments, at, stage, sums, with_hessian)
     add_drag(p.flow, at, stage, sums, with_hessian)
@@ -78,6 +78,14 @@ def evaluate(p, at, stage, with_hessian, again):
     for k in range(sums.energy.shape[0]):
         energy += sums.energy[k]
     return energy, gap
+
+
+@inner
+def _keep_lasting(followers, moments, flow, fluid, sums):
+    """Keep what stays as it is when other parts follow the configuration, if any does."""
+    if followers is None and moments is None and flow is None and fluid is None:
+        return
+    copy(sums.first, sums.lasting)
 
 
 @inner

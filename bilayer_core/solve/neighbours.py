@@ -54,8 +54,10 @@ class Neighbours:
         self._make_room(2 * max(1, len(self.carrier)))
         self.counted[0], self.margin[0] = 0, -1.0
 
-    def update(self, at: Configuration, motion: float = 0.0) -> None:
-        """Make the list valid at a configuration and whatever can be reached from it by `motion` [m]."""
+    def update(self, at: Configuration, motion: float = 0.0) -> bool:
+        """Make the list valid at a configuration and whatever can be reached from it by `motion` [m]; whether that took
+        a new one.
+        """
         moved = moved_since(
             at.carrier,
             self.listed_carrier,
@@ -65,8 +67,10 @@ class Neighbours:
             self.listed_turn,
             self.extent,
         )
-        if not moved + motion <= self.margin[0]:
-            self._list(at, max(self._reach, MOTION_MARGIN * motion))
+        if moved + motion <= self.margin[0]:
+            return False
+        self._list(at, max(self._reach, MOTION_MARGIN * motion))
+        return True
 
     def _list(self, at: Configuration, margin: float) -> None:
         surfaces, carriers = self._model.surfaces, self._model.carriers
@@ -114,8 +118,10 @@ class Neighbours:
             Place in the list of the pair that sets the bound, −1 if none.
         """
         surfaces, carriers, reach = self._model.surfaces, self._model.carriers, self._model.bodies.reach
-        extent = self.extent
-        self.update(at, largest_motion(node_step, self.node_free, body_motion, reach, surfaces.body, extent))
+        moving = node_step, self.node_free, body_motion, reach, surfaces.body, self.extent
+        motion = largest_motion(*moving)
+        if self.update(at, motion):
+            motion = largest_motion(*moving)  # extents are those of the list
         return step_bound(
             self.count,
             self.carrier,
@@ -132,4 +138,5 @@ class Neighbours:
             surfaces.body,
             at.place,
             body_motion,
+            motion,
         )

@@ -118,7 +118,7 @@ class Pair:
         pairs = (1, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
         of_carrier = (self.carrier, self.radius, self.body, self.step)
         surface = (*self.arrays, self.place, self.turn, pairs[1])
-        return step_bound(*pairs, *of_carrier, *surface, self.position, self.motion)
+        return step_bound(*pairs, *of_carrier, *surface, self.position, self.motion, np.inf)
 
 
 @pytest.mark.parametrize("turning", [False, True], ids=["straight", "turning"])
