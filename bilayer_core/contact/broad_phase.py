@@ -77,7 +77,7 @@ def _along(position, i, d0, d1, d2):
     )
 
 
-RUN = 4.0
+RUN = 2.0
 """Half of the longest run that is looked for, in units of the arc distance from which a rod sees itself."""
 
 

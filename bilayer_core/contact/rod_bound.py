@@ -47,8 +47,9 @@ def rod_step_bound(
     """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
 
     Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3), and `way` by
-    how much gaps close in the part of it up to `limit` at most [m]. A pair that stays beyond the barrier distance `d_hat` [m] sets no bound: of large gaps
-    less is kept. So what is found does not depend on which of these pairs are listed, or looked at.
+    how much gaps close in the part of it up to `limit` at most [m]. A pair that stays beyond the barrier distance
+    `d_hat` [m] sets no bound: of large gaps less is kept. So what is found does not depend on which of these pairs are
+    listed, or looked at.
 
     Returns
     -------

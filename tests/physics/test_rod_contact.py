@@ -8,6 +8,7 @@ from sample_scenes import contact, layer, rod, scene
 from slips import dissipation
 
 from bilayer_core import load_scene
+from bilayer_core.contact.broad_phase import near_pairs
 from bilayer_core.integrate.integrators import INTEGRATORS
 from bilayer_core.integrate.stages import predict, start_point
 from bilayer_core.integrate.stepper import Stepper
@@ -299,6 +300,51 @@ def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_
         found = list(zip(pairs.point[: pairs.count].tolist(), pairs.edge[: pairs.count].tolist(), strict=True))
         assert found == sorted(expected) and len(found) > 1000
     assert counts[2] - counts[1] == 2 * (counts[1] - counts[0])
+
+
+def winding_path(rng, nodes, spacing):
+    """Nodes along a smooth plane curve with random curvature, tighter than that of a rod in use at places."""
+    arc = np.linspace(0.0, 1.0, nodes - 1)
+    turns = sum(rng.normal(0.0, 2.0) * np.sin(k * np.pi * arc + rng.uniform(0.0, 6.0)) for k in range(1, 6))
+    edges = spacing * np.stack([np.cos(turns), np.zeros(nodes - 1), np.sin(turns)], axis=1)
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(edges, axis=0)])
+
+
+@pytest.mark.parametrize("layers", [1, 2])
+def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers):
+    rng = np.random.default_rng(4)
+    stations, spacing, reach = 91, 1e-3, 1.9e-3
+    parts = [layer(name) for name in ("bottom", "top")[:layers]]
+    model = model_of([rod(parts, length=spacing * (stations - 1), stations=stations)])
+    surfaces = model.rod_surfaces
+    pairs, start = NearPairs(surfaces, model.edge_node, 100_000), np.array(model.start_position)
+    s, edge = surfaces.point_fraction[:, None], surfaces.point_edge
+    exclusion, radii = surfaces.rod_exclusion[0], surfaces.edge_radius[edge][:, None] + surfaces.edge_radius
+    arc = surfaces.point_arc[:, None]
+    sees = np.maximum(surfaces.edge_arc[:, 0] - arc, arc - surfaces.edge_arc[:, 1]) >= exclusion
+    met = 0
+    for _ in range(40):
+        base = np.concatenate([winding_path(rng, stations, spacing) + [0, 0, 1e-3 * k] for k in range(layers)])
+        tip = base + np.tile(winding_path(rng, stations, spacing) * rng.choice([0.0, 0.1, 1.0]), (layers, 1))
+        geometry = (*pairs.geometry, *pairs.outputs)
+        count = near_pairs(base, tip, start, D_HAT, reach, *geometry)
+        found = set(zip(pairs.point[:count].tolist(), pairs.edge[:count].tolist(), strict=True))
+        order = np.lexsort((pairs.edge[:count], pairs.point[:count]))
+        assert np.array_equal(order, np.arange(count))
+        for part in np.linspace(0.0, 1.0, 11):
+            position = base + part * (tip - base)
+            points = (1 - s) * position[model.edge_node[edge]] + s * position[model.edge_node[edge] + 1]
+            e = position[model.edge_node + 1] - position[model.edge_node]
+            way = points[:, None] - position[model.edge_node]
+            t = np.clip(np.einsum("pkc,kc->pk", way, e) / np.einsum("kc,kc->k", e, e), 0.0, 1.0)
+            gap = np.linalg.norm(way - t[:, :, None] * e, axis=2) - radii
+            near = {(int(p), int(k)) for p, k in np.argwhere(sees & (gap < reach))}
+            assert near <= found
+            met += len(near)
+            if part == 0.0:
+                point, k = pairs.point[:count], pairs.edge[:count]
+                np.testing.assert_allclose(pairs.until[:count], gap[point, k] - D_HAT, rtol=0, atol=1e-15)
+    assert met > 1000
 
 
 @pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3])
