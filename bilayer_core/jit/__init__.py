@@ -46,7 +46,8 @@ OPTIONS = dict(cache=CACHE, nogil=True, error_model="numpy", fastmath=FASTMATH, 
 def kernel(function) -> KernelFunction:
     """Compile `function`: nopython, GIL released, cached, NaN-preserving fast arithmetic.
 
-    For what the interpreter calls; other kernels may call it too.
+    For what the interpreter calls; other kernels may call it too. An index that is no literal must not be negative:
+    it is not counted from the end of an array (`indexing`).
     """
     return with_entry(function, inner(renamed(function, "inside")), OPTIONS)
 

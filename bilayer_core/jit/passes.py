@@ -20,6 +20,7 @@ from numba.core.transforms import canonicalize_cfg
 from numba.core.typed_passes import NativeLowering, NoPythonBackend, NopythonTypeInference, PreLowerStripPhis
 from numba.core.untyped_passes import DeadBranchPrune, FixupArgs, RewriteSemanticConstants, TranslateByteCode
 
+from .indexing import counting_from_start
 from .libraries import InnerLibrary, Origin, entry_point
 
 REWRITES = (DetectStaticBinops, RewriteConstGetitems, RewriteConstSetitems)
@@ -101,7 +102,7 @@ class _InnerLowering(NativeLowering):
     lowering_class = _Lower
 
     def run_pass(self, state):
-        of = state.func_id
+        of, state.targetctx = state.func_id, counting_from_start(state.targetctx)
         state.library = library = InnerLibrary(state.targetctx.codegen(), of.func_qualname)
         state.flags.no_compile = True
         super().run_pass(state)

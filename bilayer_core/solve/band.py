@@ -58,7 +58,8 @@ def factor_signed(band, n, bandwidth):
 def forward_band(band, n, bandwidth, right):
     """Overwrite `right`, of n + b values whose last b are zero, with L⁻¹ times it.
 
-    The last b found are kept in registers: they would not be in memory in time for the next.
+    The last b found are kept in registers: they would not be in memory in time for the next. (Each moves on where it is
+    used: a loop for that alone would become one move in memory.)
     """
     b = len(bandwidth)
     found = stack_vector(bandwidth)
@@ -68,10 +69,10 @@ def forward_band(band, n, bandwidth, right):
         found[b - 1 - j] = right[j]
     for first in range(n - b):
         value = right[first + b]
-        for s in range(b):
-            value -= band[first + s, b - s] * found[b - 1 - s]
         for r in range(b - 1, 0, -1):
+            value -= band[first + b - 1 - r, r + 1] * found[r]
             found[r] = found[r - 1]
+        value -= band[first + b - 1, 1] * found[0]
         found[0] = value
         right[first + b] = value
 
@@ -85,10 +86,10 @@ def backward_band(band, n, bandwidth, right):
         found[r] = 0.0
     for j in range(n - 1, -1, -1):
         value = right[j] / band[j, 0]
-        for r in range(b, 0, -1):  # what was found last is needed last
-            value -= band[j, r] * found[r - 1]
-        for r in range(b - 1, 0, -1):
+        for r in range(b - 1, 0, -1):  # what was found last is needed last
+            value -= band[j, r + 1] * found[r]
             found[r] = found[r - 1]
+        value -= band[j, 1] * found[0]
         found[0] = value
         right[j] = value
 

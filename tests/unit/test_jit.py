@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import njit
 from numba.core import types
 from numba.core.compiler import Flags
 from numba.core.errors import TypingError
@@ -148,13 +149,22 @@ def _row(m, k):
 
 def test_elements_of_arrays_count_from_either_end():
     a, m, c = np.arange(5.0), np.arange(12.0).reshape(3, 4), np.arange(24.0).reshape(2, 3, 4)
-    for k in (0, -1):
+    for k in (0, 1):
         assert _ends(a, m, c, k) == (a[-1], a[k], m[-2, 1], m[k, -1], c[1, -1, 0], c[k, k, k])
+
+
+def test_variables_count_from_either_end_in_what_is_no_kernel():
+    ends, write = njit(_ends.py_func), njit(_write.py_func)
+    a, m, c = np.arange(5.0), np.arange(12.0).reshape(3, 4), np.arange(24.0).reshape(2, 3, 4)
+    assert ends(a, m, c, -1) == (a[-1], a[-1], m[-2, 1], m[-1, -1], c[1, -1, 0], c[-1, -1, -1])
+    flags, counts = np.zeros((1, 3), dtype=bool), np.zeros(3, dtype=np.int64)
+    write(a, m, flags, counts, -2)
+    assert a[-2] == 7 and flags.tolist() == [[False, True, False]] and counts.tolist() == [0, -2, 0]
 
 
 def test_elements_of_every_kind_are_written():
     a, m, flags, counts = np.zeros(3), np.zeros((2, 3)), np.zeros((1, 3), dtype=bool), np.zeros(3, dtype=np.int64)
-    _write(a, m, flags, counts, -2)
+    _write(a, m, flags, counts, 1)
     assert a.tolist() == [0, 7, 0] and m.tolist() == [[0, 0, 0], [0, 0.5, 0]]
     assert flags.tolist() == [[False, True, False]] and counts.tolist() == [0, -2, 0]
 
