@@ -14,6 +14,10 @@ from numba.core.codegen import CodeLibrary, JITCodeLibrary
 from numba.core.types import Type
 
 
+TIDY = 2
+"""LLVM's level for each function before it is linked: with 3 it takes longer and steps do not, with 1 they do."""
+
+
 @dataclass(frozen=True)
 class Origin:
     """What a library is the code of: a function of a module, compiled for some types, under a name in LLVM."""
@@ -36,7 +40,7 @@ class KernelLibrary(JITCodeLibrary):
             if function.is_declaration:
                 continue
             if passes is None:
-                builder = self._codegen._pass_builder()
+                builder = self._codegen._pass_builder(opt=TIDY)
                 passes = builder.getFunctionPassManager()
             passes.run(function, builder)
 
@@ -91,6 +95,11 @@ class EntryLibrary(KernelLibrary):
     def finalize(self):
         self._linking_libraries = list(dict.fromkeys(_with_all_that_is_called(self._linking_libraries)))
         super().finalize()
+
+    def _optimize_final_module(self):
+        """Numba's passes without those that come before it looks for counts of references: there are none."""
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
 
     def _finalize_specific(self):
         """Keep what is called to itself.
