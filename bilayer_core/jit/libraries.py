@@ -13,7 +13,6 @@ from numba import _dynfunc
 from numba.core.codegen import CodeLibrary, JITCodeLibrary
 from numba.core.types import Type
 
-
 TIDY = 2
 """LLVM's level for each function before it is linked: with 3 it takes longer and steps do not, with 1 they do."""
 
