@@ -263,7 +263,7 @@ class _Way:
 
     def __init__(self, model: Model, begin: _Instant, end: State, moved: Motion):
         self._model, self._begin, self._moved = model, begin.at, moved
-        self.state = State(**{key: array.copy() for key, array in vars(end).items()})
+        self.state = end.copy()
 
     def at(self, part: float) -> Configuration:
         """Configuration after a part of the way; `state` goes along, its velocities apart."""

@@ -80,34 +80,6 @@ def clear(counts: Counts) -> None:
 
 
 @inner
-def _copy_state(keeps, source, target):
-    copy(source.position, target.position)
-    copy(source.velocity, target.velocity)
-    copy(source.director1, target.director1)
-    copy(source.spin, target.spin)
-    copy(source.fluid_excess, target.fluid_excess)
-    copy(source.twist, target.twist)
-    copy(source.body_position, target.body_position)
-    copy(source.body_rotation, target.body_rotation)
-    copy(source.body_velocity, target.body_velocity)
-    copy(source.body_angular_velocity, target.body_angular_velocity)
-    copy(source.transduction, target.transduction)
-    _copy_slopes(keeps, source, target)
-
-
-@inner
-def _copy_slopes(keeps, source, target):
-    if keeps is None:
-        return
-    copy(source.kept, target.kept)
-    copy(source.acceleration, target.acceleration)
-    copy(source.spin_acceleration, target.spin_acceleration)
-    copy(source.body_acceleration, target.body_acceleration)
-    copy(source.body_moment, target.body_moment)
-    copy(source.fluid_force, target.fluid_force)
-
-
-@inner
 def _plan(control, clock, h, planned, error, iterations, shortened):
     """Write the length of the next step; one cut short by what it had to end at says little."""
     following = after_success(control.order, h, error, clock.last_error[0], iterations, shortened)
@@ -176,7 +148,7 @@ def adapt(adaptation, keeps, moment, changes, counts, until, most, newton_tolera
         look_back(adaptation.acting, begin, course)
         if changes and has_jumped(keeps, p.drives, state, course.first[0], loop.ranges, planned):
             return k, JUMPED, -1, end, gap
-        _copy_state(keeps, state, kept)
+        copy(state.values, kept.values)
         copy(work.touched, kept_touched)
         h, time, error = planned, begin, math.inf
         rejected = inaccurate = iterations = factorisations = backtracks = 0
@@ -201,7 +173,7 @@ def adapt(adaptation, keeps, moment, changes, counts, until, most, newton_tolera
                 error = method.estimate * deviation(adaptation.yardstick, kept, state, h) / control.tolerance
                 if error <= 1.0:
                     break
-                _copy_state(keeps, kept, state)
+                copy(kept.values, state.values)
                 copy(kept_touched, work.touched)
                 status = TOO_INACCURATE
             if h <= STRETCH * control.shortest:

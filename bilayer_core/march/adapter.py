@@ -75,7 +75,8 @@ class Adapter:
         if state is not self._state:
             self._state, self._parts = state, None
             self._clock = Clock(**{name: getattr(state, name) for name in Clock.fields})
-            self._kept = StateArrays(**{name: getattr(state, name).copy() for name in StateArrays.fields})
+            self._kept_state = state.copy()
+            self._kept = StateArrays(**{name: getattr(self._kept_state, name) for name in StateArrays.fields})
         if self._parts is None or self._parts.loop is not loop:
             self._parts = Adaptation(
                 loop=loop,

@@ -39,7 +39,11 @@ class GroupType(types.Type):
     """
 
     def __init__(self, declared: str, fields: tuple[tuple[str, types.Type], ...]):
-        self.fields = fields
+        self.of_field, self.offset = dict(fields), {}  # types, and places in words
+        offset = 0
+        for name, type_of_field in fields:
+            self.offset[name] = offset
+            offset += _word_count(type_of_field)
         listed = ", ".join(f"{name}: {type_of_field}" for name, type_of_field in fields)
         digest = hashlib.blake2b(listed.encode(), digest_size=8).hexdigest()
         super().__init__(f"{declared}({digest})")
@@ -154,19 +158,15 @@ class _GroupAttribute(AttributeTemplate):
     key = GroupType
 
     def generic_resolve(self, of, name):
-        return dict(of.fields).get(name)
+        return of.of_field.get(name)
 
 
 @lower_getattr_generic(GroupType)
 def _read_field(context, builder, of, address, name):
-    offset = 0
-    for field, type_of_field in of.fields:
-        if field == name:
-            break
-        offset += _word_count(type_of_field)
+    type_of_field = of.of_field[name]
     if isinstance(type_of_field, types.NoneType):
         return context.get_dummy_value()
-    return _read(context, builder, type_of_field, address, offset)
+    return _read(context, builder, type_of_field, address, of.offset[name])
 
 
 def _read(context, builder, of, address, offset):

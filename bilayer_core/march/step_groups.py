@@ -137,6 +137,7 @@ class Work:
 class StateArrays:
     """What of a `model.state.State` a step changes."""
 
+    values: Array  # all parts, these and others, in one piece
     position: Array
     velocity: Array
     director1: Array

@@ -19,6 +19,11 @@ class State:
     """What is carried from step to step.
 
     `flat` and `set_flat` copy it bit for bit.
+
+    Attributes
+    ----------
+    values : Array
+        All parts in order, of which each is a view.
     """
 
     time: Array  # simulated time [s], shape (1,); with fixed steps their number times dt, so that it does not drift
@@ -45,18 +50,26 @@ class State:
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
 
+    def __post_init__(self):
+        """Have the parts, which are copied, in one piece."""
+        parts = [getattr(self, name) for name in PARTS]
+        self.values = np.concatenate([part.ravel() for part in parts])
+        start = 0
+        for name, part in zip(PARTS, parts, strict=True):
+            setattr(self, name, self.values[start : start + part.size].reshape(part.shape))
+            start += part.size
+
     def copy(self) -> State:
         """A state of its own with the same values."""
-        return State(*(getattr(self, name).copy() for name in PARTS))
+        return State(*(getattr(self, name) for name in PARTS))
 
     def take(self, other: State) -> None:
         """Take all values of another state of the same model."""
-        for name in PARTS:
-            getattr(self, name)[...] = getattr(other, name)
+        self.values[:] = other.values
 
     def flat(self) -> Array:
         """All parts in order, as one array of float64."""
-        return np.concatenate([getattr(self, name).ravel() for name in PARTS])
+        return self.values.copy()
 
     def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
         """Name and shape of each part of `flat`."""
@@ -71,17 +84,13 @@ class State:
             If its length or a value does not fit this model; nothing is changed then.
         """
         flat = np.asarray(flat, dtype=float)
-        size = sum(getattr(self, name).size for name in PARTS)
+        size = self.values.size
         if flat.shape != (size,):
             raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}")
         bad = np.flatnonzero(~np.isfinite(flat[: size - self.override.size]))
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
-        start = 0
-        for name in PARTS:
-            array = getattr(self, name)
-            array[...] = flat[start : start + array.size].reshape(array.shape)
-            start += array.size
+        self.values[:] = flat
 
 
 PARTS = tuple(part.name for part in fields(State))
