@@ -25,6 +25,8 @@ SERIES = ("#1f77b4", "#2ca02c", "#17becf", "#9467bd", "#d62728", "#ff7f0e", "#8c
 INK, GREY, GOLD = "#222222", "#888888", "#f2b705"
 WIDE = (9.6, 5.4)
 TEXT = {"font.size": 12, "axes.titlesize": 14, "axes.labelsize": 13, "legend.fontsize": 10.5}
+MANY_DECADES = 3e3
+"""Ratio of the ends of an axis from which marks at 2 and 5 would run into each other."""
 
 
 def draw(content: dict, directory: Path) -> list[Path]:
@@ -139,10 +141,11 @@ def scaling_figure(records: list[dict], path: Path) -> None:
 
 
 def _plain_times(axis) -> None:
-    """Marks at 1, 2 and 5 of each decade, as plain numbers."""
+    """Marks at 1, 2 and 5 of each decade, or where there are many at 1 alone, as plain numbers."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    first, last = axis.get_xlim()
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if last < MANY_DECADES * first else (1.0,)))
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter(NullFormatter())
 
