@@ -233,6 +233,15 @@ def test_an_interrupted_run_ends_with_130_and_whole_files(here, number):
     assert read_log("run.mcap").times[-1] == pytest.approx(info.last_time)
 
 
+@pytest.fixture
+def heeding():
+    """A process that heeds interrupts; one started in the background may ignore them."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heeding")
 def test_a_second_signal_is_not_put_off():
     with watch.Interrupt() as interrupt:
         os.kill(os.getpid(), signal.SIGINT)
