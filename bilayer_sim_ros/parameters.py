@@ -110,7 +110,7 @@ SIM_NODE = (
     NodeParameter("dimension", "auto", "auto, 2 or 3"),
     NodeParameter("dt", 0.0, "fixed steps of this length, with `tolerance` the first [s]; 0 = as the scene says", 0.0),
     NodeParameter(
-        "tolerance", 0.0, "largest error of an adaptive step over the longest rod; 0 = as the scene says", 0.0
+        "tolerance", 0.0, "largest error per adaptive step, over the longest rod; 0 = as the scene says", 0.0
     ),
 )
 

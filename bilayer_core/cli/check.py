@@ -14,6 +14,7 @@ from bilayer_core.cli.report import CHOICES
 
 WIDTH = 100
 """Of the text beside a name [characters]."""
+ERROR_OF_A_RUN = "the tolerance bounds the error per step; that of a whole run is larger, measure it: `bilayer converge`"
 
 
 @click.command(cls=Verb)
@@ -117,6 +118,8 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         yield from _block(key, [f"{report[key]} ({report['reasons'][key]})"])
     yield from _block("size", [f"{report['nodes']} nodes, {report['dof']} unknowns"])
     yield from _block("time", [_time(report)])
+    if report["tolerance"] is not None:
+        yield from _block("accuracy", [ERROR_OF_A_RUN])
     yield from _forces(report["terms"])
     yield "contact pairs"
     yield from (f"  {pair}" for pair in report["contact_pairs"] or ["none"])

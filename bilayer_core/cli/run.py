@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from bilayer_core.scene.config import SceneConfig
 
 SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
+TOLERANCE_HELP = (
+    "Adaptive steps: largest error per step, over the longest rod. The error of a whole run is larger; "
+    "`bilayer converge` measures it."
+)
 OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 
 
@@ -28,7 +32,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--model", metavar="NAME", help="auto, two_rod or laminate.")
 @click.option("--dimension", metavar="D", help="auto, 2 or 3.")
 @click.option("--integrator", metavar="NAME", help="auto, or a name from docs/scene_keys.md (solver).")
-@click.option("--tolerance", metavar="X", help="Adaptive steps, each with at most this error over the longest rod.")
+@click.option("--tolerance", metavar="X", help=TOLERANCE_HELP)
 @set_option
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")
 @click.option("--log-rate", metavar="HZ", help="Frames recorded per simulated second.")

@@ -19,7 +19,8 @@ class Steps:
     dt : float
         Length of a fixed step, or of the first adaptive one [s].
     tolerance : float or None
-        Largest error of an adaptive step: displacement over the length of the longest rod. None: steps are fixed.
+        Largest error of one adaptive step: displacement over the length of the longest rod; errors of steps add up
+        over a run. None: steps are fixed.
     longest : float
         Length of the longest adaptive step [s].
     reason : str
@@ -38,7 +39,7 @@ class Steps:
     def __str__(self) -> str:
         if self.tolerance is None:
             return f"fixed, {1e3 * self.dt:g} ms"
-        return f"adaptive, error at most {self.tolerance:g} of the longest rod"
+        return f"adaptive, error per step at most {self.tolerance:g} of the longest rod"
 
 
 def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, tolerance: float | None = None) -> Steps:

@@ -187,7 +187,8 @@ class Solver(Part):
     """Alone: the time step, always the same. With `tolerance`, or by default (1 ms): the first adaptive step, and the
     first after a jump of a stimulus or a load."""
     tolerance: ErrorTolerance | None = None
-    """Largest error of an adaptive step: displacement over the length of the longest rod; 1e-4 unless `dt` is given."""
+    """Largest error per adaptive step: displacement over the length of the longest rod; 1e-4 unless `dt` is given. It
+    bounds no error of a whole run, in which those of steps add up; `bilayer converge` measures that."""
     max_step: PositiveTime | None = None
     """Longest adaptive step; by default a period of `output.rate`."""
     newton_tolerance: PositiveSpeed = 1e-6

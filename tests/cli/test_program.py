@@ -77,8 +77,9 @@ def test_check_says_what_is_computed_and_why_the_rest_is_skipped(capsys):
         "  model         laminate (one curve carries both layers",
         "  dimension     2 (all stays in the plane y = 0)\n",
         "  integrator    sdirk2 (second order, L-stable; ",
-        "  stepping      adaptive, error at most 0.0001 of the longest rod (neither `dt` nor `tolerance` is given; ",
+        "  stepping      adaptive, error per step at most 0.0001 of the longest rod (neither `dt` nor `tolerance` is",
         "  time          2 s, the first step 1 ms long, none longer than 20 ms\n",
+        "  accuracy      the tolerance bounds the error per step; that of a whole run is larger, measure it: `bilayer\n",
         "  active        stretching, bending, eigenstrain, inertia, damping\n",
         "  skipped       twisting: nothing twists in a plane\n",
         "gravity: gravity is zero\n",
@@ -91,10 +92,17 @@ def test_check_says_what_is_computed_and_why_the_rest_is_skipped(capsys):
     assert text.endswith("no faults, no warnings\n")
 
 
+def test_help_of_run_says_that_the_tolerance_is_no_error_of_the_run(capsys):
+    assert main(["run", "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "largest error per step" in text and "The error of a whole run is larger; `bilayer converge` measures it." in text
+
+
 def test_check_says_what_is_set(capsys):
     solver = "solver={model: two_rod, dimension: 3, integrator: implicit_euler, dt: 1 ms}"
     assert main(["check", "bending", "--set", solver]) == 0
     text = capsys.readouterr().out
+    assert "error per step" not in text
     for line in (
         "  model         two_rod (set by `solver.model`)\n",
         "  stepping      fixed, 1 ms (set by `solver.dt`)\n",
