@@ -14,7 +14,7 @@ from bilayer_core.cli.report import CHOICES
 
 WIDTH = 100
 """Of the text beside a name [characters]."""
-ERROR_OF_A_RUN = "the tolerance bounds the error per step; that of a whole run is larger, measure it: `bilayer converge`"
+ERROR_OF_A_RUN = "the tolerance bounds the error per step; that of a run is larger: `bilayer converge` measures it"
 
 
 @click.command(cls=Verb)
@@ -85,9 +85,14 @@ def _parts(scene) -> dict[str, list[str]]:
         lines = [f"{copies}{section}, {stations}; {', '.join(held) or 'both ends free'}", f"bottom to top: {layers}"]
         figures = EdgeFigures(scene, rod)
         strain, curvature = figures.eigenstrain.max(), figures.free_curvature().max()
+        natural = abs(figures.natural_change()).max()
+        if natural > 0.0:
+            lines.append(
+                f"natural curvature of its layers: if nothing hinders it, they bend it by up to {natural:.3g} 1/m"
+            )
         if curvature > 0.0:
             bends = f"curvature up to {curvature:.3g} 1/m, radius {1e3 / curvature:.3g} mm"
-            if rod.path.shape != "straight":
+            if rod.path.shape != "straight" or natural > 0.0:
                 bends = f"curvature changed by up to {curvature:.3g} 1/m"
             lines.append(f"eigenstrain up to {100 * strain:.3g} %: if nothing hinders it, {bends}")
         parts[rod.name] = lines

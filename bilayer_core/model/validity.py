@@ -10,7 +10,6 @@ import numpy as np
 from ..scene.config import SceneConfig
 from ..scene.profile import values_at
 from ..scene.rod import Rod
-from ..scene.transduction import free_strain
 from .section import outline
 
 LARGE_STRAIN = 0.1  # linear elasticity and the rectangular section lose meaning
@@ -66,7 +65,7 @@ def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
 
 def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
     where, width, thickness = f"rods.{rod.name}", at_edges.width, at_edges.thickness
-    curvature = at_edges.free_curvature()
+    curvature = at_edges.curvature()
     slenderness = rod.path.length / width.max()
     yield Figure(
         where,
@@ -76,16 +75,17 @@ def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
         "it is a plate more than a rod" if slenderness < SLENDER else "",
     )
     strain = at_edges.eigenstrain.max()
-    if strain == 0.0:
+    if strain > 0.0:
+        yield Figure(
+            where,
+            "eigenstrain up to",
+            f"{100 * strain:.3g} %",
+            f"at most {100 * LARGE_STRAIN:g} %",
+            "the law of the material is linear" if strain > LARGE_STRAIN else "",
+        )
+    bend = max((curvature * thickness).max(), at_edges.bend_of_layers().max())
+    if bend == 0.0:
         return
-    yield Figure(
-        where,
-        "eigenstrain up to",
-        f"{100 * strain:.3g} %",
-        f"at most {100 * LARGE_STRAIN:g} %",
-        "the law of the material is linear" if strain > LARGE_STRAIN else "",
-    )
-    bend = (curvature * thickness).max()
     yield Figure(
         where,
         "curvature × thickness up to",
@@ -154,13 +154,44 @@ class EdgeFigures:
             self._moduli[index] = stiffness * scene.materials[layer.material].youngs_modulus
             for law in layer.eigenstrain:
                 channel = scene.stimuli[law.stimulus]
-                ends = np.array([channel.minimum, channel.maximum])
-                strain = np.abs(free_strain(ends, law.gain, law.reference, np.full(2, law.limit))).max()
+                strain = np.abs(law.strain_at(np.array([channel.minimum, channel.maximum]))).max()
                 self.eigenstrain[index, rod.driven_edges(layer, law)] += strain
         self.thickness = self._layers.sum(axis=0)
+        along = rod.edge_length * stations
+        self._path = rod.path.curvature_at(along)
+        self._natural = np.array(
+            [
+                self._path if layer.natural_curvature is None else values_at(layer.natural_curvature, along)
+                for layer in rod.layers
+            ]
+        )
+
+    def curvature(self) -> np.ndarray:
+        """Largest curvature without loads [1/m], shape (n_edge,): that of the path, or that to which the layers'
+        natural curvatures bend it, together with what eigenstrains add at most.
+        """
+        return np.maximum(np.abs(self._path), np.abs(self._path + self.natural_change())) + self.free_curvature()
+
+    def bend_of_layers(self) -> np.ndarray:
+        """Natural curvature times thickness of each layer by itself, shape (n_layer, n_edge)."""
+        return np.abs(self._natural) * self._layers
+
+    def natural_change(self) -> np.ndarray:
+        """What the layers' natural curvatures add to that of the path [1/m], shape (n_edge,).
+
+        Σ EI (χ̄ − χ_path)/D, positive towards the normal, with D the bending stiffness of the bonded section.
+        """
+        own = self._moduli * self._layers**3 / 12.0
+        both = own.sum(axis=0)
+        if len(self._layers) == 2:
+            axial = self._moduli * self._layers
+            both = both + axial[0] * axial[1] / axial.sum(axis=0) * (0.5 * self.thickness) ** 2
+        return (own * (self._natural - self._path)).sum(axis=0) / both
 
     def free_curvature(self) -> np.ndarray:
-        """Free curvature by Timoshenko's formula [1/m], shape (n_edge,); 0 where there is one layer."""
+        """What eigenstrains add at most to the curvature without loads, by Timoshenko's formula [1/m], shape (n_edge,);
+        0 where there is one layer.
+        """
         curvature = np.zeros(len(self.width))
         both = (self._layers > 0.0).all(axis=0) & (len(self._layers) == 2)
         if both.any():

@@ -6,12 +6,15 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from bilayer_core.scene.faults import Fault, Location, one_of
-from bilayer_core.scene.profile import Profile
+from bilayer_core.scene.profile import Profile, extremes
 
 if TYPE_CHECKING:
     from bilayer_core.scene.body import Free
     from bilayer_core.scene.config import SceneConfig, Stimulus
+    from bilayer_core.scene.eigenstrain import Eigenstrain
     from bilayer_core.scene.load import Load, PointMass
     from bilayer_core.scene.rod import Layer, Rod, SpiralPath
 
@@ -53,6 +56,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         return interval[0] < interval[1] <= rod.path.length * (1.0 + ROUNDING)
 
     faults += _profiles(rod, (), ("width",), rod.path.length)
+    faults += _faces_of_path(rod)
     for index, layer in enumerate(rod.layers):
         varying = ("thickness", "stiffness", "natural_curvature", "natural_twist")
         faults += _profiles(layer, ("layers", index), varying, rod.path.length)
@@ -74,6 +78,25 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     if not faults and not any(rod.covered_stations(layer) == (0, rod.stations - 1) for layer in rod.layers):
         faults.append((("layers",), [layer.interval for layer in rod.layers], "one layer must cover the whole path"))
     return faults
+
+
+def _faces_of_path(rod: Rod) -> Iterator[Fault]:
+    """Whether the face on the inner side of a curved path has a length: the path's radius exceeds its distance."""
+    if rod.path.shape == "straight":
+        return
+    toward = rod.path.toward == "normal"
+    inner = rod.layers[-1 if toward else 0]
+    distance = extremes(inner.thickness)[1] * (0.5 if len(rod.layers) == 1 else 1.0)
+    ends = abs(rod.path.curvature_at(np.array([0.0, rod.path.length])))  # that of a spiral falls with its radius
+    radius = 1.0 / float(ends.max())
+    if radius > distance:
+        return
+    key = "radius" if rod.path.shape == "arc" else ("start_radius", "end_radius")[int(ends.argmax())]
+    demand = (
+        f"must be larger: the path has a radius of {radius:g} m, and the inner face of layer {inner.name}, "
+        f"{distance:g} m from it, would have no length"
+    )
+    yield ("path", key), getattr(rod.path, key), demand
 
 
 def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:
@@ -123,7 +146,9 @@ def faults_of_rounding(rounding: float, largest: float, what: str) -> list[Fault
 
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
     """Names that refer to other parts, names that occur twice, and parts that need another."""
-    return [*_names(scene), *_references(scene), *_clamps(scene), *_surfaces(scene), *_points(scene)]
+    references = list(_references(scene))
+    rest_lengths = [] if references else _rest_lengths(scene)
+    return [*_names(scene), *references, *rest_lengths, *_clamps(scene), *_surfaces(scene), *_points(scene)]
 
 
 def _names(scene: SceneConfig) -> Iterator[Fault]:
@@ -155,6 +180,58 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
                 if law.stimulus not in scene.stimuli:
                     demand = one_of("stimuli", law.stimulus, scene.stimuli)
                     yield (*where, "eigenstrain", place, "stimulus"), law.stimulus, demand
+
+
+def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:
+    """Whether each layer keeps a rest length |ē|(1 + η) > 0 for all that its channels allow.
+
+    It is that of a layer by itself. The rest strain of a laminate is a mean of its layers', weighted with their
+    stiffness, and so above −1 where they are.
+    """
+    for number, rod in enumerate(scene.rods):
+        for index, layer in enumerate(rod.layers):
+            acting: dict[int, tuple[int, ...]] = {}
+            for place, law in enumerate(layer.eigenstrain):
+                for edge in rod.driven_edges(layer, law):
+                    acting[edge] = (*acting.get(edge, ()), place)
+            worst, least = (), -1.0
+            for places in sorted(set(acting.values())):
+                strain = _least_strain(scene, [layer.eigenstrain[place] for place in places])
+                if strain <= least:
+                    worst, least = places, strain
+            if not worst:
+                continue
+            place = min(worst, key=lambda k: _least_strain(scene, [layer.eigenstrain[k]]))
+            law = layer.eigenstrain[place]
+            channel = scene.stimuli[law.stimulus]
+            others = ", with the laws that act there too," if len(worst) > 1 else ""
+            demand = (
+                f"must leave the layer a length: `{law.stimulus}` from {channel.minimum:g} to {channel.maximum:g} "
+                f"[{channel.unit}]{others} can take its eigenstrain to {100 * least:.4g} %; allowed is above -100 %, "
+                "by a smaller gain, a `saturation` below 1 or a narrower range of the channel"
+            )
+            yield ("rods", number, "layers", index, "eigenstrain", place, "gain"), law.gain, demand
+
+
+SAMPLES = 257
+"""Values of a channel at which laws that follow it in step are added up; the two ends are among them."""
+
+
+def _least_strain(scene: SceneConfig, laws: list[Eigenstrain]) -> float:
+    """Least sum of the eigenstrains of some laws that the ranges of their channels allow.
+
+    Laws of one channel with the same lags have reached the same stimulus at any time. Others may be anywhere in their
+    ranges independently, as lags never leave the range of what they follow.
+    """
+    together: dict[tuple, list[Eigenstrain]] = {}
+    for law in laws:
+        together.setdefault((law.stimulus, law.lags), []).append(law)
+    total = 0.0
+    for (name, _), group in together.items():
+        channel = scene.stimuli[name]
+        values = np.linspace(channel.minimum, channel.maximum, SAMPLES)
+        total += float(sum(law.strain_at(values) for law in group).min())
+    return total
 
 
 def _clamps(scene: SceneConfig) -> Iterator[Fault]:

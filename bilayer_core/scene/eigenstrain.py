@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bilayer_core.scene.faults import one_of, refuse_all
@@ -57,7 +58,8 @@ class Eigenstrain(BaseModel):
     law: Literal[*LAWS] | None = Field(None, exclude=True)
     """Ready-made numbers for keys that are not given; see docs/stimuli.md."""
     gain: Number
-    """Eigenstrain per unit of the stimulus, near `reference`; may be left out where `law` is given."""
+    """Eigenstrain per unit of the stimulus, near `reference`; may be left out where `law` is given. The laws of
+    a layer together must leave it a length: above −1 over the ranges of their channels."""
     reference: PlainNumber = 0.0
     """Stimulus without eigenstrain, in the unit of the channel."""
     time_constant: NonNegativeTime | None = None
@@ -100,6 +102,11 @@ class Eigenstrain(BaseModel):
         both = self.time_constant or 0.0
         rising, falling = self.time_constant_rising, self.time_constant_falling
         return both if rising is None else rising, both if falling is None else falling
+
+    def strain_at(self, stimulus: np.ndarray) -> np.ndarray:
+        """Eigenstrain where the material has reached a stimulus (of `scene.transduction.grown`, which kernels use)."""
+        strain = self.gain * (stimulus - self.reference)
+        return strain if self.saturation is None else self.saturation * np.tanh(strain / self.saturation)
 
     @property
     def limit(self) -> float:

@@ -48,6 +48,10 @@ class StraightPath(Part):
         """Angle between its tangents at the two ends [rad]."""
         return 0.0
 
+    def curvature_at(self, arc: np.ndarray) -> np.ndarray:
+        """Towards the normal [1/m] at lengths `arc` [m] from the start."""
+        return np.zeros_like(arc)
+
 
 class ArcPath(Part):
     """A part of a circle in the plane of its direction and the rod's normal."""
@@ -78,6 +82,10 @@ class ArcPath(Part):
     def curvature(self) -> float:
         """Towards the normal [1/m]."""
         return (1.0 if self.toward == "normal" else -1.0) / self.radius
+
+    def curvature_at(self, arc: np.ndarray) -> np.ndarray:
+        """Towards the normal [1/m] at lengths `arc` [m] from the start."""
+        return np.full_like(arc, self.curvature)
 
 
 class SpiralPath(Part):
@@ -136,6 +144,12 @@ class SpiralPath(Part):
         """Angle by which its tangent turns [rad]."""
         slope = math.atan2(self.growth, self.start_radius) - math.atan2(self.growth, self.end_radius)
         return self.angle + slope
+
+    def curvature_at(self, arc: np.ndarray) -> np.ndarray:
+        """Towards the normal [1/m] at lengths `arc` [m] from the start: (r² + 2a²)/(r² + a²)^{3/2}, r = r₀ + a φ."""
+        radius, growth = self.start_radius + self.growth * self.angle_at(arc), self.growth
+        curvature = (radius**2 + 2.0 * growth**2) / (radius**2 + growth**2) ** 1.5
+        return curvature if self.toward == "normal" else -curvature
 
 
 class Pattern(Part):

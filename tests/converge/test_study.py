@@ -64,7 +64,8 @@ def test_adaptive_steps_are_halved_and_doubled_by_their_tolerance(tmp_path, monk
     assert (coarser.dt, coarser.tolerance, coarser.max_step) == pytest.approx((2e-3, 8e-5, 0.04))
     asked = ["--quantity", "tip.strip/gel.z", "--duration", "0.1", "--json", "study.json", "--quiet"]
     assert main(["converge", "cantilever", *adaptive, *asked]) == 0
-    assert "cantilever: sdirk2, steps adaptive, error per step at most 1e-05 of the longest rod\n" in capsys.readouterr().out
+    stepping = "adaptive, error per step at most 1e-05 of the longest rod"
+    assert f"cantilever: sdirk2, steps {stepping}\n" in capsys.readouterr().out
     tip = json.loads(Path("study.json").read_text())["quantities"][0]["values"]
     assert abs(tip[FINER_STEP] - tip[BASE]) < 0.5 * abs(tip[BASE] - tip[COARSER_STEP])
 

@@ -322,6 +322,32 @@ def test_whatever_can_touch_needs_contact_settings(part):
     assert "contact: found null" in faults_of(content)[0]
 
 
+@pytest.mark.parametrize(
+    ("path", "place", "radius"),
+    [
+        ({"shape": "arc", "radius": 0.001, "angle": 1.0}, "radius", 0.001),
+        ({"shape": "spiral", "start_radius": 0.02, "end_radius": 0.001, "angle": 300.0}, "end_radius", 0.001),
+        ({"shape": "spiral", "start_radius": 0.001, "end_radius": 0.02, "angle": 300.0}, "start_radius", 0.001),
+    ],
+)
+def test_a_path_whose_inner_face_would_have_no_length_is_refused(path, place, radius):
+    def bent(toward, **layers):
+        curved = {"start": [0, 0, 0], "direction": [1, 0, 0], "toward": toward, **path}
+        both = [layer(name, thickness=thickness) for name, thickness in layers.items()]
+        return scene([rod(both, stations=401) | {"path": curved}])
+
+    for toward, layers in (("normal", {"low": 5e-4, "high": 1.1e-3}), ("opposite", {"low": 1.1e-3, "high": 5e-4})):
+        (told,) = faults_of(bent(toward, **layers))
+        inner = "high" if toward == "normal" else "low"
+        assert told.startswith(
+            f"scene: rods.rod.path.{place}: found {radius}; must be larger: the path has a radius of "
+        )
+        assert f"the inner face of layer {inner}, 0.0011 m from it, would have no length" in told
+    load_scene(bent("opposite", low=5e-4, high=1.1e-3))  # the thick layer lies outside
+    assert "0.0011 m from it" in faults_of(bent("normal", only=2.2e-3))[0]
+    load_scene(bent("normal", only=1.8e-3))
+
+
 def test_two_layers_that_cover_the_path_only_together_are_refused():
     halves = [layer("near", interval=[0, 0.05]), layer("far", interval=[0.05, 0.1])]
     assert "one layer must cover the whole path" in faults_of(scene([rod(halves)]))[0]

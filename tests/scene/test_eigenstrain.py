@@ -1,13 +1,16 @@
 """Eigenstrain laws as scenes state them."""
 
+import numpy as np
 import pytest
 from sample_scenes import layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError
+from bilayer_core.model.build import build_model
 from bilayer_core.model.validity import validity_warnings
 from bilayer_core.scene.eigenstrain import LAWS
 from bilayer_core.scene.loader import parse_scene, scene_text
+from bilayer_core.scene.transduction import free_strain
 
 CHANNELS = {
     "humidity": {"schedule": {"type": "hold", "value": 0}},
@@ -53,11 +56,76 @@ def test_one_law_is_written_without_a_list_and_several_are_read_back_the_same():
     assert parse_scene(scene_text(config), "text") == config
 
 
+def limited(*laws):
+    """Lines of the error that refuses a layer with these laws; none if it is accepted."""
+    try:
+        load_scene(driven(list(laws)))
+    except SceneError as error:
+        return str(error).splitlines()
+    return []
+
+
+def of(stimulus, gain, **more):
+    return {"stimulus": stimulus, "gain": gain, **more}
+
+
+def test_an_eigenstrain_that_would_leave_a_layer_no_length_is_refused():
+    (told,) = limited(of("humidity", -1.5))
+    assert told.startswith(
+        f"{PLACE}[0].gain: found -1.5; must leave the layer a length: `humidity` from 0 to 1 [1] can"
+    )
+    assert "take its eigenstrain to -150 %; allowed is above -100 %, by a smaller gain, a `saturation` below 1" in told
+
+
+@pytest.mark.parametrize(
+    ("laws", "reached"),
+    [
+        ([of("humidity", -0.999)], None),
+        ([of("humidity", -1)], "-100 %"),
+        ([of("heat", 1)], "-100 %"),  # heat goes down to -1
+        ([of("humidity", 3)], None),  # grows, however much
+        ([of("humidity", 0.6, reference=1.7)], "-102 %"),
+        ([of("humidity", -5, saturation=0.99)], None),
+        ([of("humidity", -5, saturation=1.2)], "-119.9 %"),
+        ([of("humidity", -0.6), of("heat", 0.5)], "-110 %"),
+        ([of("humidity", -0.6), of("heat", 0.39)], None),
+        ([of("humidity", -0.6, interval=[0, 0.05]), of("heat", 0.5, interval=[0.05, 0.1])], None),
+        ([of("humidity", -0.6, interval=[0, 0.06]), of("heat", 0.5, interval=[0.05, 0.1])], "-110 %"),
+        ([of("humidity", -2), of("humidity", 1.1)], None),  # in step: -90 % at most
+        ([of("humidity", -2), of("humidity", 1.1, time_constant=1)], "-200 %"),  # the second lags behind
+        ([of("heat", 3, saturation=0.9), of("heat", -0.8)], None),
+        ([of("humidity", -12, saturation=3), of("humidity", 2.5)], "-178.1 %"),  # in between: -50 % at the end
+    ],
+)
+def test_the_least_rest_length_counts_laws_where_and_when_they_meet(laws, reached):
+    told = limited(*laws)
+    assert len(told) == (reached is not None)
+    assert reached is None or f"can take its eigenstrain to {reached};" in told[0]
+    assert len(laws) == 1 or reached is None or "with the laws that act there too" in told[0]
+
+
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_every_edge_of_a_model_keeps_a_rest_length_at_the_ends_of_what_is_accepted(model):
+    built = build_model(load_scene(driven([of("humidity", -0.6), of("heat", 0.39)])), model)
+    least = np.minimum(built.law_gain * [0.0, -1.0], built.law_gain * [1.0, 1.0])
+    strain = built.rest_strain.copy()
+    np.add.at(strain, built.driven_edge, built.driven_weight * least[built.driven_law])
+    assert strain.min() > -1.0
+    assert strain.min() == pytest.approx({"laminate": -0.495, "two_rod": -0.99}[model])
+
+
+def test_strains_of_scenes_are_those_of_kernels():
+    values = np.linspace(-1, 1, 21)
+    for saturation in (None, 0.05):
+        law = laws_of(of("heat", 0.3, reference=0.2, saturation=saturation))[0]
+        np.testing.assert_array_max_ulp(law.strain_at(values), free_strain(values, 0.3, 0.2, law.limit), 2)
+
+
 def test_adjoining_intervals_share_no_edge_and_leave_none_out():
     strip = load_scene(
         driven(
             [
-                {"stimulus": "heat", "gain": 1, "interval": ends}
+                {"stimulus": "heat", "gain": 0.1, "interval": ends}
                 for ends in ([0, 0.0125], [0.0125, 0.061], [0.061, 0.1])
             ],
             interval=[0.005, 0.09],
@@ -120,7 +188,7 @@ def test_a_fault_of_a_law_is_told_with_its_place(laws, fault):
 
 def test_a_law_is_no_key_to_override_once_its_numbers_are_stated():
     with pytest.raises(SceneError, match="there is no law of rods.rod.layers.active.eigenstrain"):
-        load_scene(driven({"stimulus": "heat", "gain": 1}), ["rods.rod.layers.active.eigenstrain.law=current_sma"])
+        load_scene(driven({"stimulus": "heat", "gain": 0.1}), ["rods.rod.layers.active.eigenstrain.law=current_sma"])
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import pytest
 from sample_scenes import contact, layer, rod, scene
 
 from bilayer_core import load_scene
-from bilayer_core.model.validity import validity_figures, validity_warnings
+from bilayer_core.model.validity import EdgeFigures, validity_figures, validity_warnings
 
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
 
@@ -84,6 +84,58 @@ def test_the_warning_is_given_beyond_the_limit_and_not_within(case):
     (found,) = (figure for figure in validity_figures(load_scene(beyond)) if str(figure).startswith(text))
     same = [figure for figure in validity_figures(load_scene(within)) if figure.limit == found.limit]
     assert [figure.outside for figure in same] == [""]
+
+
+def told(layers, **more):
+    """Figures of a rod of these layers without contact, as one text."""
+    settings = {"length": 0.1, "width": 0.001, "stations": 51} | more
+    return "\n".join(map(str, validity_figures(load_scene(scene([rod(layers, **settings)], stimuli=HEAT)))))
+
+
+def test_the_natural_curvature_of_a_single_layer_counts_without_any_eigenstrain():
+    within, beyond = (told([layer(thickness=1e-3, natural_curvature=k)]) for k in (-199.0, 201.0))
+    assert "eigenstrain" not in within
+    assert "curvature × thickness up to 0.2 (at most 0.2)\n" in within
+    assert "curvature × thickness up to 0.2 (at most 0.2): it is no thin rod" in beyond
+
+
+def test_bonded_layers_bend_by_their_natural_curvatures_weighted_with_their_stiffness():
+    """Two equal layers: EI of each is an eighth of the half of D = E w H³/12; the curvature is the mean over four."""
+    layers = [layer("bottom", thickness=1e-3), layer("top", thickness=1e-3, natural_curvature=80.0)]
+    figures = EdgeFigures(load_scene(scene([rod(layers)])), load_scene(scene([rod(layers)])).rods[0])
+    assert figures.natural_change() == pytest.approx(10.0, rel=1e-12)
+    assert figures.curvature() == pytest.approx(10.0, rel=1e-12)
+    assert "w²κ/H up to 0.5 (below 0.5 or above 3): between beam and plate" in told(layers, width=0.01001)
+    assert "w²κ/H up to 0.5 (below 0.5 or above 3)\n" in told(layers, width=0.00999) + "\n"
+
+
+def test_a_layer_whose_own_natural_curvature_is_sharp_is_told_although_the_other_holds_it_straight():
+    layers = [layer("bottom", thickness=1e-3), layer("top", thickness=1e-3, natural_curvature=201.0)]
+    assert "curvature × thickness up to 0.2 (at most 0.2): it is no thin rod" in told(layers)
+
+
+def test_natural_curvature_and_eigenstrain_add_up():
+    swelling = {"stimulus": "heat", "gain": 0.01}
+    layers = [layer("bottom", thickness=1e-3), layer("top", thickness=1e-3, natural_curvature=-80.0)]
+    assert "curvature × thickness up to 0.08 (at most 0.2)" in told(layers)  # 10 1/m on 2 mm, 80 on 1 mm
+    layers[1]["natural_curvature"], layers[1]["eigenstrain"] = -16.0, swelling
+    assert "curvature × thickness up to 0.019 (at most 0.2)" in told(layers)  # 2 1/m and 1.5 × 1 % / H
+
+
+@pytest.mark.parametrize("shape", ["arc", "spiral"])
+def test_the_curvature_of_the_path_counts(shape):
+    radii = {"radius": 0.01} if shape == "arc" else {"start_radius": 0.02, "end_radius": 0.01}
+    path = {"shape": shape, "start": [0, 0, 0], "direction": [1, 0, 0], "angle": 3.0, **radii}
+    strip = rod([layer(thickness=1e-3)], width=0.001, stations=101) | {"path": path}
+    (text,) = (str(f) for f in validity_figures(load_scene(scene([strip]))) if f.what.startswith("curvature"))
+    assert "curvature × thickness up to 0.1 (at most 0.2)" in text
+
+
+def test_the_natural_curvature_of_a_layer_that_has_the_paths_changes_nothing():
+    path = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "angle": 3.0, "radius": 0.01}
+    strip = rod([layer(thickness=1e-3, natural_curvature=100.0)], stations=101) | {"path": path}
+    config = load_scene(scene([strip]))
+    assert EdgeFigures(config, config.rods[0]).natural_change() == pytest.approx(0.0, abs=1e-12)
 
 
 def test_without_contact_nothing_is_said_of_distances_and_without_eigenstrain_nothing_of_curvature():
