@@ -38,13 +38,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kinematics.rotation import rotation_matrix
+from ..march.evaluator import Evaluator
+from ..march.step_groups import Place
+from ..model.force_list import Kind, kinds
 from ..model.model import Model
+from ..model.rest_strains import RestStrains
 from ..model.state import State
-from ..solve.configuration import Configuration
-from ..solve.potential import IncrementalPotential
-from ..solve.terms.fluid import survey_fluid
-from ..solve.terms.term import Kind, RestStrains
-from .motion import Gradient, Motion, displacement, momentary_context, of_prescribed, velocity
+from .fluid import survey_fluid
+from .motion import MOMENT, Gradient, Motion, displacement, of_prescribed, velocity
 from .observe import kinetic_energy
 from .quadrature import simpson
 
@@ -71,7 +72,7 @@ class _Instant:
     `power` has for every dissipative term that of all forces, and that of those on what prescribed bodies impose.
     """
 
-    at: Configuration
+    at: Place
     kinetic: float
     imposed_kinetic: float
     fluid: _Fluid | None
@@ -92,11 +93,12 @@ class EnergyLedger:
 
     def __init__(self, model: Model):
         self._model = model
-        self._potential = IncrementalPotential(model)  # the stepper's own keeps what it has
+        self._evaluator = Evaluator(model)  # with arrays of its own: those of the run stay as they are
         self._imposed_mass = np.zeros(model.node_count)
         imposed = model.attached_node[model.attached_free < 0]
         self._imposed_mass[imposed] = model.node_mass[imposed]
-        self._kinds: dict[str, Kind] = {}
+        self._kinds = {name: kinds()[name] for name in model.forces}
+        self._watched = [name for name, kind in self._kinds.items() if kind is not Kind.INERTIAL]
         self._first: _Instant | None = None
 
     def begin(self, state: State, rest: RestStrains, load_factor: Array) -> None:
@@ -121,7 +123,7 @@ class EnergyLedger:
         before, after = self._last, self._look(state, rest, load_factor)
         moved = displacement(self._model, before.at, after.at)
         imposed = of_prescribed(self._model, moved)
-        way = _Way(self._model, before, state, moved)
+        way = _Way(self._model, self._evaluator, before, state, moved)
         halfway = before.rest.halfway_to(rest)
         middle = self._look_at(way.at(0.5), way.state, halfway, 0.5 * (before.load_factor + load_factor))
         for name, gradient in after.gradient.items():
@@ -172,7 +174,7 @@ class EnergyLedger:
             "supplied": supplied,
             "stored": stored,
             "lost": lost,
-            "work": {name: work[name] for name in self._kinds},
+            "work": {name: work[name] for name in self._watched},
             "residual": residual,
             "relative_residual": residual / largest if largest > 0.0 else 0.0,
         }
@@ -187,12 +189,10 @@ class EnergyLedger:
         after: _Instant,
     ) -> Array:
         """Work [J] of a barrier over each of the motions; `rates` are those at the start, in the middle, at the end."""
-        potential = self._potential
 
         def rate(part: float) -> Array:
-            for _ in potential.one_by_one(way.at(part), only=(name,)):
-                return np.array([motion.work(potential.accumulators) for motion in motions])
-            raise KeyError(name)
+            _, gradient = self._force(name, way.at(part))
+            return np.array([motion.work(gradient) for motion in motions])
 
         energy = max(before.energy[name], after.energy[name])
         return simpson(rate, (0.0, 1.0), tuple(rates), BARRIER_ERROR * energy, BARRIER_HALVINGS)
@@ -205,7 +205,12 @@ class EnergyLedger:
         work = float(np.vdot(turned, imposed.edge[: self._model.edge_count]))
         return work - 0.5 * float(np.vdot(pushed, before.velocity[held] + after.velocity[held]))
 
-    def _look_at_fluid(self, at: Configuration, state: State) -> _Fluid | None:
+    def _force(self, name: str, at: Place) -> tuple[float, Gradient]:
+        """Energy [J] and derivatives of one force at a configuration."""
+        energy = self._evaluator.forces(at, (name,))[name]
+        return energy, Gradient.copy_of(self._evaluator.first, self._model)
+
+    def _look_at_fluid(self, at: Place, state: State) -> _Fluid | None:
         model = self._model
         if not len(model.fluid_mass):
             return None
@@ -215,23 +220,23 @@ class EnergyLedger:
         return _Fluid(relative + carried, momentum, shape_gradient)
 
     def _look(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
-        at = Configuration(self._model)
-        at.take_state(state)
+        at = self._evaluator.new()
+        self._evaluator.take_state(state, at)
         return self._look_at(at, state, rest, load_factor)
 
-    def _look_at(self, at: Configuration, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
-        model, potential = self._model, self._potential
+    def _look_at(self, at: Place, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
+        model, evaluator = self._model, self._evaluator
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
-        potential.start_step(momentary_context(model, at, state, rest, load_factor))
+        evaluator.stand_still(state, at, MOMENT, rest.edge, rest.joint, load_factor)
+        evaluator.start_stage(at)
         energy, gradient, power = {}, {}, {}
-        for term, name, value in potential.one_by_one(at):
-            self._kinds[name] = term.kind
-            if term.kind is Kind.DISSIPATIVE:
-                power[name] = (moving.work(potential.accumulators), imposed.work(potential.accumulators))
+        for name in self._watched:
+            value, found = self._force(name, at)
+            if self._kinds[name] is Kind.DISSIPATIVE:
+                power[name] = (moving.work(found), imposed.work(found))
             else:
-                energy[name] = value
-                gradient[name] = Gradient.copy_of(potential.accumulators)
+                energy[name], gradient[name] = value, found
         return _Instant(
             at=at,
             kinetic=kinetic_energy(model, state),
@@ -247,7 +252,7 @@ class EnergyLedger:
         )
 
 
-def _resistance(model: Model, at: Configuration, rest: RestStrains) -> tuple[Array, Array]:
+def _resistance(model: Model, at: Place, rest: RestStrains) -> tuple[Array, Array]:
     """Derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
     strain = at.length[: model.edge_count] / model.rest_length - 1.0
     bend = at.joint_strain[:, 0] - rest.joint[:, 0]
@@ -261,19 +266,19 @@ def _resistance(model: Model, at: Configuration, rest: RestStrains) -> tuple[Arr
 class _Way:
     """The straight way from an instant to a state: positions along lines, turns at constant rates."""
 
-    def __init__(self, model: Model, begin: _Instant, end: State, moved: Motion):
-        self._model, self._begin, self._moved = model, begin.at, moved
+    def __init__(self, model: Model, evaluator: Evaluator, begin: _Instant, end: State, moved: Motion):
+        self._model, self._evaluator, self._begin, self._moved = model, evaluator, begin.at, moved
         self.state = end.copy()
 
-    def at(self, part: float) -> Configuration:
+    def at(self, part: float) -> Place:
         """Configuration after a part of the way; `state` goes along, its velocities apart."""
-        begin, moved, state = self._begin, self._moved, self.state
+        begin, moved, state, evaluator = self._begin, self._moved, self.state, self._evaluator
         state.position[:] = begin.position + part * moved.node
+        state.twist[:] = begin.joint_strain[:, 2]
         state.body_position[:] = begin.place[:-1] + part * moved.contact[:-1, :3]
         for b, turn in enumerate(moved.contact[:-1, 3:]):
             state.body_rotation[b] = rotation_matrix(part * turn) @ begin.rotation[b]
-        at = Configuration(self._model)
-        at.take_state(state)
-        at.carry_frames(begin, part * moved.edge[: self._model.edge_count, 3])
-        at.joint_strain[:, 2] = begin.joint_strain[:, 2]
+        at = evaluator.new()
+        evaluator.take_state(state, at)
+        evaluator.carry_frames(begin, part * moved.edge[: self._model.edge_count, 3], at)
         return at

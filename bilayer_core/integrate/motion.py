@@ -7,51 +7,54 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kinematics.rotation import rotation_matrix, rotation_vector
+from ..march.allocate import FirstDerivatives
+from ..march.step_groups import Place
 from ..model.model import Model
+from ..model.rest_strains import RestStrains
 from ..model.state import State
 from ..solve.configuration import Configuration
-from ..solve.terms.term import Accumulators, RestStrains, StepContext
+from ..solve.terms.term import StepContext
 
 Array = np.ndarray
-PARTS = ("node", "edge", "pair", "body", "carrier", "contact")
+PARTS = ("node", "edge", "pair", "body", "contact")
 MOMENT = 1e-6
 """Time over which potentials see a velocity as a displacement [s]; rounding makes 1e-10 m/s of it."""
 
 
 @dataclass(frozen=True)
 class Gradient:
-    """First derivatives of one term, copied from `Accumulators`: shapes as there."""
+    """First derivatives of one force: shapes as in `FirstDerivatives`.
 
-    node: Array
-    edge: Array
-    pair: Array
-    body: Array
-    carrier: Array
-    contact: Array
-
-    @classmethod
-    def copy_of(cls, out: Accumulators) -> Gradient:
-        """The present first derivatives."""
-        return cls(*(getattr(out, part).copy() for part in PARTS))
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Displacement [m, rad] or velocity [m/s, rad/s] of everything that a term may differentiate by.
-
-    Parts and shapes are those of `Accumulators`. `node` and the first rows of `carrier` are the same vectors, and so
-    are `body` and the rows of free bodies of `contact`, because a term adds to one of them; the other rows of `carrier`
-    are zero, because what bodies carry counts with these.
+    Of `contact`, rows of free bodies are zero, because theirs are in `body`.
     """
 
     node: Array
     edge: Array
     pair: Array
     body: Array
-    carrier: Array
     contact: Array
 
-    def work(self, gradient: Gradient | Accumulators) -> float:
+    @classmethod
+    def copy_of(cls, first: FirstDerivatives, model: Model) -> Gradient:
+        """The present ones."""
+        found = cls(*(getattr(first, part).copy() for part in PARTS))
+        found.contact[model.bodies.body_of_free] = 0.0
+        return found
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Displacement [m, rad] or velocity [m/s, rad/s] of everything that a force may differentiate by: shapes as in
+    `FirstDerivatives`.
+    """
+
+    node: Array
+    edge: Array
+    pair: Array
+    body: Array
+    contact: Array
+
+    def work(self, gradient: Gradient) -> float:
         """Work [J] of forces with the given gradient over this displacement; power [W] if it is a velocity."""
         return -sum(float(np.vdot(getattr(gradient, part), getattr(self, part))) for part in PARTS)
 
@@ -61,13 +64,11 @@ def compose(model: Model, node: Array, turn: Array, wall: Array, contact: Array)
     i = model.edge_node
     edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), wall])
     middle = 0.5 * (node[i] + node[i + 1])
-    carrier = np.zeros((len(model.carriers.weight), 3))
-    carrier[: model.node_count] = node
     body = contact[model.bodies.body_of_free]
-    return Motion(node, edge, middle[model.pair_top] - middle[model.pair_bottom], body, carrier, contact)
+    return Motion(node, edge, middle[model.pair_top] - middle[model.pair_bottom], body, contact)
 
 
-def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:
+def displacement(model: Model, start: Place | Configuration, end: Place | Configuration) -> Motion:
     """From one configuration to another; turns, each by less than half a turn, are those beyond parallel transport."""
     edges = model.edge_count
     turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
@@ -78,7 +79,7 @@ def displacement(model: Model, start: Configuration, end: Configuration) -> Moti
     return compose(model, end.position - start.position, turn[:edges], wall, contact)
 
 
-def velocity(model: Model, at: Configuration, state: State) -> Motion:
+def velocity(model: Model, at: Place | Configuration, state: State) -> Motion:
     """Velocities of a state whose configuration is `at`."""
     world = np.zeros((1, 6))
     contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
@@ -89,7 +90,7 @@ def velocity(model: Model, at: Configuration, state: State) -> Motion:
 
 
 def momentary_context(
-    model: Model, at: Configuration, state: State, rest: RestStrains, load_factor: Array
+    model: Model, at: Place | Configuration, state: State, rest: RestStrains, load_factor: Array
 ) -> StepContext:
     """A step so short that nothing changes in it but what moves: forces at a state, with its velocities.
 

@@ -10,7 +10,7 @@ from ..kinematics.rotation import quaternion_from_matrix
 from ..model.model import Model, StrandArrays
 from ..model.shapes import Shape, obstacle_pose, shape_of
 from ..model.state import State
-from ..solve.terms.fluid import energy_of_fluid
+from .fluid import energy_of_fluid
 from .frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper

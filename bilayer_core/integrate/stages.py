@@ -24,10 +24,11 @@ import numpy as np
 
 from ..kinematics.rotation import rotation_matrix, rotation_vector, skew
 from ..model.model import Model
+from ..model.rest_strains import RestStrains
 from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.terms.fluid import momentum_of_fluid
-from ..solve.terms.term import RestStrains, StepContext
+from ..solve.terms.term import StepContext
 
 Array = np.ndarray
 SPIN_ITERATIONS = 50

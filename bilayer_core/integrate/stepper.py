@@ -12,11 +12,12 @@ from ..errors import SimulationError
 from ..march.engine import Engine, MarchReport, Settings
 from ..march.step import AT_ONCE, NO_JUMP
 from ..model.model import Model
+from ..model.rest_strains import RestStrains
 from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonSolver, NewtonStatus
 from ..solve.potential import IncrementalPotential
-from ..solve.terms.term import RestStrains, StepContext
+from ..solve.terms.term import StepContext
 from .method import Method
 from .motion import MOMENT, momentary_context
 from .sdirk2 import METHOD as SELF_STARTING

@@ -9,10 +9,10 @@ import numpy as np
 
 from ..march.step_groups import Course
 from ..model.model import Model, scheduled_motion
+from ..model.rest_strains import RestStrains
 from ..model.state import State
 from ..scene.piece import Pieces
 from ..scene.transduction import follow, free_strain
-from ..solve.terms.term import RestStrains
 from .method import Method
 from .stages import Prescribed
 

@@ -10,11 +10,7 @@ from ..forces.slip import WAY
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
 from ..solve.band import width
-from ..solve.neighbours import Neighbours
-from ..solve.newton_matrix import NewtonMatrix
-from ..solve.planar_matrix import PlanarMatrix
-from ..solve.potential import IncrementalPotential
-from ..solve.rod_contact import Contacts, RodContact
+from .allocate import ContactColumns, NearRods, NearSurfaces, RodContacts, SecondDerivatives, body_masses
 from .model_groups import (
     Bodies,
     Bonds,
@@ -41,9 +37,9 @@ from .problem import Border, System, Wide
 Array = np.ndarray
 
 
-def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, Any]:
+def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
     """The groups of a problem that stay as they are."""
-    layout, matrix, scene = model.solved_layout, potential.matrix, model.scene
+    layout, scene = model.solved_layout, model.scene
     bodies, free, plane = model.bodies, len(model.bodies.mass), model.plane
     b = layout.half_bandwidth
     return dict(
@@ -63,8 +59,8 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
             **{name: getattr(model, name) for name in Strands.fields[10:]},
         ),
         drives=Drives(**{name: getattr(model, name) for name in Drives.fields}),
-        space=_space(model, matrix) if plane is None else None,
-        plane=_plane(model, matrix) if plane is not None else None,
+        space=_space(model, second) if plane is None else None,
+        plane=_plane(model, second) if plane is not None else None,
         off_axis=None if len(model.pair_top) else _off_axis(model),
         bonds=(
             Bonds(top=model.pair_top, bottom=model.pair_bottom, stiffness=model.pair_stiffness, rest=model.pair_rest)
@@ -77,7 +73,7 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
             prescribed=np.flatnonzero(bodies.free_index[:-1] < 0),
             mass=bodies.mass,
             second_moment=bodies.second_moment,
-            inertia=matrix.body_masses,
+            inertia=body_masses(model),
             freedom=bodies.freedom,
             reach=bodies.reach,
             turns=np.array(
@@ -96,7 +92,7 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
         loads=_forces(model, model.dead_loads) if scene.loads else None,
         followers=_forces(model, model.follower_loads) if scene.loads else None,
         moments=_moments(model) if scene.loads else None,
-        meets=1 if potential.has_contact else None,
+        meets=1 if model.meets_surfaces or model.rod_surfaces is not None else None,
         system=System(
             band=np.zeros((layout.size + b, b + 1)),
             right=np.zeros(layout.size + b),
@@ -108,21 +104,21 @@ def lasting_groups(model: Model, potential: IncrementalPotential) -> dict[str, A
     )
 
 
-def _space(model: Model, matrix: NewtonMatrix) -> Space:
+def _space(model: Model, second: SecondDerivatives) -> Space:
     return Space(
-        top_hessian=matrix.top_hessian,
-        bottom_hessian=matrix.bottom_hessian,
-        bond_hessian=matrix.cross_hessian[model.bend_count :],
+        top_hessian=second.top_hessian,
+        bottom_hessian=second.bottom_hessian,
+        bond_hessian=second.cross_hessian[model.bend_count :],
     )
 
 
-def _plane(model: Model, matrix: PlanarMatrix) -> Plane:
+def _plane(model: Model, second: SecondDerivatives) -> Plane:
     names = ("frame", "polar_gradient", "polar_hessian", "mixed_hessian")
     return Plane(
         normal=model.plane.normal,
         side=model.plane.side,
         joint_after=model.plane.joint_after,
-        **{name: getattr(matrix, name) for name in names},
+        **{name: getattr(second, name) for name in names},
     )
 
 
@@ -177,7 +173,7 @@ def _held(model: Model) -> Held:
     )
 
 
-def surfaces_of(model: Model, near: Neighbours) -> Surfaces:
+def surfaces_of(model: Model, near: NearSurfaces) -> Surfaces:
     carriers, surfaces, contact = model.carriers, model.surfaces, model.scene.contact
     return Surfaces(
         d_hat=contact.barrier_distance,
@@ -236,11 +232,11 @@ def slips_of(model: Model, room: int) -> Slips | None:
     return Slips(threshold=law.speed_threshold, way=np.zeros((room, WAY)))
 
 
-def _touches(contacts: Contacts) -> Touches:
+def _touches(contacts: RodContacts) -> Touches:
     return Touches(**{name: getattr(contacts, name) for name in Touches.fields})
 
 
-def threads_of(model: Model, rods: RodContact) -> Threads:
+def threads_of(model: Model, rods: NearRods) -> Threads:
     pairs, surfaces, contact = rods.pairs, model.rod_surfaces, model.scene.contact
     law, surface = contact.friction, ("edge_radius", "edge_rod", "edge_first", "edge_arc", "first_point")
     points = ("point_edge", "point_fraction", "point_arc", "point_weight")
@@ -272,10 +268,8 @@ def threads_of(model: Model, rods: RodContact) -> Threads:
     )
 
 
-def leaving_of(matrix: NewtonMatrix) -> Leaving:
-    border, rods = matrix.rod_border, matrix.rods
-    border.make_room(rods.contacts.room + rods.sliding.room)
-    return Leaving(counts=np.zeros(2, dtype=np.int64), **{name: getattr(border, name) for name in Leaving.fields[1:]})
+def leaving_of(columns: ContactColumns) -> Leaving:
+    return Leaving(counts=np.zeros(2, dtype=np.int64), **{name: getattr(columns, name) for name in Leaving.fields[1:]})
 
 
 def _flow(model: Model) -> Flow:

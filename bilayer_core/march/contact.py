@@ -12,7 +12,9 @@ from ..kinematics.turning import product_transposed
 from ..solve.neighbours import MOTION_MARGIN
 from .copying import copy, copy_matrix
 from .status import NO_ROOM, READY
-from .terms import BARRIER, FRICTION
+from .terms import place_of
+
+BARRIER, FRICTION = map(place_of, ("barrier", "friction"))
 
 
 @inner
@@ -68,6 +70,8 @@ def list_pairs(surfaces, at, motion):
 def _add_barrier(surfaces, bodies, at, sums, with_hessian):
     """Barrier of carriers against surfaces; returns the smallest gap [m]."""
     if surfaces is None:
+        return math.inf
+    if not sums.selected[BARRIER]:
         return math.inf
     sums.energy[BARRIER], gap, sums.links[0] = surface_contact(
         surfaces.d_hat,
@@ -151,7 +155,7 @@ def lag_sliding(sliding, surfaces, start, stage):
 def _add_sliding(sliding, surfaces, bodies, at, stage, sums, with_hessian):
     if sliding is None:
         return
-    if not sliding.acts:
+    if not (sliding.acts and sums.selected[FRICTION]):
         return
     for b in range(at.rotation.shape[0]):
         product_transposed(at.rotation, b, sliding.back, b, sliding.turn, b)

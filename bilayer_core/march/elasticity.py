@@ -16,7 +16,9 @@ from ..forces.stretch import stretch
 from ..forces.stretch_bend import natural_curvature, stretch_bend
 from ..jit import inner
 from .copying import copy
-from .terms import BENDING, BOND, STRETCHING, TWISTING
+from .terms import place_of
+
+STRETCHING, BENDING, TWISTING, BOND = map(place_of, ("stretching", "bending", "twisting", "bond"))
 
 
 @inner
@@ -24,36 +26,38 @@ def add_in_space(space, off_axis, bonds, strands, at, stage, sums, with_hessian)
     """Stretching, bending, twisting and bonds of dimension 3."""
     if space is None:
         return
-    sums.energy[STRETCHING] = stretch(
-        strands.axial_stiffness,
-        strands.rest_length,
-        stage.rest_edge,
-        at.length,
-        at.tangent,
-        sums.edge,
-        sums.edge_hessian,
-        with_hessian,
-    )
-    _bend_off_axis(off_axis, strands, at, stage)
-    sums.energy[BENDING], sums.energy[TWISTING] = bend_twist(
-        strands.first_bend,
-        strands.bend_count,
-        strands.joint_a,
-        strands.joint_b,
-        strands.joint_stiffness,
-        stage.natural,
-        at.length,
-        at.tangent,
-        at.director1,
-        at.director2,
-        stage.twist,
-        at.joint_strain,
-        sums.edge,
-        sums.edge_hessian,
-        sums.cross_hessian,
-        with_hessian,
-    )
-    _add_off_axis(off_axis, strands, at, sums, with_hessian)
+    if sums.selected[STRETCHING]:
+        sums.energy[STRETCHING] = stretch(
+            strands.axial_stiffness,
+            strands.rest_length,
+            stage.rest_edge,
+            at.length,
+            at.tangent,
+            sums.edge,
+            sums.edge_hessian,
+            with_hessian,
+        )
+    if sums.selected[BENDING] or sums.selected[TWISTING]:
+        _bend_off_axis(off_axis, strands, at, stage)
+        sums.energy[BENDING], sums.energy[TWISTING] = bend_twist(
+            strands.first_bend,
+            strands.bend_count,
+            strands.joint_a,
+            strands.joint_b,
+            strands.joint_stiffness,
+            stage.natural,
+            at.length,
+            at.tangent,
+            at.director1,
+            at.director2,
+            stage.twist,
+            at.joint_strain,
+            sums.edge,
+            sums.edge_hessian,
+            sums.cross_hessian,
+            with_hessian,
+        )
+        _add_off_axis(off_axis, strands, at, sums, with_hessian)
     _add_bonds(bonds, space, strands, at, stage, sums, with_hessian)
 
 
@@ -112,32 +116,34 @@ def add_in_plane(plane, off_axis, bonds, strands, at, stage, sums, with_hessian)
         return
     plane.polar_gradient[:] = 0.0
     in_plane_frames(strands.axes, at.length, at.tangent, plane.frame)
-    sums.energy[STRETCHING] = planar_stretch(
-        strands.axial_stiffness,
-        strands.rest_length,
-        stage.rest_edge,
-        at.length,
-        plane.polar_gradient,
-        plane.polar_hessian,
-        with_hessian,
-    )
-    _bend_off_axis(off_axis, strands, at, stage)
-    sums.energy[BENDING] = planar_bend(
-        strands.first_bend,
-        strands.bend_count,
-        strands.joint_a,
-        strands.joint_b,
-        strands.joint_stiffness,
-        stage.natural,
-        plane.side,
-        plane.frame,
-        at.joint_strain,
-        plane.polar_gradient,
-        plane.polar_hessian,
-        sums.cross_hessian,
-        with_hessian,
-    )
-    _add_off_axis_in_plane(plane, off_axis, strands, at, sums, with_hessian)
+    if sums.selected[STRETCHING]:
+        sums.energy[STRETCHING] = planar_stretch(
+            strands.axial_stiffness,
+            strands.rest_length,
+            stage.rest_edge,
+            at.length,
+            plane.polar_gradient,
+            plane.polar_hessian,
+            with_hessian,
+        )
+    if sums.selected[BENDING]:
+        _bend_off_axis(off_axis, strands, at, stage)
+        sums.energy[BENDING] = planar_bend(
+            strands.first_bend,
+            strands.bend_count,
+            strands.joint_a,
+            strands.joint_b,
+            strands.joint_stiffness,
+            stage.natural,
+            plane.side,
+            plane.frame,
+            at.joint_strain,
+            plane.polar_gradient,
+            plane.polar_hessian,
+            sums.cross_hessian,
+            with_hessian,
+        )
+        _add_off_axis_in_plane(plane, off_axis, strands, at, sums, with_hessian)
     _add_bonds_in_plane(plane, bonds, strands, at, stage, sums, with_hessian)
     polar_to_edges(strands.axes, plane.frame, plane.polar_gradient, sums.edge)
 
@@ -166,6 +172,8 @@ def _add_off_axis_in_plane(plane, off_axis, strands, at, sums, with_hessian):
 @inner
 def _add_bonds_in_plane(plane, bonds, strands, at, stage, sums, with_hessian):
     if bonds is None:
+        return
+    if not sums.selected[BOND]:
         return
     rotation = planar_bend(
         strands.bend_count,
@@ -206,6 +214,8 @@ def _add_bonds_in_plane(plane, bonds, strands, at, stage, sums, with_hessian):
 @inner
 def _add_bonds(bonds, space, strands, at, stage, sums, with_hessian):
     if bonds is None:
+        return
+    if not sums.selected[BOND]:
         return
     bending, twisting = bend_twist(
         strands.bend_count,

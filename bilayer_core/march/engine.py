@@ -4,25 +4,42 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 
 from ..model.model import Model
+from ..model.rest_strains import RestStrains
 from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
 from ..solve.potential import IncrementalPotential
-from ..solve.terms.term import RestStrains
+from .allocate import ContactColumns
 from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
 from .loop import Counted, Loop
 from .problem import Problem
 from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER, TOO_INACCURATE
 from .step import count_step, take_steps
-from .step_groups import Course, Method, StateArrays, Tally
-from .terms import NAMES
+from .step_groups import Course, Method, Place, StateArrays, Tally
+from .terms import NAMES, require_computed
 from .workspace import sums_of, work_of
 
 Array = np.ndarray
+
+
+def _first_of(potential: IncrementalPotential) -> SimpleNamespace:
+    """Its first derivatives, named as in `FirstDerivatives`."""
+    out = potential.accumulators
+    parts = {name: getattr(out, name) for name in ("node", "edge", "pair", "body", "carrier", "contact")}
+    attached = potential.attached_gradient
+    return SimpleNamespace(flat=out.all_but_carriers, unknowns=potential.gradient, attached=attached, **parts)
+
+
+def _second_of(potential: IncrementalPotential) -> SimpleNamespace:
+    """Its second derivatives, named as in `SecondDerivatives`."""
+    matrix = potential.matrix
+    names = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
+    return SimpleNamespace(flat=matrix.second_derivatives, **{name: getattr(matrix, name) for name in names})
 
 
 class Engine:
@@ -42,7 +59,8 @@ class Engine:
         self._model, self._potential = model, potential
         self.keeps = 1 if keeps_slopes else None
         self._energy = np.zeros(len(NAMES))
-        self._groups = lasting_groups(model, potential)
+        require_computed(model.forces)
+        self._groups = lasting_groups(model, potential.matrix)
         self._problem: Problem | None = None
         self._rooms: tuple | None = None
         self._state: State | None = None
@@ -64,7 +82,8 @@ class Engine:
         )
         self.start_over(-math.inf)
         self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
-        self._work = work_of(model, places, self.touched, self._groups["off_axis"])
+        records = [Place(**dict(zip(Place.fields, place.arrays, strict=True))) for place in places]
+        self._work = work_of(model, records, self.touched, self._groups["off_axis"])
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""
@@ -86,8 +105,8 @@ class Engine:
                 sliding=sliding_of(model, room) if near else None,
                 threads=threads_of(model, rods) if rods else None,
                 slips=slips_of(model, room + (rods.sliding.room if rods else 0)),
-                leaving=leaving_of(matrix) if rods else None,
-                sums=sums_of(model, potential, self._energy, 2 * room),
+                leaving=leaving_of(ContactColumns(model, rods.contacts.room + rods.sliding.room)) if rods else None,
+                sums=sums_of(_first_of(potential), _second_of(potential), self._energy, 2 * room),
             )
             self._rooms, self._counted = rooms, None
         return self._problem

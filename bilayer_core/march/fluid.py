@@ -5,7 +5,9 @@ from __future__ import annotations
 from ..forces.added_mass import added_mass, fluid_momentum
 from ..forces.drag import drag, node_directions
 from ..jit import inner
-from .terms import ADDED_MASS, DRAG
+from .terms import place_of
+
+DRAG, ADDED_MASS = map(place_of, ("drag", "added mass"))
 
 
 @inner
@@ -19,6 +21,8 @@ def turn_drag(flow, at):
 @inner
 def add_drag(flow, at, stage, sums, with_hessian):
     if flow is None:
+        return
+    if not sums.selected[DRAG]:
         return
     sums.energy[DRAG] = drag(
         flow.node,
@@ -74,6 +78,8 @@ def survey(fluid, strands, at, velocity, momentum_out):
 @inner
 def add_fluid(fluid, strands, at, stage, sums, with_hessian):
     if fluid is None:
+        return
+    if not sums.selected[ADDED_MASS]:
         return
     sums.energy[ADDED_MASS] = added_mass(
         fluid.mass,

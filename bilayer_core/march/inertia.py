@@ -5,7 +5,9 @@ from __future__ import annotations
 from ..forces.body import body_spring
 from ..forces.quadratic import angle_spring, gravity, node_spring
 from ..jit import inner
-from .terms import DAMPING, GRAVITY, INERTIA
+from .terms import place_of
+
+INERTIA, DAMPING, GRAVITY = map(place_of, ("inertia", "damping", "gravity"))
 
 
 @inner
@@ -28,17 +30,19 @@ def _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian
 
 @inner
 def add_inertia(gravitation, damping, border, strands, bodies, at, stage, sums, with_hessian):
-    factor = 1.0 / (stage.lengths[0] * stage.lengths[1])
-    energy = node_spring(strands.node_mass, factor, at.position, stage.predicted_position, sums.node)
-    energy += angle_spring(strands.spin_inertia, factor, at.turn, stage.predicted_turn, sums.edge)
-    energy += _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian)
-    sums.energy[INERTIA] = energy
-    if damping > 0.0:
+    if sums.selected[INERTIA]:
+        factor = 1.0 / (stage.lengths[0] * stage.lengths[1])
+        energy = node_spring(strands.node_mass, factor, at.position, stage.predicted_position, sums.node)
+        energy += angle_spring(strands.spin_inertia, factor, at.turn, stage.predicted_turn, sums.edge)
+        energy += _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian)
+        sums.energy[INERTIA] = energy
+    if damping > 0.0 and sums.selected[DAMPING]:
         factor = damping / stage.lengths[0]
         energy = node_spring(strands.node_mass, factor, at.position, stage.origin_position, sums.node)
         energy += angle_spring(strands.spin_inertia, factor, at.turn, stage.origin_turn, sums.edge)
         sums.energy[DAMPING] = energy
-    if gravitation[0] != 0.0 or gravitation[1] != 0.0 or gravitation[2] != 0.0:
+    falls = gravitation[0] != 0.0 or gravitation[1] != 0.0 or gravitation[2] != 0.0
+    if falls and sums.selected[GRAVITY]:
         energy = gravity(strands.node_mass, gravitation, at.position, sums.node)
         energy += gravity(bodies.mass, gravitation, at.body_position, sums.body)
         sums.energy[GRAVITY] = energy

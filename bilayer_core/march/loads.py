@@ -5,7 +5,9 @@ from __future__ import annotations
 from ..forces.drag import node_directions
 from ..forces.load import body_moment, point_force
 from ..jit import inner
-from .terms import MOMENTS
+from .terms import place_of
+
+LOADS, FOLLOWERS, MOMENTS = map(place_of, ("loads", "followers", "moments"))
 
 
 @inner
@@ -24,6 +26,8 @@ def scale_loads(loads, load_factor):
 @inner
 def add_loads(loads, at, sums, place):
     if loads is None:
+        return
+    if not sums.selected[place]:
         return
     energy = point_force(loads.node, loads.on_nodes, at.position, sums.node)
     sums.energy[place] = energy + point_force(loads.body, loads.on_bodies, at.body_position, sums.body)
@@ -73,6 +77,8 @@ def turn_moments(moments, load_factor, at):
 @inner
 def add_moments(moments, at, stage, sums, with_hessian):
     if moments is None:
+        return
+    if not sums.selected[MOMENTS]:
         return
     sums.energy[MOMENTS] = body_moment(
         moments.body,

@@ -113,34 +113,51 @@ all that takes it once more.)"""
 
 
 @inner
+def assemble(p, at, factor, simplified):
+    """The matrix of the last evaluation, that of `at`, with `factor` times the masses [1/s²]: the band, and the border
+    and corner of free bodies. Nodes that bodies hold are rows of the identity.
+    """
+    strands, band = p.strands, p.system.band
+    band[:] = 0.0
+    _assemble_in_space(p.space, p.bonds, strands, p.sums, factor, band)
+    _assemble_in_plane(p.plane, p.bonds, strands, at, p.sums, factor, band)
+    take_contacts_of(p.threads, p.leaving, strands, simplified, band)
+    start_border(p.wide, p.bodies)
+    assemble_border(p.border, p.wide, p.grips, p.leaving, p.space, p.plane, strands, p.sums, band, at)
+    _hold(p.held, strands, band)
+
+
+@inner
 def factorise(p, at, stage):
-    """Assemble and factorise the matrix of the last evaluation, that of `at`; returns a status.
+    """Assemble and factorise the matrix of the last evaluation, that of `at`.
 
     What is negative in the contact of rods is left out, then multiples of the mass matrix are added, until the matrix
     is positive definite.
+
+    Returns
+    -------
+    status : int
+    shift : float
+        Multiple of the inertial part that was added.
+    simplified : int
+        How far contacts of rods were simplified; see `take_contacts`.
     """
     strands, band = p.strands, p.system.band
     factor = 1.0 / (stage.lengths[0] * stage.lengths[1]) + p.damping / stage.lengths[0]
     shift, simplified = 0.0, EXACT
     while True:
-        band[:] = 0.0
-        _assemble_in_space(p.space, p.bonds, strands, p.sums, factor * (1.0 + shift), band)
-        _assemble_in_plane(p.plane, p.bonds, strands, at, p.sums, factor * (1.0 + shift), band)
-        take_contacts_of(p.threads, p.leaving, strands, simplified, band)
-        start_border(p.wide, p.bodies)
-        assemble_border(p.border, p.wide, p.grips, p.leaving, p.space, p.plane, strands, p.sums, band, at)
-        _hold(p.held, strands, band)
+        assemble(p, at, factor * (1.0 + shift), simplified)
         take_border(p.border, p.wide, p.bodies, p.held, strands.dimension, strands.size, shift * factor)
         if not leave(p.leaving, p.wide, strands, band):
-            return NO_ROOM_IN_BORDER
+            return NO_ROOM_IN_BORDER, shift, simplified
         if factor_band(band, strands.size, strands.bandwidth) < 0 and factorise_border(p.wide, strands, band):
-            return READY
+            return READY, shift, simplified
         if simplified < 2 and rods_touch(p.threads):
             simplified += 1
             continue
         shift = max(FIRST_SHIFT, shift * SHIFT_GROWTH)
         if shift > LARGEST_SHIFT:
-            return INDEFINITE
+            return INDEFINITE, shift, simplified
 
 
 @inner

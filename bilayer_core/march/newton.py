@@ -255,7 +255,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, looks):
                     status = NOT_FINITE
                     break
                 factorisations += 1
-                status = factorise(p, at, stage)
+                status, _, _ = factorise(p, at, stage)
                 if status != READY:
                     break
                 iterations += 1
@@ -274,7 +274,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, looks):
         if not fresh and residual > KEEP_FACTOR_BELOW * previous:
             task = FACTORISE
             continue
-        slope, noise = _look_ahead(p.strands, p.bodies, p.sums, p.system)
+        slope, noise = look_ahead(p.strands, p.bodies, p.sums, p.system)
         alpha, _, status = bound(p.surfaces, p.threads, p.bodies, p.held, p.strands, p.system, at)
         if status != READY:
             break
@@ -286,7 +286,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, looks):
 
 
 @inner
-def _look_ahead(strands, bodies, sums, system):
+def look_ahead(strands, bodies, sums, system):
     """Slope of the potential along the present step, and the difference below which its values mean nothing [J]; the
     motion of nodes and bodies is left for the bound.
     """

@@ -12,9 +12,8 @@ from .copying import copy
 from .elasticity import add_in_plane, add_in_space, take_rest
 from .fluid import add_drag, add_fluid, turn_drag, turn_fluid
 from .inertia import add_inertia
-from .loads import add_loads, add_moments, scale_loads, turn_followers, turn_moments
+from .loads import FOLLOWERS, LOADS, add_loads, add_moments, scale_loads, turn_followers, turn_moments
 from .status import NO_ROOM_FOR_RODS, READY
-from .terms import FOLLOWERS, LOADS
 from .threads import add_threads, lag_threads
 
 
@@ -50,6 +49,19 @@ def evaluate(p, at, stage, with_hessian, again):
     `again` the configuration is that of the last evaluation, and only what `follow` has changed since is found anew,
     without second derivatives and the gap.
     """
+    gap = add_forces(p, at, stage, with_hessian, again)
+    expand(p, at)
+    energy = 0.0
+    for k in range(p.sums.energy.shape[0]):
+        energy += p.sums.energy[k]
+    return energy, gap
+
+
+@inner
+def add_forces(p, at, stage, with_hessian, again):
+    """Energies and first derivatives by nodes, edges, pairs and bodies, second ones on request; parameters as for
+    `evaluate`. Returns the smallest gap [m].
+    """
     strands, bodies, sums = p.strands, p.bodies, p.sums
     gap = math.inf
     if again:
@@ -73,11 +85,7 @@ def evaluate(p, at, stage, with_hessian, again):
     add_moments(p.moments, at, stage, sums, with_hessian)
     add_drag(p.flow, at, stage, sums, with_hessian)
     add_fluid(p.fluid, strands, at, stage, sums, with_hessian)
-    _expand(p.bonds, p.held, strands, at, sums)
-    energy = 0.0
-    for k in range(sums.energy.shape[0]):
-        energy += sums.energy[k]
-    return energy, gap
+    return gap
 
 
 @inner
@@ -89,9 +97,10 @@ def _keep_lasting(followers, moments, flow, fluid, sums):
 
 
 @inner
-def _expand(bonds, held, strands, at, sums):
-    """From nodes, edges, pairs and bodies to the unknowns."""
-    _expand_edges(bonds, strands, sums)
+def expand(p, at):
+    """First derivatives from nodes, edges, pairs and bodies to the unknowns."""
+    held, strands, sums = p.held, p.strands, p.sums
+    _expand_edges(p.bonds, strands, sums)
     hand_gradient_to_bodies(
         held.unknown,
         held.free,

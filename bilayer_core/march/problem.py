@@ -34,7 +34,8 @@ class Sums:
     """First and second derivatives to which forces add; see `solve.terms.term.Accumulators`."""
 
     lasting: Array  # the part of `first` that stays as it is when other parts follow the configuration
-    energy: Array  # of each term, in the order of `march.terms` [J]
+    energy: Array  # of each force, in the order of `march.terms` [J]
+    selected: Array  # whether a force is computed, bool, in that order; in steps all are
     first: Array  # node, edge, pair and body in one piece, for clearing
     node: Array
     edge: Array

@@ -1,24 +1,34 @@
-"""Terms of the potential, by their place in `Sums.energy`; the order is that of the sum."""
+"""Places of forces in `Sums.energy` and `Sums.selected`: those of the list (`model.force_list`)."""
 
 from __future__ import annotations
 
-NAMES = (
-    "stretching",
-    "bending",
-    "twisting",
-    "bond",
-    "inertia",
-    "damping",
-    "gravity",
-    "loads",
-    "followers",
-    "moments",
-    "drag",
-    "added mass",
-    "barrier",
-    "friction",
-    "rod barrier",
-    "rod friction",
-)
-STRETCHING, BENDING, TWISTING, BOND, INERTIA, DAMPING, GRAVITY = range(7)
-LOADS, FOLLOWERS, MOMENTS, DRAG, ADDED_MASS, BARRIER, FRICTION, ROD_BARRIER, ROD_FRICTION = range(7, 16)
+from collections.abc import Iterable
+
+from ..model.force_list import kinds
+
+NAMES = tuple(kinds())
+"""Of forces, in the order of the sum."""
+_computed: set[str] = set()
+
+
+def place_of(name: str) -> int:
+    """Place of a force, for the module that computes it: nothing else may ask."""
+    if name not in NAMES:
+        raise LookupError(f"force {name!r}: is not in the list, bilayer_core/model/force_list.py: {', '.join(NAMES)}")
+    _computed.add(name)
+    return NAMES.index(name)
+
+
+def require_computed(forces: Iterable[str]) -> None:
+    """Refuse forces that a scene needs and nothing computes.
+
+    Raises
+    ------
+    NotImplementedError
+    """
+    missing = [name for name in forces if name not in _computed]
+    if missing:
+        raise NotImplementedError(
+            f"force {missing[0]!r}: is in the list, bilayer_core/model/force_list.py, and the scene needs it, but no "
+            "module of bilayer_core/march computes it"
+        )

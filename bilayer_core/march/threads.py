@@ -9,7 +9,9 @@ from ..contact.rod_list import FIRST, PATH, list_rods, reachable
 from ..contact.segment import facing_contacts
 from ..forces.rod_contact import rod_barrier, rod_friction
 from ..jit import inner
-from .terms import ROD_BARRIER, ROD_FRICTION
+from .terms import place_of
+
+ROD_BARRIER, ROD_FRICTION = map(place_of, ("rod barrier", "rod friction"))
 
 
 @inner
@@ -188,10 +190,10 @@ def add_threads(threads, strands, at, stage, sums):
     """Barrier and friction at the contacts found last; returns the smallest gap below the barrier distance [m]."""
     if threads is None:
         return math.inf
-    if rods_touch(threads):
+    if rods_touch(threads) and sums.selected[ROD_BARRIER]:
         sums.energy[ROD_BARRIER] = _barrier(threads, strands, at.position, sums.carrier)
     sliding = threads.sliding
-    if sliding.counted[0] > 0:
+    if sliding.counted[0] > 0 and sums.selected[ROD_FRICTION]:
         sums.energy[ROD_FRICTION] = rod_friction(
             threads.coefficient,
             threads.threshold,

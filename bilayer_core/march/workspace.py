@@ -1,12 +1,11 @@
-"""Room for what a step computes: sums of derivatives, which it shares with `solve.potential`, points and a stage."""
+"""What a step computes into: sums of derivatives, points and a stage."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..model.model import Model
-from ..solve.configuration import Configuration
-from ..solve.potential import IncrementalPotential
+from .allocate import FirstDerivatives, SecondDerivatives
 from .build import read_only
 from .model_groups import OffAxis
 from .problem import Sums
@@ -15,18 +14,18 @@ from .step_groups import Place, Point, Stage, Work
 Array = np.ndarray
 
 
-def sums_of(model: Model, potential: IncrementalPotential, energy: Array, links: int) -> Sums:
-    out, matrix = potential.accumulators, potential.matrix
-    second = ("edge_hessian", "cross_hessian", "pair_hessian")
+def sums_of(first: FirstDerivatives, second: SecondDerivatives, energy: Array, links: int) -> Sums:
+    hessians = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
     return Sums(
         energy=energy,
-        first=out.all_but_carriers,
-        lasting=np.zeros_like(out.all_but_carriers),
-        **{name: getattr(out, name) for name in ("node", "edge", "pair", "body", "carrier", "contact")},
-        gradient=potential.gradient,
-        attached=potential.attached_gradient,
-        second=matrix.second_derivatives,
-        **{name: getattr(matrix, name) for name in (*second, "node_hessian", "body_hessian")},
+        selected=np.ones(len(energy), dtype=bool),
+        first=first.flat,
+        lasting=np.zeros_like(first.flat),
+        **{name: getattr(first, name) for name in ("node", "edge", "pair", "body", "carrier", "contact")},
+        gradient=first.unknowns,
+        attached=first.attached,
+        second=second.flat,
+        **{name: getattr(second, name) for name in hessians},
         links=np.zeros(1, dtype=np.int64),
         link_node=np.zeros(links, dtype=np.int64),
         link_body=np.zeros(links, dtype=np.int64),
@@ -34,7 +33,8 @@ def sums_of(model: Model, potential: IncrementalPotential, energy: Array, links:
     )
 
 
-def _point(model: Model) -> Point:
+def point_of(model: Model) -> Point:
+    """Arrays of a point."""
     nodes, edges, free = model.node_count, model.edge_count, model.free_count
     bodies, wet = len(model.bodies.names), model.node_count if len(model.fluid_mass) else 0
     return Point(
@@ -50,37 +50,43 @@ def _point(model: Model) -> Point:
     )
 
 
-def work_of(model: Model, places: list[Configuration], touched: Array, off_axis: OffAxis | None) -> Work:
+def stage_of(model: Model, off_axis: OffAxis | None) -> Stage:
+    """Arrays of a stage."""
     nodes, edges, free, bodies = model.node_count, model.edge_count, model.free_count, len(model.bodies.names)
     world = np.zeros((bodies + 1, 3, 3))
     world[-1] = np.eye(3)
     rest_joint = np.zeros_like(model.joint_rest)
     read_only_rest = read_only(rest_joint)
+    return Stage(
+        lengths=np.zeros(2),
+        origin_position=np.zeros((nodes, 3)),
+        origin_turn=np.zeros(edges),
+        origin_body_position=np.zeros((free, 3)),
+        origin_place=np.zeros((bodies + 1, 3)),
+        origin_rotation=world,
+        origin_fluid_momentum=np.zeros((nodes if len(model.fluid_mass) else 0, 3)),
+        predicted_position=np.zeros((nodes, 3)),
+        predicted_turn=np.zeros(edges),
+        predicted_body_position=np.zeros((free, 3)),
+        predicted_body_rotation=np.zeros((free, 3, 3)),
+        twist=np.zeros(len(model.joint_a)),
+        rest_edge=np.zeros(edges),
+        rest_joint_out=rest_joint,
+        rest_joint=read_only_rest,
+        natural=read_only_rest if off_axis is None else off_axis.rest,
+        load_factor=np.zeros(len(model.scene.loads)),
+        body_turn=np.zeros((free, 3)),
+    )
+
+
+def work_of(model: Model, places: list[Place], touched: Array, off_axis: OffAxis | None) -> Work:
+    edges, bodies = model.edge_count, len(model.bodies.names)
     return Work(
-        places=tuple(Place(**dict(zip(Place.fields, place.arrays, strict=True))) for place in places),
-        stage=Stage(
-            lengths=np.zeros(2),
-            origin_position=np.zeros((nodes, 3)),
-            origin_turn=np.zeros(edges),
-            origin_body_position=np.zeros((free, 3)),
-            origin_place=np.zeros((bodies + 1, 3)),
-            origin_rotation=world,
-            origin_fluid_momentum=np.zeros((nodes if len(model.fluid_mass) else 0, 3)),
-            predicted_position=np.zeros((nodes, 3)),
-            predicted_turn=np.zeros(edges),
-            predicted_body_position=np.zeros((free, 3)),
-            predicted_body_rotation=np.zeros((free, 3, 3)),
-            twist=np.zeros(len(model.joint_a)),
-            rest_edge=np.zeros(edges),
-            rest_joint_out=rest_joint,
-            rest_joint=read_only_rest,
-            natural=read_only_rest if off_axis is None else off_axis.rest,
-            load_factor=np.zeros(len(model.scene.loads)),
-            body_turn=np.zeros((free, 3)),
-        ),
-        first=_point(model),
-        origins=(_point(model), _point(model)),
-        ends=(_point(model), _point(model)),
+        places=tuple(places),
+        stage=stage_of(model, off_axis),
+        first=point_of(model),
+        origins=(point_of(model), point_of(model)),
+        ends=(point_of(model), point_of(model)),
         turned=np.zeros(edges),
         rotation=np.zeros((bodies, 3, 3)),
         transduction=np.zeros(len(model.law_channel)),

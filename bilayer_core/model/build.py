@@ -7,6 +7,7 @@ import numpy as np
 from ..scene.config import SceneConfig
 from .bodies import build_bodies
 from .carriers import build_contact, refuse_penetration
+from .force_list import acting
 from .laminate import add_laminate
 from .layout import number_unknowns
 from .model import Bodies, Model
@@ -54,6 +55,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     mass_moment = found.column("mass_moment")
     arrays = Model(
         scene=scene,
+        forces=acting(scene, model, dimension),
         strands=tuple(found.strands),
         layout=number_unknowns(*numbered),
         plane=None

@@ -132,6 +132,7 @@ class Model(ReadOnlyArrays):
     """
 
     scene: SceneConfig
+    forces: tuple[str, ...]  # with an energy, that the scene needs; see `model.force_list`
     strands: tuple[StrandArrays, ...]
     layout: Layout
     plane: InPlane | None  # None in three dimensions

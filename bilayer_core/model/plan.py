@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..errors import SceneError
-from ..scene.body import Prescribed
 from ..scene.config import Coupling, SceneConfig
 from ..scene.profile import extremes
+from .force_list import planned
 from .laminate import uneven_faces
-from .meeting import Meeting, meetings, passing_warnings
+from .meeting import meetings, passing_warnings
 from .parties import contact_pairs
 from .planarity import find_plane, require_plane
 from .validity import validity_warnings
@@ -72,7 +72,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         chosen_dimension,
         chosen_integrator,
         reasons,
-        _terms(scene, chosen_model, chosen_dimension),
+        planned(scene, chosen_model, chosen_dimension),
         _contact_pairs(scene),
         (*validity_warnings(scene), *passing_warnings(scene), *_warnings_of(chosen_model, scene)),
     )
@@ -110,58 +110,6 @@ def _choose(key: str, asked, of_scene, allowed: tuple) -> tuple | None:
     if str(value) not in map(str, allowed):
         raise SceneError(f"{key}: {value} does not exist; allowed: auto, {', '.join(map(str, allowed))}")
     return next(candidate for candidate in allowed if str(candidate) == str(value)), origin
-
-
-def _terms(scene: SceneConfig, model: str, dimension: int) -> dict[str, str]:
-    def state(needed: bool, reason: str) -> str:
-        return "active" if needed else f"skipped: {reason}"
-
-    pairs = contact_pairs(scene)
-    rods = meetings(scene)
-    touch, apart = any(meeting.active for meeting in rods), _why_apart(rods)
-    friction = scene.contact.friction if scene.contact else None
-    free = any(not isinstance(body.motion, Prescribed) for body in scene.bodies)
-    dead = [load for load in scene.loads if load.frame == "world"]
-    turning = [load for load in scene.loads if load.frame == "material"]
-    driven = any(layer.eigenstrain for rod in scene.rods for layer in rod.layers)
-    bond = "skipped: one curve carries both layers" if model == "laminate" else ""
-    return {
-        "stretching": "active",
-        "bending": "active",
-        "twisting": state(dimension == 3, "nothing twists in a plane"),
-        "bond": bond or state(any(len(rod.layers) == 2 for rod in scene.rods), "no rod has two layers"),
-        "eigenstrain": state(driven, "no layer follows a stimulus"),
-        "inertia": "active",
-        "gravity": state(any(scene.gravity), "gravity is zero"),
-        "loads": state(any(any(load.force) for load in dead), "no force of fixed direction"),
-        "followers": state(any(any(load.force) for load in turning), "no load in a material frame"),
-        "moments": state(any(any(load.moment) for load in scene.loads), "no moment on a body"),
-        "drag": state(scene.fluid is not None, "no fluid"),
-        "added mass": state(
-            scene.fluid is not None and scene.fluid.added_mass is not None,
-            "no fluid" if scene.fluid is None else "fluid.added_mass is false",
-        ),
-        "damping": state(scene.damping.mass > 0.0, "damping.mass is zero"),
-        "bodies": state(free, "no free body"),
-        "barrier": state(bool(pairs), "no surfaces that can meet"),
-        "friction": state(
-            bool(pairs) and friction is not None and friction.acts,
-            "no surfaces that can meet" if not pairs else "no friction coefficient above zero",
-        ),
-        "rod barrier": state(touch, apart),
-        "rod friction": state(
-            touch and friction is not None and friction.coefficient > 0.0,
-            "no friction coefficient above zero" if touch else apart,
-        ),
-    }
-
-
-def _why_apart(found: tuple[Meeting, ...]) -> str:
-    """Why no rod can touch another or itself."""
-    reasons = {meeting.reason for meeting in found}
-    if len(reasons) == 1:
-        return reasons.pop()
-    return "; ".join(f"{meeting.what}: {meeting.reason}" for meeting in found)
 
 
 def _contact_pairs(scene: SceneConfig) -> tuple[str, ...]:

@@ -12,10 +12,10 @@ from bilayer_core.integrate.motion import momentary_context
 from bilayer_core.integrate.stepper import Stepper
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
+from bilayer_core.model.rest_strains import RestStrains
 from bilayer_core.model.section import bond, rectangle
 from bilayer_core.model.state import initial_state
 from bilayer_core.solve.configuration import Configuration
-from bilayer_core.solve.terms.term import RestStrains
 
 ELASTIC = ("stretching", "bending", "twisting", "bond")
 

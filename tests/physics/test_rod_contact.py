@@ -14,11 +14,11 @@ from bilayer_core.integrate.stages import predict, start_point
 from bilayer_core.integrate.stepper import Stepper
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
+from bilayer_core.model.rest_strains import RestStrains
 from bilayer_core.model.rod_surfaces import NearPairs
 from bilayer_core.model.state import initial_state
 from bilayer_core.solve.configuration import Configuration
 from bilayer_core.solve.rod_contact import RodContact
-from bilayer_core.solve.terms.term import RestStrains
 
 D_HAT = 1e-3
 

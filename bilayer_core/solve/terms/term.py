@@ -4,42 +4,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
 from ...forces.slip import WAY
+from ...model.force_list import Kind
 from ...model.model import Model
+from ...model.rest_strains import RestStrains
 from ..configuration import Configuration
 from ..newton_matrix import NewtonMatrix, zeros_in_one
 from ..planar_matrix import PlanarMatrix
 
 Array = np.ndarray
-
-
-@dataclass(frozen=True)
-class RestStrains:
-    """Strains without stress, as stimuli set them.
-
-    Attributes
-    ----------
-    edge : Array
-        η of each edge, shape (n_edge,).
-    joint : Array
-        κ̄₁ κ̄₂ ψ̄ of each joint [rad], shape (n_joint, 3), read-only; where `Model.coupled_joint` says so κ̄₁ is that
-        at ε = 0.
-    """
-
-    edge: Array
-    joint: Array
-
-    def halfway_to(self, other: RestStrains) -> RestStrains:
-        """The mean of both."""
-        joint = self.joint
-        if other.joint is not joint:
-            joint = 0.5 * (joint + other.joint)
-            joint.flags.writeable = False
-        return RestStrains(0.5 * (self.edge + other.edge), joint)
 
 
 @dataclass(frozen=True)
@@ -149,15 +125,6 @@ class Accumulators:
         """Forget the first derivatives of contact."""
         self.carrier.fill(0.0)
         self.contact.fill(0.0)
-
-
-class Kind(Enum):
-    """What a term's energy means, and on which side of the budget its work stands."""
-
-    CONSERVATIVE = "energy of the configuration"
-    DISSIPATIVE = "potential of the velocity; its work is lost"
-    INERTIAL = "distance from the motion without forces; its work is kinetic energy"
-    EXTERNAL = "work of a load over the step; supplied from outside"
 
 
 class Term(ABC):

@@ -1,0 +1,198 @@
+"""The list of forces, from which the plan, the engine, the energy budget and the documentation take theirs.
+
+A force has its line here and its formula in `forces/`; the part of the engine that computes it asks for its place by
+name (`march.terms.place_of`). An engine refuses to be built for a scene that needs a force nobody asked a place for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+from ..scene.body import Prescribed
+from ..scene.config import SceneConfig
+from ..scene.load import Load
+from .meeting import Meeting, meetings
+from .parties import contact_pairs
+
+
+class Kind(Enum):
+    """What the energy of a force means, and on which side of the energy budget its work stands."""
+
+    CONSERVATIVE = "energy of the configuration"
+    DISSIPATIVE = "potential of the velocity; its work is lost"
+    INERTIAL = "distance from the motion without forces; its work is kinetic energy"
+    EXTERNAL = "work of a load over the step; supplied from outside"
+
+
+@dataclass(frozen=True)
+class Question:
+    """A scene, the model and the dimension that were chosen for it."""
+
+    scene: SceneConfig
+    model: str
+    dimension: int
+
+    @cached_property
+    def pairs(self) -> tuple[str, ...]:
+        """Surfaces that something can meet."""
+        return contact_pairs(self.scene)
+
+    @cached_property
+    def meetings(self) -> tuple[Meeting, ...]:
+        """Rods that may meet each other or themselves."""
+        return meetings(self.scene)
+
+    @property
+    def rods_touch(self) -> bool:
+        """Whether the contact of any rods is computed."""
+        return any(meeting.active for meeting in self.meetings)
+
+    def loads(self, frame: str) -> list[Load]:
+        """Those that are fixed in the frame of the world, or of the material."""
+        return [load for load in self.scene.loads if load.frame == frame]
+
+
+@dataclass(frozen=True)
+class Force:
+    """A line of the list.
+
+    Attributes
+    ----------
+    name : str
+    kind : Kind or None
+        None for what acts through other forces and has no energy of its own.
+    formula : str
+        The file that derives it.
+    skipped : callable
+        Why a scene does not need it; None if it does.
+    """
+
+    name: str
+    kind: Kind | None
+    formula: str
+    skipped: Callable[[Question], str | None]
+
+
+def _unless(needed: bool, reason: str) -> str | None:
+    return None if needed else reason
+
+
+def _always(_: Question) -> None:
+    return None
+
+
+def _bond(q: Question) -> str | None:
+    if q.model == "laminate":
+        return "one curve carries both layers"
+    return _unless(any(len(rod.layers) == 2 for rod in q.scene.rods), "no rod has two layers")
+
+
+def _eigenstrain(q: Question) -> str | None:
+    driven = any(layer.eigenstrain for rod in q.scene.rods for layer in rod.layers)
+    return _unless(driven, "no layer follows a stimulus")
+
+
+def _bodies(q: Question) -> str | None:
+    return _unless(any(not isinstance(body.motion, Prescribed) for body in q.scene.bodies), "no free body")
+
+
+def _added_mass(q: Question) -> str | None:
+    if q.scene.fluid is None:
+        return "no fluid"
+    return _unless(q.scene.fluid.added_mass is not None, "fluid.added_mass is false")
+
+
+def _friction(q: Question) -> str | None:
+    if not q.pairs:
+        return "no surfaces that can meet"
+    law = q.scene.contact.friction
+    return _unless(law is not None and law.acts, "no friction coefficient above zero")
+
+
+def _rod_barrier(q: Question) -> str | None:
+    if q.rods_touch:
+        return None
+    reasons = {meeting.reason for meeting in q.meetings}
+    if len(reasons) == 1:
+        return reasons.pop()
+    return "; ".join(f"{meeting.what}: {meeting.reason}" for meeting in q.meetings)
+
+
+def _rod_friction(q: Question) -> str | None:
+    if not q.rods_touch:
+        return _rod_barrier(q)
+    law = q.scene.contact.friction
+    return _unless(law is not None and law.coefficient > 0.0, "no friction coefficient above zero")
+
+
+CONSERVATIVE, DISSIPATIVE, INERTIAL, EXTERNAL = Kind
+FORCES: tuple[Force, ...] = (
+    Force("stretching", CONSERVATIVE, "stretch.py", _always),
+    Force("bending", CONSERVATIVE, "bend_twist.py", _always),
+    Force(
+        "twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")
+    ),
+    Force("bond", CONSERVATIVE, "coupling.py", _bond),
+    Force("eigenstrain", None, "stretch.py", _eigenstrain),
+    Force("inertia", INERTIAL, "quadratic.py", _always),
+    Force("bodies", None, "body.py", _bodies),
+    Force(
+        "damping", DISSIPATIVE, "quadratic.py", lambda q: _unless(q.scene.damping.mass > 0.0, "damping.mass is zero")
+    ),
+    Force("gravity", CONSERVATIVE, "quadratic.py", lambda q: _unless(any(q.scene.gravity), "gravity is zero")),
+    Force(
+        "loads",
+        EXTERNAL,
+        "load.py",
+        lambda q: _unless(any(any(load.force) for load in q.loads("world")), "no force of fixed direction"),
+    ),
+    Force(
+        "followers",
+        EXTERNAL,
+        "load.py",
+        lambda q: _unless(any(any(load.force) for load in q.loads("material")), "no load in a material frame"),
+    ),
+    Force(
+        "moments",
+        EXTERNAL,
+        "load.py",
+        lambda q: _unless(any(any(load.moment) for load in q.scene.loads), "no moment on a body"),
+    ),
+    Force("drag", DISSIPATIVE, "drag.py", lambda q: _unless(q.scene.fluid is not None, "no fluid")),
+    Force("added mass", INERTIAL, "added_mass.py", _added_mass),
+    Force("barrier", CONSERVATIVE, "contact.py", lambda q: _unless(bool(q.pairs), "no surfaces that can meet")),
+    Force("friction", DISSIPATIVE, "friction.py", _friction),
+    Force("rod barrier", CONSERVATIVE, "rod_contact.py", _rod_barrier),
+    Force("rod friction", DISSIPATIVE, "rod_contact.py", _rod_friction),
+)
+"""In the order in which their energies are added."""
+
+
+def planned(scene: SceneConfig, model: str, dimension: int) -> dict[str, str]:
+    """What becomes of each force: ``"active"`` or ``"skipped: reason"``."""
+    question = Question(scene, model, dimension)
+    reasons = {force.name: force.skipped(question) for force in FORCES}
+    return {name: "active" if reason is None else f"skipped: {reason}" for name, reason in reasons.items()}
+
+
+def acting(scene: SceneConfig, model: str, dimension: int) -> tuple[str, ...]:
+    """Names of the forces with an energy that a scene needs."""
+    terms = planned(scene, model, dimension)
+    return tuple(force.name for force in FORCES if force.kind is not None and terms[force.name] == "active")
+
+
+def kinds() -> dict[str, Kind]:
+    """Of all forces that have an energy, by name."""
+    return {force.name: force.kind for force in FORCES if force.kind is not None}
+
+
+def markdown_table() -> str:
+    """The list as a table for `docs/equations.md`."""
+    rows = ["| force | its energy is | formula |", "| --- | --- | --- |"]
+    for force in FORCES:
+        meaning = force.kind.value if force.kind else "none of its own: it acts through other forces"
+        rows.append(f"| {force.name} | {meaning} | `bilayer_core/forces/{force.formula}` |")
+    return "\n".join(rows) + "\n"
