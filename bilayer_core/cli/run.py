@@ -93,7 +93,11 @@ def _make_simulator(config: SceneConfig, from_state: str | None, budget: bool, q
     if from_state is not None:
         from bilayer_core.record.state_file import read_saved_state
 
-        simulator.load_state(read_saved_state(from_state, simulator.description))
+        state = read_saved_state(from_state, simulator.description)
+        try:
+            simulator.load_state(state)
+        except InputError as error:
+            raise InputError(f"{from_state}: {error}") from error
     with notice_of_compilation(quiet):
         simulator.compile()
     return simulator

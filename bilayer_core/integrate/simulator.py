@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError, SimulationError
 from ..model.build import build_model
+from ..model.fingerprint import fingerprint_of
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
 from ..scene.config import SceneConfig
@@ -73,6 +74,8 @@ class Simulator:
         self.dt, self.tolerance = self.steps.dt, self.steps.tolerance
         self.scene = scene
         self.model = build_model(scene, self.plan.model, self.plan.dimension)
+        self._keeps_history = method.history is not None
+        self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
         solver = scene.solver
         newton = solver.newton_tolerance, solver.max_newton_iterations, solver.max_halvings
         if self.tolerance is None:
@@ -86,7 +89,7 @@ class Simulator:
         self._start_over()
 
     def _initial_state(self) -> State:
-        return initial_state(self.model, INTEGRATORS[self.plan.integrator].history is not None)
+        return initial_state(self.model, self._keeps_history, self._fingerprint)
 
     def _start_over(self) -> None:
         self.statistics = RunStatistics(com_max_height=float(self.com[2]))
@@ -384,16 +387,20 @@ class Simulator:
             self.wall_time += clock.perf_counter() - wall
 
     def save_state(self) -> Array:
-        """Flat copy of the state; `load_state` continues from it bit for bit."""
+        """Flat copy of the state; `load_state` continues from it bit for bit.
+
+        Its last values are a fingerprint of the scene (`model.fingerprint`), so that no other scene takes it.
+        """
         return self._state.flat()
 
     def load_state(self, snapshot: Array) -> None:
-        """Go to a saved state of the same scene.
+        """Go to a saved state of the same scene, or of one that differs only in schedules of stimuli, loads, gravity,
+        contact, friction, damping, drag, steps, tolerances or output.
 
         Raises
         ------
         InputError
-            If it does not fit; nothing is changed then.
+            If it is of another scene or model, or does not fit; nothing is changed then.
         """
         loaded = self._initial_state()
         loaded.set_flat(snapshot)

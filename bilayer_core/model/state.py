@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import InputError
+from .fingerprint import FREE, difference
 from .model import Model
 
 Array = np.ndarray
@@ -49,6 +50,7 @@ class State:
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
+    fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
 
     def __post_init__(self):
         """Have the parts, which are copied, in one piece."""
@@ -81,13 +83,19 @@ class State:
         Raises
         ------
         InputError
-            If its length or a value does not fit this model; nothing is changed then.
+            If it belongs to another scene, or its length or a value does not fit this model; nothing is changed then.
         """
         flat = np.asarray(flat, dtype=float)
-        size = self.values.size
+        size, marks = self.values.size, self.fingerprint.size
+        differs = ""
+        if marks and flat.ndim == 1 and flat.size >= marks:
+            differs = difference(flat[-marks:], self.fingerprint)
         if flat.shape != (size,):
-            raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}")
-        bad = np.flatnonzero(~np.isfinite(flat[: size - self.override.size]))
+            why = f"; it is of another scene, with other {differs}" if differs else ""
+            raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}{why}")
+        if differs:
+            raise InputError(f"saved state: is of another scene, with other {differs}; allowed to differ are {FREE}")
+        bad = np.flatnonzero(~np.isfinite(flat[: size - marks - self.override.size]))
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
         self.values[:] = flat
@@ -124,11 +132,12 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
             )
 
 
-def initial_state(model: Model, with_history: bool = False) -> State:
+def initial_state(model: Model, with_history: bool = False, fingerprint: Array | None = None) -> State:
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
 
     Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
-    `with_history` makes room for what some integrators keep from step to step.
+    `with_history` makes room for what some integrators keep from step to step; `fingerprint` says what the state
+    belongs to (`model.fingerprint`).
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
     channels = list(model.scene.stimuli.values())
@@ -157,4 +166,5 @@ def initial_state(model: Model, with_history: bool = False) -> State:
         fluid_force=np.zeros((with_history * in_fluid, 3)),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels), np.nan),
+        fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),
     )

@@ -121,6 +121,17 @@ def test_a_state_of_another_scene_is_refused(here, capsys):
     assert "state.npz: holds a state of another scene: position has shape (51, 3)" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("saved", ["state.npz", "state.mcap"])
+def test_a_state_of_another_material_is_refused_and_of_another_gravity_it_is_not(here, capsys, saved):
+    first = ["--duration", "0.001", "--quiet", "--save-state", "state.npz", "--log", "state.mcap"]
+    assert main(["run", "cantilever", *first]) == 0
+    again = ["run", "cantilever", "--duration", "0.001", "--quiet", "--from-state", saved, "--set"]
+    assert main([*again, "materials.gel.youngs_modulus=2 MPa"]) == 2
+    told = f"{saved}: saved state: is of another scene, with other materials; allowed to differ are schedules"
+    assert told in capsys.readouterr().err
+    assert main([*again, "gravity=[0, 0, -1]"]) == 0
+
+
 def test_a_state_of_a_version_without_its_time_is_refused(here, capsys):
     assert main(["run", "cantilever", "--duration", "0.001", "--quiet", "--save-state", "state.npz"]) == 0
     with np.load("state.npz") as saved:

@@ -1,0 +1,72 @@
+"""Which scene a state belongs to: one number for each part of a scene that its values have a meaning in.
+
+What may differ, so that a state can be taken on under other conditions: schedules of stimuli, loads, gravity, contact
+and friction, damping, drag, steps and accuracy, output, texts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import Any
+
+import numpy as np
+
+from ..scene.config import SceneConfig
+
+Array = np.ndarray
+DIGITS = 12
+"""Hexadecimal digits of a number: 48 bits, which a float64 holds exactly."""
+FIXED = {
+    "model": "model",
+    "history": "integrator, which keeps what the last step left",
+    "materials": "materials",
+    "stimuli": "channels of stimuli",
+    "rods": "rods",
+    "bodies": "bodies",
+    "masses": "masses",
+    "obstacles": "obstacles",
+    "coupling": "coupling of two rods",
+    "added_mass": "added mass of the fluid",
+}
+"""Parts of a fingerprint in order, and what each is called."""
+FREE = "schedules of stimuli, loads, gravity, contact, friction, damping, drag, steps, tolerances, output and duration"
+"""What may differ between the scene of a state and that which it is loaded into."""
+
+
+def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
+    """Fingerprint of the states of a scene, shape (n_part,).
+
+    Parameters
+    ----------
+    scene : SceneConfig
+    model : str
+        ``"laminate"`` or ``"two_rod"``.
+    history : str
+        Name of the integrator if it keeps slopes from step to step, else empty.
+    """
+    used = {layer.material for rod in scene.rods for layer in rod.layers}
+    fluid = scene.fluid if scene.fluid is not None and scene.fluid.added_mass is not None else None
+    content: dict[str, Any] = {
+        "model": model,
+        "history": history,
+        "materials": {name: scene.materials[name].model_dump(mode="json") for name in sorted(used)},
+        "stimuli": [(name, c.unit, c.minimum, c.maximum) for name, c in scene.stimuli.items()],
+        "rods": [rod.model_dump(mode="json", exclude={"friction_axis"}) for rod in scene.rods],
+        "bodies": [body.model_dump(mode="json") for body in scene.bodies],
+        "masses": [mass.model_dump(mode="json") for mass in scene.masses],
+        "obstacles": [obstacle.model_dump(mode="json") for obstacle in scene.obstacles],
+        "coupling": scene.coupling.model_dump(mode="json") if model == "two_rod" else None,
+        "added_mass": fluid and (fluid.density, fluid.added_mass.model_dump(mode="json")),
+    }
+    return np.array([_number(content[part]) for part in FIXED], dtype=float)
+
+
+def _number(content: Any) -> int:
+    text = json.dumps(content, sort_keys=True, ensure_ascii=False)
+    return int(hashlib.sha256(text.encode("utf-8")).hexdigest()[:DIGITS], 16)
+
+
+def difference(saved: Array, own: Array) -> str:
+    """Which parts are not the same, as text; empty if all are."""
+    return ", ".join(name for name, a, b in zip(FIXED.values(), saved, own, strict=True) if a != b)
