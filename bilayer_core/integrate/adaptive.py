@@ -15,12 +15,12 @@ from ..errors import InputError, SimulationError
 from ..march.adapt import Control
 from ..march.adapter import Adapter
 from ..march.engine import MarchReport, Settings
+from ..march.modes import STEP
 from ..march.status import JUMPED, TOO_INACCURATE
 from ..march.step_groups import Course
 from ..model.model import Model
 from ..model.state import State
 from .method import Method
-from .motion import MOMENT
 from .sdirk2 import METHOD as SELF_STARTING
 from .stepper import Stepper, StepReport
 from .stretch import Stretch
@@ -115,7 +115,7 @@ class AdaptiveStepper(Stepper):
         found: MarchReport | None = None
         while found is None or (not found.failed and found.done < steps and state.time[0] < until):
             stop, breaks = self._next_stop(state, until)
-            more = self._go(state, steps - (found.done if found else 0), stop, counts)
+            more = self._go(state, steps - (found.done if found else 0), stop, counts=counts)
             if breaks and more.done and state.time[0] == stop:
                 self._begin_again_if_jumped(state)
             found = more if found is None else found.followed_by(more)
@@ -123,15 +123,26 @@ class AdaptiveStepper(Stepper):
             self.rest(state)  # what the last attempt left is not what the state is
         return found
 
-    def _look(self, state: State) -> None:
-        self._go(state, 1, math.inf, counts=False, moment=MOMENT)
+    def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> MarchReport:
+        return self._go(state, 1, math.inf, counts=False, mode=mode, length=length, tolerance=tolerance)
 
-    def _go(self, state: State, most: int, stop: float, counts: bool, moment: float = 0.0) -> MarchReport:
-        """At most so many steps up to `stop` [s], before which nothing has a corner, or a look at the state."""
-        solver = self.model.scene.solver
-        method, changes = self.method, self.method.history is not None and not moment
+    def _go(
+        self,
+        state: State,
+        most: int,
+        stop: float,
+        *,
+        counts: bool,
+        mode: int = STEP,
+        length: float = 0.0,
+        tolerance: float | None = None,
+    ) -> MarchReport:
+        """At most so many steps up to `stop` [s], before which nothing has a corner, or what another mode does."""
+        iterations = self.model.scene.solver.max_newton_iterations
+        tolerance = self.solver.tolerance if tolerance is None else tolerance
+        method, changes = self.method, self.method.history is not None and mode == STEP
         while True:
-            settings = Settings(self.solver.tolerance, solver.max_newton_iterations, moment, changes, counts)
+            settings = Settings(tolerance, iterations, mode, length, changes, counts)
             course = self._room_of(state, method)
             found = self._adapter.adapt(state, self._arrays[method], course, stop, most, settings)
             if found.status == JUMPED and not found.done:
@@ -140,7 +151,6 @@ class AdaptiveStepper(Stepper):
                 break
         self.used = method
         self.end = self._places[found.place]
-        self._start, self._trial = (self._places[k] for k in range(3) if k != found.place)
         self.stimulus = course.stimulus[0, -1].copy()
         return found
 

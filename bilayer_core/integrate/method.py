@@ -83,11 +83,23 @@ class Method:
     history: History | None = None
     estimate: float | None = None
 
+    def __post_init__(self):
+        if self.weights is not None and self.history is not None:
+            raise ValueError(
+                f"{self.name}: slopes are those of a last stage that ends the step, so `weights` must be None"
+            )
+
+    @property
+    def points(self) -> tuple[float, ...]:
+        """cᵢ of each stage, and 1 if the end lies beyond the last one: where it has to be known what acts."""
+        return self.nodes if self.weights is None else (*self.nodes, 1.0)
+
     def arrays(self) -> MethodArrays:
-        """The coefficients as compiled loops take them; couplings are over γ."""
+        """The coefficients as compiled loops take them; couplings are over γ, and `weights` are a row more of them."""
         stages, history = len(self.nodes), self.history
-        couplings = np.zeros((stages, stages))
-        for row, own in enumerate(self.couplings):
+        rows = self.couplings if self.weights is None else (*self.couplings, self.weights)
+        couplings = np.zeros((len(rows), stages))
+        for row, own in enumerate(rows):
             couplings[row, : len(own)] = own
         return MethodArrays(
             diagonal=self.diagonal,
@@ -98,7 +110,7 @@ class Method:
             momenta=np.array(history.momenta if history else np.zeros(stages)),
             bend=history.bend if history else 0.0,
             carry=history.carry if history else 0.0,
-            nodes=np.array(self.nodes),
+            nodes=np.array(self.points),
             estimate=np.nan if self.estimate is None else float(self.estimate),
         )
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..kinematics.rotation import rotation_matrix, rotation_vector
 from ..march.allocate import FirstDerivatives
+from ..march.modes import MOMENT
 from ..march.step_groups import Place
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
@@ -17,8 +18,6 @@ from ..solve.terms.term import StepContext
 
 Array = np.ndarray
 PARTS = ("node", "edge", "pair", "body", "contact")
-MOMENT = 1e-6
-"""Time over which potentials see a velocity as a displacement [s]; rounding makes 1e-10 m/s of it."""
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,11 @@ Positions and momenta advance as `integrate.method` says. What is no vector need
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rotation import rotation_matrix, rotation_vector, skew
+from ..kinematics.rotation import rotation_matrix, skew
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
 from ..model.state import State
@@ -69,11 +68,6 @@ class Point:
     rotation: Array
 
 
-POSITIONS = ("position", "body_position", "turn")
-MOMENTA = ("velocity", "spin", "body_velocity", "angular_momentum", "fluid_momentum")
-"""Parts of a `Point` that are vectors; velocities stand for momenta of a constant mass."""
-
-
 @dataclass(frozen=True)
 class Prescribed:
     """Motion of prescribed bodies at the time of a stage.
@@ -108,18 +102,6 @@ def start_point(model: Model, state: State, start: Configuration) -> Point:
         fluid_momentum=momentum_of_fluid(model, start, state.velocity) + state.fluid_excess,
         rotation=state.body_rotation.copy(),
     )
-
-
-def combine(first: Point, stages: Sequence[tuple[float, Point, Point]]) -> Point:
-    """yₙ + Σ w (yⱼ − ȳⱼ) over (w, ȳⱼ, yⱼ); rotations likewise on their group."""
-    total = Point(**{part.name: getattr(first, part.name).copy() for part in fields(Point)})
-    for weight, origin, end in stages:
-        for name in (*POSITIONS, *MOMENTA):
-            getattr(total, name)[...] += weight * (getattr(end, name) - getattr(origin, name))
-        for b in range(len(total.rotation)):
-            turn = rotation_vector(end.rotation[b] @ origin.rotation[b].T)
-            total.rotation[b] = rotation_matrix(weight * turn) @ total.rotation[b]
-    return total
 
 
 def predict(
@@ -187,65 +169,6 @@ def predict(
     )
 
 
-def end_point(
-    model: Model,
-    context: StepContext,
-    origin: Point,
-    turned: Array,
-    end: Configuration,
-    prescribed: Prescribed,
-) -> Point:
-    """The end of a stage that was solved.
-
-    Parameters
-    ----------
-    end : Configuration
-    turned : Array
-        As for `predict`.
-    prescribed : Prescribed
-        At the time of the stage.
-    """
-    h, bodies = context.length, model.bodies
-    position, rotation = prescribed.position.copy(), prescribed.rotation.copy()
-    position[bodies.body_of_free], rotation[bodies.body_of_free] = end.body_position, end.body_rotation
-    velocity = (end.position - context.origin_position) / h
-    momentum = origin.angular_momentum + context.momentum_length * _moment_of_inertia(model, context, end)
-    return Point(
-        position=end.position.copy(),
-        body_position=position,
-        turn=turned + end.turn,
-        velocity=velocity,
-        spin=(end.turn - context.origin_turn) / h,
-        body_velocity=(end.body_position - context.origin_body_position) / h,
-        angular_momentum=momentum,
-        fluid_momentum=momentum_of_fluid(model, end, velocity),
-        rotation=rotation,
-    )
-
-
-def write_state(model: Model, state: State, last: Point, end: Configuration, rates: Array) -> None:
-    """Take the end of a step into the state: positions, frames, velocities; `rates` are those of prescribed bodies,
-    shape (n_body, 6) [m/s, rad/s].
-    """
-    free, held = model.bodies.body_of_free, model.attached_free < 0
-    state.velocity[:] = last.velocity
-    of_body = rates[model.attached_body[held]]
-    turning = np.cross(of_body[:, 3:], end.arm[held]) if of_body[:, 3:].any() else 0.0
-    state.velocity[model.attached_node[held]] = of_body[:, :3] + turning
-    state.position[:] = end.position
-    state.fluid_excess[:] = last.fluid_momentum - momentum_of_fluid(model, end, last.velocity)
-    state.director1[:] = end.director1[: model.edge_count]
-    state.spin[:] = last.spin
-    state.twist[:] = end.joint_strain[:, 2]
-    state.body_velocity[:], state.body_angular_velocity[:] = rates[:, :3], rates[:, 3:]
-    state.body_velocity[free] = last.body_velocity
-    state.body_position[:], state.body_rotation[:] = last.body_position, last.rotation
-    inertia = inertia_tensors(model, end.body_rotation)
-    for place, body in enumerate(free):
-        state.body_angular_velocity[body] = np.linalg.solve(inertia[place], last.angular_momentum[place])
-        state.body_rotation[body] = _orthonormal(end.body_rotation[place])
-
-
 def inertia_tensors(model: Model, rotation: Array) -> Array:
     """Inertia tensors of free bodies in the world's axes [kg m²], shape (n_free, 3, 3)."""
     second = model.bodies.second_moment
@@ -255,15 +178,6 @@ def inertia_tensors(model: Model, rotation: Array) -> Array:
 
 def _times(matrices: Array, vectors: Array) -> Array:
     return np.einsum("bij,bj->bi", matrices, vectors)
-
-
-def _moment_of_inertia(model: Model, context: StepContext, end: Configuration) -> Array:
-    """Moment that acts on each free body at the end of a stage [N m]: the gradient of its inertia (`forces.body`),
-    shape (n_free, 3).
-    """
-    a = context.predicted_body_rotation @ model.bodies.second_moment @ end.body_rotation.transpose(0, 2, 1)
-    axial = np.stack([a[:, 2, 1] - a[:, 1, 2], a[:, 0, 2] - a[:, 2, 0], a[:, 1, 0] - a[:, 0, 1]], axis=1)
-    return -context.inertia_factor * axial
 
 
 def _spin_without_moment(second_moment: Array, rotation: Array, momentum: Array, length: float) -> Array:
@@ -278,10 +192,3 @@ def _spin_without_moment(second_moment: Array, rotation: Array, momentum: Array,
             break
         turned = rotation_matrix(length * spin) @ rotation
     return spin
-
-
-def _orthonormal(matrix: Array) -> Array:
-    """The rotation matrix nearest to `matrix` to first order in its error: 1.5 R − 0.5 R Rᵀ R (a Newton–Schulz
-    step).
-    """
-    return 1.5 * matrix - 0.5 * matrix @ matrix.T @ matrix

@@ -92,11 +92,11 @@ class Surroundings:
         return Drive(stimulus, transduction, self.rest_strains_of(transduction), load_factor)
 
     def course(self, state: State, method: Method, times: list[float], h: float) -> Course:
-        """What acts from outside at the stages of steps of length `h` [s] that end at `times` [s].
+        """What acts from outside at the points of steps of length `h` [s] that end at `times` [s].
 
-        It is good until the next one is asked for with as many steps and stages, which is made in its place.
+        It is good until the next one is asked for with as many steps and points, which is made in its place.
         """
-        elapsed = [node * h for node in method.nodes]
+        elapsed = [node * h for node in method.points]
         begins = [time - h for time in times]
         stages = [begin + part for begin in begins for part in elapsed]
         parts = elapsed * len(times)
@@ -121,17 +121,17 @@ class Surroundings:
 
     def new_course(self, state: State, method: Method, times: list[float], h: float) -> Course:
         """Room for a course, with the poses of prescribed bodies, of which it has one row if none of them moves."""
-        steps, stages = len(times), len(method.nodes)
+        steps, points = len(times), len(method.points)
         placed = times if self._moves else times[:1]
-        poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.nodes]
-        rows = len(placed), stages, len(self.model.bodies.names)
+        poses = [self.prescribed(state, time - (1.0 - node) * h) for time in placed for node in method.points]
+        rows = len(placed), points, len(self.model.bodies.names)
         return Course(
             time=np.empty(steps),
-            elapsed=np.empty(stages),
+            elapsed=np.empty(points),
             first=np.empty((steps, len(self._channels))),
             jumps=np.zeros(steps, dtype=bool),
-            stimulus=np.empty((steps, stages, len(self._channels))),
-            load_factor=np.empty((steps, stages, len(self.model.scene.loads))),
+            stimulus=np.empty((steps, points, len(self._channels))),
+            load_factor=np.empty((steps, points, len(self.model.scene.loads))),
             position=np.array([pose.position for pose in poses]).reshape(*rows, 3),
             rotation=np.array([pose.rotation for pose in poses]).reshape(*rows, 3, 3),
             rates=np.array([pose.rates for pose in poses]).reshape(*rows, 6),

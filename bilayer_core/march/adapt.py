@@ -12,6 +12,7 @@ from .copying import copy
 from .error_estimate import Yardstick, deviation
 from .group import group
 from .loop import Loop
+from .modes import STEP
 from .status import CONVERGED, JUMPED, MAX_ITERATIONS, READY, TOO_INACCURATE
 from .step import count_in, has_jumped, take_step
 from .step_control import FAILURE_FACTOR, STRETCH, after_rejection, after_success, fit
@@ -104,8 +105,9 @@ def _count(counts, h, iterations, factorisations, backtracks, rejected, inaccura
 
 
 @kernel
-def adapt(adaptation, keeps, moment, changes, counts, until, most, newton_tolerance, max_iterations):
-    """Advance a state to `until` [s], by at most so many steps, as far as each succeeds, or look at it.
+def adapt(adaptation, keeps, mode, length, changes, counts, until, most, newton_tolerance, max_iterations):
+    """Advance a state to `until` [s], by at most so many steps, as far as each succeeds, or do once what another mode
+    says.
 
     Each is made again, shorter, where its error exceeds the tolerance or Newton fails.
 
@@ -114,8 +116,10 @@ def adapt(adaptation, keeps, moment, changes, counts, until, most, newton_tolera
     adaptation : Adaptation
     keeps : int or None
         None if the integrator of the run keeps no slopes.
-    moment : float
-        If above 0: make no step, but evaluate the potential at the state as it stands, in so short a time [s].
+    mode : int
+        From `modes`.
+    length : float
+        For other modes than steps, as for `step.take_step` [s].
     changes : bool
         Whether the method begins with slopes that the step before must have left: a jump ends the loop then.
     counts : bool
@@ -159,11 +163,14 @@ def adapt(adaptation, keeps, moment, changes, counts, until, most, newton_tolera
             time = until if h == until - begin else begin + h
             h = time - begin
             look_ahead(adaptation.acting, method.nodes, begin, h, course)
-            looks, length = moment > 0.0, moment if moment > 0.0 else h
+            span = h if mode == STEP else length
             status, pair, end, last_iterations, factors, halvings, residual, gap = take_step(
-                p, state, method, keeps, looks, course, 0, work, length, newton_tolerance, max_iterations
+                p, state, method, keeps, mode, course, 0, work, span, newton_tolerance, max_iterations
             )
-            if looks or (status != CONVERGED and status < MAX_ITERATIONS):
+            if mode != STEP:
+                _count(counted, span, last_iterations, factors, halvings, 0, 0, residual)
+                return k, status, pair, end, gap
+            if status != CONVERGED and status < MAX_ITERATIONS:
                 return k, status, pair, end, gap
             iterations += last_iterations
             factorisations += factors
@@ -188,7 +195,7 @@ def adapt(adaptation, keeps, moment, changes, counts, until, most, newton_tolera
                 h = FAILURE_FACTOR * h
             h = max(h, control.shortest)
         _count(counted, h, iterations, factorisations, backtracks, rejected, inaccurate, residual)
-        _plan(control, clock, h, planned, error, last_iterations / method.nodes.shape[0], rejected > 0)
+        _plan(control, clock, h, planned, error, last_iterations / method.couplings.shape[1], rejected > 0)
         clock.time[0] = time
         clock.step[0] += 1.0
         if counts:

@@ -12,6 +12,7 @@ from .adapt import Adaptation, Clock, Control, adapt, clear, room_for_counts
 from .engine import Engine, MarchReport, Settings
 from .error_estimate import Yardstick
 from .loop import Loop
+from .modes import STEP
 from .status import CONVERGED, FAILURES
 from .step_groups import Course, Method, StateArrays
 
@@ -56,7 +57,7 @@ class Adapter:
         engine, counts = self._engine, self._counts
         parts = self._parts_of(state, engine.loop_of(state, method, course))
         clear(counts)
-        flags = engine.keeps, settings.moment, settings.changes, settings.counts
+        flags = engine.keeps, settings.mode, settings.length, settings.changes, settings.counts
         done, status, pair, place, gap = adapt(parts, *flags, until, most, settings.tolerance, settings.max_iterations)
         if status == CONVERGED or status in FAILURES:
             engine.take_over(gap)
@@ -64,7 +65,7 @@ class Adapter:
         shortest, longest, length = counts.lengths.tolist()
         residual, largest_residual = counts.residuals.tolist()
         error = 0.0
-        if status != CONVERGED and done == 0:
+        if settings.mode == STEP and status != CONVERGED and done == 0:
             length, residual, error, iterations = counts.failure.tolist()
         how = FAILURES.get(status, NewtonStatus.CONVERGED)
         newton = NewtonReport(how, int(iterations), factorisations, residual, backtracks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..jit import inner
 from ..solve.band import eliminate_band
 from ..solve.clamps import hand_nodes_to_bodies, hand_rows_to_bodies, hand_walls_to_bodies
-from ..solve.dense import factor_dense, solve_dense
+from ..solve.dense import count_negative_dense, factor_dense, solve_dense
 from ..solve.newton_matrix import add_links
 from ..solve.planar_matrix import hand_walls_to_bodies_in_plane
 from .copying import copy
@@ -152,13 +152,28 @@ def take_border(border, wide, bodies, held, dimension, size, shift):
 
 
 @inner
-def factorise_border(wide, strands, band):
-    """S = D − Uᵀ A⁻¹ U, factorised, and L⁻¹ U in place of U; false if S is not positive definite."""
+def eliminate_rods(wide, strands, band):
+    """S = D − Uᵀ A⁻¹ U in place of D, and L⁻¹ U in place of U, given the factorised band."""
     if wide is None:
-        return True
+        return
     if wide.coupled[0] == 1:
         eliminate_band(band, strands.size, strands.bandwidth, wide.width[0], wide.border, wide.scaled, wide.schur)
+
+
+@inner
+def factorise_border(wide):
+    """Factorise S in place; false if it is not positive definite."""
+    if wide is None:
+        return True
     return factor_dense(wide.schur, wide.width[0])
+
+
+@inner
+def count_negative_of_border(wide):
+    """Number of negative eigenvalues of S, −1 if it is not finite; S is overwritten."""
+    if wide is None:
+        return 0
+    return count_negative_dense(wide.schur, wide.width[0])
 
 
 @inner

@@ -100,6 +100,7 @@ def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
             body_step=np.zeros((free, 6)),
             node_step=np.zeros((model.node_count, 3)),
             motion=np.zeros((len(bodies.names) + 1, 6)),
+            negative=np.zeros(1, dtype=np.int64),
         ),
     )
 

@@ -10,13 +10,14 @@ import numpy as np
 
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
-from ..model.state import State
+from ..model.state import State, initial_state
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
 from ..solve.potential import IncrementalPotential
 from .allocate import ContactColumns
 from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
 from .loop import Counted, Loop
+from .modes import STEP
 from .problem import Problem
 from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER, TOO_INACCURATE
 from .step import count_step, take_steps
@@ -55,7 +56,14 @@ class Engine:
         Extremes of the run; see `march.step_groups.Tally`.
     """
 
-    def __init__(self, model: Model, potential: IncrementalPotential, places: list[Configuration], keeps_slopes: bool):
+    def __init__(
+        self,
+        model: Model,
+        potential: IncrementalPotential,
+        places: list[Configuration],
+        keeps_slopes: bool,
+        stages: int,
+    ):
         self._model, self._potential = model, potential
         self.keeps = 1 if keeps_slopes else None
         self._energy = np.zeros(len(NAMES))
@@ -83,7 +91,8 @@ class Engine:
         self.start_over(-math.inf)
         self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
         records = [Place(**dict(zip(Place.fields, place.arrays, strict=True))) for place in places]
-        self._work = work_of(model, records, self.touched, self._groups["off_axis"])
+        values = initial_state(model, keeps_slopes).values.size
+        self._work = work_of(model, records, self.touched, self._groups["off_axis"], stages, values)
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""
@@ -127,9 +136,9 @@ class Engine:
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:
         """Make the steps of a course, each of length `h` [s], as far as they succeed; `state` is that after them."""
         loop = self.loop_of(state, method, course)
-        flags = self.keeps, settings.moment, settings.changes, settings.counts
+        flags = self.keeps, settings.mode, settings.changes, settings.counts
         done, status, pair, place, iterations, factorisations, backtracks, residual, worst, gap = take_steps(
-            loop, *flags, h, settings.tolerance, settings.max_iterations
+            loop, *flags, h if settings.mode == STEP else settings.length, settings.tolerance, settings.max_iterations
         )
         if status == CONVERGED or status in FAILURES:
             self.take_over(gap)
@@ -140,6 +149,16 @@ class Engine:
     def take_over(self, gap: float) -> None:
         """Leave the energies of the last configuration, and the smallest gap there [m], to the potential."""
         self._potential.take_over(dict(zip(NAMES, self._energy.tolist(), strict=True)), gap)
+
+    @property
+    def moved(self) -> float:
+        """Largest displacement of a material point in the last round of statics [m]."""
+        return float(self._work.moved[0])
+
+    @property
+    def unstable(self) -> int:
+        """How many directions were found unstable when they were last counted."""
+        return int(self._groups["system"].negative[0])
 
     def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
         """What acts on the state that is looked at next, by settings that say so."""
@@ -175,8 +194,10 @@ class Settings:
     tolerance : float
         Of Newton [m/s].
     max_iterations : int
-    moment : float
-        If above 0: make no step, but evaluate the potential at the state as it stands, in so short a time [s].
+    mode : int
+        From `modes`.
+    length : float
+        For other modes than steps, as for `step.take_step` [s].
     changes : bool
         Whether a jump ends the loop, because another integrator has to step in.
     counts : bool
@@ -185,7 +206,8 @@ class Settings:
 
     tolerance: float
     max_iterations: int
-    moment: float
+    mode: int
+    length: float
     changes: bool
     counts: bool
 

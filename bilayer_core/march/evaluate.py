@@ -101,9 +101,7 @@ def evaluate_at(call, operation, base, at, with_hessian):
     elif operation == PREDICT:
         predict(bodies, held, call.point, at, call.turned, call.position, call.rotation, call.rates, stage)
     elif operation == STAND_STILL:
-        stand_still(bodies, state, at, stage)
-        for k in range(stage.twist.shape[0]):
-            stage.twist[k] = at.joint_strain[k, 2]
+        stand_still(bodies, p.fluid, strands, state, at, False, stage)
     elif operation == START_STAGE:
         status = start_stage(p, at, stage)
     if operation == START_STAGE or operation == FOLLOW:
@@ -176,7 +174,7 @@ def solve_at(call, operation, at):
         assemble(p, at, factor, EXACT)
         _put_back(p.threads, before)
     elif operation == FACTORISE:
-        status, first, simplified = factorise(p, at, stage)
+        status, first, simplified = factorise(p, at, stage, False)
         second = float(simplified)
     elif operation == SOLVE:
         solve(p.space, p.plane, p.wide, p.leaving, p.strands, p.bodies, p.sums, p.system)

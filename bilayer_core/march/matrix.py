@@ -6,12 +6,21 @@ import numpy as np
 
 from ..jit import inner
 from ..solve.assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
-from ..solve.band import backward_band, factor_band, forward_band
+from ..solve.band import backward_band, factor_band, factor_signed, forward_band
 from ..solve.newton_matrix import FIRST_SHIFT, LARGEST_SHIFT, SHIFT_GROWTH
 from ..solve.planar_assembly import expand_in_plane, expand_pairs_in_plane, put_in_space, take_in_plane
-from .border import assemble_border, factorise_border, solve_border, start_border, take_border
+from .border import (
+    assemble_border,
+    count_negative_of_border,
+    eliminate_rods,
+    factorise_border,
+    solve_border,
+    start_border,
+    take_border,
+)
 from .leaving import leave, put_leaving, take_contacts_of, take_leaving
-from .status import INDEFINITE, NO_ROOM_IN_BORDER, READY
+from .modes import SLOWEST_GROWTH
+from .status import INDEFINITE, NO_ROOM_IN_BORDER, NOT_FINITE, READY
 from .threads import rods_touch
 
 
@@ -128,11 +137,13 @@ def assemble(p, at, factor, simplified):
 
 
 @inner
-def factorise(p, at, stage):
+def factorise(p, at, stage, counts):
     """Assemble and factorise the matrix of the last evaluation, that of `at`.
 
     What is negative in the contact of rods is left out, then multiples of the mass matrix are added, until the matrix
-    is positive definite.
+    is positive definite. If it `counts`, nothing of the kind is done, but the number of the matrix's negative
+    eigenvalues (Sylvester's law of inertia) is left in `System.negative`: of second derivatives in a step so long that
+    inertia does not count, with masses over the square of the slowest growth time.
 
     Returns
     -------
@@ -145,13 +156,26 @@ def factorise(p, at, stage):
     strands, band = p.strands, p.system.band
     factor = 1.0 / (stage.lengths[0] * stage.lengths[1]) + p.damping / stage.lengths[0]
     shift, simplified = 0.0, EXACT
+    if counts:
+        factor = SLOWEST_GROWTH**2
     while True:
         assemble(p, at, factor * (1.0 + shift), simplified)
-        take_border(p.border, p.wide, p.bodies, p.held, strands.dimension, strands.size, shift * factor)
+        of_bodies = factor if counts else shift * factor
+        take_border(p.border, p.wide, p.bodies, p.held, strands.dimension, strands.size, of_bodies)
         if not leave(p.leaving, p.wide, strands, band):
             return NO_ROOM_IN_BORDER, shift, simplified
-        if factor_band(band, strands.size, strands.bandwidth) < 0 and factorise_border(p.wide, strands, band):
-            return READY, shift, simplified
+        if counts:
+            negative = factor_signed(band, strands.size, strands.bandwidth)
+        else:
+            negative = 0 if factor_band(band, strands.size, strands.bandwidth) < 0 else 1
+        if counts or negative == 0:
+            eliminate_rods(p.wide, strands, band)
+            if counts:
+                of_border = count_negative_of_border(p.wide)
+                p.system.negative[0] = negative + of_border
+                return READY if of_border >= 0 else NOT_FINITE, shift, simplified
+            if factorise_border(p.wide):
+                return READY, shift, simplified
         if simplified < 2 and rods_touch(p.threads):
             simplified += 1
             continue

@@ -11,6 +11,7 @@ from ..kinematics.turning import turn_between, turn_by
 from ..solve.newton import ARMIJO, BACKTRACKING, KEEP_FACTOR_BELOW, MAX_BACKTRACKS, ROUNDING, largest_move
 from .contact import list_pairs
 from .matrix import factorise, solve
+from .modes import NEGATIVE, VALUE
 from .place import carry_frames, copy_prescribed, move, put_carried
 from .potential import evaluate, follow
 from .slip import hold_up
@@ -127,10 +128,12 @@ def _move_prescribed(bodies, start, position, rotation, motion):
 
 
 @inner
-def first_guess(p, start, position, rotation, stage, guess):
-    """Set `guess` to `start` moved by its velocity, prescribed bodies to the given poses.
+def first_guess(p, start, position, rotation, stage, guess, whole):
+    """Set `guess` to `start` moved to where inertia takes it, or as far as no gap closes, prescribed bodies to given
+    poses.
 
-    Returns a status: `BLOCKED` with the blocking pair if prescribed motion would close a gap.
+    Returns a status: `BLOCKED` with the blocking pair if prescribed motion would close a gap, or, where the `whole` way
+    is asked for, if it cannot be gone.
     """
     bodies, system = p.bodies, p.system
     free = bodies.mass.shape[0]
@@ -151,7 +154,7 @@ def first_guess(p, start, position, rotation, stage, guess):
             return status, -1
         if alpha >= 1.0:
             break
-        if attempt == 2:
+        if attempt == 2 or whole:
             return BLOCKED, pair
         fraction *= (0.5 if attempt == 0 else 0.0) * alpha
     for i in range(system.node_step.shape[0]):
@@ -187,8 +190,8 @@ of the line search."""
 
 
 @inner
-def minimise(p, at, trial, stage, tolerance, max_iterations, looks):
-    """Move `at` to the minimum of the potential, or look at the potential where it is; `trial` is scratch.
+def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
+    """Move `at` to the minimum of the potential, or only do there what is `wanted` (`modes`); `trial` is scratch.
 
     The method is that of `solve.newton.NewtonSolver.minimise`, turned inside out: all evaluations are at one place,
     because the compiler would make as many copies of them as there are places. Where a new matrix is likely to be
@@ -221,9 +224,9 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, looks):
             if not found and not find_contacts(p.threads, p.strands, place.position):
                 status = NO_ROOM_FOR_RODS
                 break
-            found, curved = True, curved or task == FACTORISE and not looks
+            found, curved = True, curved or task == FACTORISE and wanted != VALUE
             value, new_gap = evaluate(p, place, stage, curved, task == FOLLOW)
-            if looks:
+            if wanted == VALUE:
                 gap, status = new_gap, CONVERGED
                 break
         if task == SEARCH:
@@ -255,7 +258,9 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, looks):
                     status = NOT_FINITE
                     break
                 factorisations += 1
-                status, _, _ = factorise(p, at, stage)
+                status, _, _ = factorise(p, at, stage, wanted == NEGATIVE)
+                if wanted == NEGATIVE and status == READY:
+                    status = CONVERGED
                 if status != READY:
                     break
                 iterations += 1

@@ -67,6 +67,7 @@ class System:
     body_step: Array
     node_step: Array
     motion: Array
+    negative: Array  # number of negative eigenvalues, where they were counted, shape (1,)
 
 
 @group

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..jit import inner
 from ..kinematics.stack import stack_matrix
 from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn_by
@@ -46,42 +48,30 @@ def start_point(bodies, fluid, strands, state, start, first):
 
 
 @inner
-def _add_weighted(total, end, origin, weight):
-    """total += w (end − origin) of arrays with the same shape."""
-    a, b, c = total.reshape(total.size), end.reshape(end.size), origin.reshape(origin.size)
-    for i in range(a.shape[0]):
-        a[i] += weight * (b[i] - c[i])
-
-
-@inner
 def copy_point(source, target):
     """All parts of a point."""
-    copy(source.position, target.position)
-    copy(source.body_position, target.body_position)
-    copy(source.turn, target.turn)
-    copy(source.velocity, target.velocity)
-    copy(source.spin, target.spin)
-    copy(source.body_velocity, target.body_velocity)
-    copy(source.angular_momentum, target.angular_momentum)
-    copy(source.fluid_momentum, target.fluid_momentum)
+    copy(source.vectors, target.vectors)
     copy(source.rotation, target.rotation)
 
 
 @inner
-def add_stage(total, weight, origin, end, scratch):
-    """total += w (end − origin); rotations likewise on their group. `scratch` has room for all rotations."""
-    _add_weighted(total.position, end.position, origin.position, weight)
-    _add_weighted(total.body_position, end.body_position, origin.body_position, weight)
-    _add_weighted(total.turn, end.turn, origin.turn, weight)
-    _add_weighted(total.velocity, end.velocity, origin.velocity, weight)
-    _add_weighted(total.spin, end.spin, origin.spin, weight)
-    _add_weighted(total.body_velocity, end.body_velocity, origin.body_velocity, weight)
-    _add_weighted(total.angular_momentum, end.angular_momentum, origin.angular_momentum, weight)
-    _add_weighted(total.fluid_momentum, end.fluid_momentum, origin.fluid_momentum, weight)
+def gain(origin, end, gained, turned, n):
+    """Write what stage n has gained over its origin: vectors, and rotation vectors of bodies."""
+    for i in range(origin.vectors.shape[0]):
+        gained[n, i] = end.vectors[i] - origin.vectors[i]
+    for b in range(origin.rotation.shape[0]):
+        turned[n, b, 0], turned[n, b, 1], turned[n, b, 2] = turn_between(origin.rotation, b, end.rotation, b)
+
+
+@inner
+def add_stage(total, weight, gained, turned, scratch):
+    """Add a part of what a stage has gained; rotations likewise on their group. `scratch` has room for all
+    rotations.
+    """
+    add_scaled(total.vectors, weight, gained)
     copy(total.rotation, scratch)
     for b in range(total.rotation.shape[0]):
-        x, y, z = turn_between(origin.rotation, b, end.rotation, b)
-        turn_by(weight * x, weight * y, weight * z, scratch, b, total.rotation, b)
+        turn_by(weight * turned[b, 0], weight * turned[b, 1], weight * turned[b, 2], scratch, b, total.rotation, b)
 
 
 @inner
@@ -189,15 +179,43 @@ def predict(bodies, held, origin, start, turned, position, rotation, rates, stag
     for i in range(origin.fluid_momentum.shape[0]):
         for c in range(3):
             stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
+    _take_twist(start, stage)
+
+
+@inner
+def aim(bodies, end, start, turned, position, rotation, stage):
+    """Predict just the end of a step, which lies beyond its last stage; prescribed bodies are put there.
+
+    Parameters as for `predict`.
+    """
+    copy(end.position, stage.predicted_position)
+    for k in range(turned.shape[0]):
+        stage.predicted_turn[k] = end.turn[k] - turned[k]
+    for b in range(position.shape[0]):
+        f = bodies.free_index[b]
+        if f < 0:
+            copy_row(position, b, end.body_position, b)
+            copy_matrix(rotation, b, end.rotation, b)
+            continue
+        copy_row(end.body_position, b, stage.predicted_body_position, f)
+        copy_matrix(end.rotation, b, stage.predicted_body_rotation, f)
+        x, y, z = turn_between(start.body_rotation, f, stage.predicted_body_rotation, f)
+        stage.body_turn[f, 0], stage.body_turn[f, 1], stage.body_turn[f, 2] = x, y, z
+    _take_twist(start, stage)
+
+
+@inner
+def _take_twist(start, stage):
     for k in range(stage.twist.shape[0]):
         stage.twist[k] = start.joint_strain[k, 2]
 
 
 @inner
-def stand_still(bodies, state, start, stage):
-    """Frozen data of a stage so short that nothing changes in it but what moves; inertia asks for nothing.
+def stand_still(bodies, fluid, strands, state, start, with_fluid, stage):
+    """Frozen data of a stage in which inertia wants everything to stay where it is.
 
-    Forces at a state see its velocities as displacements; see `integrate.motion.momentary_context`.
+    Forces see velocities as displacements from an origin. `with_fluid` says whether inertia of the fluid wants the
+    fluid's momentum at `start` with these velocities to stay, too, instead of asking for nothing.
     """
     length = stage.lengths[0]
     for b in range(state.body_position.shape[0]):
@@ -209,6 +227,7 @@ def stand_still(bodies, state, start, stage):
         copy_row(stage.origin_place, bodies.body_of_free[f], stage.origin_body_position, f)
     copy(start.body_position, stage.predicted_body_position)
     copy(start.body_rotation, stage.predicted_body_rotation)
+    stage.body_turn[:] = 0.0
     copy(start.position, stage.predicted_position)
     copy(start.position, stage.origin_position)
     add_scaled(stage.origin_position, -length, state.velocity)
@@ -216,7 +235,30 @@ def stand_still(bodies, state, start, stage):
     stage.origin_turn[:] = 0.0
     add_scaled(stage.origin_turn, -length, state.spin)
     stage.origin_fluid_momentum[:] = 0.0
-    copy(state.twist, stage.twist)
+    if with_fluid:
+        survey(fluid, strands, start, state.velocity, stage.origin_fluid_momentum)
+    _take_twist(start, stage)
+
+
+@inner
+def distance(bodies, strands, start, end):
+    """Largest displacement of a material point from one configuration to another [m]."""
+    largest = 0.0
+    for i in range(start.position.shape[0]):
+        square = 0.0
+        for c in range(3):
+            square += (end.position[i, c] - start.position[i, c]) ** 2
+        largest = max(largest, math.sqrt(square))
+    for k in range(end.turn.shape[0]):
+        largest = max(largest, abs(end.turn[k]) * strands.half_width[k])
+    for f in range(bodies.mass.shape[0]):
+        square = 0.0
+        for c in range(3):
+            square += (end.body_position[f, c] - start.body_position[f, c]) ** 2
+        x, y, z = turn_between(start.body_rotation, f, end.body_rotation, f)
+        turn = math.sqrt(x * x + y * y + z * z)
+        largest = max(largest, math.sqrt(square) + bodies.reach[bodies.body_of_free[f]] * turn)
+    return largest
 
 
 @inner
@@ -284,18 +326,14 @@ def write_state(bodies, held, fluid, strands, state, last, end, rates):
     """Take the end of a step into the state; `rates` are those of prescribed bodies."""
     copy(last.velocity, state.velocity)
     _write_velocity_of_held(held, end, rates, state)
-    copy(end.position, state.position)
     survey(fluid, strands, end, last.velocity, state.fluid_excess)
     for i in range(state.fluid_excess.shape[0]):
         for c in range(3):
             state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]
-    for k in range(strands.edge_count):
-        copy_row(end.director1, k, state.director1, k)
     copy(last.spin, state.spin)
-    for k in range(state.twist.shape[0]):
-        state.twist[k] = end.joint_strain[k, 2]
     copy(last.body_position, state.body_position)
     copy(last.rotation, state.body_rotation)
+    write_shape(bodies, strands, end, state)
     tensor = stack_matrix(3, 3)
     for b in range(rates.shape[0]):
         f = bodies.free_index[b]
@@ -308,7 +346,19 @@ def write_state(bodies, held, fluid, strands, state, last, end, rates):
         spin = solve_three(tensor, momentum[0], momentum[1], momentum[2])
         for c in range(3):
             state.body_velocity[b, c], state.body_angular_velocity[b, c] = last.body_velocity[f, c], spin[c]
-        _write_orthonormal(end.body_rotation, f, state.body_rotation, b)
+
+
+@inner
+def write_shape(bodies, strands, at, state):
+    """Take positions, frames, and the poses of free bodies into the state."""
+    copy(at.position, state.position)
+    for k in range(strands.edge_count):
+        copy_row(at.director1, k, state.director1, k)
+    write_twist(at, state)
+    for f in range(bodies.mass.shape[0]):
+        b = bodies.body_of_free[f]
+        copy_row(at.body_position, f, state.body_position, b)
+        _write_orthonormal(at.body_rotation, f, state.body_rotation, b)
 
 
 @inner
@@ -321,6 +371,13 @@ def _write_velocity_of_held(held, end, rates, state):
         state.velocity[i, 0] = rates[b, 0] + w1 * end.arm[k, 2] - w2 * end.arm[k, 1]
         state.velocity[i, 1] = rates[b, 1] + w2 * end.arm[k, 0] - w0 * end.arm[k, 2]
         state.velocity[i, 2] = rates[b, 2] + w0 * end.arm[k, 1] - w1 * end.arm[k, 0]
+
+
+@inner
+def write_twist(at, state):
+    """Take the unwrapped twists of joints, as they were found when the potential was evaluated, into the state."""
+    for k in range(state.twist.shape[0]):
+        state.twist[k] = at.joint_strain[k, 2]
 
 
 @inner

@@ -13,8 +13,8 @@ NO_ROOM_IN_BORDER = 3
 """More nodes leave the band than the border has room for."""
 JUMPED = 4
 """Something has jumped: another integrator has to make this step."""
-CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED = 5, 10, 11, 12, 13, 14
-"""How Newton ended; from `MAX_ITERATIONS` on it failed."""
+CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND = 5, 10, 11, 12, 13, 14, 15
+"""How a step ended; from `MAX_ITERATIONS` on it failed."""
 TOO_INACCURATE = 20
 """The error of a step exceeds its tolerance, however short it is."""
 
@@ -24,4 +24,5 @@ FAILURES = {
     INDEFINITE: NewtonStatus.INDEFINITE,
     NOT_FINITE: NewtonStatus.NOT_FINITE,
     BLOCKED: NewtonStatus.BLOCKED,
+    BEYOND: NewtonStatus.BEYOND,
 }

@@ -7,21 +7,27 @@ import math
 from ..jit import inner, kernel
 from ..scene.transduction import grown, lagged
 from .copying import copy
+from .modes import COUNT, LOOK, MINIMUM, MOMENT, NEGATIVE, SETTLE, STEP, VALUE, WITHOUT_INERTIA
 from .newton import first_guess, minimise
 from .place import take_state
 from .potential import start_stage
 from .stages import (
     add_stage,
+    aim,
     copy_point,
+    distance,
     end_point,
+    gain,
     keep_slopes,
     move_along,
     predict,
     stand_still,
     start_point,
+    write_shape,
     write_state,
+    write_twist,
 )
-from .status import CONVERGED, JUMPED, MAX_ITERATIONS, READY
+from .status import BEYOND, BLOCKED, CONVERGED, JUMPED, MAX_ITERATIONS, READY
 
 
 @inner
@@ -57,11 +63,11 @@ def _take_slopes(keeps, bodies, origin, state, first, h, method, n, scratch):
 
 
 @inner
-def _keep_slopes(keeps, sums, state, origin, end, momentum_length, carry, touched):
+def _keep_slopes(keeps, sums, state, origin, last, momentum_length, carry, touched):
     """Leave slopes for the step after, and whether it can take them: not if something touches anew."""
     if keeps is None:
         return
-    keep_slopes(state, origin, end, momentum_length, carry)
+    keep_slopes(state, origin, last, momentum_length, carry)
     state.kept[0] = _compare_touched(sums, touched)
 
 
@@ -103,28 +109,40 @@ def _drive(drives, state, course, k, n, work, stage):
 
 
 @inner
-def take_step(p, state, method, keeps, looks, course, k, work, h, tolerance, max_iterations):
-    """Advance a state by a step of length h [s]; it changes only if every stage converged.
+def _total(energy):
+    total = 0.0
+    for k in range(energy.shape[0]):
+        total += energy[k]
+    return total
 
-    A look at a state is a step that ends with its first evaluation, at its start. It is made here and not by itself
-    because the compiler would make a copy of all that it needs.
+
+@inner
+def take_step(p, state, method, keeps, mode, course, k, work, h, tolerance, max_iterations):
+    """Advance a state by a step of length h [s]; it changes only if every stage converged and its end can be reached.
+
+    Everything happens in passes through one loop, because the compiler would make a copy of all that is called in two
+    places. A pass solves a stage. Where a step ends beyond its last stage (`Method.couplings`), one more pass moves
+    there, and the last looks at the potential as it is there. In other modes there is one pass, from the state at rest,
+    or as it stands; rest strains and factors of loads in `work.stage` are those to use then.
 
     Parameters
     ----------
     p : Problem
     state : StateArrays
+        In the mode `SETTLE` it takes the shape found, if one was, or if the potential has at least fallen as far as the
+        iterations went.
     method : Method
         For this step.
     keeps : int or None
         None if the integrator of the run keeps no slopes.
-    looks : bool
-        Whether only to evaluate the potential at the state as it stands; h, and rest strains and factors of loads in
-        `work.stage`, are those of the look then.
+    mode : int
+        From `modes`.
     course : Course
     k : int
         Which step of the course.
     work : Work
     h : float
+        In the mode `SETTLE` the length over which inertia acts; not used by `LOOK` and `COUNT`.
     tolerance : float
         [m/s]
     max_iterations : int
@@ -139,63 +157,93 @@ def take_step(p, state, method, keeps, looks, course, k, work, h, tolerance, max
     iterations, factorisations, backtracks : int
     residual, gap : float
     """
-    first, stage = work.first, work.stage
+    first, origin, end, stage = work.first, work.origin, work.end, work.stage
     bodies, held, strands = p.bodies, p.held, p.strands
     s, e, t = 0, 1, 2
     take_state(bodies, held, p.surfaces, strands, state, work.places[s])
-    if looks:
-        e = s
-        stage.lengths[:] = h
-        stand_still(bodies, state, work.places[s], stage)
-    else:
+    points, stages = method.couplings.shape
+    passes = 1
+    if mode == STEP:
+        passes = stages if points == stages else points + 1
         start_point(bodies, p.fluid, strands, state, work.places[s], first)
         stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
         work.turned[:] = 0.0
+    else:
+        stage.lengths[:] = MOMENT if mode == LOOK else h if mode == SETTLE else WITHOUT_INERTIA
     iterations = factorisations = backtracks = 0
     worst, gap = 0.0, math.inf
-    stages = course.elapsed.shape[0]
     place = min(k, course.position.shape[0] - 1)
-    for n in range(stages):
-        start, origin = work.places[s], work.origins[n]
-        position, rotation = course.position[place, n], course.rotation[place, n]
-        if not looks:
+    for n in range(passes):
+        point = min(n, points - 1)
+        beyond = mode == STEP and n == stages
+        stays = mode != STEP or n == points
+        start, position, rotation = work.places[s], course.position[place, point], course.rotation[place, point]
+        if stays:
+            stand_still(bodies, p.fluid, strands, state, start, mode == SETTLE or mode == COUNT, stage)
+            position, rotation = state.body_position, state.body_rotation
+        else:
             copy_point(first, origin)
-            for j in range(n):
-                add_stage(origin, method.couplings[n, j], work.origins[j], work.ends[j], work.rotation)
-            _take_slopes(keeps, bodies, origin, state, first, h, method, n, work.rotation)
+            for j in range(min(n, stages)):
+                add_stage(origin, method.couplings[n, j], work.gained[j], work.gained_turn[j], work.rotation)
             _drive(p.drives, state, course, k, n, work, stage)
-            predict(bodies, held, origin, start, work.turned, position, rotation, course.rates[place, n], stage)
-        status = start_stage(p, start, stage)
-        if status != READY:
-            return status, -1, e, iterations, factorisations, backtracks, worst, gap
-        if not looks:
-            status, pair = first_guess(p, start, position, rotation, stage, work.places[e])
+            if beyond:
+                aim(bodies, origin, start, work.turned, position, rotation, stage)
+            else:
+                _take_slopes(keeps, bodies, origin, state, first, h, method, n, work.rotation)
+                predict(bodies, held, origin, start, work.turned, position, rotation, course.rates[place, n], stage)
+        status = READY
+        if not beyond:
+            status = start_stage(p, start, stage)
+        if status == READY and (not stays or mode == SETTLE):
+            status, pair = first_guess(p, start, position, rotation, stage, work.places[e], beyond)
             if status != READY:
+                if beyond and status == BLOCKED:
+                    status, pair = BEYOND, -1
                 return status, pair, e, iterations, factorisations, backtracks, math.inf, gap
-        status, swapped, more, factors, halvings, residual, gap = minimise(
-            p, work.places[e], work.places[t], stage, tolerance, max_iterations, looks
-        )
-        if swapped:
-            e, t = t, e
-        iterations += more
-        factorisations += factors
-        backtracks += halvings
-        if looks or status != CONVERGED:
+        elif status == READY:
+            e = s
+        residual = 0.0
+        if status == READY and not beyond:
+            wanted = NEGATIVE if mode == COUNT else VALUE if stays and mode != SETTLE else MINIMUM
+            status, swapped, more, factors, halvings, residual, gap = minimise(
+                p, work.places[e], work.places[t], stage, tolerance, max_iterations, wanted
+            )
+            if swapped:
+                e, t = t, e
+            iterations += more
+            factorisations += factors
+            backtracks += halvings
+        if mode == SETTLE and (status == CONVERGED or status == MAX_ITERATIONS):
+            work.moved[0] = distance(bodies, strands, start, work.places[e])
+            write_shape(bodies, strands, work.places[e], state)
+        if stays and mode == STEP and (status != CONVERGED or not math.isfinite(_total(p.sums.energy))):
+            copy(work.kept, state.values)
+            status, residual = BEYOND if status == CONVERGED else status, math.inf
+        if mode != STEP or not (beyond or status == CONVERGED):
             return status, -1, e, iterations, factorisations, backtracks, residual, gap
+        if stays:
+            write_twist(work.places[e], state)
+            break
         worst = max(worst, residual)
-        end, ended = work.places[e], work.ends[n]
-        end_point(bodies, p.fluid, strands, stage, origin, work.turned, end, position, rotation, ended)
-        if n + 1 < stages:
-            copy(work.ends[n].turn, work.turned)
+        last = origin
+        if not beyond:
+            last = end
+            end_point(bodies, p.fluid, strands, stage, origin, work.turned, work.places[e], position, rotation, end)
+        if n + 1 == points:
+            if beyond:
+                copy(state.values, work.kept)
+            write_state(bodies, held, p.fluid, strands, state, last, work.places[e], course.rates[place, n])
+            for i in range(state.transduction.shape[0]):
+                state.transduction[i] = work.transduction[i]
+            _keep_slopes(keeps, p.sums, state, origin, last, stage.lengths[1], method.carry, work.touched)
+        if n + 1 < passes:
+            if not beyond:
+                gain(origin, end, work.gained, work.gained_turn, n)
+            copy(last.turn, work.turned)
             s, e = e, s
             work.places[s].turn[:] = 0.0
-    last = stages - 1
-    write_state(bodies, held, p.fluid, strands, state, work.ends[last], work.places[e], course.rates[place, last])
-    for i in range(state.transduction.shape[0]):
-        state.transduction[i] = work.transduction[i]
-    _keep_slopes(
-        keeps, p.sums, state, work.origins[last], work.ends[last], stage.lengths[1], method.carry, work.touched
-    )
+        if beyond:
+            stage.lengths[:] = MOMENT
     return CONVERGED, -1, e, iterations, factorisations, backtracks, worst, gap
 
 
@@ -234,15 +282,13 @@ def _count_contacts(surfaces, nodes, time, tally):
 
 
 @kernel
-def take_steps(loop, keeps, moment, changes, counts, h, tolerance, max_iterations):
-    """Advance a state by the steps of a course, as far as each succeeds, or look at it; parameters beside those of
-    `take_step`:
+def take_steps(loop, keeps, mode, changes, counts, h, tolerance, max_iterations):
+    """Advance a state by the steps of a course, as far as each succeeds, or do once what another mode says; parameters
+    beside those of `take_step`:
 
     Parameters
     ----------
     loop : Loop
-    moment : float
-        If above 0: make no step, but evaluate the potential at the state as it stands, in so short a time [s].
     changes : bool
         Whether `method` begins with slopes that the step before must have left: a jump ends the loop then.
     counts : bool
@@ -263,15 +309,14 @@ def take_steps(loop, keeps, moment, changes, counts, h, tolerance, max_iteration
     residual = worst = 0.0
     gap = math.inf
     status, pair, end = READY, -1, 1
-    looks, length = moment > 0.0, moment if moment > 0.0 else h
     for k in range(course.time.shape[0]):
         if changes and (course.jumps[k] or has_jumped(keeps, p.drives, state, course.first[k], loop.ranges, h)):
             return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
         status, pair, e, more, factors, halvings, left, nearest = take_step(
-            p, state, loop.method, keeps, looks, course, k, work, length, tolerance, max_iterations
+            p, state, loop.method, keeps, mode, course, k, work, h, tolerance, max_iterations
         )
-        if looks:
-            return 0, status, pair, e, iterations, factorisations, backtracks, left, worst, nearest
+        if mode != STEP:
+            return 0, status, pair, e, more, factors, halvings, left, worst, nearest
         if status == CONVERGED or status >= MAX_ITERATIONS:  # what has to be begun again does not count
             iterations += more
             factorisations += factors

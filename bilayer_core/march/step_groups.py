@@ -61,17 +61,18 @@ class Stage:
 
 @group
 class Point:
-    """Positions and momenta at the start of a step, at the origin of a stage, or at its end; see `integrate.stages`."""
+    """Positions and momenta at the start of a step, at the origin of a stage, or at its end."""
 
-    position: Array
-    body_position: Array
-    turn: Array
-    velocity: Array
-    spin: Array
-    body_velocity: Array
-    angular_momentum: Array
-    fluid_momentum: Array
-    rotation: Array
+    vectors: Array  # all but rotations, in one piece, of which the following are views
+    position: Array  # of nodes [m]
+    body_position: Array  # of all bodies [m]
+    turn: Array  # of edges about their tangents since the start of the step [rad]
+    velocity: Array  # of nodes [m/s]
+    spin: Array  # of edges [rad/s]
+    body_velocity: Array  # of free bodies [m/s]
+    angular_momentum: Array  # of free bodies about their mass centres [N m s]
+    fluid_momentum: Array  # of the fluid at nodes [N s]
+    rotation: Array  # of all bodies, shape (n_body, 3, 3)
 
 
 @group
@@ -80,29 +81,29 @@ class Method:
 
     diagonal: float
     momentum_diagonal: float
-    couplings: Array  # over the diagonal, shape (n_stage, n_stage)
+    couplings: Array  # over the diagonal, shape (n_stage, n_stage), with a row more if the end is beyond the last stage
     history: bool
     along: Array
     momenta: Array
     bend: float
     carry: float
-    nodes: Array  # of stages, as parts of a step, shape (n_stage,)
+    nodes: Array  # of stages, and of an end beyond them, as parts of a step, shape (n_point,)
     estimate: float  # of the error of a step, see `march.error_estimate`; NaN without
 
 
 @group
 class Course:
-    """What acts from outside over some steps, at the end of each of their stages."""
+    """What acts from outside over some steps, at each of their points: the ends of stages, and of the step."""
 
     time: Array  # at the end of each step [s], shape (n_step,)
-    elapsed: Array  # from the start of a step to each stage [s], shape (n_stage,)
+    elapsed: Array  # from the start of a step to each point [s], shape (n_point,)
     first: Array  # stimuli at the start of each step, shape (n_step, n_channel)
     jumps: Array  # whether a load jumps there, shape (n_step,)
-    stimulus: Array  # shape (n_step, n_stage, n_channel)
-    load_factor: Array  # shape (n_step, n_stage, n_load)
-    position: Array  # of all bodies; those of prescribed ones count, shape (n_step or 1, n_stage, n_body, 3)
-    rotation: Array  # shape (n_step or 1, n_stage, n_body, 3, 3)
-    rates: Array  # shape (n_step or 1, n_stage, n_body, 6)
+    stimulus: Array  # shape (n_step, n_point, n_channel)
+    load_factor: Array  # shape (n_step, n_point, n_load)
+    position: Array  # of all bodies; those of prescribed ones count, shape (n_step or 1, n_point, n_body, 3)
+    rotation: Array  # shape (n_step or 1, n_point, n_body, 3, 3)
+    rates: Array  # shape (n_step or 1, n_point, n_body, 6)
 
 
 @group
@@ -124,10 +125,14 @@ class Work:
     places: tuple[Place, Place, Place]
     stage: Stage
     first: Point
-    origins: tuple[Point, Point]
-    ends: tuple[Point, Point]
-    turned: Array
-    rotation: Array
+    origin: Point  # of the stage at hand, or the end of a step beyond its last stage
+    end: Point
+    gained: Array  # by each stage over its origin, in the vectors of points, shape (n_stage, n_vectors)
+    gained_turn: Array  # likewise rotation vectors of bodies, shape (n_stage, n_body, 3)
+    kept: Array  # values of the state at the start of a step that has to look at its end
+    moved: Array  # largest displacement in a round of statics [m], shape (1,)
+    turned: Array  # of edges, from the start of the step to that of the stage [rad]
+    rotation: Array  # scratch
     transduction: Array  # at a stage, shape (n_law,)
     strain: Array  # of laws at a stage, shape (n_law,)
     touched: Array  # carriers that something pushed at the end of the last step, shape (n_carrier,)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model.model import Model
-from .allocate import FirstDerivatives, SecondDerivatives
+from .allocate import FirstDerivatives, SecondDerivatives, zeros_in_one
 from .build import read_only
 from .model_groups import OffAxis
 from .problem import Sums
@@ -37,17 +37,18 @@ def point_of(model: Model) -> Point:
     """Arrays of a point."""
     nodes, edges, free = model.node_count, model.edge_count, model.free_count
     bodies, wet = len(model.bodies.names), model.node_count if len(model.fluid_mass) else 0
-    return Point(
-        position=np.zeros((nodes, 3)),
-        body_position=np.zeros((bodies, 3)),
-        turn=np.zeros(edges),
-        velocity=np.zeros((nodes, 3)),
-        spin=np.zeros(edges),
-        body_velocity=np.zeros((free, 3)),
-        angular_momentum=np.zeros((free, 3)),
-        fluid_momentum=np.zeros((wet, 3)),
-        rotation=np.zeros((bodies, 3, 3)),
+    shapes = dict(
+        position=(nodes, 3),
+        body_position=(bodies, 3),
+        turn=(edges,),
+        velocity=(nodes, 3),
+        spin=(edges,),
+        body_velocity=(free, 3),
+        angular_momentum=(free, 3),
+        fluid_momentum=(wet, 3),
     )
+    vectors, parts = zeros_in_one(shapes)
+    return Point(vectors=vectors, **parts, rotation=np.zeros((bodies, 3, 3)))
 
 
 def stage_of(model: Model, off_axis: OffAxis | None) -> Stage:
@@ -79,14 +80,21 @@ def stage_of(model: Model, off_axis: OffAxis | None) -> Stage:
     )
 
 
-def work_of(model: Model, places: list[Place], touched: Array, off_axis: OffAxis | None) -> Work:
-    edges, bodies = model.edge_count, len(model.bodies.names)
+def work_of(
+    model: Model, places: list[Place], touched: Array, off_axis: OffAxis | None, stages: int, state: int
+) -> Work:
+    """Room for steps of so many stages, of a state of so many values."""
+    edges, bodies, first = model.edge_count, len(model.bodies.names), point_of(model)
     return Work(
         places=tuple(places),
         stage=stage_of(model, off_axis),
-        first=point_of(model),
-        origins=(point_of(model), point_of(model)),
-        ends=(point_of(model), point_of(model)),
+        first=first,
+        origin=point_of(model),
+        end=point_of(model),
+        gained=np.zeros((stages, first.vectors.size)),
+        gained_turn=np.zeros((stages, bodies, 3)),
+        kept=np.zeros(state),
+        moved=np.zeros(1),
         turned=np.zeros(edges),
         rotation=np.zeros((bodies, 3, 3)),
         transduction=np.zeros(len(model.law_channel)),

@@ -132,9 +132,7 @@ CONSERVATIVE, DISSIPATIVE, INERTIAL, EXTERNAL = Kind
 FORCES: tuple[Force, ...] = (
     Force("stretching", CONSERVATIVE, "stretch.py", _always),
     Force("bending", CONSERVATIVE, "bend_twist.py", _always),
-    Force(
-        "twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")
-    ),
+    Force("twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")),
     Force("bond", CONSERVATIVE, "coupling.py", _bond),
     Force("eigenstrain", None, "stretch.py", _eigenstrain),
     Force("inertia", INERTIAL, "quadratic.py", _always),

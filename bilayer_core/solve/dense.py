@@ -42,3 +42,70 @@ def solve_dense(factor, n, right):
         right[i] /= factor[i, i]
         for k in range(i):
             right[k] -= factor[i, k] * right[i]
+
+
+PIVOT_RATIO = (1.0 + math.sqrt(17.0)) / 8.0
+"""Of the largest value on the diagonal to that off it, above which a pivot is one value and not a block of two."""
+
+
+@kernel
+def count_negative_dense(matrix, n):
+    """Number of negative eigenvalues of the first n rows and columns of a symmetric matrix, whose lower triangle is
+    overwritten; −1 if it is not finite.
+
+    It is that of the negative eigenvalues of pivots (Sylvester's law of inertia), which are values on the diagonal or
+    blocks of two, the largest left each time (Bunch and Parlett 1971, SIAM J. Numer. Anal. 8): a block has one.
+    """
+    total = 0.0
+    for i in range(n):
+        for j in range(i + 1):
+            total += abs(matrix[i, j])
+    if not math.isfinite(total):
+        return -1
+    negative = first = 0
+    while first < n:
+        on = off = 0.0
+        pivot = low = high = first
+        for i in range(first, n):
+            if abs(matrix[i, i]) > on:
+                on, pivot = abs(matrix[i, i]), i
+            for j in range(first, i):
+                if abs(matrix[i, j]) > off:
+                    off, high, low = abs(matrix[i, j]), i, j
+        if on == 0.0 and off == 0.0:
+            return negative
+        if on >= PIVOT_RATIO * off:
+            exchange_dense(matrix, n, first, pivot)
+            negative += matrix[first, first] < 0.0
+            for i in range(first + 1, n):
+                part = matrix[i, first] / matrix[first, first]
+                for j in range(first + 1, i + 1):
+                    matrix[i, j] -= part * matrix[j, first]
+            first += 1
+            continue
+        exchange_dense(matrix, n, first, low)
+        exchange_dense(matrix, n, first + 1, high)
+        a, b, c = matrix[first, first], matrix[first + 1, first], matrix[first + 1, first + 1]
+        determinant = a * c - b * b
+        negative += 1
+        for i in range(first + 2, n):
+            u, v = matrix[i, first], matrix[i, first + 1]
+            x, y = (c * u - b * v) / determinant, (a * v - b * u) / determinant
+            for j in range(first + 2, i + 1):
+                matrix[i, j] -= x * matrix[j, first] + y * matrix[j, first + 1]
+        first += 2
+    return negative
+
+
+@kernel
+def exchange_dense(matrix, n, a, b):
+    """Exchange rows and columns a ≤ b of a symmetric matrix, kept in the lower triangle."""
+    if a == b:
+        return
+    for j in range(a):
+        matrix[a, j], matrix[b, j] = matrix[b, j], matrix[a, j]
+    for i in range(a + 1, b):
+        matrix[i, a], matrix[b, i] = matrix[b, i], matrix[i, a]
+    for i in range(b + 1, n):
+        matrix[i, a], matrix[i, b] = matrix[i, b], matrix[i, a]
+    matrix[a, a], matrix[b, b] = matrix[b, b], matrix[a, a]

@@ -11,6 +11,8 @@ from sample_scenes import fixed, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrate.integrators import INTEGRATORS
+from bilayer_core.march.modes import STEP
+from bilayer_core.march.status import MAX_ITERATIONS
 from bilayer_core.solve.newton import NewtonStatus
 
 # what the integrator loses
@@ -167,16 +169,24 @@ def test_parts_of_halved_steps_enter_the_budget():
 
 def test_accepted_parts_of_a_step_that_fails_leave_the_budget(monkeypatch):
     simulator = run(driven(solver={"max_halvings": 1}), 0.05, 1e-3)
-    before, solver, attempts = simulator.budget(), simulator._stepper.solver, []
-    simulator._stepper.loops = False  # term by term, where a test can step in
-    minimise = solver.minimise
+    before, engine, attempts = simulator.budget(), simulator._stepper.engine, []
+    march = engine.march
 
-    def accepts_the_second(at, trial):
+    def accepts_the_second(state, method, course, h, settings):
+        kept = state.copy()
+        found = march(state, method, course, h, settings)
+        if settings.mode != STEP:
+            return found
         attempts.append(None)
-        report, end = minimise(at, trial)
-        return report if len(attempts) == 2 else replace(report, status=NewtonStatus.MAX_ITERATIONS), end
+        assert found.newton.converged
+        if len(attempts) == 2:
+            return found
+        state.take(kept)
+        return replace(
+            found, done=0, status=MAX_ITERATIONS, newton=replace(found.newton, status=NewtonStatus.MAX_ITERATIONS)
+        )
 
-    monkeypatch.setattr(solver, "minimise", accepts_the_second)
+    monkeypatch.setattr(engine, "march", accepts_the_second)
     with pytest.raises(SimulationError):
         simulator.step()
     assert len(attempts) == 3

@@ -10,6 +10,7 @@ from sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.integrate.integrators import INTEGRATORS
+from bilayer_core.integrate.method import Method
 
 HISTORY = [name for name, method in INTEGRATORS.items() if method.history is not None]
 SECOND_ORDER = [name for name, method in INTEGRATORS.items() if method.order == 2]
@@ -45,6 +46,27 @@ def test_positions_and_velocities_converge_at_the_order_of_the_integrator(integr
     for coarse, middle, fine in zip(*runs, strict=True):
         first, second = np.linalg.norm(coarse - middle), np.linalg.norm(middle - fine)
         assert math.log2(first / second) == pytest.approx(INTEGRATORS[integrator].order, abs=0.2)
+
+
+THREE = 0.4358665215084590  # of Alexander's method, L-stable, whose last stage is the end of the step
+ENDS = -(6 * THREE**2 - 16 * THREE + 1) / 4, (6 * THREE**2 - 20 * THREE + 5) / 4
+CROUZEIX = 0.5 + math.sqrt(3) / 6
+OF_ORDER_3 = {
+    "alexander": Method(
+        "alexander", 3, THREE, (THREE, 0.5 * (1 + THREE), 1.0), ((), (0.5 * (1 - THREE),), ENDS), None, ""
+    ),
+    "crouzeix": Method("crouzeix", 3, CROUZEIX, (CROUZEIX, 1 - CROUZEIX), ((), (1 - 2 * CROUZEIX,)), (0.5, 0.5), ""),
+}
+
+
+@pytest.mark.parametrize("name", OF_ORDER_3)
+def test_a_method_may_have_any_number_of_stages_and_end_beyond_the_last(name, monkeypatch):
+    """Methods that only this test knows, in the place of another: three stages; two, and an end beyond them."""
+    monkeypatch.setitem(INTEGRATORS, "sdirk2", OF_ORDER_3[name])
+    runs = [end_of.__wrapped__("cantilever", "sdirk2", dt) for dt in (1e-3, 5e-4, 2.5e-4)]
+    for coarse, middle, fine in zip(*runs, strict=True):
+        first, second = np.linalg.norm(coarse - middle), np.linalg.norm(middle - fine)
+        assert math.log2(first / second) == pytest.approx(3.0, abs=0.3)
 
 
 def free_strip():

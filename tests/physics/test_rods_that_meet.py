@@ -184,33 +184,3 @@ def hugging(coefficient):
         contact={**contact(coefficient=coefficient), "rods": True},
         damping={"mass": 20.0},
     )
-
-
-@pytest.mark.parametrize(
-    ("description", "settings", "begin"),
-    [
-        (curling(contact=contact(coefficient=0.5)), {"model": "two_rod"}, 0.1),
-        (curling(contact=contact(coefficient=0.5)), {"model": "laminate", "dimension": 2}, 0.1),
-        (curling(contact=contact(coefficient=0.0)), {"model": "laminate", "integrator": "generalised_alpha"}, 0.1),
-        (curling(contact=contact(coefficient=0.5)), {"model": "two_rod", "dimension": 2, "tolerance": 1e-4}, 0.1),
-        (hugging(0.5), {"model": "laminate", "integrator": "tr_bdf2"}, 0.02),
-        (hugging(0.0), {"model": "two_rod", "dimension": 2}, 0.02),
-    ],
-    ids=["itself", "itself in a plane", "without friction", "adaptive", "with a body", "with a body in a plane"],
-)
-def test_steps_in_a_loop_are_those_made_term_by_term_while_rods_touch(description, settings, begin):
-    looped, by_terms = (Simulator(load_scene(description), **settings) for _ in range(2))
-    by_terms._stepper.loops = False
-    looped.run(begin)
-    touched = 0
-    for _ in range(20):
-        by_terms.load_state(looped.save_state())
-        reports = [simulator.step() for simulator in (looped, by_terms)]
-        assert (reports[0].iterations, reports[0].factorisations) == (reports[1].iterations, reports[1].factorisations)
-        assert looped.positions == pytest.approx(by_terms.positions, rel=0, abs=1e-13)
-        assert looped.frame().min_gap == pytest.approx(by_terms.frame().min_gap, rel=1e-9)
-        force = np.abs(looped.contact_forces).max()
-        assert looped.contact_forces == pytest.approx(by_terms.contact_forces, rel=0, abs=1e-9 * force)
-        assert looped.energy() == pytest.approx(by_terms.energy(), rel=1e-9, abs=1e-15)
-        touched += looped.energy()["rod barrier"] > 0.0
-    assert touched > 5

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 import yaml
-from planar_scenes import AHEAD, everything_in_plane
 from sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, PenetrationError, SceneError, SimulationError
 from bilayer_core.integrate.result import Termination
+from bilayer_core.jit import kernel
+from bilayer_core.march.newton import correction_speed
 
 
 class Recorder:
@@ -48,36 +49,6 @@ def test_a_saved_state_continues_bit_for_bit(simulator):
     other.run(0.03)
     assert np.array_equal(other.save_state(), expected, equal_nan=True)
     assert np.array_equal(other.contact_forces, simulator.contact_forces)
-
-
-@pytest.mark.parametrize(
-    ("description", "settings"),
-    [
-        (everything(), {"model": "two_rod"}),
-        (everything(), {"model": "laminate", "integrator": "generalised_alpha"}),
-        (everything_in_plane(AHEAD["oblique"]), {"dimension": 2}),
-    ],
-)
-def test_a_state_is_looked_at_in_the_loop_as_term_by_term(description, settings):
-    simulator = Simulator(load_scene(description), **settings)
-    simulator.run(0.02)
-    state, frames, potential = simulator.save_state(), [], simulator._stepper.potential
-    for loops in (True, False):
-        simulator._stepper.loops = loops
-        potential.carrier_gradient[:] = potential.contact_gradient[:] = math.nan
-        simulator.load_state(state)
-        frames.append((simulator.frame(), dict(potential.terms)))
-    (looped, terms), (by_terms, expected) = frames
-    assert {name: value for name, value in terms.items() if value} == pytest.approx(
-        {name: value for name, value in expected.items() if value}, rel=1e-9
-    )
-    assert looped.energy == pytest.approx(by_terms.energy, rel=1e-12)
-    force = np.abs(by_terms.contact_forces).max()
-    assert force > 0.0
-    assert looped.contact_forces == pytest.approx(by_terms.contact_forces, rel=0, abs=1e-9 * force)
-    assert looped.body_wrenches == pytest.approx(by_terms.body_wrenches, rel=0, abs=1e-9 * force)
-    for name in ("positions", "directors", "strain", "curvature", "stimulus", "min_gap"):
-        np.testing.assert_allclose(getattr(looped, name), getattr(by_terms, name), rtol=1e-12, atol=1e-15)
 
 
 def test_a_state_in_a_frame_is_enough_to_continue(simulator):
@@ -201,12 +172,19 @@ def test_a_duration_in_which_nothing_would_happen_is_refused(simulator):
     assert simulator.run(0.0).steps == 0
 
 
+@kernel
+def speed_of_correction(problem, length):
+    return correction_speed(problem.strands, problem.bodies, problem.system, length)
+
+
 def test_a_correction_that_is_not_finite_is_never_small(simulator):
-    simulator._stepper.loops = False  # term by term
     simulator.step()
-    solver, size = simulator._stepper.solver, simulator.model.layout.size
+    problem = simulator._stepper.engine._gather()
     for rods, body in ((np.nan, 0.0), (0.0, np.nan), (0.0, np.inf)):
-        assert not solver.speed(np.full(size, rods), np.full((1, 6), body)) <= 1.0
+        problem.system.step[:], problem.system.body_step[:] = rods, body
+        assert not speed_of_correction(problem, 1.0) <= 1.0
+    problem.system.step[:], problem.system.body_step[:] = 0.0, 0.0
+    assert speed_of_correction(problem, 1.0) <= 1.0
 
 
 def test_a_step_that_does_not_converge_is_halved_and_the_steps_grow_again():

@@ -17,9 +17,8 @@ from bilayer_core import Simulator, load_scene
 
 ribbons = [rod([layer()], name="a"), rod([layer(), layer("top")], name="b", start=(0, 0, 2.3e-3))]
 touching = scene(ribbons, contact=contact(coefficient=0.5), gravity=[0, 0, -10])
-def run(description, loops=False, **settings):
+def run(description, **settings):
     simulator = Simulator(load_scene(description), **settings)
-    simulator._stepper.loops = loops
     simulator.run(0.005)
     return simulator
 
@@ -31,9 +30,6 @@ for description in (everything_in_plane(AHEAD["oblique"]), scene([rod([layer()])
     for model in ("two_rod", "laminate"):
         run(description, model=model, dimension=2, budget=True)
 run(scene([rod([layer(), layer("top")])])).solve_static()
-# compiled loops call the same kernels; one of each model, because each set of forces is compiled by itself
-run(everything(), loops=True)
-run(everything_in_plane(AHEAD["oblique"]), loops=True, model="laminate", dimension=2)
 
 used = {}
 for part in ("kinematics", "contact", "forces", "solve", "integrate"):
