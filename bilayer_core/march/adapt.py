@@ -165,7 +165,7 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, most, newton_
             look_ahead(adaptation.acting, method.nodes, begin, h, course)
             span = h if mode == STEP else length
             status, pair, end, last_iterations, factors, halvings, residual, gap = take_step(
-                p, state, method, keeps, mode, course, 0, work, span, newton_tolerance, max_iterations
+                p, state, method, keeps, mode, course, 0, work, loop.before, span, newton_tolerance, max_iterations
             )
             if mode != STEP:
                 _count(counted, span, last_iterations, factors, halvings, 0, 0, residual)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
-from ..model.state import State, initial_state
+from ..model.state import State
 from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
 from ..solve.potential import IncrementalPotential
@@ -91,8 +91,7 @@ class Engine:
         self.start_over(-math.inf)
         self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
         records = [Place(**dict(zip(Place.fields, place.arrays, strict=True))) for place in places]
-        values = initial_state(model, keeps_slopes).values.size
-        self._work = work_of(model, records, self.touched, self._groups["off_axis"], stages, values)
+        self._work = work_of(model, records, self.touched, self._groups["off_axis"], stages)
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""
@@ -130,7 +129,9 @@ class Engine:
         """What compiled steps take, with the present rooms; the same object as long as all parts are."""
         parts = {"problem": self._gather(), "state": self._arrays_of(state), "method": method, "course": course}
         if self._loop is None or any(getattr(self._loop, name) is not part for name, part in parts.items()):
-            self._loop = Loop(**parts, work=self._work, tally=self.tally, ranges=self.ranges)
+            self._loop = Loop(
+                **parts, work=self._work, before=np.zeros_like(state.values), tally=self.tally, ranges=self.ranges
+            )
         return self._loop
 
     def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:

@@ -21,6 +21,7 @@ class Loop:
     method: Method
     course: Course
     work: Work
+    before: Array  # room for the values of the state
     tally: Tally
     ranges: Array  # of channels, in their units, shape (n_channel,)
 

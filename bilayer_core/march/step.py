@@ -117,7 +117,7 @@ def _total(energy):
 
 
 @inner
-def take_step(p, state, method, keeps, mode, course, k, work, h, tolerance, max_iterations):
+def take_step(p, state, method, keeps, mode, course, k, work, before, h, tolerance, max_iterations):
     """Advance a state by a step of length h [s]; it changes only if every stage converged and its end can be reached.
 
     Everything happens in passes through one loop, because the compiler would make a copy of all that is called in two
@@ -141,6 +141,8 @@ def take_step(p, state, method, keeps, mode, course, k, work, h, tolerance, max_
     k : int
         Which step of the course.
     work : Work
+    before : Array
+        Room for the values of the state at the start of a step that has to look at its end.
     h : float
         In the mode `SETTLE` the length over which inertia acts; not used by `LOOK` and `COUNT`.
     tolerance : float
@@ -217,7 +219,7 @@ def take_step(p, state, method, keeps, mode, course, k, work, h, tolerance, max_
             work.moved[0] = distance(bodies, strands, start, work.places[e])
             write_shape(bodies, strands, work.places[e], state)
         if stays and mode == STEP and (status != CONVERGED or not math.isfinite(_total(p.sums.energy))):
-            copy(work.kept, state.values)
+            copy(before, state.values)
             status, residual = BEYOND if status == CONVERGED else status, math.inf
         if mode != STEP or not (beyond or status == CONVERGED):
             return status, -1, e, iterations, factorisations, backtracks, residual, gap
@@ -231,7 +233,7 @@ def take_step(p, state, method, keeps, mode, course, k, work, h, tolerance, max_
             end_point(bodies, p.fluid, strands, stage, origin, work.turned, work.places[e], position, rotation, end)
         if n + 1 == points:
             if beyond:
-                copy(state.values, work.kept)
+                copy(state.values, before)
             write_state(bodies, held, p.fluid, strands, state, last, work.places[e], course.rates[place, n])
             for i in range(state.transduction.shape[0]):
                 state.transduction[i] = work.transduction[i]
@@ -313,7 +315,7 @@ def take_steps(loop, keeps, mode, changes, counts, h, tolerance, max_iterations)
         if changes and (course.jumps[k] or has_jumped(keeps, p.drives, state, course.first[k], loop.ranges, h)):
             return k, JUMPED, pair, end, iterations, factorisations, backtracks, residual, worst, gap
         status, pair, e, more, factors, halvings, left, nearest = take_step(
-            p, state, loop.method, keeps, mode, course, k, work, h, tolerance, max_iterations
+            p, state, loop.method, keeps, mode, course, k, work, loop.before, h, tolerance, max_iterations
         )
         if mode != STEP:
             return 0, status, pair, e, more, factors, halvings, left, worst, nearest

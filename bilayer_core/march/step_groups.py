@@ -129,7 +129,6 @@ class Work:
     end: Point
     gained: Array  # by each stage over its origin, in the vectors of points, shape (n_stage, n_vectors)
     gained_turn: Array  # likewise rotation vectors of bodies, shape (n_stage, n_body, 3)
-    kept: Array  # values of the state at the start of a step that has to look at its end
     moved: Array  # largest displacement in a round of statics [m], shape (1,)
     turned: Array  # of edges, from the start of the step to that of the stage [rad]
     rotation: Array  # scratch

@@ -80,10 +80,8 @@ def stage_of(model: Model, off_axis: OffAxis | None) -> Stage:
     )
 
 
-def work_of(
-    model: Model, places: list[Place], touched: Array, off_axis: OffAxis | None, stages: int, state: int
-) -> Work:
-    """Room for steps of so many stages, of a state of so many values."""
+def work_of(model: Model, places: list[Place], touched: Array, off_axis: OffAxis | None, stages: int) -> Work:
+    """Room for steps of so many stages."""
     edges, bodies, first = model.edge_count, len(model.bodies.names), point_of(model)
     return Work(
         places=tuple(places),
@@ -93,7 +91,6 @@ def work_of(
         end=point_of(model),
         gained=np.zeros((stages, first.vectors.size)),
         gained_turn=np.zeros((stages, bodies, 3)),
-        kept=np.zeros(state),
         moved=np.zeros(1),
         turned=np.zeros(edges),
         rotation=np.zeros((bodies, 3, 3)),

@@ -249,3 +249,12 @@ def test_velocities_of_prescribed_bodies_are_those_of_their_schedule():
         expected = 0.01 * 6.0 * 0.25 * 0.75 / 0.1
         assert simulator.frame().body_velocities[0, 0] == pytest.approx(expected, rel=1e-12)
         assert simulator.velocities[0, 0] == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_no_step_writes_beyond_the_values_of_its_state(integrator):
+    """A step that may be refused at its end keeps the whole state, whatever parts that has."""
+    description, _ = PROBLEMS["cantilever"]
+    simulator = Simulator(load_scene(description), dt=2.5e-4, integrator=integrator)
+    simulator.run(1e-3)
+    assert simulator._stepper.engine._loop.before.shape == simulator.save_state().shape
