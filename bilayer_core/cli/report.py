@@ -33,14 +33,18 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     if summary["tolerance"] is not None and summary["steps"]:
         lengths = ", ".join(f"{name} {1e3 * length:.3g} ms" for name, length in summary["step_length"].items())
         yield f"  {'their length':22}{lengths}; {summary['inaccurate_steps']} attempts refused for their error"
-    yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m"
+    yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m in the run"
+    yield f"  {'largest strain':22}{100 * summary['max_strain']:.3g} % in the run, of an edge without its eigenstrain"
     if summary["min_gap"] is not None:
-        yield f"  {'smallest gap':22}{1e3 * summary['min_gap']:.4g} mm"
-        yield f"  {'largest contact force':22}{1e3 * summary['max_contact_force']:.3g} mN on a node"
+        yield f"  {'smallest gap':22}{1e3 * summary['min_gap']:.4g} mm in the run"
+        yield f"  {'largest contact force':22}{1e3 * summary['max_contact_force']:.3g} mN on a node in the run"
     for name, body in summary["bodies"].items():
         if body["first_contact"] is not None:
             now, most = body["contact_nodes"], body["most_contact_nodes"]
             touched = f"first at {body['first_contact']:.3f} s, by {now} nodes at the end, by {most} at most"
             yield f"  {name + ' touched':22}{touched}"
         if name in moved:
-            yield f"  {name + ' lifted by':22}{1e3 * body['lift']:.2f} mm"
+            heights = f"{1e3 * body['lift']:.2f} mm at most, {1e3 * body['lift_end']:.2f} mm at the end"
+            yield f"  {name + ' lifted by':22}{heights}"
+    for warning in summary["warnings"]:
+        yield f"  {'WARNING':22}{warning}"

@@ -7,7 +7,8 @@
 | ``take_off`` | when nodes lost their last contact, if they end the run without any [s] |
 | ``body.<name>.x``, ``.y``, ``.z`` | displacement of a body [m] |
 | ``body.<name>.first_contact`` | when a node first touched it [s] |
-| ``mean_curvature``, ``max_curvature`` | size of the curvature through the thickness at the end [1/m] |
+| ``mean_curvature`` | mean size of the curvature through the thickness at the end [1/m] |
+| ``max_curvature`` | its largest size in the run [1/m] |
 | ``tip.<rod>/<layer>.x``, ``.y``, ``.z`` | displacement of the last node of a layer [m] |
 """
 

@@ -239,6 +239,7 @@ class Simulator:
             self._stepper.rest(self._state)
             self._stepper.compile(self._state)
             self._stepper.rest(self._state)
+            self.statistics.take_shape(self._stepper, self._state)
             self._begin_budget()
             self._compile_time = clock.thread_time() - begin
         return self._compile_time
@@ -382,6 +383,7 @@ class Simulator:
             return solve_static(self._stepper, self._state, tolerance)
         finally:
             self._stepper.rest(self._state)
+            self.statistics.take_shape(self._stepper, self._state)
             self._begin_budget()
             self.cpu_time += clock.thread_time() - begin
             self.wall_time += clock.perf_counter() - wall
@@ -409,6 +411,7 @@ class Simulator:
         self.compile()
         self._stepper.rest(self._state)
         self._start_over()
+        self.statistics.take_shape(self._stepper, self._state)
         self._begin_budget()
 
     def reset(self) -> None:

@@ -32,9 +32,11 @@ class BodyContact:
 
 @dataclass
 class RunStatistics:
-    """Counts, extremes and first contacts, from `update` after every step.
+    """Counts, extremes and first contacts of a run, from `update` after every step.
 
-    Times in s, lengths in m, forces in N, residuals in m/s.
+    Times in s, lengths in m, forces in N, residuals in m/s, curvatures in 1/m. `max_strain` is the largest magnitude of
+    the strain of an edge without its eigenstrain, `body_tops` the greatest height of each body; these two and
+    `max_curvature` count the state at the start too.
     """
 
     steps: int = 0
@@ -50,6 +52,9 @@ class RunStatistics:
     min_gap: float = math.inf
     max_contact_force: float = 0.0
     com_max_height: float = -math.inf
+    max_curvature: float = 0.0
+    max_strain: float = 0.0
+    body_tops: dict[str, float] = field(default_factory=dict)
     bodies: dict[str, BodyContact] = field(default_factory=dict)
 
     def update(self, report: StepReport, stepper: Stepper, state: State) -> None:
@@ -64,6 +69,12 @@ class RunStatistics:
         self.last_residual = report.residual
         self.largest_residual = max(self.largest_residual, report.residual)
         stepper.engine.count_in(state, stepper.potential.min_gap)
+        self.take_shape(stepper, state)
+
+    def take_shape(self, stepper: Stepper, state: State) -> None:
+        """Take in the shape of a state that no compiled loop has led to, evaluated in `stepper`."""
+        rest = stepper.surroundings.rest_strains_of(state.transduction)
+        stepper.engine.count_shape(state, stepper.end, rest.edge)
         self._take_extremes(stepper)
 
     def update_with(self, report: MarchReport, stepper: Stepper) -> None:
@@ -82,7 +93,9 @@ class RunStatistics:
 
     def _take_extremes(self, stepper: Stepper) -> None:
         engine, model = stepper.engine, stepper.model
-        self.com_max_height, self.min_gap, self.max_contact_force = engine.figures.tolist()
+        self.com_max_height, self.min_gap, self.max_contact_force, *shape = engine.figures.tolist()
+        self.max_curvature, self.max_strain = shape
+        self.body_tops = dict(zip(model.bodies.names, engine.body_top.tolist(), strict=True))
         if stepper.potential.near is None:
             return
         for surface, body in enumerate(model.surfaces.body):

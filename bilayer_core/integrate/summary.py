@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..model.validity import LARGE_STRAIN
 from . import observe
 
 if TYPE_CHECKING:
@@ -13,7 +15,14 @@ if TYPE_CHECKING:
 
 
 def summarise(simulator: Simulator) -> dict:
-    """Figures of a run since its start; lengths in m, times in s, forces in N, energies in J."""
+    """Figures of a run since its start; lengths in m, times in s, forces in N, energies in J, curvatures in 1/m.
+
+    Of the run, over the start and the ends of all accepted steps: ``max_curvature`` (through the thickness),
+    ``max_strain`` (of an edge, without its eigenstrain), ``com_max_height``, ``min_gap``, ``max_contact_force``, and of
+    bodies ``lift``, the greatest height over that at the start, ``first_contact`` and ``most_contact_nodes``. Of the
+    end: ``com_end``, ``mean_curvature``, ``tip_positions``, ``energy``, and of bodies ``end``, ``lift_end`` and
+    ``contact_nodes``. ``warnings`` tell where the run left the range in which the model is meant to be used.
+    """
     model, statistics, plan = simulator.model, simulator.statistics, simulator.plan
     positions = simulator.positions
     curvature = np.abs(simulator.curvatures[: model.node_count])
@@ -55,16 +64,26 @@ def summarise(simulator: Simulator) -> dict:
         "com_start": simulator.start_com.tolist(),
         "com_end": simulator.com.tolist(),
         "com_max_height": statistics.com_max_height,
-        "max_curvature": float(curvature.max()),
+        "max_curvature": statistics.max_curvature,
         "mean_curvature": float(np.average(curvature, weights=model.carriers.weight[: model.node_count])),
         "tip_positions": {s.name: positions[s.first_node + s.node_count - 1].tolist() for s in model.strands},
+        "max_strain": statistics.max_strain,
         "min_gap": min_gap if np.isfinite(min_gap) else None,
         "max_contact_force": statistics.max_contact_force,
         "energy": simulator.energy(),
         **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
+        "warnings": list(_warnings(statistics.max_strain)),
         "versions": observe.versions(),
     }
+
+
+def _warnings(strain: float) -> Iterator[str]:
+    if strain > LARGE_STRAIN:
+        yield (
+            f"largest strain of an edge {100 * strain:.3g} % (at most {100 * LARGE_STRAIN:g} %): "
+            "the law of the material is linear"
+        )
 
 
 def _bodies(simulator: Simulator) -> dict:
@@ -76,7 +95,8 @@ def _bodies(simulator: Simulator) -> dict:
         found[name] = {
             "start": start.tolist(),
             "end": end.tolist(),
-            "lift": float(end[2] - start[2]),
+            "lift": simulator.statistics.body_tops[name] - float(start[2]),
+            "lift_end": float(end[2] - start[2]),
             "first_contact": contact.first_contact if contact else None,
             "contact_nodes": contact.nodes if contact else 0,
             "most_contact_nodes": contact.most_nodes if contact else 0,

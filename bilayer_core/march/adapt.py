@@ -14,7 +14,7 @@ from .group import group
 from .loop import Loop
 from .modes import STEP
 from .status import CONVERGED, JUMPED, MAX_ITERATIONS, READY, TOO_INACCURATE
-from .step import count_in, has_jumped, take_step
+from .step import count_in, count_shape, has_jumped, take_step
 from .step_control import FAILURE_FACTOR, STRETCH, after_rejection, after_success, fit
 from .step_groups import StateArrays
 
@@ -200,6 +200,7 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, most, newton_
         clock.step[0] += 1.0
         if counts:
             count_in(p.surfaces, p.strands, p.sums, state, gap, time, loop.tally)
+            count_shape(p.strands, work.places[end], work.stage.rest_edge, state, loop.tally)
         if time == until:
             return k + 1, CONVERGED, -1, end, gap
     return most, status, pair, end, gap

@@ -52,7 +52,7 @@ class Engine:
         Carriers that something pushed at the end of the last step, bool, shape (n_carrier,).
     ranges : Array
         Of channels, in their units, shape (n_channel,).
-    figures, nodes, most_nodes, first_contact : Array
+    figures, nodes, most_nodes, first_contact, body_top : Array
         Extremes of the run; see `march.step_groups.Tally`.
     """
 
@@ -77,13 +77,16 @@ class Engine:
         self.ranges = np.array([c.maximum - c.minimum for c in model.scene.stimuli.values()], dtype=float)
         self._columns = model.bodies.freedom.shape[1]  # room in the border
         self._width = np.zeros(1, dtype=np.int64)  # of it in use
-        self.figures = np.zeros(3)
+        self.figures = np.zeros(5)
+        self.body_top = np.zeros(len(model.bodies.names))
         self.nodes, self.most_nodes = np.zeros((2, len(model.surfaces.names)), dtype=np.int64)
         self.first_contact = np.zeros(len(model.surfaces.names))
         self.tally = Tally(
             mass_moment=model.mass_moment,
             mass=float(model.node_mass.sum()),
+            voronoi_length=model.voronoi_length,
             figures=self.figures,
+            body_top=self.body_top,
             nodes=self.nodes,
             most_nodes=self.most_nodes,
             first_contact=self.first_contact,
@@ -95,7 +98,8 @@ class Engine:
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""
-        self.figures[:] = height, math.inf, 0.0
+        self.figures[:] = height, math.inf, 0.0, 0.0, 0.0
+        self.body_top[:] = -math.inf
         self.nodes[:], self.most_nodes[:], self.first_contact[:] = 0, 0, math.nan
 
     def _gather(self) -> Problem:
@@ -184,6 +188,23 @@ class Engine:
         if self._counted is None:
             self._counted = Counted(surfaces=p.surfaces, strands=p.strands, sums=p.sums, state=arrays, tally=self.tally)
         count_step(self._counted, gap, float(state.time[0]))
+
+    def count_shape(self, state: State, end: Configuration, rest_edge: Array) -> None:
+        """Take the shape of a state that no loop has led to into the tally: `march.step.count_shape` without kernels.
+
+        Parameters
+        ----------
+        state : State
+        end : Configuration
+            That of the state.
+        rest_edge : Array
+            Rest strains of edges there, shape (n_edge,).
+        """
+        model = self._model
+        curvature = np.abs(end.joint_strain[: model.bend_count, 0]) / model.voronoi_length
+        strain = np.abs(end.length[: model.edge_count] / model.rest_length - 1.0 - rest_edge)
+        self.figures[3:] = np.maximum(self.figures[3:], [curvature.max(initial=0.0), strain.max(initial=0.0)])
+        np.maximum(self.body_top, state.body_position[: len(self.body_top), 2], out=self.body_top)
 
 
 @dataclass(frozen=True)

@@ -269,6 +269,21 @@ def count_in(surfaces, strands, sums, state, gap, time, tally):
 
 
 @inner
+def count_shape(strands, place, rest_edge, state, tally):
+    """Take the shape at the end of a step into the extremes of a run; `rest_edge` holds rest strains of edges."""
+    figures, voronoi = tally.figures, tally.voronoi_length
+    sharpest = 0.0
+    for j in range(voronoi.shape[0]):
+        sharpest = max(sharpest, abs(place.joint_strain[j, 0]) / voronoi[j])
+    largest = 0.0
+    for e in range(strands.edge_count):
+        largest = max(largest, abs(place.length[e] / strands.rest_length[e] - 1.0 - rest_edge[e]))
+    figures[3], figures[4] = max(figures[3], sharpest), max(figures[4], largest)
+    for b in range(tally.body_top.shape[0]):
+        tally.body_top[b] = max(tally.body_top[b], state.body_position[b, 2])
+
+
+@inner
 def _count_contacts(surfaces, nodes, time, tally):
     if surfaces is None:
         return
@@ -329,6 +344,7 @@ def take_steps(loop, keeps, mode, changes, counts, h, tolerance, max_iterations)
         worst = max(worst, residual)
         if counts:
             count_in(p.surfaces, p.strands, p.sums, state, gap, course.time[k], loop.tally)
+            count_shape(p.strands, work.places[e], work.stage.rest_edge, state, loop.tally)
     return course.time.shape[0], status, pair, end, iterations, factorisations, backtracks, residual, worst, gap
 
 

@@ -112,7 +112,9 @@ class Tally:
 
     mass_moment: Array  # of edges along m1 [kg m], shape (n_edge,) or (0,)
     mass: float  # of all rods [kg]
-    figures: Array  # greatest height of the mass centre [m], smallest gap [m], largest contact force [N]
+    voronoi_length: Array  # of bending elements [m], shape (n_bend,)
+    figures: Array  # highest mass centre [m], smallest gap [m], largest contact force [N], curvature [1/m], strain
+    body_top: Array  # greatest height of each body's position [m], shape (n_body,)
     nodes: Array  # that touch each surface now, shape (n_surface,)
     most_nodes: Array
     first_contact: Array  # [s], NaN before, shape (n_surface,)

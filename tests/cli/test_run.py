@@ -19,7 +19,7 @@ from bilayer_core.scene.loader import parse_scene
 SUMMARY_KEYS = """
     scene model dimension integrator nodes dof dt duration simulated steps rejected_steps newton_iterations cpu_time
     wall_time compile_time real_time_factor converged termination terms com_start com_end com_max_height max_curvature
-    mean_curvature tip_positions min_gap max_contact_force energy versions
+    max_strain mean_curvature tip_positions min_gap max_contact_force energy versions
 """.split()
 HOPELESS = [
     "--set",
@@ -43,6 +43,7 @@ def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
     assert main(["run", "cantilever", "--duration", "50 ms", *outputs]) == 0
     summary = json.loads((here / "run.json").read_text())
     assert not set(SUMMARY_KEYS) - set(summary)
+    assert summary["warnings"] == []
     assert summary["simulated"] == summary["duration"] == 0.05 and summary["converged"] is True
     assert set(summary["reasons"]) == {"model", "dimension", "integrator", "stepping"}
     info = read_info("run.mcap")
@@ -52,6 +53,8 @@ def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
     assert told.startswith(f"cantilever: completed, 0.05 s in {summary['steps']} steps\n")
     assert f"  stepping              {summary['stepping']} ({summary['reasons']['stepping']})\n" in told
     assert "real-time factor" in told and "run.mcap" in told
+    assert f"  largest curvature     {summary['max_curvature']:.3g} 1/m in the run\n" in told
+    assert "% in the run, of an edge without its eigenstrain\n" in told
 
 
 @pytest.mark.parametrize(
