@@ -26,7 +26,7 @@ class Status:
     steps, substeps, iterations : int
         Steps, the parts in which they were taken, and Newton iterations.
     residual : float
-        Largest velocity correction left at the end of a step [m/s].
+        Largest of the last velocity corrections of steps [m/s].
     waited : float
         Real time for which there has been no step because no controller answers [s].
     """

@@ -29,7 +29,7 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     each = f", {1e3 * summary['cpu_time'] / iterations:.2g} ms each" if iterations else ""
     yield f"  {'Newton iterations':22}{iterations}{each}"
     refused = f", {summary['rejected_steps']} attempts refused" if summary["rejected_steps"] else ""
-    yield f"  {'steps':22}{summary['steps']}{refused}; correction left at most {summary['largest_residual']:.1g} m/s"
+    yield f"  {'steps':22}{summary['steps']}{refused}; last correction at most {summary['largest_residual']:.1g} m/s"
     if summary["tolerance"] is not None and summary["steps"]:
         lengths = ", ".join(f"{name} {1e3 * length:.3g} ms" for name, length in summary["step_length"].items())
         yield f"  {'their length':22}{lengths}; {summary['inaccurate_steps']} attempts refused for their error"

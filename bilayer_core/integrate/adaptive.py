@@ -39,12 +39,12 @@ class AdaptiveStepper(Stepper):
         With an estimate of its error.
     first : float
         Length of the first step, and of the first after a jump [s].
-    newton_tolerance, max_iterations, max_halvings
-        As for `Stepper`; the shortest step is ``first/2**max_halvings``.
+    newton_tolerance, max_iterations
+        As for `Stepper`.
     tolerance : float
         Largest local error of a step: displacement over the length of the longest rod (`march.error_estimate`).
-    largest : float
-        Length of the longest step [s].
+    shortest, largest : float
+        Lengths of the shortest and the longest step [s].
 
     Raises
     ------
@@ -59,8 +59,8 @@ class AdaptiveStepper(Stepper):
         first: float,
         newton_tolerance: float,
         max_iterations: int,
-        max_halvings: int,
         tolerance: float,
+        shortest: float,
         largest: float,
     ):
         if method.estimate is None:
@@ -68,11 +68,10 @@ class AdaptiveStepper(Stepper):
                 f"tolerance: {tolerance:g} is not allowed with the integrator {method.name}, which has no estimate of "
                 "its error; leave it out, or take another integrator"
             )
-        super().__init__(model, method, first, newton_tolerance, max_iterations, max_halvings)
+        super().__init__(model, method, first, newton_tolerance, max_iterations, max_halvings=0)
         self.tolerance = tolerance
         self._first = min(first, largest)
         self._stretch = Stretch(model)
-        shortest = self._first / 2**max_halvings
         control = Control(
             order=method.order, tolerance=tolerance, first=self._first, shortest=shortest, longest=largest
         )

@@ -133,9 +133,12 @@ def node_curvature(model: Model, stepper: Stepper) -> Array:
     n_point,).
     """
     curvature = np.zeros(model.node_count + model.point_count)
-    bends = slice(model.bend_count)
-    nodes = model.joint_node[bends]
-    curvature[nodes] = stepper.end.joint_strain[bends, 0] / model.voronoi_length
+    bends, at = slice(model.bend_count), stepper.end
+    a, b = model.joint_a[bends], model.joint_b[bends]
+    tangents, directors = at.tangent, at.director1  # of the end; strains were last evaluated before Newton's last step
+    bend = np.einsum("ki,ki->k", tangents[b], directors[a]) - np.einsum("ki,ki->k", tangents[a], directors[b])
+    bend /= 1.0 + np.einsum("ki,ki->k", tangents[a], tangents[b])  # κ₁ of `forces.bend_twist`
+    curvature[model.joint_node[bends]] = bend / model.voronoi_length
     for s in model.strands:
         first, last = s.first_node, s.first_node + s.node_count - 1
         for end, neighbour in ((first, first + 1), (last, last - 1)):

@@ -77,11 +77,12 @@ class Simulator:
         self._keeps_history = method.history is not None
         self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
         solver = scene.solver
-        newton = solver.newton_tolerance, solver.max_newton_iterations, solver.max_halvings
+        newton = self.steps.newton_tolerance, solver.max_newton_iterations
         if self.tolerance is None:
-            self._stepper = Stepper(self.model, method, self.dt, *newton)
+            self._stepper = Stepper(self.model, method, self.dt, *newton, self.steps.max_halvings)
         else:
-            self._stepper = AdaptiveStepper(self.model, method, self.dt, *newton, self.tolerance, self.steps.longest)
+            lengths = self.steps.shortest, self.steps.longest
+            self._stepper = AdaptiveStepper(self.model, method, self.dt, *newton, self.tolerance, *lengths)
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = self._initial_state()
@@ -186,7 +187,7 @@ class Simulator:
             "integrator": self.plan.integrator,
             "dt": repr(self.dt),
             "tolerance": "none" if self.tolerance is None else repr(self.tolerance),
-            "newton_tolerance": repr(self.scene.solver.newton_tolerance),
+            "newton_tolerance": repr(self.steps.newton_tolerance),
             **observe.versions(),
         }
         return observe.describe(self.model, self._state, settings, scene_text(self.scene))

@@ -42,7 +42,7 @@ class StepReport:
     iterations, factorisations : int
         Newton corrections and factorised Hessians, failed attempts included.
     residual : float
-        Largest speed of a correction left [m/s].
+        Largest speed of a last correction [m/s].
     inaccurate : int
         Attempts that were not accepted because of their error.
     """
@@ -246,7 +246,6 @@ class Stepper:
     def _explain(self, report: NewtonReport, time: float, h: float) -> str:
         text = f"{report.status.value} in the step to t = {time:.6g} s, tried down to {h:.3g} s"
         if np.isfinite(report.residual):
-            tolerance = self.model.scene.solver.newton_tolerance
-            text += f" (correction left {report.residual:.3g} m/s, allowed {tolerance:.3g} m/s, "
+            text += f" (correction left {report.residual:.3g} m/s, allowed {self.solver.tolerance:.3g} m/s, "
             text += f"{report.iterations} iterations)"
         return text + (f": {report.detail}" if report.detail else "")

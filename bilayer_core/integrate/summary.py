@@ -9,6 +9,7 @@ import numpy as np
 
 from ..model.validity import LARGE_STRAIN
 from . import observe
+from .result import Termination
 
 if TYPE_CHECKING:
     from .simulator import Simulator
@@ -57,7 +58,7 @@ def summarise(simulator: Simulator) -> dict:
         "wall_time": simulator.wall_time,
         "compile_time": simulator.compile(),
         "real_time_factor": simulated / cpu if cpu > 0.0 else None,
-        "converged": statistics.largest_residual <= simulator.scene.solver.newton_tolerance,
+        "converged": simulator.termination != Termination.FAILED.value,  # no other step is accepted
         "largest_residual": statistics.largest_residual,
         "termination": simulator.termination,
         "terms": plan.terms,

@@ -54,7 +54,16 @@ def kernel(function) -> KernelFunction:
 
 def inner(function):
     """A function that only kernels call, and the interpreter cannot: it is compiled within each of them."""
-    options = OPTIONS | {"cache": False, "no_cpython_wrapper": True}
+    return _within_kernels(function, FASTMATH)
+
+
+def exact(function):
+    """Like `inner`, with the operations in the order they are written: rounding is part of the result."""
+    return _within_kernels(function, False)
+
+
+def _within_kernels(function, fastmath):
+    options = OPTIONS | {"cache": False, "no_cpython_wrapper": True, "fastmath": fastmath}
     compiled = numba.njit(**options, pipeline_class=InnerCompiler)(function)
     compiled.__class__ = InnerFunction
     if CACHE:

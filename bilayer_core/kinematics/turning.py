@@ -51,6 +51,49 @@ def turn_between(first, a, last, b):
 
 
 @inner
+def turn_further(v0, v1, v2, turned, out, f):
+    """out[f] = vector part of the unit quaternion of exp([v]×) after that of turned[f]; they may be the same array.
+
+    Of turns by less than half a turn, whose quaternions have a positive real part. Small turns keep all their digits,
+    which a matrix next to the unit matrix does not.
+    """
+    angle2 = v0 * v0 + v1 * v1 + v2 * v2
+    if angle2 < 1e-8:  # as in `turn_by`
+        s, w = 0.5 - angle2 / 48.0, 1.0 - angle2 / 8.0
+    else:
+        angle = math.sqrt(angle2)
+        s, w = math.sin(0.5 * angle) / angle, math.cos(0.5 * angle)
+    p0, p1, p2 = s * v0, s * v1, s * v2
+    q0, q1, q2 = turned[f, 0], turned[f, 1], turned[f, 2]
+    u = real_part(turned, f)
+    sign = -1.0 if w * u < p0 * q0 + p1 * q1 + p2 * q2 else 1.0
+    out[f, 0] = sign * (w * q0 + u * p0 + (p1 * q2 - p2 * q1))
+    out[f, 1] = sign * (w * q1 + u * p1 + (p2 * q0 - p0 * q2))
+    out[f, 2] = sign * (w * q2 + u * p2 + (p0 * q1 - p1 * q0))
+
+
+@inner
+def real_part(turned, f):
+    """Of the unit quaternion with the vector part turned[f], by less than half a turn."""
+    return math.sqrt(max(1.0 - turned[f, 0] ** 2 - turned[f, 1] ** 2 - turned[f, 2] ** 2, 0.0))
+
+
+@inner
+def turned_by(turned, f, u0, u1, u2):
+    """(E − 1) u = 2 w q×u + 2 q×(q×u) for the rotation E of the quaternion with the vector part q = turned[f], as a
+    tuple.
+    """
+    q0, q1, q2 = turned[f, 0], turned[f, 1], turned[f, 2]
+    w = real_part(turned, f)
+    t0, t1, t2 = 2.0 * (q1 * u2 - q2 * u1), 2.0 * (q2 * u0 - q0 * u2), 2.0 * (q0 * u1 - q1 * u0)
+    return (
+        w * t0 + (q1 * t2 - q2 * t1),
+        w * t1 + (q2 * t0 - q0 * t2),
+        w * t2 + (q0 * t1 - q1 * t0),
+    )
+
+
+@inner
 def spin_of(v0, v1, v2, u0, u1, u2):
     """Angular velocity of exp([v]×) while v changes at the rate u, as a tuple; see `kinematics.rotation`."""
     angle2 = v0 * v0 + v1 * v1 + v2 * v2

@@ -277,6 +277,9 @@ def configuration(model: Model) -> Place:
         held=np.zeros((len(model.attached_node), 3)),
         point_arm=np.zeros((len(carriers.weight) - model.node_count, 3)),
         surface_arm=np.zeros((len(surfaces.kind), 3)),
+        departure=np.zeros((model.node_count, 3)),
+        body_departure=np.zeros((model.free_count, 3)),
+        body_turned=np.zeros((model.free_count, 3)),
     )
     if not (surfaces.body < bodies).any():
         at.surface_place[:], at.surface_arm[:], at.surface_turn[:] = surfaces.position, surfaces.position, surfaces.turn

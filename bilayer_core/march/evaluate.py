@@ -16,7 +16,7 @@ from .group import group
 from .inertia import DAMPING, INERTIA
 from .matrix import EXACT, assemble, factorise, solve
 from .newton import bound, correction_speed, look_ahead
-from .place import carry_frames, move, take_state
+from .place import carry_frames, measure_departure, move, take_state
 from .potential import add_forces, expand, follow, start_stage
 from .problem import Problem
 from .slip import hold_up
@@ -93,13 +93,14 @@ def evaluate_at(call, operation, base, at, with_hessian):
         take_state(bodies, held, p.surfaces, strands, state, at)
     elif operation == MOVE:
         step, body_step = p.system.step, p.system.body_step
-        move(bodies, held, p.surfaces, p.space, p.plane, strands, base, step, body_step, 1.0, at)
+        move(bodies, held, p.surfaces, p.space, p.plane, strands, base, step, body_step, 1.0, stage, at)
     elif operation == CARRY_FRAMES:
         carry_frames(p.space, p.plane, strands, base, at, at.angle)
     elif operation == START_POINT:
         start_point(bodies, p.fluid, strands, state, at, call.point)
     elif operation == PREDICT:
-        predict(bodies, held, call.point, at, call.turned, call.position, call.rotation, call.rates, stage)
+        point, poses = call.point, (call.position, call.rotation, call.rates)
+        predict(bodies, held, state, point, point, at, call.turned, poses[0], poses[1], poses[2], stage)
     elif operation == STAND_STILL:
         stand_still(bodies, p.fluid, strands, state, at, False, stage)
     elif operation == START_STAGE:
@@ -108,6 +109,7 @@ def evaluate_at(call, operation, base, at, with_hessian):
         follow(p, at, stage)
     elif operation == FORCES or operation == UNKNOWNS:
         status = _find(p, at)
+        measure_departure(bodies, stage, at)
         if status == READY:
             gap = add_forces(p, at, stage, with_hessian, False)
             for k in range(p.sums.energy.shape[0]):

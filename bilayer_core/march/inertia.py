@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..forces.body import body_spring
-from ..forces.quadratic import angle_spring, gravity, node_spring
+from ..forces.body import body_inertia
+from ..forces.quadratic import angle_spring, departure_spring, gravity, node_spring
 from ..jit import inner
 from .terms import place_of
 
@@ -14,13 +14,12 @@ INERTIA, DAMPING, GRAVITY = map(place_of, ("inertia", "damping", "gravity"))
 def _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian):
     if border is None:
         return 0.0
-    return body_spring(
+    return body_inertia(
         bodies.mass,
         bodies.second_moment,
         factor,
-        at.body_position,
-        at.body_rotation,
-        stage.predicted_body_position,
+        at.body_departure,
+        at.body_turned,
         stage.predicted_body_rotation,
         sums.body,
         sums.body_hessian,
@@ -32,7 +31,7 @@ def _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian
 def add_inertia(gravitation, damping, border, strands, bodies, at, stage, sums, with_hessian):
     if sums.selected[INERTIA]:
         factor = 1.0 / (stage.lengths[0] * stage.lengths[1])
-        energy = node_spring(strands.node_mass, factor, at.position, stage.predicted_position, sums.node)
+        energy = departure_spring(strands.node_mass, factor, at.departure, sums.node)
         energy += angle_spring(strands.spin_inertia, factor, at.turn, stage.predicted_turn, sums.edge)
         energy += _add_inertia_of_bodies(border, bodies, factor, at, stage, sums, with_hessian)
         sums.energy[INERTIA] = energy

@@ -7,12 +7,13 @@ import math
 from ..contact.near import largest_motion
 from ..contact.step_bound import step_bound
 from ..jit import inner
-from ..kinematics.turning import turn_between, turn_by
+from ..kinematics.turning import turn_between, turn_by, turn_further
 from ..solve.newton import ARMIJO, BACKTRACKING, KEEP_FACTOR_BELOW, MAX_BACKTRACKS, ROUNDING, largest_move
 from .contact import list_pairs
+from .copying import copy
 from .matrix import factorise, solve
 from .modes import NEGATIVE, VALUE
-from .place import carry_frames, copy_prescribed, move, put_carried
+from .place import carry_frames, copy_prescribed, move, put_carried, put_departure_of_held
 from .potential import evaluate, follow
 from .slip import hold_up
 from .status import (
@@ -41,6 +42,23 @@ def correction_speed(strands, bodies, system, length):
             return size
         largest = max(largest, size)
     return largest / length
+
+
+@inner
+def rounding_speed(at, length):
+    """Speed of a correction that moves the node farthest out by a few of its last digits over a length of time [m/s].
+
+    Elasticity sees positions no better than that, so Newton cannot do better where it outweighs inertia.
+    """
+    farthest = 0.0
+    for i in range(at.position.shape[0]):
+        for c in range(3):
+            farthest = max(farthest, abs(at.position[i, c]))
+    return LAST_DIGITS * farthest / length
+
+
+LAST_DIGITS = 4.0 * 2.0**-52
+"""Relative error of a coordinate by four units of its last digit."""
 
 
 @inner
@@ -143,12 +161,11 @@ def first_guess(p, start, position, rotation, stage, guess, whole):
         for f in range(free):
             b = bodies.body_of_free[f]
             for c in range(3):
-                way = stage.predicted_body_position[f, c] - start.body_position[f, c]
-                system.motion[b, c] = fraction * way
+                system.motion[b, c] = fraction * stage.body_way[f, c]
                 system.motion[b, 3 + c] = fraction * stage.body_turn[f, c]
         for i in range(system.node_step.shape[0]):
             for c in range(3):
-                system.node_step[i, c] = fraction * (stage.predicted_position[i, c] - start.position[i, c])
+                system.node_step[i, c] = fraction * stage.way[i, c]
         alpha, pair, status = bound(p.surfaces, p.threads, bodies, p.held, p.strands, system, start)
         if status != READY:
             return status, -1
@@ -159,15 +176,16 @@ def first_guess(p, start, position, rotation, stage, guess, whole):
         fraction *= (0.5 if attempt == 0 else 0.0) * alpha
     for i in range(system.node_step.shape[0]):
         for c in range(3):
-            way = stage.predicted_position[i, c] - start.position[i, c]
-            guess.position[i, c] = start.position[i, c] + fraction * way
+            guess.position[i, c] = start.position[i, c] + fraction * stage.way[i, c]
+            guess.departure[i, c] = (fraction - 1.0) * stage.way[i, c]
     for k in range(p.strands.edge_count):
         guess.turn[k] = fraction * stage.predicted_turn[k]
     copy_prescribed(bodies, position, rotation, guess)
     for f in range(free):
         for c in range(3):
-            way = stage.predicted_body_position[f, c] - start.body_position[f, c]
-            guess.body_position[f, c] = start.body_position[f, c] + fraction * way
+            guess.body_position[f, c] = start.body_position[f, c] + fraction * stage.body_way[f, c]
+            guess.body_departure[f, c] = (fraction - 1.0) * stage.body_way[f, c]
+            guess.body_turned[f, c] = 0.0
         turn_by(
             fraction * stage.body_turn[f, 0],
             fraction * stage.body_turn[f, 1],
@@ -177,7 +195,17 @@ def first_guess(p, start, position, rotation, stage, guess, whole):
             guess.body_rotation,
             f,
         )
+        short = fraction - 1.0
+        turn_further(
+            short * stage.body_turn[f, 0],
+            short * stage.body_turn[f, 1],
+            short * stage.body_turn[f, 2],
+            guess.body_turned,
+            guess.body_turned,
+            f,
+        )
     put_carried(bodies, p.held, p.surfaces, p.strands, guess)
+    put_departure_of_held(p.held, stage, guess)
     carry_frames(p.space, p.plane, p.strands, start, guess, guess.turn)
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]
@@ -197,6 +225,10 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
     because the compiler would make as many copies of them as there are places. Where a new matrix is likely to be
     needed at the end of a step, it is evaluated with second derivatives at once.
 
+    The correction that is small enough is the last one, and it is taken, as far as gaps stay open: a linear problem is
+    solved exactly, however slow the motion. The potential is not evaluated again after it. Energies, forces and gaps
+    are those of the configuration before it, which is nearer than the tolerance times the length of the stage.
+
     Returns
     -------
     status : int
@@ -204,12 +236,13 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
         Whether the minimum is `trial` and not `at`.
     iterations, factorisations, backtracks : int
     residual : float
-        Speed of the correction that was left [m/s].
+        Speed of the last correction [m/s].
     gap : float
         Smallest gap to a surface or another rod [m].
     """
     follow(p, at, stage)
     swapped, fresh, bounded, short, task = False, True, False, False, FACTORISE
+    settled = False  # whether what is left to do is the last correction
     found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
     iterations = factorisations = backtracks = halvings = 0
     residual = previous = gap = math.inf
@@ -217,7 +250,11 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
     while True:
         if task == SEARCH:
             step, body_step = p.system.step, p.system.body_step
-            move(p.bodies, p.held, p.surfaces, p.space, p.plane, p.strands, at, step, body_step, alpha, trial)
+            move(p.bodies, p.held, p.surfaces, p.space, p.plane, p.strands, at, step, body_step, alpha, stage, trial)
+            if settled:
+                copy(at.joint_strain, trial.joint_strain)  # twists, by which turns are counted, are near enough
+                swapped, status = not swapped, CONVERGED
+                break
             found, curved = False, short or factorisations > 1
         if task != FACTORISE or not curved:
             place = trial if task == SEARCH else at
@@ -270,13 +307,11 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
         if not math.isfinite(residual):
             status = NOT_FINITE
             break
-        if residual <= tolerance:
-            status = CONVERGED
-            break
-        if iterations >= max_iterations:
+        settled = residual <= tolerance or residual <= rounding_speed(at, stage.lengths[0])
+        if not settled and iterations >= max_iterations:
             status = MAX_ITERATIONS
             break
-        if not fresh and residual > KEEP_FACTOR_BELOW * previous:
+        if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:
             task = FACTORISE
             continue
         slope, noise = look_ahead(p.strands, p.bodies, p.sums, p.system)
@@ -284,7 +319,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
         if status != READY:
             break
         bounded, halvings, task = alpha < 1.0, 0, SEARCH
-        if fresh:
+        if fresh and not settled:
             alpha = hold_up(p.slips, p.sliding, p.surfaces, p.threads, p.system, stage, at, slope, alpha)
         short = alpha < 1.0
     return status, swapped, iterations, factorisations, backtracks, residual, gap

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..jit import inner
 from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
-from ..kinematics.turning import turn_by
+from ..kinematics.turning import turn_between, turn_by, turn_further, turned_by
 from ..solve.configuration import carry_points, carry_turns, carry_walls, second_director, take_step
 from .copying import copy, copy_matrix, copy_row
 
@@ -99,7 +99,7 @@ def copy_prescribed(bodies, source_place, source_rotation, at):
 
 
 @inner
-def move(bodies, held, surfaces, space, plane, strands, base, step, body_step, alpha, at):
+def move(bodies, held, surfaces, space, plane, strands, base, step, body_step, alpha, stage, at):
     """Become `base` moved by α times a step of the unknowns and of free bodies."""
     copy_prescribed(bodies, base.place, base.rotation, at)
     take_step(
@@ -113,26 +113,68 @@ def move(bodies, held, surfaces, space, plane, strands, base, step, body_step, a
         at.angle,
         at.turn,
     )
+    for i in range(strands.node_unknown.shape[0]):
+        d = strands.node_unknown[i]
+        for c in range(3):
+            at.departure[i, c] = base.departure[i, c] + alpha * step[d + c]
     for b in range(bodies.mass.shape[0]):
         for c in range(3):
             at.body_position[b, c] = base.body_position[b, c] + alpha * body_step[b, c]
-        turn_by(
-            alpha * body_step[b, 3],
-            alpha * body_step[b, 4],
-            alpha * body_step[b, 5],
-            base.body_rotation,
-            b,
-            at.body_rotation,
-            b,
-        )
+            at.body_departure[b, c] = base.body_departure[b, c] + alpha * body_step[b, c]
+        v0, v1, v2 = alpha * body_step[b, 3], alpha * body_step[b, 4], alpha * body_step[b, 5]
+        turn_by(v0, v1, v2, base.body_rotation, b, at.body_rotation, b)
+        turn_further(v0, v1, v2, base.body_turned, at.body_turned, b)
     put_carried(bodies, held, surfaces, strands, at)
+    put_departure_of_held(held, stage, at)
     carry_frames(space, plane, strands, base, at, at.angle)
+
+
+@inner
+def put_departure_of_held(held, stage, at):
+    """Departure of what bodies hold: that of a free body, and of the arm R̃ r with it; a prescribed one has digits to
+    spare, because its inertia moves nothing.
+    """
+    for k in range(held.node.shape[0]):
+        f, i = held.free[k], held.node[k]
+        if f < 0:
+            for c in range(3):
+                at.departure[i, c] = at.position[i, c] - stage.predicted_position[i, c]
+            continue
+        u = stage.held_arm[k, 0], stage.held_arm[k, 1], stage.held_arm[k, 2]
+        turned = turned_by(at.body_turned, f, u[0], u[1], u[2])
+        for c in range(3):
+            at.departure[i, c] = at.body_departure[f, c] + turned[c] + stage.held_lag[k, c]
+
+
+@inner
+def clear_departure(at):
+    """Be where inertia takes everything."""
+    at.departure[:] = 0.0
+    at.body_departure[:] = 0.0
+    at.body_turned[:] = 0.0
+
+
+@inner
+def measure_departure(bodies, stage, at):
+    """Departure of a configuration that was not moved from where inertia takes everything: to last digits of its
+    positions.
+    """
+    for i in range(at.position.shape[0]):
+        for c in range(3):
+            at.departure[i, c] = at.position[i, c] - stage.predicted_position[i, c]
+    for f in range(bodies.mass.shape[0]):
+        for c in range(3):
+            at.body_departure[f, c] = at.body_position[f, c] - stage.predicted_body_position[f, c]
+            at.body_turned[f, c] = 0.0
+        x, y, z = turn_between(stage.predicted_body_rotation, f, at.body_rotation, f)
+        turn_further(x, y, z, at.body_turned, at.body_turned, f)
 
 
 @inner
 def take_state(bodies, held, surfaces, strands, state, at):
     """Start from a state."""
     copy(state.position, at.position)
+    clear_departure(at)
     for k in range(strands.edge_count):
         at.turn[k] = 0.0
         for c in range(3):

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 
+from ..forces.body import moment_of_turn
 from ..jit import inner
+from ..kinematics.compensated import add_exactly
 from ..kinematics.stack import stack_matrix
 from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn_by
 from ..kinematics.vector import row
 from .copying import add_scaled, copy, copy_matrix, copy_row
 from .fluid import survey
+from .place import clear_departure
 
 SPIN_ITERATIONS = 50
 SPIN_CHANGE = 1e-15
@@ -29,8 +32,8 @@ def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
 @inner
 def start_point(bodies, fluid, strands, state, start, first):
     """The start of a step."""
-    copy(start.position, first.position)
-    copy(state.body_position, first.body_position)
+    first.displacement[:] = 0.0
+    first.body_displacement[:] = 0.0
     copy(state.body_rotation, first.rotation)
     first.turn[:] = 0.0
     copy(state.velocity, first.velocity)
@@ -80,11 +83,11 @@ def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
 
     `along`, `bend` and `momenta` are the weights of q̇ h, q̈ h² and ṗ h.
     """
-    add_scaled(point.position, along * h, state.velocity)
-    add_scaled(point.body_position, along * h, state.body_velocity)
+    add_scaled(point.displacement, along * h, state.velocity)
+    add_scaled(point.body_displacement, along * h, state.body_velocity)
     add_scaled(point.turn, along * h, state.spin)
     if bend != 0.0:
-        add_scaled(point.position, bend * h * h, state.acceleration)
+        add_scaled(point.displacement, bend * h * h, state.acceleration)
         add_scaled(point.turn, bend * h * h, state.spin_acceleration)
     add_scaled(point.velocity, momenta * h, state.acceleration)
     add_scaled(point.spin, momenta * h, state.spin_acceleration)
@@ -99,7 +102,7 @@ def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
         x, y, z = along * h * w[0], along * h * w[1], along * h * w[2]
         if f >= 0:
             for c in range(3):
-                point.body_position[b, c] += bend * h * h * state.body_acceleration[f, c]
+                point.body_displacement[b, c] += bend * h * h * state.body_acceleration[f, c]
             m = row(first.angular_momentum, f)
             inertia_tensor(bodies.second_moment, f, state.body_rotation, b, tensor)
             rate = solve_three(
@@ -133,11 +136,12 @@ def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned
 
 
 @inner
-def predict(bodies, held, origin, start, turned, position, rotation, rates, stage):
+def predict(bodies, held, state, origin, previous, start, turned, position, rotation, rates, stage):
     """Frozen data of a stage from its origin; puts the origin of what bodies hold to where it has their velocity.
 
-    `turned` is the turn of edges from the start of the step to `start`; `position`, `rotation` and `rates` are those
-    of prescribed bodies at the time of the stage, among those of all.
+    `previous` is the end of the stage before, or the start of the step, and `start` its configuration; `position`,
+    `rotation` and `rates` are those of prescribed bodies at the time of the stage, among those of all. `turned` is the
+    turn of edges from the start of the step, where positions are those of `state`, to `start`.
     """
     length = stage.lengths[0]
     count = origin.rotation.shape[0]
@@ -146,10 +150,9 @@ def predict(bodies, held, origin, start, turned, position, rotation, rates, stag
         if f < 0:
             w0, w1, w2 = rates[b, 3], rates[b, 4], rates[b, 5]
             for c in range(3):
-                origin.body_position[b, c] = position[b, c] - length * rates[b, c]
+                stage.origin_place[b, c] = position[b, c] - length * rates[b, c]
             _set_back(rotation, b, length, w0, w1, w2, stage.origin_rotation, b)
         else:
-            scratch = stack_matrix(3, 3)
             w0, w1, w2 = _spin_without_moment(
                 bodies.second_moment,
                 f,
@@ -158,21 +161,26 @@ def predict(bodies, held, origin, start, turned, position, rotation, rates, stag
                 origin.angular_momentum,
                 length,
                 stage.predicted_body_rotation,
-                scratch,
+                stack_matrix(3, 3),
             )
+            stage.body_spin[f, 0], stage.body_spin[f, 1], stage.body_spin[f, 2] = w0, w1, w2
             _set_back(stage.predicted_body_rotation, f, length, w0, w1, w2, stage.origin_rotation, b)
             for c in range(3):
-                stage.origin_body_position[f, c] = origin.body_position[b, c]
-                stage.predicted_body_position[f, c] = origin.body_position[b, c] + length * origin.body_velocity[f, c]
+                moved = origin.body_displacement[b, c]
+                stage.origin_place[b, c] = state.body_position[b, c] + moved
+                stage.origin_body_position[f, c] = stage.origin_place[b, c]
+                ahead = length * origin.body_velocity[f, c]
+                stage.predicted_body_position[f, c] = stage.origin_place[b, c] + ahead
+                stage.body_way[f, c] = (moved - previous.body_displacement[b, c]) + ahead
             x, y, z = turn_between(start.body_rotation, f, stage.predicted_body_rotation, f)
             stage.body_turn[f, 0], stage.body_turn[f, 1], stage.body_turn[f, 2] = x, y, z
+    for i in range(origin.displacement.shape[0]):
         for c in range(3):
-            stage.origin_place[b, c] = origin.body_position[b, c]
-    _put_origin_of_held(held, origin, stage)
-    for i in range(origin.position.shape[0]):
-        for c in range(3):
-            stage.origin_position[i, c] = origin.position[i, c]
-            stage.predicted_position[i, c] = origin.position[i, c] + length * origin.velocity[i, c]
+            moved, ahead = origin.displacement[i, c], length * origin.velocity[i, c]
+            stage.origin_position[i, c] = state.position[i, c] + moved
+            stage.predicted_position[i, c] = stage.origin_position[i, c] + ahead
+            stage.way[i, c] = (moved - previous.displacement[i, c]) + ahead
+    _put_origin_of_held(bodies, held, origin, state, stage)
     for k in range(origin.turn.shape[0]):
         stage.origin_turn[k] = origin.turn[k] - turned[k]
         stage.predicted_turn[k] = stage.origin_turn[k] + length * origin.spin[k]
@@ -183,21 +191,25 @@ def predict(bodies, held, origin, start, turned, position, rotation, rates, stag
 
 
 @inner
-def aim(bodies, end, start, turned, position, rotation, stage):
+def aim(bodies, state, end, previous, start, turned, position, rotation, stage):
     """Predict just the end of a step, which lies beyond its last stage; prescribed bodies are put there.
 
     Parameters as for `predict`.
     """
-    copy(end.position, stage.predicted_position)
+    for i in range(end.displacement.shape[0]):
+        for c in range(3):
+            stage.predicted_position[i, c] = state.position[i, c] + end.displacement[i, c]
+            stage.way[i, c] = end.displacement[i, c] - previous.displacement[i, c]
     for k in range(turned.shape[0]):
         stage.predicted_turn[k] = end.turn[k] - turned[k]
     for b in range(position.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
-            copy_row(position, b, end.body_position, b)
             copy_matrix(rotation, b, end.rotation, b)
             continue
-        copy_row(end.body_position, b, stage.predicted_body_position, f)
+        for c in range(3):
+            stage.predicted_body_position[f, c] = state.body_position[b, c] + end.body_displacement[b, c]
+            stage.body_way[f, c] = end.body_displacement[b, c] - previous.body_displacement[b, c]
         copy_matrix(end.rotation, b, stage.predicted_body_rotation, f)
         x, y, z = turn_between(start.body_rotation, f, stage.predicted_body_rotation, f)
         stage.body_turn[f, 0], stage.body_turn[f, 1], stage.body_turn[f, 2] = x, y, z
@@ -228,6 +240,11 @@ def stand_still(bodies, fluid, strands, state, start, with_fluid, stage):
     copy(start.body_position, stage.predicted_body_position)
     copy(start.body_rotation, stage.predicted_body_rotation)
     stage.body_turn[:] = 0.0
+    stage.way[:] = 0.0
+    stage.body_way[:] = 0.0
+    copy(start.arm, stage.held_arm)
+    stage.held_lag[:] = 0.0
+    clear_departure(start)
     copy(start.position, stage.predicted_position)
     copy(start.position, stage.origin_position)
     add_scaled(stage.origin_position, -length, state.velocity)
@@ -272,49 +289,60 @@ def _set_back(rotation, b, length, w0, w1, w2, out, c):
 
 
 @inner
-def _put_origin_of_held(held, origin, stage):
+def _put_origin_of_held(bodies, held, origin, state, stage):
+    length = stage.lengths[0]
     for k in range(held.node.shape[0]):
-        b, i = held.body[k], held.node[k]
+        b, i, f = held.body[k], held.node[k], held.free[k]
         for c in range(3):
-            origin.position[i, c] = origin.body_position[b, c]
+            place = stage.origin_place[b, c]
             for m in range(3):
-                origin.position[i, c] += stage.origin_rotation[b, c, m] * held.position[k, m]
+                place += stage.origin_rotation[b, c, m] * held.position[k, m]
+            origin.displacement[i, c] = place - state.position[i, c]
+            stage.origin_position[i, c] = place
+            stage.predicted_position[i, c] = place + length * origin.velocity[i, c]
+        if f < 0:
+            continue
+        for c in range(3):
+            stage.held_arm[k, c] = 0.0
+            for m in range(3):
+                stage.held_arm[k, c] += stage.predicted_body_rotation[f, c, m] * held.position[k, m]
+        w0, w1, w2 = row(stage.body_spin, f)
+        u0, u1, u2 = row(stage.held_arm, k)
+        v0, v1, v2 = row(origin.velocity, i)
+        stage.held_lag[k, 0] = length * (origin.body_velocity[f, 0] + (w1 * u2 - w2 * u1) - v0)
+        stage.held_lag[k, 1] = length * (origin.body_velocity[f, 1] + (w2 * u0 - w0 * u2) - v1)
+        stage.held_lag[k, 2] = length * (origin.body_velocity[f, 2] + (w0 * u1 - w1 * u0) - v2)
 
 
 @inner
-def end_point(bodies, fluid, strands, stage, origin, turned, end, position, rotation, point):
-    """The end of a stage that was solved; parameters as for `predict`."""
+def end_point(bodies, fluid, strands, state, stage, origin, turned, end, position, rotation, point):
+    """The end of a stage that was solved; parameters as for `predict`.
+
+    Velocities and displacements are those of inertia's motion and what the end departs from it.
+    """
     length = stage.lengths[0]
     for b in range(position.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
-            copy_row(position, b, point.body_position, b)
+            for c in range(3):
+                point.body_displacement[b, c] = position[b, c] - state.body_position[b, c]
             copy_matrix(rotation, b, point.rotation, b)
             continue
-        copy_row(end.body_position, f, point.body_position, b)
         copy_matrix(end.body_rotation, f, point.rotation, b)
-        for c in range(3):
-            point.body_velocity[f, c] = (end.body_position[f, c] - stage.origin_body_position[f, c]) / length
         # moment of inertia's potential at the end: −ax(R̃ J Rᵀ)/(γ γ′ h²), see `forces.body`
-        second, r, q = bodies.second_moment, stage.predicted_body_rotation, end.body_rotation
+        moment = moment_of_turn(bodies.second_moment, f, stage.predicted_body_rotation, end.body_turned)
         factor = 1.0 / length  # γ′ h times 1/(γ γ′ h²)
-        a21 = a12 = a02 = a20 = a10 = a01 = 0.0
-        for k in range(3):
-            for m in range(3):
-                j = second[f, k, m]
-                a21 += r[f, 2, k] * j * q[f, 1, m]
-                a12 += r[f, 1, k] * j * q[f, 2, m]
-                a02 += r[f, 0, k] * j * q[f, 2, m]
-                a20 += r[f, 2, k] * j * q[f, 0, m]
-                a10 += r[f, 1, k] * j * q[f, 0, m]
-                a01 += r[f, 0, k] * j * q[f, 1, m]
-        point.angular_momentum[f, 0] = origin.angular_momentum[f, 0] - factor * (a21 - a12)
-        point.angular_momentum[f, 1] = origin.angular_momentum[f, 1] - factor * (a02 - a20)
-        point.angular_momentum[f, 2] = origin.angular_momentum[f, 2] - factor * (a10 - a01)
-    for i in range(point.position.shape[0]):
         for c in range(3):
-            point.position[i, c] = end.position[i, c]
-            point.velocity[i, c] = (end.position[i, c] - stage.origin_position[i, c]) / length
+            velocity, departure = origin.body_velocity[f, c], end.body_departure[f, c]
+            moved = origin.body_displacement[b, c]
+            point.body_velocity[f, c] = velocity + departure / length
+            point.body_displacement[b, c] = moved + (length * velocity + departure)
+            point.angular_momentum[f, c] = origin.angular_momentum[f, c] - factor * moment[c]
+    for i in range(point.displacement.shape[0]):
+        for c in range(3):
+            velocity, departure = origin.velocity[i, c], end.departure[i, c]
+            point.velocity[i, c] = velocity + departure / length
+            point.displacement[i, c] = origin.displacement[i, c] + (length * velocity + departure)
     for k in range(point.turn.shape[0]):
         point.turn[k] = turned[k] + end.turn[k]
         point.spin[k] = (end.turn[k] - stage.origin_turn[k]) / length
@@ -322,8 +350,8 @@ def end_point(bodies, fluid, strands, stage, origin, turned, end, position, rota
 
 
 @inner
-def write_state(bodies, held, fluid, strands, state, last, end, rates):
-    """Take the end of a step into the state; `rates` are those of prescribed bodies."""
+def write_state(bodies, held, fluid, strands, state, last, end, position, rates):
+    """Take the end of a step into the state; `position` and `rates` are those of prescribed bodies."""
     copy(last.velocity, state.velocity)
     _write_velocity_of_held(held, end, rates, state)
     survey(fluid, strands, end, last.velocity, state.fluid_excess)
@@ -331,14 +359,20 @@ def write_state(bodies, held, fluid, strands, state, last, end, rates):
         for c in range(3):
             state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]
     copy(last.spin, state.spin)
-    copy(last.body_position, state.body_position)
+    _move_positions(state.position, state.position_low, last.displacement)
+    for k in range(held.node.shape[0]):
+        i = held.node[k]
+        for c in range(3):
+            state.position[i, c], state.position_low[i, c] = end.position[i, c], 0.0
+    _move_positions(state.body_position, state.body_position_low, last.body_displacement)
     copy(last.rotation, state.body_rotation)
-    write_shape(bodies, strands, end, state)
+    _write_frames(bodies, strands, end, state)
     tensor = stack_matrix(3, 3)
     for b in range(rates.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
             for c in range(3):
+                state.body_position[b, c], state.body_position_low[b, c] = position[b, c], 0.0
                 state.body_velocity[b, c], state.body_angular_velocity[b, c] = rates[b, c], rates[b, 3 + c]
             continue
         inertia_tensor(bodies.second_moment, f, end.body_rotation, f, tensor)
@@ -352,12 +386,28 @@ def write_state(bodies, held, fluid, strands, state, last, end, rates):
 def write_shape(bodies, strands, at, state):
     """Take positions, frames, and the poses of free bodies into the state."""
     copy(at.position, state.position)
+    state.position_low[:] = 0.0
+    state.body_position_low[:] = 0.0
+    for f in range(bodies.mass.shape[0]):
+        copy_row(at.body_position, f, state.body_position, bodies.body_of_free[f])
+    _write_frames(bodies, strands, at, state)
+
+
+@inner
+def _move_positions(position, low, displacement):
+    """Add displacements, also those smaller than the last digit."""
+    for i in range(position.shape[0]):
+        for c in range(3):
+            position[i, c], low[i, c] = add_exactly(position[i, c], low[i, c], displacement[i, c])
+
+
+@inner
+def _write_frames(bodies, strands, at, state):
     for k in range(strands.edge_count):
         copy_row(at.director1, k, state.director1, k)
     write_twist(at, state)
     for f in range(bodies.mass.shape[0]):
         b = bodies.body_of_free[f]
-        copy_row(at.body_position, f, state.body_position, b)
         _write_orthonormal(at.body_rotation, f, state.body_rotation, b)
 
 

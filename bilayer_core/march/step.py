@@ -174,6 +174,7 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
         stage.lengths[:] = MOMENT if mode == LOOK else h if mode == SETTLE else WITHOUT_INERTIA
     iterations = factorisations = backtracks = 0
     worst, gap = 0.0, math.inf
+    previous = first
     place = min(k, course.position.shape[0] - 1)
     for n in range(passes):
         point = min(n, points - 1)
@@ -189,10 +190,11 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
                 add_stage(origin, method.couplings[n, j], work.gained[j], work.gained_turn[j], work.rotation)
             _drive(p.drives, state, course, k, n, work, stage)
             if beyond:
-                aim(bodies, origin, start, work.turned, position, rotation, stage)
+                aim(bodies, state, origin, previous, start, work.turned, position, rotation, stage)
             else:
                 _take_slopes(keeps, bodies, origin, state, first, h, method, n, work.rotation)
-                predict(bodies, held, origin, start, work.turned, position, rotation, course.rates[place, n], stage)
+                rates = course.rates[place, n]
+                predict(bodies, held, state, origin, previous, start, work.turned, position, rotation, rates, stage)
         status = READY
         if not beyond:
             status = start_stage(p, start, stage)
@@ -230,17 +232,20 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
         last = origin
         if not beyond:
             last = end
-            end_point(bodies, p.fluid, strands, stage, origin, work.turned, work.places[e], position, rotation, end)
+            reached = work.places[e]
+            end_point(bodies, p.fluid, strands, state, stage, origin, work.turned, reached, position, rotation, end)
         if n + 1 == points:
             if beyond:
                 copy(state.values, before)
-            write_state(bodies, held, p.fluid, strands, state, last, work.places[e], course.rates[place, n])
+            rates = course.rates[place, n]
+            write_state(bodies, held, p.fluid, strands, state, last, work.places[e], position, rates)
             for i in range(state.transduction.shape[0]):
                 state.transduction[i] = work.transduction[i]
             _keep_slopes(keeps, p.sums, state, origin, last, stage.lengths[1], method.carry, work.touched)
         if n + 1 < passes:
             if not beyond:
                 gain(origin, end, work.gained, work.gained_turn, n)
+                previous = end
             copy(last.turn, work.turned)
             s, e = e, s
             work.places[s].turn[:] = 0.0

@@ -33,6 +33,9 @@ class Place:
     held: Array
     point_arm: Array
     surface_arm: Array
+    departure: Array  # of nodes from where inertia takes them, x − x̃ [m]: its digits are not those of x
+    body_departure: Array  # of free bodies, X − X̃ [m]
+    body_turned: Array  # vector part of the unit quaternion from R̃ to R of free bodies; see `forces.body`
 
 
 @group
@@ -57,15 +60,24 @@ class Stage:
     natural: Array  # of joints, with what strains off the axis add; `rest_joint` itself where none do
     load_factor: Array
     body_turn: Array  # rotation vector to where inertia takes free bodies
+    way: Array  # of nodes, from the start of the stage to where inertia takes them [m]
+    body_way: Array  # likewise of free bodies
+    body_spin: Array  # with which they turn there [rad/s]
+    held_arm: Array  # of what free bodies hold, R̃ r [m], shape (n_attached, 3)
+    held_lag: Array  # of these, by which bodies without forces would take them farther than its own inertia [m]
 
 
 @group
 class Point:
-    """Positions and momenta at the start of a step, at the origin of a stage, or at its end."""
+    """Positions and momenta at the start of a step, at the origin of a stage, or at its end.
+
+    Positions count from the start of the step: differences of absolute ones have lost their digits where steps are
+    short or motions slow.
+    """
 
     vectors: Array  # all but rotations, in one piece, of which the following are views
-    position: Array  # of nodes [m]
-    body_position: Array  # of all bodies [m]
+    displacement: Array  # of nodes [m]
+    body_displacement: Array  # of all bodies [m]
     turn: Array  # of edges about their tangents since the start of the step [rad]
     velocity: Array  # of nodes [m/s]
     spin: Array  # of edges [rad/s]
@@ -145,12 +157,14 @@ class StateArrays:
 
     values: Array  # all parts, these and others, in one piece
     position: Array
+    position_low: Array
     velocity: Array
     director1: Array
     spin: Array
     fluid_excess: Array
     twist: Array
     body_position: Array
+    body_position_low: Array
     body_rotation: Array
     body_velocity: Array
     body_angular_velocity: Array

@@ -38,8 +38,8 @@ def point_of(model: Model) -> Point:
     nodes, edges, free = model.node_count, model.edge_count, model.free_count
     bodies, wet = len(model.bodies.names), model.node_count if len(model.fluid_mass) else 0
     shapes = dict(
-        position=(nodes, 3),
-        body_position=(bodies, 3),
+        displacement=(nodes, 3),
+        body_displacement=(bodies, 3),
         turn=(edges,),
         velocity=(nodes, 3),
         spin=(edges,),
@@ -77,6 +77,11 @@ def stage_of(model: Model, off_axis: OffAxis | None) -> Stage:
         natural=read_only_rest if off_axis is None else off_axis.rest,
         load_factor=np.zeros(len(model.scene.loads)),
         body_turn=np.zeros((free, 3)),
+        way=np.zeros((nodes, 3)),
+        body_way=np.zeros((free, 3)),
+        body_spin=np.zeros((free, 3)),
+        held_arm=np.zeros((len(model.attached_node), 3)),
+        held_lag=np.zeros((len(model.attached_node), 3)),
     )
 
 

@@ -33,12 +33,14 @@ class State:
     next_step: Array  # length of the next adaptive step [s], 0 at the start, shape (1,)
     last_error: Array  # error of the last adaptive step as a part of the tolerance, 0 if there is none, shape (1,)
     position: Array  # of nodes [m], shape (n_node, 3)
+    position_low: Array  # what rounding cut off `position` [m], shape (n_node, 3); see `kinematics.compensated`
     velocity: Array  # [m/s], shape (n_node, 3)
     director1: Array  # material director m1 of edges, unit, shape (n_edge, 3)
     spin: Array  # rate of edges about their tangent [rad/s], shape (n_edge,)
     fluid_excess: Array  # the fluid's momentum less that of `velocity` [N s], shape (n_node, 3) or (0, 3) (`stages`)
-    twist: Array  # unwrapped twist angle of joints [rad], shape (n_joint,)
+    twist: Array  # of joints when forces were last evaluated [rad]: tells whole turns apart, shape (n_joint,)
     body_position: Array  # [m], shape (n_body, 3)
+    body_position_low: Array  # what rounding cut off `body_position` [m], shape (n_body, 3)
     body_rotation: Array  # shape (n_body, 3, 3)
     body_velocity: Array  # [m/s], shape (n_body, 3)
     body_angular_velocity: Array  # [rad/s], shape (n_body, 3)
@@ -149,12 +151,14 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         next_step=np.zeros(1),
         last_error=np.zeros(1),
         position=model.start_position.copy(),
+        position_low=np.zeros((model.node_count, 3)),
         velocity=np.zeros((model.node_count, 3)),
         director1=model.start_director1[: model.edge_count].copy(),
         spin=np.zeros(model.edge_count),
         fluid_excess=np.zeros((in_fluid, 3)),
         twist=np.zeros(len(model.joint_a)),
         body_position=bodies.start_position.copy(),
+        body_position_low=np.zeros_like(bodies.start_position),
         body_rotation=bodies.start_rotation.copy(),
         body_velocity=bodies.start_velocity.copy(),
         body_angular_velocity=bodies.start_angular_velocity.copy(),

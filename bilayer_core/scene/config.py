@@ -35,7 +35,7 @@ LARGEST_TOLERANCE = 0.1
 DEFAULT_TOLERANCE, DEFAULT_DT = 1e-4, 1e-3
 """Of `Solver`: where neither is given, steps are adaptive with this tolerance and begin with this length [s]."""
 ErrorTolerance = real(
-    "a part of the longest rod (the speed that Newton may leave is `newton_tolerance`)",
+    "a part of the longest rod (the speed at which Newton ends is `newton_tolerance`)",
     "1",
     "1e-4",
     above=0.0,
@@ -191,12 +191,14 @@ class Solver(Part):
     bounds no error of a whole run, in which those of steps add up; `bilayer converge` measures that."""
     max_step: PositiveTime | None = None
     """Longest adaptive step; by default a period of `output.rate`."""
-    newton_tolerance: PositiveSpeed = 1e-6
-    """Largest velocity correction that Newton may leave."""
+    newton_tolerance: PositiveSpeed | None = None
+    """Newton ends with a correction of velocities, which it still takes, no larger than this; by default the speed that
+    makes 1/100 of `tolerance` (1e-4 with fixed steps) in the longest adaptive step (`max_step`)."""
     max_newton_iterations: whole(1) = 50
     """After which a step counts as failed and is shortened."""
-    max_halvings: whole(0) = 10
-    """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why."""
+    max_halvings: whole(0) | None = None
+    """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why. By default 10;
+    adaptive steps may then be as short as a thousandth of the time in which sound passes an edge."""
 
 
 class Output(Part):

@@ -146,6 +146,9 @@ class Configuration:
             self._held,
             self._point_arm,
             self._surface_arm,
+            np.zeros_like(self.position),
+            np.zeros_like(self.body_position),
+            np.zeros_like(self.body_position),
         )
         self._surfaces_move = bool((surfaces.body < bodies).any())
         if not self._surfaces_move:

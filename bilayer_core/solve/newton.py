@@ -2,9 +2,8 @@
 
 The Hessian is exact. Once factorised it serves several corrections as long as each is less than `KEEP_FACTOR_BELOW`
 times the one before;
-a new correction of the gradient at hand costs a fraction of a new factorisation. The last of them, not taken, is the
-measure of convergence:
-what Newton would still change, as the speed of the fastest material point [m/s].
+a new correction of the gradient at hand costs a fraction of a new factorisation. The measure of convergence is the
+speed of the fastest material point in the last of them [m/s], which is still taken.
 What the potential takes at the configuration (`IncrementalPotential.follow`) moves along with every correction.
 """
 
@@ -240,6 +239,7 @@ class NewtonSolver:
                 break
             if residual <= self.tolerance:
                 status = NewtonStatus.CONVERGED
+                at = self._take_last(at, trial, step, body_step)
                 break
             if iterations >= self._max_iterations:
                 break
@@ -261,6 +261,15 @@ class NewtonSolver:
             if potential.follow(at) and not stale:
                 energy = potential.evaluate(at, False)
         return NewtonReport(status, iterations, factorisations, residual, backtracks), at
+
+    def _take_last(self, at: Configuration, trial: Configuration, step: Array, body_step: Array) -> Configuration:
+        """`at` moved by a correction, as far as gaps stay open."""
+        self._motion[self._prescribed] = 0.0
+        self._motion[self._model.bodies.body_of_free] = body_step
+        alpha, _ = self.bound(at, step[self._node_unknown], self._motion)
+        trial.set_moved(at, step, body_step, alpha)
+        trial.joint_strain[:] = at.joint_strain
+        return trial
 
     def _search(
         self, at, trial, step: Array, body_step: Array, energy: float, fresh: bool

@@ -139,6 +139,35 @@ def damped_fall() -> tuple[float, float]:
     return float(simulator.velocities[:, 2].mean()), -10.0 / 3.0 * (1.0 - math.exp(-3.0 * 0.4))
 
 
+WEAK = 1e-3
+"""Gravity of free falls [m/s²]: a few of the forces, and all but none of the speeds, of a scene on Earth."""
+
+
+def _way_fallen(duration: float, dimension: int, **steps) -> float:
+    """Height [m] by which a strip 1 m from the origin falls under weak gravity, with the digits of `position_low`."""
+    strip = rod([layer("bottom"), layer("top")], start=(1.0, 0.0, 0.7), stations=11)
+    falling = scene([strip], gravity=[0, 0, -WEAK])
+    falling["solver"] = {"model": "laminate", "dimension": dimension, **steps}
+    simulator = Simulator(load_scene(falling))
+    state = simulator._state
+    before = state.position[:, 2].copy()
+    simulator.run(duration)
+    return float(np.max((before - state.position[:, 2]) - state.position_low[:, 2]))
+
+
+def fall_in_short_steps(integrator: str) -> tuple[float, float]:
+    """In 200 steps of 1 µs; implicit Euler falls by ½ g t (t + h)."""
+    dt, steps = 1e-6, 200
+    time = steps * dt
+    late = dt if INTEGRATORS[integrator].order == 1 else 0.0
+    return _way_fallen(time, 3, integrator=integrator, dt=dt), 0.5 * WEAK * time * (time + late)
+
+
+def fall_by_default() -> tuple[float, float]:
+    """In half a second of adaptive steps."""
+    return _way_fallen(0.5, 2), 0.125 * WEAK
+
+
 # A method that keeps angular momentum exactly has no order of its loss.
 _LOSING = [name for name in INTEGRATORS if name != "implicit_midpoint"]
 CASES = [
@@ -190,6 +219,17 @@ CASES = [
         )
         for direction in SINKING
     ),
+    *(
+        Case(
+            f"motion/free fall/{name}",
+            "½ g t² under 1 mm/s² in steps of 1 µs, ½ g t (t + h) with implicit Euler",
+            1e-9,
+            lambda name=name: fall_in_short_steps(name),
+            "m",
+        )
+        for name in _LOSING
+    ),
+    Case("motion/free fall/by default", "½ g t² under 1 mm/s²", 1e-9, fall_by_default, "m"),
     Case("motion/drag", "v₀/(1 + k v₀ t)", 0.01, slowing, "m/s"),
     Case("motion/mass damping", "(g/α)(1 − e^(−α t))", 0.005, damped_fall, "m/s"),
 ]

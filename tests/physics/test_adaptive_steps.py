@@ -380,7 +380,7 @@ def test_implicit_midpoint_has_no_adaptive_steps():
 @pytest.mark.parametrize(
     ("solver", "fault"),
     [
-        ({"tolerance": "1e-6 m/s"}, "(the speed that Newton may leave is `newton_tolerance`) above 0 and at most 0.1"),
+        ({"tolerance": "1e-6 m/s"}, "(the speed at which Newton ends is `newton_tolerance`) above 0 and at most 0.1"),
         ({"tolerance": 0.2}, "solver.tolerance: found 0.2; must be a part of the longest rod"),
         ({"tolerance": 1e-3, "max_step": 0}, "solver.max_step: found 0; must be a time [s] above 0"),
     ],

@@ -42,7 +42,7 @@ def test_directions_and_numbers_are_read_back_bit_for_bit(direction, number):
 
 def test_the_text_states_the_values_that_the_scene_left_out():
     text = scene_text(load_scene(scene([rod([layer()])])))
-    assert "max_halvings: 10" in text and "marker_rate: 20.0" in text
+    assert "max_halvings: null" in text and "marker_rate: 20.0" in text
 
 
 @pytest.mark.parametrize(
