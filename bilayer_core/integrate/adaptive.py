@@ -137,11 +137,10 @@ class AdaptiveStepper(Stepper):
         tolerance: float | None = None,
     ) -> MarchReport:
         """At most so many steps up to `stop` [s], before which nothing has a corner, or what another mode does."""
-        iterations = self.model.scene.solver.max_newton_iterations
-        tolerance = self.solver.tolerance if tolerance is None else tolerance
+        tolerance = self.newton_tolerance if tolerance is None else tolerance
         method, changes = self.method, self.method.history is not None and mode == STEP
         while True:
-            settings = Settings(tolerance, iterations, mode, length, changes, counts)
+            settings = Settings(tolerance, self._max_iterations, mode, length, changes, counts)
             course = self._room_of(state, method)
             found = self._adapter.adapt(state, self._arrays[method], course, stop, most, settings)
             if found.status == JUMPED and not found.done:
@@ -149,7 +148,6 @@ class AdaptiveStepper(Stepper):
             elif not self.engine.make_room(found.status) or found.done:
                 break
         self.used = method
-        self.end = self._places[found.place]
         self.stimulus = course.stimulus[0, -1].copy()
         return found
 
@@ -193,7 +191,7 @@ class AdaptiveStepper(Stepper):
         if found.status != TOO_INACCURATE:
             report = found.newton
             if found.pair >= 0:
-                report = replace(report, detail=self.solver.who_blocks(found.pair))
+                report = replace(report, detail=self.engine.who_blocks(found.pair))
             return self._explain(report, time, h)
         return (
             f"the error of the step to t = {time:.6g} s, tried down to {h:.3g} s, stays above the tolerance "

@@ -106,12 +106,12 @@ def _points(model: Model, state: State) -> tuple[Array, Array]:
 def contact_forces(stepper: Stepper) -> Array:
     """Barrier and friction force on nodes and contact points [N], shape (n_node + n_point, 3)."""
     model = stepper.model
-    return -stepper.potential.carrier_gradient[: model.node_count + model.point_count]
+    return -stepper.engine.first.carrier[: model.node_count + model.point_count]
 
 
 def body_wrenches(stepper: Stepper) -> Array:
     """Contact force [N] and moment about its position [N m] on every body, shape (n_body, 6)."""
-    return -stepper.potential.contact_gradient[:-1]
+    return -stepper.engine.first.contact[:-1]
 
 
 def node_strain(model: Model, stepper: Stepper) -> Array:
@@ -165,7 +165,7 @@ def energies(stepper: Stepper, state: State) -> dict[str, float]:
     kinetic = {"kinetic": kinetic_energy(model, state)}
     if len(model.fluid_mass):
         kinetic["fluid"] = energy_of_fluid(model, stepper.end, state.velocity, state.spin)
-    return {**kinetic, **stepper.potential.energies}
+    return {**kinetic, **stepper.engine.energies}
 
 
 def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:
@@ -188,7 +188,7 @@ def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStati
         com=center_of_mass(model, state),
         stimulus=stepper.stimulus.copy(),
         energy=energies(stepper, state),
-        min_gap=float(stepper.potential.min_gap),
+        min_gap=float(stepper.engine.gap),
         iterations=statistics.iterations,
         residual=statistics.last_residual,
         substeps=statistics.substeps,

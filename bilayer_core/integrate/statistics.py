@@ -68,7 +68,7 @@ class RunStatistics:
         self.factorisations += report.factorisations
         self.last_residual = report.residual
         self.largest_residual = max(self.largest_residual, report.residual)
-        stepper.engine.count_in(state, stepper.potential.min_gap)
+        stepper.engine.count_in(state, stepper.engine.gap)
         self.take_shape(stepper, state)
 
     def take_shape(self, stepper: Stepper, state: State) -> None:
@@ -96,7 +96,7 @@ class RunStatistics:
         self.com_max_height, self.min_gap, self.max_contact_force, *shape = engine.figures.tolist()
         self.max_curvature, self.max_strain = shape
         self.body_tops = dict(zip(model.bodies.names, engine.body_top.tolist(), strict=True))
-        if stepper.potential.near is None:
+        if not model.meets_surfaces:
             return
         for surface, body in enumerate(model.surfaces.body):
             if body < len(model.bodies.names):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +13,10 @@ from ..errors import SimulationError
 from ..march.engine import Engine, MarchReport, Settings
 from ..march.modes import LOOK, STEP
 from ..march.step import AT_ONCE, NO_JUMP
+from ..march.step_groups import Place
 from ..model.model import Model
 from ..model.state import State
-from ..solve.configuration import Configuration
-from ..solve.newton import NewtonReport, NewtonSolver
+from ..solve.newton import NewtonReport
 from ..solve.potential import IncrementalPotential
 from .method import Method
 from .sdirk2 import METHOD as SELF_STARTING
@@ -69,8 +70,6 @@ class Stepper:
 
     Attributes
     ----------
-    end : Configuration
-        The last accepted configuration.
     stimulus : Array
         Value of each channel over the last step.
     used : Method
@@ -87,17 +86,23 @@ class Stepper:
         self.method = self.used = method
         self.dt = dt
         self.max_halvings = max_halvings
-        self.potential = IncrementalPotential(model)
-        self.solver = NewtonSolver(model, self.potential, newton_tolerance, max_iterations)
+        self.newton_tolerance, self._max_iterations = newton_tolerance, max_iterations
         self.surroundings = Surroundings(model)
-        self._places = [Configuration(model) for _ in range(3)]
-        self.end = self._places[1]
         self._arrays = {used: used.arrays() for used in {method, SELF_STARTING}}
         stages = max(len(used.nodes) for used in self._arrays)
-        self.engine = Engine(model, self.potential, self._places, method.history is not None, stages)
-        self._touched = self.engine.touched
+        self.engine = Engine(model, method.history is not None, stages)
         self.stimulus = np.zeros(len(model.scene.stimuli))
         self.ledger: EnergyLedger | None = None
+
+    @cached_property
+    def potential(self) -> IncrementalPotential:
+        """The same potential, term by term, with arrays of its own."""
+        return IncrementalPotential(self.model)
+
+    @property
+    def end(self) -> Place:
+        """The configuration of the state after the last step or look."""
+        return self.engine.end
 
     def rest(self, state: State) -> None:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the first step."""
@@ -107,7 +112,7 @@ class Stepper:
         load_factor = self.surroundings.load_factor(time)
         self.engine.set_drive(rest, load_factor)
         self.do_once(state, LOOK)
-        self._touched[:] = self._touching()
+        self.engine.touched[:] = self.engine.touching
         self.stimulus = stimulus
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> MarchReport:
@@ -191,7 +196,7 @@ class Stepper:
         found = self._loop(state, method, [time], h)
         report = found.newton
         if not report.converged:
-            return replace(report, detail=self.solver.who_blocks(found.pair)) if found.pair >= 0 else report
+            return replace(report, detail=self.engine.who_blocks(found.pair)) if found.pair >= 0 else report
         if self.ledger is not None:
             rest = self.surroundings.rest_strains_of(state.transduction)
             self.ledger.record(state, rest, self.surroundings.load_factor(time, h), h)
@@ -211,23 +216,16 @@ class Stepper:
         counts: bool = False,
     ) -> MarchReport:
         """Steps that end at the given times, as many as succeed, in a compiled loop, or what another mode does."""
-        tolerance = self.solver.tolerance if tolerance is None else tolerance
-        iterations = self.model.scene.solver.max_newton_iterations
-        settings = Settings(tolerance, iterations, mode, length, changes, counts)
+        tolerance = self.newton_tolerance if tolerance is None else tolerance
+        settings = Settings(tolerance, self._max_iterations, mode, length, changes, counts)
         course = self.surroundings.course(state, method, times, h)
         while True:
             found = self.engine.march(state, self._arrays[method], course, h, settings)
             if not self.engine.make_room(found.status) or found.done > 0:
                 break
-        if found.done > 0 or found.failed or found.finished:
-            self.end = self._places[found.place]
         if found.done > 0:
             self.stimulus = course.stimulus[found.done - 1, -1].copy()
         return found
-
-    def _touching(self) -> Array:
-        """Which carriers something pushed at the last evaluation, shape (n_carrier,)."""
-        return np.any(self.potential.carrier_gradient != 0.0, axis=1)
 
     def _method_at(self, state: State, time: float, h: float) -> Method:
         """The method for a step of length `h` [s] that begins at `time` [s]: one without history after a jump."""

@@ -59,8 +59,8 @@ class Adapter:
         clear(counts)
         flags = engine.keeps, settings.mode, settings.length, settings.changes, settings.counts
         done, status, pair, place, gap = adapt(parts, *flags, until, most, settings.tolerance, settings.max_iterations)
-        if status == CONVERGED or status in FAILURES:
-            engine.take_over(gap)
+        if done > 0 or status == CONVERGED or status in FAILURES:
+            engine.take_over(place, gap)
         iterations, factorisations, backtracks, rejected, inaccurate = counts.numbers.tolist()
         shortest, longest, length = counts.lengths.tolist()
         residual, largest_residual = counts.residuals.tolist()

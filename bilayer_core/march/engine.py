@@ -4,50 +4,43 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 
+from ..model.carriers import carrier_names
+from ..model.force_list import Kind, kinds
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
 from ..model.state import State
-from ..solve.configuration import Configuration
 from ..solve.newton import NewtonReport, NewtonStatus
-from ..solve.potential import IncrementalPotential
-from .allocate import ContactColumns
+from .allocate import ContactColumns, FirstDerivatives, NearRods, NearSurfaces, SecondDerivatives, configuration
 from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
 from .loop import Counted, Loop
 from .modes import STEP
 from .problem import Problem
 from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER, TOO_INACCURATE
 from .step import count_step, take_steps
-from .step_groups import Course, Method, Place, StateArrays, Tally
+from .step_groups import Course, Method, StateArrays, Tally
 from .terms import NAMES, require_computed
 from .workspace import sums_of, work_of
 
 Array = np.ndarray
 
 
-def _first_of(potential: IncrementalPotential) -> SimpleNamespace:
-    """Its first derivatives, named as in `FirstDerivatives`."""
-    out = potential.accumulators
-    parts = {name: getattr(out, name) for name in ("node", "edge", "pair", "body", "carrier", "contact")}
-    attached = potential.attached_gradient
-    return SimpleNamespace(flat=out.all_but_carriers, unknowns=potential.gradient, attached=attached, **parts)
-
-
-def _second_of(potential: IncrementalPotential) -> SimpleNamespace:
-    """Its second derivatives, named as in `SecondDerivatives`."""
-    matrix = potential.matrix
-    names = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
-    return SimpleNamespace(flat=matrix.second_derivatives, **{name: getattr(matrix, name) for name in names})
-
-
 class Engine:
-    """Compiled steps of a model, sharing arrays with a potential and three configurations.
+    """Compiled steps of a model, and the arrays that they compute into.
 
     Attributes
     ----------
+    places : list of Place
+        Configurations that steps use.
+    end : Place
+        That of them which was evaluated last.
+    first : FirstDerivatives
+        There.
+    gap : float
+        The smallest to a surface or another rod there [m], infinite without contact; between rods those below the
+        barrier distance count.
     touched : Array
         Carriers that something pushed at the end of the last step, bool, shape (n_carrier,).
     ranges : Array
@@ -56,27 +49,27 @@ class Engine:
         Extremes of the run; see `march.step_groups.Tally`.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        potential: IncrementalPotential,
-        places: list[Configuration],
-        keeps_slopes: bool,
-        stages: int,
-    ):
-        self._model, self._potential = model, potential
-        self.keeps = 1 if keeps_slopes else None
-        self._energy = np.zeros(len(NAMES))
+    def __init__(self, model: Model, keeps_slopes: bool, stages: int):
         require_computed(model.forces)
-        self._groups = lasting_groups(model, potential.matrix)
+        self._model = model
+        self.keeps = 1 if keeps_slopes else None
+        self.places = [configuration(model) for _ in range(3)]
+        self.end = self.places[1]
+        self.first, second = FirstDerivatives(model), SecondDerivatives(model)
+        self._second = second
+        self._near = NearSurfaces(model) if model.meets_surfaces else None
+        self._rods = NearRods(model) if model.rod_surfaces is not None else None
+        self._columns = model.bodies.freedom.shape[1]  # capacity of the border
+        self._width = np.zeros(1, dtype=np.int64)  # of it in use
+        self._energy = np.zeros(len(NAMES))
+        self.gap = math.inf
+        self._groups = lasting_groups(model, second)
         self._problem: Problem | None = None
-        self._rooms: tuple | None = None
+        self._capacity: tuple | None = None
         self._state: State | None = None
         self._loop: Loop | None = None
         self._counted: Counted | None = None
         self.ranges = np.array([c.maximum - c.minimum for c in model.scene.stimuli.values()], dtype=float)
-        self._columns = model.bodies.freedom.shape[1]  # room in the border
-        self._width = np.zeros(1, dtype=np.int64)  # of it in use
         self.figures = np.zeros(5)
         self.body_top = np.zeros(len(model.bodies.names))
         self.nodes, self.most_nodes = np.zeros((2, len(model.surfaces.names)), dtype=np.int64)
@@ -93,8 +86,7 @@ class Engine:
         )
         self.start_over(-math.inf)
         self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
-        records = [Place(**dict(zip(Place.fields, place.arrays, strict=True))) for place in places]
-        self._work = work_of(model, records, self.touched, self._groups["off_axis"], stages)
+        self._work = work_of(model, self.places, self.touched, self._groups["off_axis"], stages)
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""
@@ -103,24 +95,23 @@ class Engine:
         self.nodes[:], self.most_nodes[:], self.first_contact[:] = 0, 0, math.nan
 
     def _gather(self) -> Problem:
-        """The problem with the present rooms for near pairs, contacts, and nodes in the border."""
-        potential, model = self._potential, self._model
-        near, matrix = potential.near, potential.matrix
-        rods = matrix.rods
-        rooms = len(near.carrier) if near else 0, rods.room if rods else 0, self._columns
-        if rooms != self._rooms:
-            room = rooms[0]
+        """The problem with the present capacities for near pairs, contacts, and nodes in the border."""
+        model, near, rods = self._model, self._near, self._rods
+        capacity = near.capacity if near else 0, rods.capacity if rods else 0, self._columns
+        if capacity != self._capacity:
+            pairs = capacity[0]
+            of_rods = rods.contacts.capacity + rods.sliding.capacity if rods else 0
             self._problem = Problem(
                 **self._groups,
                 wide=wide_of(model, self._columns, self._width) if rods or model.free_count else None,
                 surfaces=surfaces_of(model, near) if near else None,
-                sliding=sliding_of(model, room) if near else None,
+                sliding=sliding_of(model, pairs) if near else None,
                 threads=threads_of(model, rods) if rods else None,
-                slips=slips_of(model, room + (rods.sliding.room if rods else 0)),
-                leaving=leaving_of(ContactColumns(model, rods.contacts.room + rods.sliding.room)) if rods else None,
-                sums=sums_of(_first_of(potential), _second_of(potential), self._energy, 2 * room),
+                slips=slips_of(model, pairs + (rods.sliding.capacity if rods else 0)),
+                leaving=leaving_of(ContactColumns(model, of_rods)) if rods else None,
+                sums=sums_of(self.first, self._second, self._energy, 2 * pairs),
             )
-            self._rooms, self._counted = rooms, None
+            self._capacity, self._counted = capacity, None
         return self._problem
 
     def _arrays_of(self, state: State) -> StateArrays:
@@ -145,15 +136,36 @@ class Engine:
         done, status, pair, place, iterations, factorisations, backtracks, residual, worst, gap = take_steps(
             loop, *flags, h if settings.mode == STEP else settings.length, settings.tolerance, settings.max_iterations
         )
-        if status == CONVERGED or status in FAILURES:
-            self.take_over(gap)
+        if done > 0 or status == CONVERGED or status in FAILURES:
+            self.take_over(place, gap)
         how = FAILURES.get(status, NewtonStatus.CONVERGED)
         newton = NewtonReport(how, iterations, factorisations, residual, backtracks)
         return MarchReport(done, status, place, pair, newton, worst, h, h, h)
 
-    def take_over(self, gap: float) -> None:
-        """Leave the energies of the last configuration, and the smallest gap there [m], to the potential."""
-        self._potential.take_over(dict(zip(NAMES, self._energy.tolist(), strict=True)), gap)
+    def take_over(self, place: int, gap: float) -> None:
+        """Note which configuration was evaluated last, and the smallest gap there [m]."""
+        self.end, self.gap = self.places[place], gap
+
+    @property
+    def energies(self) -> dict[str, float]:
+        """Of the conservative forces at the configuration evaluated last [J]; what others lose or supply is no
+        energy.
+        """
+        kind, values = kinds(), dict(zip(NAMES, self._energy.tolist(), strict=True))
+        return {name: values[name] for name in self._model.forces if kind[name] is Kind.CONSERVATIVE}
+
+    @property
+    def touching(self) -> Array:
+        """Which carriers something pushed at the last evaluation, shape (n_carrier,)."""
+        return np.any(self.first.carrier != 0.0, axis=1)
+
+    def who_blocks(self, pair: int) -> str:
+        """What a message says of the near pair that blocks prescribed motion."""
+        if pair < 0:
+            return "a rod would reach another"
+        near = self._near
+        surface = self._model.surfaces.names[near.surface[pair]]
+        return f"{carrier_names(self._model)[near.carrier[pair]]} would reach the surface of {surface}"
 
     @property
     def moved(self) -> float:
@@ -173,9 +185,9 @@ class Engine:
     def make_room(self, status: int) -> bool:
         """Have the room that a loop lacked; false if that is not what it lacked: something has jumped."""
         if status == NO_ROOM:
-            self._potential.near.grow()
+            self._near.grow()
         elif status == NO_ROOM_FOR_RODS:
-            self._potential.matrix.rods.make_room()
+            self._rods.grow()
         elif status == NO_ROOM_IN_BORDER:
             self._columns = 2 * int(self._width[0])
         else:
@@ -189,13 +201,13 @@ class Engine:
             self._counted = Counted(surfaces=p.surfaces, strands=p.strands, sums=p.sums, state=arrays, tally=self.tally)
         count_step(self._counted, gap, float(state.time[0]))
 
-    def count_shape(self, state: State, end: Configuration, rest_edge: Array) -> None:
+    def count_shape(self, state: State, end: Place, rest_edge: Array) -> None:
         """Take the shape of a state that no loop has led to into the tally: `march.step.count_shape` without kernels.
 
         Parameters
         ----------
         state : State
-        end : Configuration
+        end : Place
             That of the state.
         rest_edge : Array
             Rest strains of edges there, shape (n_edge,).

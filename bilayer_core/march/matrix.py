@@ -157,7 +157,7 @@ def factorise(p, at, stage, counts):
     factor = 1.0 / (stage.lengths[0] * stage.lengths[1]) + p.damping / stage.lengths[0]
     shift, simplified = 0.0, EXACT
     if counts:
-        factor = SLOWEST_GROWTH**2
+        factor = SLOWEST_GROWTH * SLOWEST_GROWTH
     while True:
         assemble(p, at, factor * (1.0 + shift), simplified)
         of_bodies = factor if counts else shift * factor

@@ -249,7 +249,7 @@ def test_without_added_mass_there_is_nothing_to_compute():
         simulator = Simulator(load_scene(scene([rod(WHOLE)], fluid=fluid)))
         assert simulator.model.fluid_mass.shape == (0, 3)
         simulator.run(0.002)
-        assert "added mass" not in simulator._stepper.potential.terms
+        assert "added mass" not in simulator.model.forces
         assert "fluid" not in simulator.energy()
         assert simulator.plan.terms["added mass"].startswith("skipped")
     assert Simulator(load_scene(scene([rod(WHOLE)], fluid=water()))).plan.terms["added mass"] == "active"

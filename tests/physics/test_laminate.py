@@ -7,11 +7,13 @@ from sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, s
 import bilayer_core.model.laminate as laminate
 from bilayer_core import Simulator, load_scene
 from bilayer_core.beam2d.scene import beam_of, set_stimuli
+from bilayer_core.march.evaluator import Evaluator
 from bilayer_core.model.build import build_model
 from bilayer_core.model.plan import leanest_model, make_plan
 from bilayer_core.validate.bending import PAIRS, THICKNESS, strip
 from bilayer_core.validate.references import timoshenko
 
+ELASTIC = ("stretching", "bending", "twisting")
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1}}}
 
 
@@ -108,9 +110,14 @@ def test_the_elastic_energy_has_no_direction_that_costs_nothing_but_rigid_motion
     content = scene([rod([layer("bottom"), growing(0.02, interval=[0.02, 0.06])], stations=21)], stimuli=HEAT)
     simulator = settled(content)
     assert simulator.solve_static().stable
-    stepper = simulator._stepper
-    matrix, model = stepper.potential.matrix, simulator.model
-    band, _, _ = matrix.assemble(0.0, stepper.end, stepper.potential.edge_gradient, np.zeros((0, 3)))
+    model, state, surroundings = simulator.model, simulator._state, simulator._stepper.surroundings
+    evaluator = Evaluator(model)
+    at, rest = evaluator.new(), surroundings.rest_strains_of(state.transduction)
+    evaluator.take_state(state, at)
+    evaluator.stand_still(state, at, 1.0, rest.edge, rest.joint, surroundings.load_factor(simulator.time))
+    evaluator.start_stage(at)
+    evaluator.evaluate(at, ELASTIC, second=True)
+    band, _, _ = evaluator.assemble(at)
     size, width = model.layout.size, model.layout.half_bandwidth
     hessian = np.zeros((size, size))
     for j in range(size):
