@@ -222,9 +222,10 @@ class SimulationWorker:
             self._single_steps.popleft().set_result(f"paused at t = {now:.6g} s")
 
     def _next_stop(self) -> float:
-        """When a frame or a controller is due, or the run ends [s]: where adaptive steps end at the latest."""
-        now = self._simulator.time
-        due = min(self._frames.next_end(now), self._control.next_stop(now))
+        """When a controller is due, or the run ends [s]: where adaptive steps end at the latest, beside the scene's own
+        output times. Frames at another rate are those of the first step after their time.
+        """
+        due = self._control.next_stop(self._simulator.time)
         return due if due < self._duration - TIME_ROUNDING * self._simulator.dt else self._duration
 
     def _hand_out(self) -> None:

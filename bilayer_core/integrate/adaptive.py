@@ -81,7 +81,7 @@ class AdaptiveStepper(Stepper):
     def compile(self, state: State) -> None:
         """Make a step for its kernels; `state` stays as it is."""
         copy = state.copy()
-        self._go(copy, 1, self._next_stop(copy, math.inf)[0], counts=False)
+        self._go(copy, 1, self._next_stop(copy, math.inf)[0], math.inf, counts=False)
 
     def advance(self, state: State, until: float = math.inf) -> StepReport:
         """One step, in place, that ends at `until` [s] at the latest.
@@ -91,7 +91,7 @@ class AdaptiveStepper(Stepper):
         SimulationError
             If the shortest step does not converge or is not accurate enough; nothing is changed then.
         """
-        found = self._march(state, 1, until, counts=False)
+        found = self._march(state, 1, until, math.inf, counts=False)
         if not found.done:
             raise SimulationError(self._why(found, float(state.time[0])), float(state.time[0]))
         report = StepReport.of(found, float(state.time[0]))
@@ -100,21 +100,21 @@ class AdaptiveStepper(Stepper):
             self.ledger.record(state, rest, self.surroundings.load_factor(report.time, report.length), report.length)
         return report
 
-    def march(self, state: State, steps: int, until: float = math.inf) -> MarchReport | None:
-        """At most so many steps, none of which passes `until` [s], taken into the tally. None if it made none: the next
-        step is one for `advance`, which says why it cannot be made.
+    def march(self, state: State, steps: int, until: float = math.inf, due: float = math.inf) -> MarchReport | None:
+        """At most so many steps, none of which passes `until` or begins at `due` or later [s], taken into the tally.
+        None if it made none: the next step is one for `advance`, which says why it cannot be made.
         """
         if self.ledger is not None:
             return None
-        found = self._march(state, steps, until, counts=True)
+        found = self._march(state, steps, until, due, counts=True)
         return found if found.done else None
 
-    def _march(self, state: State, steps: int, until: float, counts: bool) -> MarchReport:
+    def _march(self, state: State, steps: int, until: float, due: float, *, counts: bool) -> MarchReport:
         """As many steps as succeed, from one corner to the next."""
         found: MarchReport | None = None
-        while found is None or (not found.failed and found.done < steps and state.time[0] < until):
+        while found is None or (not found.failed and found.done < steps and state.time[0] < min(until, due)):
             stop, breaks = self._next_stop(state, until)
-            more = self._go(state, steps - (found.done if found else 0), stop, counts=counts)
+            more = self._go(state, steps - (found.done if found else 0), stop, due, counts=counts)
             if breaks and more.done and state.time[0] == stop:
                 self._begin_again_if_jumped(state)
             found = more if found is None else found.followed_by(more)
@@ -123,13 +123,14 @@ class AdaptiveStepper(Stepper):
         return found
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> MarchReport:
-        return self._go(state, 1, math.inf, counts=False, mode=mode, length=length, tolerance=tolerance)
+        return self._go(state, 1, math.inf, math.inf, counts=False, mode=mode, length=length, tolerance=tolerance)
 
     def _go(
         self,
         state: State,
         most: int,
         stop: float,
+        due: float,
         *,
         counts: bool,
         mode: int = STEP,
@@ -142,7 +143,7 @@ class AdaptiveStepper(Stepper):
         while True:
             settings = Settings(tolerance, self._max_iterations, mode, length, changes, counts)
             course = self._room_of(state, method)
-            found = self._adapter.adapt(state, self._arrays[method], course, stop, most, settings)
+            found = self._adapter.adapt(state, self._arrays[method], course, stop, due, most, settings)
             if found.status == JUMPED and not found.done:
                 method, most, changes = SELF_STARTING, 1, False
             elif not self.engine.make_room(found.status) or found.done:

@@ -14,11 +14,23 @@ if TYPE_CHECKING:
 
 
 TIME_ROUNDING = 1e-9
-"""Part of a step by which a time may be off and is still the time at which somebody is due."""
+"""Part of a period by which a time may be off and is still the time at which something is due."""
+
+
+def completed(time: float, rate: float) -> int:
+    """Periods of `rate` [1/s] from time 0 to `time` [s]."""
+    return math.floor(time * rate + TIME_ROUNDING)
+
+
+def next_end(time: float, rate: float) -> float:
+    """When the period ends that has not ended at `time` [s]."""
+    return (completed(time, rate) + 1) / rate
 
 
 class Observer(Protocol):
-    """Something that looks at a run `rate` times in each simulated second."""
+    """Something that looks at a run `rate` times in each simulated second: when the first step ends after each multiple
+    of its period, or exactly there. No step is another for it.
+    """
 
     rate: float
 
@@ -38,9 +50,7 @@ class Schedule:
     def __init__(self, observers: Sequence[Observer], simulator: Simulator):
         self._observers = list(observers)
         self._simulator = simulator
-        self._count = [0] * len(self._observers)
-        self._origin = simulator.time
-        self._rounding = TIME_ROUNDING * simulator.dt
+        self._count = [completed(simulator.time, of.rate) for of in self._observers]
         self._last_seen: list[float | None] = [None] * len(self._observers)
 
     def start(self) -> None:
@@ -50,26 +60,21 @@ class Schedule:
                 observer.start(description)
             self._show(range(len(self._observers)))
 
-    def next_stop(self, end: float) -> float:
-        """When the next observer is due [s], but not after `end` [s]."""
-        due = min(
-            (self._origin + (count + 1) / of.rate for count, of in zip(self._count, self._observers, strict=True)),
-            default=end,
-        )
-        return due if due < end - self._rounding else end
+    def next_due(self) -> float:
+        """The earliest time of a step's end at which an observer is to look [s]; infinite without any."""
+        due = zip(self._count, self._observers, strict=True)
+        return min(((count + 1 - TIME_ROUNDING) / of.rate for count, of in due), default=math.inf)
 
     def steps_until_due(self, most: float) -> int:
         """Fixed steps until the next observer is due, at most `most`."""
-        now, dt = self._simulator.time, self._simulator.dt
-        due = self.next_stop(math.inf)
-        return int(most) if math.isinf(due) else int(min(most, max(1.0, math.ceil((due - now - self._rounding) / dt))))
+        due, dt = self.next_due(), self._simulator.dt
+        return int(most) if math.isinf(due) else int(min(most, max(1.0, math.ceil((due - self._simulator.time) / dt))))
 
     def observe_due(self) -> None:
-        elapsed = self._simulator.time - self._origin + self._rounding
-        due = [i for i, observer in enumerate(self._observers) if elapsed >= (self._count[i] + 1) / observer.rate]
+        done = [completed(self._simulator.time, of.rate) for of in self._observers]
+        due = [i for i, (count, before) in enumerate(zip(done, self._count, strict=True)) if count > before]
         if due:
-            for i in due:
-                self._count[i] = int(elapsed * self._observers[i].rate)
+            self._count = done
             self._show(due)
 
     def _show(self, which) -> None:

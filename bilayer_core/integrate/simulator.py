@@ -20,7 +20,7 @@ from .adaptive import AdaptiveStepper
 from .frame import Description, Frame
 from .integrators import INTEGRATORS
 from .ledger import EnergyLedger
-from .observer import Observer, Schedule
+from .observer import TIME_ROUNDING, Observer, Schedule, next_end
 from .result import BodyView, RunResult, Termination
 from .statics import StaticReport, solve_static
 from .statistics import RunStatistics, center_of_mass
@@ -251,7 +251,8 @@ class Simulator:
         Parameters
         ----------
         until : float
-            Simulated time [s] at which an adaptive step ends at the latest; a fixed one is as long as ever.
+            Simulated time [s] at which an adaptive step ends at the latest, if the scene's next output time is not
+            earlier; a fixed one is as long as ever.
 
         Raises
         ------
@@ -260,6 +261,7 @@ class Simulator:
         """
         self.compile()
         begin, wall = clock.thread_time(), clock.perf_counter()
+        until = self._stop_before(until)
         found = self._stepper.march(self._state, 1, until)
         if found is not None:
             self.statistics.update_with(found, self._stepper)
@@ -281,10 +283,20 @@ class Simulator:
         self.statistics.update(report, self._stepper, self._state)
         return report
 
-    def _march(self, steps: int, until: float) -> int:
-        """Advance by at most so many steps, adaptive ones to `until` [s] at the latest; returns how many."""
+    def _stop_before(self, end: float) -> float:
+        """The scene's next output time, or `end` [s]: where adaptive steps end whether or not anybody observes, so that
+        a run does not depend on who does.
+        """
+        rate = self.scene.output.rate
+        due = next_end(self.time, rate)
+        return due if due < end - TIME_ROUNDING / rate else end
+
+    def _march(self, steps: int, until: float, due: float) -> int:
+        """Advance by at most so many steps, adaptive ones to `until` [s] at the latest, and by none after one that has
+        reached `due` [s]; returns how many.
+        """
         begin, wall = clock.thread_time(), clock.perf_counter()
-        found = self._stepper.march(self._state, steps, until)
+        found = self._stepper.march(self._state, steps, until, due)
         if found is not None:
             self.statistics.update_with(found, self._stepper)
         else:
@@ -304,13 +316,15 @@ class Simulator:
     ) -> RunResult:
         """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
 
-        Fixed steps end within half a step of it. Adaptive ones end exactly there, and wherever an observer is to look.
+        Fixed steps end within half a step of it. Adaptive ones end exactly there, and at the scene's output times
+        (`output.rate`), whether or not anybody observes: the run is the same bit for bit whatever watches it.
 
         Parameters
         ----------
         duration : float, optional
         observers : sequence of Observer
-            Each sees the first frame, the last, and those at its rate between; all are closed whatever happens.
+            Each sees the first frame, the last, and at its rate between that of the first step which ends at or after
+            each due time; all are closed whatever happens.
         stop : callable, optional
             Asked every few steps; true ends the run as interrupted.
         progress : callable, optional
@@ -340,7 +354,7 @@ class Simulator:
             schedule.start()
             while done < steps and self.time < end:
                 at_once = most if adaptive else schedule.steps_until_due(min(steps - done, most))
-                done += self._march(at_once, schedule.next_stop(end))
+                done += self._march(at_once, self._stop_before(end), schedule.next_due())
                 schedule.observe_due()
                 if each_step is not None:
                     each_step(self.time)

@@ -173,7 +173,7 @@ class Stepper:
         state.halvings[0] = level
         return StepReport(time, self.dt, substeps, rejected, iterations, factorisations, residual)
 
-    def march(self, state: State, steps: int, until: float = math.inf) -> MarchReport | None:
+    def march(self, state: State, steps: int, until: float = math.inf, due: float = math.inf) -> MarchReport | None:
         """As many of the next fixed steps as a compiled loop makes without help, at most `steps`, wherever they end,
         each taken into the tally. None if it made none: the next step is one for `advance`.
         """
@@ -244,6 +244,6 @@ class Stepper:
     def _explain(self, report: NewtonReport, time: float, h: float) -> str:
         text = f"{report.status.value} in the step to t = {time:.6g} s, tried down to {h:.3g} s"
         if np.isfinite(report.residual):
-            text += f" (correction left {report.residual:.3g} m/s, allowed {self.solver.tolerance:.3g} m/s, "
+            text += f" (correction left {report.residual:.3g} m/s, allowed {self.newton_tolerance:.3g} m/s, "
             text += f"{report.iterations} iterations)"
         return text + (f": {report.detail}" if report.detail else "")

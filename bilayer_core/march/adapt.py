@@ -105,7 +105,7 @@ def _count(counts, h, iterations, factorisations, backtracks, rejected, inaccura
 
 
 @kernel
-def adapt(adaptation, keeps, mode, length, changes, counts, until, most, newton_tolerance, max_iterations):
+def adapt(adaptation, keeps, mode, length, changes, counts, until, due, most, newton_tolerance, max_iterations):
     """Advance a state to `until` [s], by at most so many steps, as far as each succeeds, or do once what another mode
     says.
 
@@ -126,6 +126,8 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, most, newton_
         Whether to take the steps into the tally.
     until : float
         Where the last step ends exactly, later than now and before any corner [s].
+    due : float
+        The first step that ends there or later is the last one, and as long as it would have been [s].
     most : int
     newton_tolerance : float
         [m/s]
@@ -201,6 +203,6 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, most, newton_
         if counts:
             count_in(p.surfaces, p.strands, p.sums, state, gap, time, loop.tally)
             count_shape(p.strands, work.places[end], work.stage.rest_edge, state, loop.tally)
-        if time == until:
+        if time == until or time >= due:
             return k + 1, CONVERGED, -1, end, gap
     return most, status, pair, end, gap

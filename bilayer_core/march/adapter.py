@@ -51,14 +51,18 @@ class Adapter:
         self._parts: Adaptation | None = None
 
     def adapt(
-        self, state: State, method: Method, course: Course, until: float, most: int, settings: Settings
+        self, state: State, method: Method, course: Course, until: float, due: float, most: int, settings: Settings
     ) -> MarchReport:
-        """Make at most so many steps as long as their error allows; none passes `until` [s]."""
+        """Make at most so many steps as long as their error allows; none passes `until` [s], and none
+        begins at `due` [s] or later.
+        """
         engine, counts = self._engine, self._counts
         parts = self._parts_of(state, engine.loop_of(state, method, course))
         clear(counts)
         flags = engine.keeps, settings.mode, settings.length, settings.changes, settings.counts
-        done, status, pair, place, gap = adapt(parts, *flags, until, most, settings.tolerance, settings.max_iterations)
+        done, status, pair, place, gap = adapt(
+            parts, *flags, until, due, most, settings.tolerance, settings.max_iterations
+        )
         if done > 0 or status == CONVERGED or status in FAILURES:
             engine.take_over(place, gap)
         iterations, factorisations, backtracks, rejected, inaccurate = counts.numbers.tolist()

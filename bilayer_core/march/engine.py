@@ -20,7 +20,7 @@ from .modes import STEP
 from .problem import Problem
 from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER, TOO_INACCURATE
 from .step import count_step, take_steps
-from .step_groups import Course, Method, StateArrays, Tally
+from .step_groups import Course, Method, Place, StateArrays, Tally
 from .terms import NAMES, require_computed
 from .workspace import sums_of, work_of
 
