@@ -53,6 +53,23 @@ class VerbGroup(click.Group):
         return list(self.commands)
 
 
+class Rate(click.ParamType):
+    """A rate above zero, in Hz or with a unit."""
+
+    name = "rate"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
+        """The rate [Hz]."""
+        from pydantic import TypeAdapter, ValidationError
+
+        from bilayer_core.scene.units import PositiveRate
+
+        try:
+            return TypeAdapter(PositiveRate).validate_python(value)
+        except ValidationError as error:
+            self.fail(f"found {value!r}; {error.errors()[0]['msg']}", param, context)
+
+
 class Duration(click.ParamType):
     """A time above zero, in seconds or with a unit; with `from_zero` zero as well."""
 

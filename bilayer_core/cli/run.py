@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bilayer_core.cli.options import INTERRUPTED, Duration, Verb, scene_argument, set_option
+from bilayer_core.cli.options import INTERRUPTED, Duration, Rate, Verb, scene_argument, set_option
 from bilayer_core.cli.report import summary_lines
 from bilayer_core.cli.watch import Interrupt, notice_of_compilation, progress_bar
 from bilayer_core.errors import InputError, SimulationError
@@ -35,7 +35,9 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--tolerance", metavar="X", help=TOLERANCE_HELP)
 @set_option
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")
-@click.option("--log-rate", metavar="HZ", help="Frames recorded per simulated second.")
+@click.option(
+    "--log-rate", type=Rate(), metavar="HZ", help="Frames recorded per simulated second; the run stays the same."
+)
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
 @click.option("--summary", metavar="FILE.json", help="Write all figures of the run.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
@@ -50,8 +52,6 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     changes = [*overrides, *(f"solver.{key}={options[key]}" for key in SOLVER_OPTIONS if options[key] is not None)]
     if options["dt"] is not None and options["tolerance"] is None:
         changes.append("solver.tolerance=null")  # fixed steps, whatever the scene says
-    if options["log_rate"] is not None:
-        changes.append(f"output.rate={options['log_rate']}")
     config = load_scene(scene, changes)
     interrupt = Interrupt()
     observers = _open_outputs(config, options)
@@ -75,13 +75,13 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
         check_output_path(path, force)
         if Path(path).resolve() in {Path(other).resolve() for other in paths[:place]}:
             raise InputError(f"{path}: is named for two outputs; give each a file of its own")
-    observers = []
+    observers, rate = [], options["log_rate"] or output.rate
     if options["log"]:
-        observers.append(McapRecorder(options["log"], output.rate, output.marker_rate, force))
+        observers.append(McapRecorder(options["log"], rate, output.marker_rate, force))
     if options["rrd"]:
         from bilayer_core.view.rerun_view import RrdRecorder
 
-        observers.append(RrdRecorder(options["rrd"], output.rate, force))
+        observers.append(RrdRecorder(options["rrd"], rate, force))
     return observers
 
 

@@ -159,7 +159,7 @@ def test_a_scene_that_starts_in_penetration_is_refused_with_the_node_and_the_dep
             ["run", "cantilever", "--set", "solver.newton_tolerance=0"],
             "solver.newton_tolerance: found 0; must be a speed [m/s] above 0",
         ),
-        (["run", "cantilever", "--log-rate", "-1"], "output.rate: found -1; must be a rate [Hz] above 0, such as 50"),
+        (["run", "cantilever", "--log-rate", "-1"], "found '-1'; must be a rate [Hz] above 0, such as 50"),
         (["run", "cantilever", "--duration", "1 kg"], "found '1 kg', a quantity in kg; must be a time [s] above 0"),
         (["run", "cantilever", "--set", "rods.strip.station=9"], "no station of rods.strip, did you mean stations?"),
         (["run", "cantilever", "--from-state", "absent.npz"], "absent.npz: cannot be read: No such file or directory"),

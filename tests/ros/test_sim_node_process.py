@@ -2,6 +2,7 @@
 
 import signal
 
+import numpy as np
 import pytest
 import yaml
 from mcap.reader import make_reader
@@ -57,12 +58,15 @@ def test_a_rerun_recording_is_written_when_the_run_ends(start, domain, tmp_path)
     assert recording.stat().st_size > 10_000
 
 
-def test_adaptive_steps_end_at_output_times_and_at_the_duration(start, domain, tmp_path):
+def test_frames_at_another_rate_are_those_of_the_first_steps_after_their_times(
+    start, domain, tmp_path
+):
     log = tmp_path / "run.mcap"
     node = start("sim_node", domain, FAST | {"log": log, "rate": 30.0, "duration": 0.5, "tolerance": 1e-3})
     assert node.wait() == 0, node.output
-    times = read_log(log).times
-    assert times == pytest.approx([k / 30.0 for k in range(16)], abs=1e-9)  # logs count nanoseconds
+    late = np.array(read_log(log).times) - np.arange(16) / 30.0
+    assert (late >= -1e-9).all() and late[[0, -1]] == pytest.approx([0.0, 0.0], abs=1e-9)  # logs count nanoseconds
+    assert 1e-6 < late.max() < 0.02
     assert read_info(log).complete and read_info(log).settings["tolerance"] == "0.001"
 
 
