@@ -39,13 +39,14 @@ import numpy as np
 
 from ..kinematics.rotation import rotation_matrix
 from ..march.evaluator import Evaluator
+from ..march.modes import MOMENT
 from ..march.step_groups import Place
 from ..model.force_list import Kind, kinds
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
 from ..model.state import State
 from .fluid import survey_fluid
-from .motion import MOMENT, Gradient, Motion, displacement, of_prescribed, velocity
+from .motion import Gradient, Motion, displacement, of_prescribed, velocity
 from .observe import kinetic_energy
 from .quadrature import simpson
 

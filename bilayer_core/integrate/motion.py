@@ -6,15 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rotation import rotation_matrix, rotation_vector
+from ..kinematics.rotation import rotation_vector
 from ..march.allocate import FirstDerivatives
-from ..march.modes import MOMENT
 from ..march.step_groups import Place
 from ..model.model import Model
-from ..model.rest_strains import RestStrains
 from ..model.state import State
-from ..solve.configuration import Configuration
-from ..solve.terms.term import StepContext
 
 Array = np.ndarray
 PARTS = ("node", "edge", "pair", "body", "contact")
@@ -67,7 +63,7 @@ def compose(model: Model, node: Array, turn: Array, wall: Array, contact: Array)
     return Motion(node, edge, middle[model.pair_top] - middle[model.pair_bottom], body, contact)
 
 
-def displacement(model: Model, start: Place | Configuration, end: Place | Configuration) -> Motion:
+def displacement(model: Model, start: Place, end: Place) -> Motion:
     """From one configuration to another; turns, each by less than half a turn, are those beyond parallel transport."""
     edges = model.edge_count
     turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
@@ -78,7 +74,7 @@ def displacement(model: Model, start: Place | Configuration, end: Place | Config
     return compose(model, end.position - start.position, turn[:edges], wall, contact)
 
 
-def velocity(model: Model, at: Place | Configuration, state: State) -> Motion:
+def velocity(model: Model, at: Place, state: State) -> Motion:
     """Velocities of a state whose configuration is `at`."""
     world = np.zeros((1, 6))
     contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
@@ -86,38 +82,6 @@ def velocity(model: Model, at: Place | Configuration, state: State) -> Motion:
     spin = contact[model.wall_body, 3:]
     wall = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
     return compose(model, state.velocity, state.spin, wall, contact)
-
-
-def momentary_context(
-    model: Model, at: Place | Configuration, state: State, rest: RestStrains, load_factor: Array
-) -> StepContext:
-    """A step so short that nothing changes in it but what moves: forces at a state, with its velocities.
-
-    Inertia is at rest in it: it has nothing to ask for.
-    """
-    moving, free = velocity(model, at, state), model.bodies.body_of_free
-    place = at.place - MOMENT * moving.contact[:, :3]
-    rotation = at.rotation.copy()
-    for b, turn in enumerate(moving.contact[:, 3:]):
-        if turn.any():
-            rotation[b] = rotation_matrix(-MOMENT * turn) @ at.rotation[b]
-    return StepContext(
-        length=MOMENT,
-        start=at,
-        origin_position=at.position - MOMENT * moving.node,
-        origin_turn=at.turn - MOMENT * state.spin,
-        origin_place=place,
-        origin_rotation=rotation,
-        origin_body_position=place[free],
-        origin_body_rotation=rotation[free],
-        origin_fluid_momentum=np.zeros((model.node_count if len(model.fluid_mass) else 0, 3)),
-        predicted_position=at.position,
-        predicted_turn=at.turn,
-        predicted_body_position=at.body_position,
-        predicted_body_rotation=at.body_rotation,
-        rest=rest,
-        load_factor=load_factor,
-    )
 
 
 def of_prescribed(model: Model, motion: Motion) -> Motion:

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..errors import InputError, SimulationError
 from ..march.modes import COUNT, SETTLE
+from ..march.newton_report import NewtonStatus
 from ..model.state import State
-from ..solve.newton import NewtonStatus
 from .stepper import Stepper
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,12 +11,11 @@ import numpy as np
 from ..errors import SimulationError
 from ..march.engine import Engine, MarchReport, Settings
 from ..march.modes import LOOK, STEP
+from ..march.newton_report import NewtonReport
 from ..march.step import AT_ONCE, NO_JUMP
 from ..march.step_groups import Place
 from ..model.model import Model
 from ..model.state import State
-from ..solve.newton import NewtonReport
-from ..solve.potential import IncrementalPotential
 from .method import Method
 from .sdirk2 import METHOD as SELF_STARTING
 from .surroundings import Surroundings
@@ -93,11 +91,6 @@ class Stepper:
         self.engine = Engine(model, method.history is not None, stages)
         self.stimulus = np.zeros(len(model.scene.stimuli))
         self.ledger: EnergyLedger | None = None
-
-    @cached_property
-    def potential(self) -> IncrementalPotential:
-        """The same potential, term by term, with arrays of its own."""
-        return IncrementalPotential(self.model)
 
     @property
     def end(self) -> Place:

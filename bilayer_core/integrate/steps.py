@@ -118,7 +118,7 @@ NEWTON_PART = 1e-2
 
 A correction at speed u moves a point by at most u h in a step of length h. With u = part × tolerance × L/h_max, L the
 longest rod, that is at most this part of the error allowed in the longest step, and of a smaller one in proportion.
-The correction is taken, so what is left is less by another factor: below `solve.newton.KEEP_FACTOR_BELOW` where
+The correction is taken, so what is left is less by another factor: below `march.newton.KEEP_FACTOR_BELOW` where
 the matrix is an old one, by the correction itself where it is new. The scales are the scene's own, so u fits
 robots of a micrometre, which move in microseconds, as it fits one of a kilometre; for a rod of 50 mm recorded at 50 Hz
 it is 2.5e-6 m/s. Where this is less than positions can express, the last digit of a position counts (`march.newton`).

@@ -14,9 +14,28 @@ from ..model.state import State
 from ..scene.piece import Pieces
 from ..scene.transduction import follow, free_strain
 from .method import Method
-from .stages import Prescribed
 
 Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """Motion of prescribed bodies at the time of a stage.
+
+    Attributes
+    ----------
+    index : Array
+        Which bodies.
+    position, rotation : Array
+        Of all bodies [m], shapes (n_body, 3), (n_body, 3, 3).
+    rates : Array
+        Velocity [m/s] and angular velocity [rad/s] of all bodies, shape (n_body, 6).
+    """
+
+    index: Array
+    position: Array
+    rotation: Array
+    rates: Array
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,13 @@ import numpy as np
 
 from ..model.model import Model
 from ..model.state import State
-from ..solve.newton import NewtonReport, NewtonStatus
 from .acting import Acting
 from .adapt import Adaptation, Clock, Control, adapt, clear, room_for_counts
 from .engine import Engine, MarchReport, Settings
 from .error_estimate import Yardstick
 from .loop import Loop
 from .modes import STEP
+from .newton_report import NewtonReport, NewtonStatus
 from .status import CONVERGED, FAILURES
 from .step_groups import Course, Method, StateArrays
 

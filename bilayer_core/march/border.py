@@ -1,15 +1,31 @@
-"""The border of the Newton matrix: free bodies, as in `solve.newton_matrix`, and nodes that left the band for it."""
+"""The border of the Newton matrix: free bodies, and nodes that left the band for it."""
 
 from __future__ import annotations
 
 from ..jit import inner
 from ..solve.band import eliminate_band
-from ..solve.clamps import hand_nodes_to_bodies, hand_rows_to_bodies, hand_walls_to_bodies
+from ..solve.clamps import (
+    hand_nodes_to_bodies,
+    hand_rows_to_bodies,
+    hand_walls_to_bodies,
+    hand_walls_to_bodies_in_plane,
+)
 from ..solve.dense import count_negative_dense, factor_dense, solve_dense
-from ..solve.newton_matrix import add_links
-from ..solve.planar_matrix import hand_walls_to_bodies_in_plane
 from .copying import copy
 from .leaving import hand_contacts_to_bodies
+
+
+@inner
+def add_links(axes, links, link_node, link_body, link_hessian, node_unknown, border_out):
+    """Add the blocks between nodes, whose unknowns are along `axes`, and free bodies to the border."""
+    for k in range(links):
+        row, column = node_unknown[link_node[k]], 6 * link_body[k]
+        for m in range(axes.shape[0]):
+            for c in range(3):
+                along = axes[m, c]
+                if along != 0.0:
+                    for n in range(6):
+                        border_out[row + m, column + n] += along * link_hessian[k, c, n]
 
 
 @inner

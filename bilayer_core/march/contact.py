@@ -9,12 +9,13 @@ from ..forces.contact import surface_contact
 from ..forces.friction import friction, lag_axes, lag_friction
 from ..jit import inner
 from ..kinematics.turning import product_transposed
-from ..solve.neighbours import MOTION_MARGIN
 from .copying import copy, copy_matrix
 from .status import NO_ROOM, READY
 from .terms import place_of
 
 BARRIER, FRICTION = map(place_of, ("barrier", "friction"))
+MOTION_MARGIN = 4.0
+"""Margin of a list, in units of the motion that demands it."""
 
 
 @inner

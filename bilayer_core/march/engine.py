@@ -12,17 +12,16 @@ from ..model.force_list import Kind, kinds
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
 from ..model.state import State
-from ..solve.newton import NewtonReport, NewtonStatus
-from .allocate import ContactColumns, FirstDerivatives, NearRods, NearSurfaces, SecondDerivatives, configuration
-from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
+from .allocate import configuration
 from .loop import Counted, Loop
 from .modes import STEP
-from .problem import Problem
-from .status import CONVERGED, FAILURES, NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER, TOO_INACCURATE
+from .newton_report import NewtonReport, NewtonStatus
+from .status import CONVERGED, FAILURES, TOO_INACCURATE
 from .step import count_step, take_steps
 from .step_groups import Course, Method, Place, StateArrays, Tally
-from .terms import NAMES, require_computed
-from .workspace import sums_of, work_of
+from .storage import Storage
+from .terms import NAMES
+from .workspace import work_of
 
 Array = np.ndarray
 
@@ -50,22 +49,11 @@ class Engine:
     """
 
     def __init__(self, model: Model, keeps_slopes: bool, stages: int):
-        require_computed(model.forces)
-        self._model = model
+        self._model, self._storage = model, Storage(model)
+        self.first, self.gap = self._storage.first, math.inf
         self.keeps = 1 if keeps_slopes else None
         self.places = [configuration(model) for _ in range(3)]
         self.end = self.places[1]
-        self.first, second = FirstDerivatives(model), SecondDerivatives(model)
-        self._second = second
-        self._near = NearSurfaces(model) if model.meets_surfaces else None
-        self._rods = NearRods(model) if model.rod_surfaces is not None else None
-        self._columns = model.bodies.freedom.shape[1]  # capacity of the border
-        self._width = np.zeros(1, dtype=np.int64)  # of it in use
-        self._energy = np.zeros(len(NAMES))
-        self.gap = math.inf
-        self._groups = lasting_groups(model, second)
-        self._problem: Problem | None = None
-        self._capacity: tuple | None = None
         self._state: State | None = None
         self._loop: Loop | None = None
         self._counted: Counted | None = None
@@ -86,33 +74,13 @@ class Engine:
         )
         self.start_over(-math.inf)
         self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
-        self._work = work_of(model, self.places, self.touched, self._groups["off_axis"], stages)
+        self._work = work_of(model, self.places, self.touched, self._storage.problem.off_axis, stages)
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""
         self.figures[:] = height, math.inf, 0.0, 0.0, 0.0
         self.body_top[:] = -math.inf
         self.nodes[:], self.most_nodes[:], self.first_contact[:] = 0, 0, math.nan
-
-    def _gather(self) -> Problem:
-        """The problem with the present capacities for near pairs, contacts, and nodes in the border."""
-        model, near, rods = self._model, self._near, self._rods
-        capacity = near.capacity if near else 0, rods.capacity if rods else 0, self._columns
-        if capacity != self._capacity:
-            pairs = capacity[0]
-            of_rods = rods.contacts.capacity + rods.sliding.capacity if rods else 0
-            self._problem = Problem(
-                **self._groups,
-                wide=wide_of(model, self._columns, self._width) if rods or model.free_count else None,
-                surfaces=surfaces_of(model, near) if near else None,
-                sliding=sliding_of(model, pairs) if near else None,
-                threads=threads_of(model, rods) if rods else None,
-                slips=slips_of(model, pairs + (rods.sliding.capacity if rods else 0)),
-                leaving=leaving_of(ContactColumns(model, of_rods)) if rods else None,
-                sums=sums_of(self.first, self._second, self._energy, 2 * pairs),
-            )
-            self._capacity, self._counted = capacity, None
-        return self._problem
 
     def _arrays_of(self, state: State) -> StateArrays:
         if state is not self._state:
@@ -122,7 +90,7 @@ class Engine:
 
     def loop_of(self, state: State, method: Method, course: Course) -> Loop:
         """What compiled steps take, with the present rooms; the same object as long as all parts are."""
-        parts = {"problem": self._gather(), "state": self._arrays_of(state), "method": method, "course": course}
+        parts = {"problem": self._storage.problem, "state": self._arrays_of(state), "method": method, "course": course}
         if self._loop is None or any(getattr(self._loop, name) is not part for name, part in parts.items()):
             self._loop = Loop(
                 **parts, work=self._work, before=np.zeros_like(state.values), tally=self.tally, ranges=self.ranges
@@ -151,7 +119,7 @@ class Engine:
         """Of the conservative forces at the configuration evaluated last [J]; what others lose or supply is no
         energy.
         """
-        kind, values = kinds(), dict(zip(NAMES, self._energy.tolist(), strict=True))
+        kind, values = kinds(), dict(zip(NAMES, self._storage.energy.tolist(), strict=True))
         return {name: values[name] for name in self._model.forces if kind[name] is Kind.CONSERVATIVE}
 
     @property
@@ -163,7 +131,7 @@ class Engine:
         """What a message says of the near pair that blocks prescribed motion."""
         if pair < 0:
             return "a rod would reach another"
-        near = self._near
+        near = self._storage.near
         surface = self._model.surfaces.names[near.surface[pair]]
         return f"{carrier_names(self._model)[near.carrier[pair]]} would reach the surface of {surface}"
 
@@ -175,7 +143,7 @@ class Engine:
     @property
     def unstable(self) -> int:
         """How many directions were found unstable when they were last counted."""
-        return int(self._groups["system"].negative[0])
+        return int(self._storage.problem.system.negative[0])
 
     def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
         """What acts on the state that is looked at next, by settings that say so."""
@@ -184,20 +152,12 @@ class Engine:
 
     def make_room(self, status: int) -> bool:
         """Have the room that a loop lacked; false if that is not what it lacked: something has jumped."""
-        if status == NO_ROOM:
-            self._near.grow()
-        elif status == NO_ROOM_FOR_RODS:
-            self._rods.grow()
-        elif status == NO_ROOM_IN_BORDER:
-            self._columns = 2 * int(self._width[0])
-        else:
-            return False
-        return True
+        return self._storage.grow(status)
 
     def count_in(self, state: State, gap: float) -> None:
         """Take the end of a step that no loop has made into the tally."""
-        p, arrays = self._gather(), self._arrays_of(state)
-        if self._counted is None:
+        p, arrays = self._storage.problem, self._arrays_of(state)
+        if self._counted is None or self._counted.surfaces is not p.surfaces:
             self._counted = Counted(surfaces=p.surfaces, strands=p.strands, sums=p.sums, state=arrays, tally=self.tally)
         count_step(self._counted, gap, float(state.time[0]))
 

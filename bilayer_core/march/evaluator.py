@@ -9,15 +9,7 @@ import numpy as np
 
 from ..model.model import Model
 from ..model.state import State, initial_state
-from .allocate import (
-    ContactColumns,
-    FirstDerivatives,
-    NearRods,
-    NearSurfaces,
-    SecondDerivatives,
-    configuration,
-)
-from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
+from .allocate import configuration
 from .evaluate import (
     ASSEMBLE,
     BOUND,
@@ -38,12 +30,12 @@ from .evaluate import (
     evaluate_at,
     solve_at,
 )
-from .model_groups import Sliding
 from .problem import Problem
-from .status import NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER, READY
+from .status import READY
 from .step_groups import Place, Point, Stage, StateArrays
-from .terms import NAMES, require_computed
-from .workspace import point_of, stage_of, sums_of
+from .storage import Storage
+from .terms import NAMES
+from .workspace import point_of, stage_of
 
 Array = np.ndarray
 
@@ -90,45 +82,26 @@ class Evaluator:
     """
 
     def __init__(self, model: Model):
-        require_computed(model.forces)
         self.model = model
         # a stiffness of its own, whose columns are set to zero where bending or twisting is left out
         self._stiffness = model.joint_stiffness.copy()
-        self._own = replace(model, joint_stiffness=self._stiffness.view())
-        self.first, self._second = FirstDerivatives(model), SecondDerivatives(model)
-        self.near = NearSurfaces(model) if model.meets_surfaces else None
-        self.rods = NearRods(model) if model.rod_surfaces is not None else None
-        self._columns, self._width = model.bodies.freedom.shape[1], np.zeros(1, dtype=np.int64)
-        self._groups = lasting_groups(self._own, self._second)
-        self._energy = np.zeros(len(NAMES))
+        self._storage = Storage(replace(model, joint_stiffness=self._stiffness.view()))
+        self.first, self.near, self.rods = self._storage.first, self._storage.near, self._storage.rods
         self._state = initial_state(model)
         self._arrays = StateArrays(**{name: getattr(self._state, name) for name in StateArrays.fields})
-        self.stage: Stage = stage_of(model, self._groups["off_axis"])
+        self.stage: Stage = stage_of(model, self._problem.off_axis)
         self.point: Point = point_of(model)
         bodies = len(model.bodies.names)
         self._turned = np.zeros(model.edge_count)
         self._poses = np.zeros((bodies, 3)), np.zeros((bodies, 3, 3)), np.zeros((bodies, 6))
-        self._problem: Problem | None = None
-        self._reserve()
+        self._take_problem()
 
-    def _reserve(self) -> None:
-        """Have the present capacities; friction's contacts stay."""
-        model, near, rods = self.model, self.near, self.rods
-        capacity = near.capacity if near else 0
-        of_rods = rods.contacts.capacity + rods.sliding.capacity if rods else 0
-        sliding = sliding_of(model, capacity) if near else None
-        if sliding is not None and self._problem is not None:
-            _copy_used(self._problem.sliding, sliding)
-        self._problem = Problem(
-            **self._groups,
-            wide=wide_of(model, self._columns, self._width) if rods or model.free_count else None,
-            surfaces=surfaces_of(model, near) if near else None,
-            sliding=sliding,
-            threads=threads_of(model, rods) if rods else None,
-            slips=slips_of(model, capacity + (rods.sliding.capacity if rods else 0)),
-            leaving=leaving_of(ContactColumns(model, of_rods)) if rods else None,
-            sums=sums_of(self.first, self._second, self._energy, 2 * capacity),
-        )
+    @property
+    def _problem(self) -> Problem:
+        return self._storage.problem
+
+    def _take_problem(self) -> None:
+        """Have the present problem evaluated."""
         position, rotation, rates = self._poses
         self._call = Evaluation(
             problem=self._problem,
@@ -142,24 +115,16 @@ class Evaluator:
         )
 
     def _grow(self, status: int) -> None:
-        if status == NO_ROOM:
-            self.near.grow()
-        elif status == NO_ROOM_FOR_RODS:
-            self.rods.grow()
-        elif status == NO_ROOM_IN_BORDER:
-            self._columns = 2 * int(self._width[0])
-        else:
+        if not self._storage.grow(status):
             raise ArithmeticError(f"the evaluation ended with status {status}")
-        self._reserve()
+        self._take_problem()
 
     def _do(self, operation: int, at: Place, base: Place | None = None, second: bool = False) -> tuple[float, float]:
         while True:
             status, energy, gap = evaluate_at(self._call, operation, base or at, at, second)
             if status == READY:
                 return energy, gap
-            selected = self._problem.sums.selected.copy()
             self._grow(status)
-            self._problem.sums.selected[:] = selected
 
     def _solve(self, operation: int, at: Place) -> tuple[float, float, int]:
         status, first, second, pair = solve_at(self._call, operation, at)
@@ -305,8 +270,8 @@ class Evaluator:
         return self._energies()
 
     def _energies(self) -> dict[str, float]:
-        selected = self._problem.sums.selected
-        return {name: float(self._energy[k]) for k, name in enumerate(NAMES) if selected[k]}
+        selected, energy = self._problem.sums.selected, self._storage.energy
+        return {name: float(energy[k]) for k, name in enumerate(NAMES) if selected[k]}
 
     # the matrix
 
@@ -371,11 +336,3 @@ class Evaluator:
         if not hasattr(self, "_place"):
             self._place = self.new()
         return self._place
-
-
-def _copy_used(before: Sliding, after: Sliding) -> None:
-    """Copy contacts of friction to arrays with more capacity."""
-    for name in Sliding.fields:
-        old, new = getattr(before, name), getattr(after, name)
-        if isinstance(new, np.ndarray) and new.flags.writeable:
-            new[: len(old)] = old

@@ -1,4 +1,15 @@
-"""The Newton matrix in compiled form: the band of rods with a border of free bodies, as in `solve.newton_matrix`."""
+"""The Newton matrix: a band for rods, bordered by the unknowns of free bodies, and its factorisation.
+
+    [ A   U ] [ δ   ]     [ g   ]
+    [ Uᵀ  D ] [ δ_b ] = − [ g_b ]
+
+A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the
+motions that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
+Some nodes of rods that touch leave the band for the border, too (`solve.rod_border`).
+
+If a pivot is not positive the matrix is not convex there; what is negative in the contact of rods is left out, then
+multiples of the mass matrix are added until it is, so that the step is a descent direction.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +18,6 @@ import numpy as np
 from ..jit import inner
 from ..solve.assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
 from ..solve.band import backward_band, factor_band, factor_signed, forward_band
-from ..solve.newton_matrix import FIRST_SHIFT, LARGEST_SHIFT, SHIFT_GROWTH
 from ..solve.planar_assembly import expand_in_plane, expand_pairs_in_plane, put_in_space, take_in_plane
 from .border import (
     assemble_border,
@@ -22,6 +32,10 @@ from .leaving import leave, put_leaving, take_contacts_of, take_leaving
 from .modes import SLOWEST_GROWTH
 from .status import INDEFINITE, NO_ROOM_IN_BORDER, NOT_FINITE, READY
 from .threads import rods_touch
+
+FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
+SHIFT_GROWTH = 10.0
+LARGEST_SHIFT = 1e8
 
 
 @inner

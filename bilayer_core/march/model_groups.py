@@ -70,7 +70,7 @@ class Space:
 
 @group
 class Plane:
-    """What dimension 2 has instead of frames and twist; see `forces.planar` and `solve.planar_matrix`."""
+    """What dimension 2 has instead of frames and twist; see `forces.planar`."""
 
     normal: Array
     side: Array
@@ -146,7 +146,7 @@ class Grips:
 
 @group
 class Surfaces:
-    """Carriers, surfaces, and the list of near pairs with what it was made for; see `solve.neighbours`."""
+    """Carriers, surfaces, and the list of near pairs with what it was made for; see `allocate.NearSurfaces`."""
 
     d_hat: float
     stiffness: float
@@ -232,7 +232,7 @@ class Touches:
 
 @group
 class Threads:
-    """Rods that can meet: their geometry, the list of near pairs, and contacts; see `solve.rod_contact`."""
+    """Rods that can meet: their geometry, the list of near pairs, and contacts; see `allocate.NearRods`."""
 
     d_hat: float
     stiffness: float

@@ -1,4 +1,12 @@
-"""Newton's method in compiled form: line search, step bound and measure of convergence as in `solve.newton`."""
+"""Newton's method on the incremental potential, with line search and a step bound.
+
+The Hessian is exact. Once factorised it serves several corrections as long as each is less than `KEEP_FACTOR_BELOW`
+times the one before;
+a new correction of the gradient at hand costs a fraction of a new factorisation. The last of them, not taken, is the
+measure of convergence:
+what Newton would still change, as the speed of the fastest material point [m/s].
+What the potential takes at the configuration (`potential.follow`) moves along with every correction.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +16,6 @@ from ..contact.near import largest_motion
 from ..contact.step_bound import step_bound
 from ..jit import inner
 from ..kinematics.turning import turn_between, turn_by, turn_further
-from ..solve.newton import ARMIJO, BACKTRACKING, KEEP_FACTOR_BELOW, MAX_BACKTRACKS, ROUNDING, largest_move
 from .contact import list_pairs
 from .copying import copy
 from .matrix import factorise, solve
@@ -27,6 +34,29 @@ from .status import (
 )
 from .threads import bound_between_rods, find_contacts
 
+ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 2006, ch. 3)
+KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
+BACKTRACKING = 0.5
+MAX_BACKTRACKS = 30
+ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the potential below it mean nothing
+
+
+@inner
+def largest_move(step, node_unknown, edge_unknown, half_width):
+    """Largest displacement of a node, or of an edge's border by its turn [m]; NaN if any is."""
+    largest, total = 0.0, 0.0
+    for i in range(node_unknown.shape[0]):
+        d = node_unknown[i]
+        square = step[d] * step[d] + step[d + 1] * step[d + 1] + step[d + 2] * step[d + 2]
+        total += square
+        largest = max(largest, square)
+    largest = math.sqrt(largest)
+    for k in range(edge_unknown.shape[0]):
+        size = abs(step[edge_unknown[k]]) * half_width[k]
+        total += size
+        largest = max(largest, size)
+    return total if math.isnan(total) else largest
+
 
 @inner
 def correction_speed(strands, bodies, system, length):
@@ -35,8 +65,8 @@ def correction_speed(strands, bodies, system, length):
     for f in range(bodies.mass.shape[0]):
         shift, turn = 0.0, 0.0
         for c in range(3):
-            shift += system.body_step[f, c] ** 2
-            turn += system.body_step[f, 3 + c] ** 2
+            shift += system.body_step[f, c] * system.body_step[f, c]
+            turn += system.body_step[f, 3 + c] * system.body_step[f, 3 + c]
         size = math.sqrt(shift) + bodies.reach[bodies.body_of_free[f]] * math.sqrt(turn)
         if math.isnan(size):
             return size
@@ -221,9 +251,8 @@ of the line search."""
 def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
     """Move `at` to the minimum of the potential, or only do there what is `wanted` (`modes`); `trial` is scratch.
 
-    The method is that of `solve.newton.NewtonSolver.minimise`, turned inside out: all evaluations are at one place,
-    because the compiler would make as many copies of them as there are places. Where a new matrix is likely to be
-    needed at the end of a step, it is evaluated with second derivatives at once.
+    All evaluations are at one place, because the compiler would make as many copies of them as there are places. Where
+    a new matrix is likely to be needed at the end of a step, it is evaluated with second derivatives at once.
 
     The correction that is small enough is the last one, and it is taken, as far as gaps stay open: a linear problem is
     solved exactly, however slow the motion. The potential is not evaluated again after it. Energies, forces and gaps

@@ -1,12 +1,72 @@
-"""Where everything is: frames, and what bodies carry. The compiled form of `solve.configuration`."""
+"""Where everything is: frames, and what bodies carry."""
 
 from __future__ import annotations
 
 from ..jit import inner
 from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
 from ..kinematics.turning import turn_between, turn_by, turn_further, turned_by
-from ..solve.configuration import carry_points, carry_turns, carry_walls, second_director, take_step
 from .copying import copy, copy_matrix, copy_row
+
+
+@inner
+def take_step(step, alpha, node_unknown, edge_unknown, position, turn, position_out, angle_out, turn_out):
+    """x + α δx of nodes, α δθ of edges and their turn since the start of the step."""
+    for i in range(node_unknown.shape[0]):
+        d = node_unknown[i]
+        for c in range(3):
+            position_out[i, c] = position[i, c] + alpha * step[d + c]
+    for k in range(edge_unknown.shape[0]):
+        angle = alpha * step[edge_unknown[k]]
+        angle_out[k] = angle
+        turn_out[k] = turn[k] + angle
+
+
+@inner
+def second_director(tangent, director1, director2_out):
+    """m2 = t × m1."""
+    for k in range(tangent.shape[0]):
+        director2_out[k, 0] = tangent[k, 1] * director1[k, 2] - tangent[k, 2] * director1[k, 1]
+        director2_out[k, 1] = tangent[k, 2] * director1[k, 0] - tangent[k, 0] * director1[k, 2]
+        director2_out[k, 2] = tangent[k, 0] * director1[k, 1] - tangent[k, 1] * director1[k, 0]
+
+
+@inner
+def carry_points(body, local, position, rotation, arm_out, place_out):
+    """X + R r of points r of bodies, and the arms R r [m]."""
+    for k in range(body.shape[0]):
+        b = body[k]
+        for i in range(3):
+            arm = rotation[b, i, 0] * local[k, 0] + rotation[b, i, 1] * local[k, 1] + rotation[b, i, 2] * local[k, 2]
+            arm_out[k, i] = arm
+            place_out[k, i] = position[b, i] + arm
+
+
+@inner
+def carry_walls(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
+    """t and m1 of walls, edges from `first` on, turned with their bodies, and m2 = t × m1."""
+    for k in range(body.shape[0]):
+        b, w = body[k], first + k
+        for i in range(3):
+            tangent[w, i] = director1[w, i] = 0.0
+            for j in range(3):
+                tangent[w, i] += rotation[b, i, j] * local_tangent[k, j]
+                director1[w, i] += rotation[b, i, j] * local_director1[w, j]
+        director2[w, 0] = tangent[w, 1] * director1[w, 2] - tangent[w, 2] * director1[w, 1]
+        director2[w, 1] = tangent[w, 2] * director1[w, 0] - tangent[w, 0] * director1[w, 2]
+        director2[w, 2] = tangent[w, 0] * director1[w, 1] - tangent[w, 1] * director1[w, 0]
+
+
+@inner
+def carry_turns(body, local, rotation, turn_out):
+    """R L of matrices L of bodies."""
+    for k in range(body.shape[0]):
+        b = body[k]
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for m in range(3):
+                    total += rotation[b, i, m] * local[k, m, j]
+                turn_out[k, i, j] = total
 
 
 @inner

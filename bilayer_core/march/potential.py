@@ -1,4 +1,4 @@
-"""The incremental potential in one compiled function: the sum of `solve.potential` without the interpreter."""
+"""The incremental potential of one implicit step: the sum of all forces that a scene needs, and its gradient."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ Array = np.ndarray
 
 @group
 class Sums:
-    """First and second derivatives to which forces add; see `solve.terms.term.Accumulators`."""
+    """First and second derivatives to which forces add; see `allocate`."""
 
     lasting: Array  # the part of `first` that stays as it is when other parts follow the configuration
     energy: Array  # of each force, in the order of `march.terms` [J]
@@ -59,7 +59,7 @@ class Sums:
 
 @group
 class System:
-    """The Newton matrix, its factors, and steps; see `solve.newton_matrix`."""
+    """The Newton matrix, its factors, and steps; see `matrix`."""
 
     band: Array
     right: Array
@@ -82,7 +82,7 @@ class Border:
 class Wide:
     """The border as it is eliminated: of bodies their freedom, then nodes that left the band.
 
-    Rooms for columns are larger than what is in use; see `solve.newton_matrix`.
+    Rooms for columns are larger than what is in use; see `matrix`.
     """
 
     border: Array  # U by columns, then L⁻¹ U, shape (room, size + half-bandwidth)

@@ -1,4 +1,4 @@
-"""Where on a Newton step friction holds it up, as in `solve.potential`."""
+"""Where on a Newton step friction holds it up."""
 
 from __future__ import annotations
 

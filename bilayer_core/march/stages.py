@@ -1,4 +1,19 @@
-"""Origins, predictions and ends of stages in compiled form; see `integrate.stages` and `integrate.slopes`."""
+"""Origins and predictions of the stages of a step, and where the step ends.
+
+Positions and momenta advance as `integrate.method` says. What is no vector needs a word:
+
+- A rotation advances along rotation vectors: R̄ = exp(h a f₁) … Rₙ with f = log(R R̄ᵀ)/(γ h) of each earlier stage. Over
+  the stage, inertia prefers R̃ = exp(γ h ω̃) R̄ with I(R̃) ω̃ = L̄: without a moment, the angular momentum L stays what
+  it was. Given the moment that acts at the end of the stage, L = L̄ + γ h × moment and ω = I(R)⁻¹ L. What ω differs by
+  from the rotation's own log(R R̄ᵀ)/(γ h) is of second order.
+- What a body holds has the body's velocity, v + ω × r, not that of a chord of its arc, which differs at first order. So
+  its origin is where R̄ := R̃ − γ h ω × R̃ has it: (R − R̄)/(γ h) is dR/dt to second order. A prescribed body has its
+  own velocity, not that of a chord either: the same with its pose at the end of the stage and its rates.
+- The momentum of the fluid is no fixed multiple of a velocity. Where the end of a step lies beyond its last stage, both
+  are extrapolated, and what they differ by at the end (second order in h) is kept in the state; the momentum counts.
+- The angle of an edge counts from the start of the stage, where its frame was last re-based; its origin lies
+  before or behind that.
+"""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..solve.newton import NewtonStatus
+from .newton_report import NewtonStatus
 
 READY = 0
 NO_ROOM = 1

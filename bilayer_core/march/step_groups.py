@@ -11,28 +11,28 @@ Array = np.ndarray
 
 @group
 class Place:
-    """A configuration; see `solve.configuration.Configuration`, whose arrays these are."""
+    """A configuration: positions, frames and bodies at one point of a Newton iteration."""
 
-    carrier: Array
-    position: Array
-    point: Array
-    length: Array
-    tangent: Array
-    director1: Array
+    carrier: Array  # all carriers [m], shape (n_carrier, 3); the first are the nodes, the others points of bodies
+    position: Array  # of nodes [m], shape (n_node, 3)
+    point: Array  # of the other carriers [m]
+    length: Array  # of edges and walls [m], shape (n_edge + n_wall,)
+    tangent: Array  # of edges and walls, unit, shape (n_edge + n_wall, 3)
+    director1: Array  # likewise
     director2: Array
-    turn: Array
-    angle: Array
-    joint_strain: Array
-    body_position: Array
-    body_rotation: Array
-    place: Array
-    rotation: Array
-    surface_place: Array
-    surface_turn: Array
-    arm: Array
-    held: Array
-    point_arm: Array
-    surface_arm: Array
+    turn: Array  # of edges about their tangents since the start of the step [rad], shape (n_edge,)
+    angle: Array  # of edges in the last move [rad], shape (n_edge,)
+    joint_strain: Array  # κ₁ κ₂ ψ of joints, ψ unwrapped [rad], shape (n_joint, 3)
+    body_position: Array  # of free bodies [m], shape (n_free, 3)
+    body_rotation: Array  # shape (n_free, 3, 3)
+    place: Array  # of all bodies and last of the world [m], shape (n_body + 1, 3)
+    rotation: Array  # shape (n_body + 1, 3, 3)
+    surface_place: Array  # of surfaces [m], shape (n_surface, 3)
+    surface_turn: Array  # their axes, shape (n_surface, 3, 3)
+    arm: Array  # from the position of its body to each attached node [m], shape (n_attached, 3)
+    held: Array  # of attached nodes [m], shape (n_attached, 3)
+    point_arm: Array  # like `arm`, of points
+    surface_arm: Array  # and of surfaces
     departure: Array  # of nodes from where inertia takes them, x − x̃ [m]: its digits are not those of x
     body_departure: Array  # of free bodies, X − X̃ [m]
     body_turned: Array  # vector part of the unit quaternion from R̃ to R of free bodies; see `forces.body`
@@ -40,19 +40,22 @@ class Place:
 
 @group
 class Stage:
-    """What is frozen over a stage; see `solve.terms.term.StepContext`. `lengths` holds γ h and γ′ h [s]."""
+    """What is frozen over a stage of a step: it reads as an implicit Euler step from an origin (`integrate.method`).
 
-    lengths: Array
-    origin_position: Array
-    origin_turn: Array
-    origin_body_position: Array
-    origin_place: Array
-    origin_rotation: Array
-    origin_fluid_momentum: Array
-    predicted_position: Array
-    predicted_turn: Array
-    predicted_body_position: Array
-    predicted_body_rotation: Array
+    The velocity of whatever is at q is (q − origin)/(γ h).
+    """
+
+    lengths: Array  # γ h and γ′ h [s], where p = p̄ + γ′ h × force for momenta, shape (2,)
+    origin_position: Array  # of nodes [m], shape (n_node, 3)
+    origin_turn: Array  # of edges, counted from the start of the stage [rad], shape (n_edge,)
+    origin_body_position: Array  # of free bodies [m], shape (n_free, 3)
+    origin_place: Array  # of all bodies and last of the world [m], shape (n_body + 1, 3)
+    origin_rotation: Array  # likewise; R̄ is no rotation but the matrix with dR/dt = (R − R̄)/(γ h)
+    origin_fluid_momentum: Array  # P̄ of the fluid at nodes [N s], shape (n_node, 3); (0, 3) without added mass
+    predicted_position: Array  # x̃ of nodes [m], shape (n_node, 3)
+    predicted_turn: Array  # of edges that inertia prefers, counted from the start of the stage [rad], shape (n_edge,)
+    predicted_body_position: Array  # X̃ of free bodies [m], shape (n_free, 3)
+    predicted_body_rotation: Array  # R̃ of free bodies, shape (n_free, 3, 3)
     twist: Array  # of joints at the start of the stage
     rest_edge: Array  # strains without stress
     rest_joint_out: Array

@@ -1,4 +1,8 @@
-"""Contact of rods with each other and with themselves, as in `solve.rod_contact`."""
+"""Contact of rods with each other and with themselves.
+
+What is computed does not depend on the list of near pairs, which holds all contacts at any time, always in the same
+order; see `contact.rod_list`.
+"""
 
 from __future__ import annotations
 

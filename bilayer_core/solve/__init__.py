@@ -1,1 +1,1 @@
-"""The incremental potential of a step, its matrix, its minimum."""
+"""The Newton matrix: from second derivatives to a band with a border, and its factors."""

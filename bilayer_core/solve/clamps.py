@@ -210,3 +210,57 @@ def hand_walls_to_bodies(
                             value = signed * arm_jacobian(axes, arm, other, own, n)
                             body_hessian_out[row + n, base + m] += value
                             body_hessian_out[base + m, row + n] += value
+
+
+@kernel
+def hand_walls_to_bodies_in_plane(
+    axes,
+    normal,
+    wall_free,
+    wall_joint,
+    joint_a,
+    joint_b,
+    edge_count,
+    edge_node,
+    node_unknown,
+    attached_of_unknown,
+    attached_unknown,
+    attached_free,
+    arm,
+    frame,
+    polar_hessian,
+    cross_hessian,
+    border_out,
+    body_hessian_out,
+):
+    """Add the second derivatives of clamps' elements with respect to the rotation of free bodies to U and D.
+
+    The angle of a clamp's direction is that of its body about the normal.
+    """
+    for k in range(wall_free.shape[0]):
+        f, w, x = wall_free[k], edge_count + k, wall_joint[k]
+        if f < 0:
+            continue
+        base = 6 * f + 3
+        for m in range(3):
+            for n in range(3):
+                body_hessian_out[base + m, base + n] += polar_hessian[w, 2] * normal[m] * normal[n]
+        wall_first = joint_a[x] == w
+        edge = joint_b[x] if wall_first else joint_a[x]
+        by_length, by_angle = cross_hessian[x, 2 if wall_first else 1], cross_hessian[x, 3]
+        for end in range(2):
+            sign = 1.0 if end == 1 else -1.0
+            for c in range(2):
+                unknown = node_unknown[edge_node[edge] + end] + c
+                value = sign * (by_length * frame[edge, c] + by_angle * frame[edge, 2 + c])
+                other = attached_of_unknown[unknown]
+                if other < 0:
+                    for m in range(3):
+                        border_out[unknown, base + m] += value * normal[m]
+                elif attached_free[other] >= 0:
+                    row = 6 * attached_free[other]
+                    for n in range(6):
+                        held = value * arm_jacobian(axes, arm, other, unknown - attached_unknown[other], n)
+                        for m in range(3):
+                            body_hessian_out[row + n, base + m] += held * normal[m]
+                            body_hessian_out[base + m, row + n] += held * normal[m]

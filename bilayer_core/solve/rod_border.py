@@ -14,15 +14,9 @@ contacting nodes, and the cost stays linear in the number of nodes.
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..jit import kernel
-from ..model.model import Model
 from .assembly import hold_unknowns
 from .clamps import arm_jacobian
-from .rod_contact import Contacts
-
-Array = np.ndarray
 
 
 @kernel
@@ -270,75 +264,3 @@ def add_between(count, node, weight, matrix, side, turn, attached, node_unknown,
                             border_out[column, base + a] += value
                         else:
                             border_out[row, base + b] += value
-
-
-class RodBorder:
-    """The contacts of rods as the Newton matrix takes them, and the nodes that leave the band for them.
-
-    Attributes
-    ----------
-    count, node, weight, matrix, side, turn
-        Contacts of barrier and friction in one list, see `take_contacts`.
-    strand, attached, mark, met, leaving, place
-        See `choose_leaving`.
-    """
-
-    def __init__(self, model: Model):
-        self._model, self._layout = model, model.solved_layout
-        nodes, strands = model.node_count, len(model.strands)
-        self.strand = np.repeat(np.arange(strands), [s.node_count for s in model.strands])
-        self.attached = np.full(nodes, -1)
-        self.attached[model.attached_node] = np.arange(len(model.attached_node))
-        self.mark, self.met = np.zeros((nodes, 3), dtype=np.int64), np.zeros((strands, strands), dtype=np.int64)
-        self.leaving = np.zeros(nodes, dtype=np.int64)
-        self.unknown = self.leaving.view()
-        self.unknown.flags.writeable = False  # as those of attached nodes: one type for kernels
-        self.place = np.zeros(self._layout.size, dtype=np.int64)
-        self.count = self._leaving = 0
-        self.make_room(0)
-
-    def make_room(self, room: int) -> None:
-        """Have room for so many contacts."""
-        d = self._layout.dimension
-        self.node, self.side = np.zeros((room, 2), dtype=np.int64), np.zeros(room)
-        self.weight, self.matrix, self.turn = np.zeros((room, 4)), np.zeros((room, d, d)), np.zeros((room, 4, d))
-
-    @property
-    def rows(self) -> Array:
-        """Rows of the matrix that leave the band."""
-        return (self.leaving[: self._leaving, None] + np.arange(self._layout.dimension)).ravel()
-
-    def add_to_band(self, parts: list[Contacts], simplified: int, band: Array) -> None:
-        """Add each edge's own blocks to the band, and choose the nodes that leave it; `simplified` is for
-        `take_contacts`.
-        """
-        layout, model = self._layout, self._model
-        room = sum(part.room for part in parts)
-        if room > len(self.side):
-            self.make_room(room)
-        self.count = 0
-        for part in parts:
-            of_part = (part.node, part.weight, part.normal, part.lean, part.along, part.matrix, part.side, part.turn)
-            take_contacts(
-                *(model.directions, simplified, self.count, part.count, *of_part),
-                *(self.node, self.weight, self.matrix, self.side, self.turn),
-            )
-            self.count += part.count
-        add_own_edges(self.count, self.node, self.weight, self.matrix, self.side, self.turn, layout.node, band)
-        nodes = (self.strand, self.attached, self.mark, self.met, layout.node, layout.dimension)
-        self._leaving = choose_leaving(self.count, self.node, *nodes, self.leaving, self.place)
-
-    def add_to_bodies(self, arm: Array, border: Array, corner: Array) -> None:
-        """Add the blocks of nodes that free bodies hold to these bodies' border and corner."""
-        model = self._model
-        blocks = (self.node, self.weight, self.matrix, self.side, self.turn)
-        bodies = (self.attached, model.attached_free, arm, self._layout.node)
-        add_to_bodies(model.directions, self.count, *blocks, *bodies, border, corner)
-
-    def widen(self, band: Array, base: int, border: Array, corner: Array) -> None:
-        """Move the nodes that leave from the band to the border and corner of bodies' freedom, after `base` columns."""
-        layout = self._layout
-        leaving = (self._leaving, self.unknown, layout.dimension, self.place)
-        leave_band(*leaving, layout.half_bandwidth, layout.size, base, border, corner, band)
-        blocks = (self.node, self.weight, self.matrix, self.side, self.turn)
-        add_between(self.count, *blocks, self.attached, layout.node, self.place, base, border, corner)

@@ -4,18 +4,19 @@ import math
 
 import numpy as np
 import pytest
+from evaluations import end_of_step, left_of_step
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.forces.drag import drag, node_directions
+from bilayer_core.integrate.fluid import energy_of_fluid, momentum_of_fluid
 from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.march.evaluator import Evaluator
 from bilayer_core.model.build import build_model
 from bilayer_core.model.layout import columns
 from bilayer_core.model.section import rectangle
 from bilayer_core.model.state import initial_state
-from bilayer_core.solve.configuration import Configuration
-from bilayer_core.solve.terms.fluid import energy_of_fluid, momentum_of_fluid
 
 WIDTH, THICKNESS = 0.01, 2e-3
 OWN = 1000.0 * WIDTH * THICKNESS  # [kg/m]
@@ -60,11 +61,12 @@ def random_problem(seed=0):
     content = scene([rod(HALVES, length=0.02, stations=7)], fluid=water(velocity=[0.1, -0.2, 0.05]))
     model = build_model(load_scene(content))
     state = initial_state(model)
-    start, bent = Configuration(model), Configuration(model)
-    start.take_state(state)
+    evaluator = Evaluator(model)
+    start, bent = evaluator.new(), evaluator.new()
+    evaluator.take_state(state, start)
     bent.position[:] = start.position + 4e-4 * rng.standard_normal((model.node_count, 3))
-    bent.carry_frames(start, 0.3 * rng.standard_normal(model.edge_count))
-    return model, bent, rng.standard_normal((model.node_count, 3)), rng.standard_normal(model.edge_count)
+    evaluator.carry_frames(start, 0.3 * rng.standard_normal(model.edge_count), bent)
+    return evaluator, bent, rng.standard_normal((model.node_count, 3)), rng.standard_normal(model.edge_count)
 
 
 def shape_gradient_of(model, at, velocity):
@@ -76,8 +78,8 @@ def shape_gradient_of(model, at, velocity):
 
 
 def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
-    model, at, velocity, spin = random_problem()
-    moved, h = Configuration(model), 1e-6
+    evaluator, at, velocity, spin = random_problem()
+    model, moved, h = evaluator.model, evaluator.new(), 1e-6
     by_velocity = np.zeros_like(velocity)
     for entry in np.ndindex(velocity.shape):
         unit = np.zeros_like(velocity)
@@ -89,7 +91,7 @@ def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
 
     def displaced(position, angle):
         moved.position[:] = at.position + position
-        moved.carry_frames(at, angle)
+        evaluator.carry_frames(at, angle, moved)
         return energy_of_fluid(model, moved, velocity, spin)
 
     gradient = shape_gradient_of(model, at, velocity)
@@ -110,9 +112,10 @@ def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
 
 
 def test_a_turn_of_body_motion_and_flow_leaves_the_fluids_energy_unchanged():
-    model, at, velocity, spin = random_problem()
+    evaluator, at, velocity, spin = random_problem()
+    model = evaluator.model
     flow = np.array(model.scene.fluid.velocity)
-    turn, turned = rotation_matrix(np.array([0.4, -1.1, 2.0])), Configuration(model)
+    turn, turned = rotation_matrix(np.array([0.4, -1.1, 2.0])), evaluator.new()
     for name in ("tangent", "director1", "director2"):
         getattr(turned, name)[:] = getattr(at, name) @ turn.T
     turned.length[:] = at.length
@@ -274,14 +277,14 @@ def test_forces_of_the_fluid_act_along_the_directions_at_the_end_of_the_step(add
     state, middle = simulator._state, simulator.positions.mean(axis=0)
     state.velocity[:] = np.array([0.3, 0.0, 0.2]) + np.cross((0, 60.0, 0), state.position - middle)
     simulator.compile()
-    start = Configuration(simulator.model)
-    start.take_state(state)
-    before = momentum(simulator)
+    before, held = state.copy(), momentum(simulator)
     simulator.step()  # turns by 3 degrees
-    lost = momentum(simulator) - before
-    along_the_end, along_the_start = (
-        dt * force_of_drag(simulator, state, at) for at in (simulator._stepper.end, start)
-    )
+    evaluator, start, end = end_of_step(simulator, before)
+    lost = momentum(simulator) - held
+    along_the_end, along_the_start = (dt * force_of_drag(simulator, state, at) for at in (end, start))
     largest = np.abs(lost).max()
     assert np.abs(lost - along_the_end).max() < 1e-6 * largest
     assert np.abs(lost - along_the_start).max() > 1e-2 * largest
+    assert evaluator.speed(*left_of_step(evaluator, end)) < simulator.scene.solver.newton_tolerance
+    evaluator.follow(start)
+    assert evaluator.speed(*left_of_step(evaluator, end)) > 100.0 * simulator.scene.solver.newton_tolerance

@@ -12,8 +12,8 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrate.integrators import INTEGRATORS
 from bilayer_core.march.modes import STEP
+from bilayer_core.march.newton_report import NewtonStatus
 from bilayer_core.march.status import MAX_ITERATIONS
-from bilayer_core.solve.newton import NewtonStatus
 
 # what the integrator loses
 

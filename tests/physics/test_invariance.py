@@ -1,23 +1,17 @@
 """What no force may do: feel a rigid motion, create momentum; and what twist must cost."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from evaluations import at_rest
 from sample_scenes import ball, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.integrate.integrators import INTEGRATORS
-from bilayer_core.integrate.motion import momentary_context
-from bilayer_core.integrate.stepper import Stepper
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
-from bilayer_core.model.rest_strains import RestStrains
 from bilayer_core.model.section import bond, rectangle
-from bilayer_core.model.state import initial_state
-from bilayer_core.solve.configuration import Configuration
 
 ELASTIC = ("stretching", "bending", "twisting", "bond")
+LONG = 1e3  # in which inertia does not count [s]
 
 
 def bilayer(stations=9, torsion="laminate", length=0.02):
@@ -25,71 +19,63 @@ def bilayer(stations=9, torsion="laminate", length=0.02):
     return scene([rod(layers, length=length, stations=stations, torsion=torsion)])
 
 
-def at_rest(scene_dict):
-    """Model, stepper, and a context in which inertia asks for nothing."""
-    model = build_model(load_scene(scene_dict))
-    stepper = Stepper(model, INTEGRATORS["implicit_euler"], 1e3, 1e-6, 50, 0)
-    state = initial_state(model)
-    start = Configuration(model)
-    start.take_state(state)
-    undriven = RestStrains(model.rest_strain, model.joint_rest), np.zeros(0)
-    still = momentary_context(model, start, state, *undriven)
-    stepper.potential.start_step(replace(still, length=1e3))  # so long that inertia does not count
-    return model, stepper.potential, start
+def model_of(content):
+    return build_model(load_scene(content))
 
 
-def deformed(model, start, seed=0, amplitude=2e-4):
-    rng = np.random.default_rng(seed)
-    shape = Configuration(model)
+def deformed(evaluator, start, seed=0, amplitude=2e-4):
+    model, rng = evaluator.model, np.random.default_rng(seed)
+    shape = evaluator.new()
     step = np.zeros(model.layout.size)
     step[model.layout.node[:, None] + np.arange(3)] = amplitude * rng.standard_normal((model.node_count, 3))
     step[model.layout.edge] = 0.2 * rng.standard_normal(model.edge_count)
-    shape.set_moved(start, step, np.zeros((0, 6)), 1.0)
+    evaluator.move(start, step, np.zeros((0, 6)), shape)
     return shape
 
 
-def elastic_energy(potential, shape):
-    potential.evaluate(shape, False)
-    return sum(potential.terms[name] for name in ELASTIC)
+def elastic_energy(evaluator, shape):
+    return sum(evaluator.evaluate(shape, ELASTIC).values())
 
 
 def test_rigid_motion_leaves_the_elastic_energy_unchanged():
-    model, potential, start = at_rest(bilayer())
-    shape = deformed(model, start)
-    before = elastic_energy(potential, shape)
+    evaluator, start = at_rest(model_of(bilayer()), LONG)
+    shape = deformed(evaluator, start)
+    before = elastic_energy(evaluator, shape)
     turn, shift = rotation_matrix(np.array([0.4, -1.1, 2.0])), np.array([0.3, -0.2, 0.7])
-    moved = Configuration(model)
+    moved = evaluator.new()
     moved.position[:] = shape.position @ turn.T + shift
     for name in ("tangent", "director1", "director2"):
         getattr(moved, name)[:] = getattr(shape, name) @ turn.T
     moved.length[:] = shape.length
     assert before > 1.0
-    assert elastic_energy(potential, moved) == pytest.approx(before, rel=1e-10)
+    assert elastic_energy(evaluator, moved) == pytest.approx(before, rel=1e-10)
 
 
 def test_frames_carried_along_a_rigid_turn_turn_with_the_body():
-    model, potential, start = at_rest(bilayer())
-    shape = deformed(model, start)
-    before = elastic_energy(potential, shape)
+    evaluator, start = at_rest(model_of(bilayer()), LONG)
+    shape = deformed(evaluator, start)
+    before = elastic_energy(evaluator, shape)
     axis, steps = np.array([0.3, 0.5, -0.8]), 400
     turn = rotation_matrix(axis / steps)
-    now, following = shape, Configuration(model)
+    now, following = shape, evaluator.new()
     for _ in range(steps):
         following.position[:] = now.position @ turn.T
         # a rigid turn spins each edge about its tangent by the turn's component along it
-        tangents = now.tangent[: model.edge_count]
-        following.carry_frames(now, tangents @ (axis / steps))
-        now, following = following, Configuration(model)
-    assert elastic_energy(potential, now) == pytest.approx(before, rel=1e-6)
+        tangents = now.tangent[: evaluator.model.edge_count]
+        evaluator.carry_frames(now, tangents @ (axis / steps), following)
+        now, following = following, evaluator.new()
+    assert elastic_energy(evaluator, now) == pytest.approx(before, rel=1e-6)
 
 
+@pytest.mark.parametrize("forces", ["all", *ELASTIC])
 @pytest.mark.parametrize("torsion", ["laminate", "layers"])
-def test_elastic_forces_and_moments_sum_to_zero(torsion):
-    model, potential, start = at_rest(bilayer(torsion=torsion))
-    shape = deformed(model, start)
-    potential.evaluate(shape, False)
-    forces = potential.gradient[model.layout.node[:, None] + np.arange(3)]
-    about_tangent = potential.gradient[model.layout.edge]
+def test_elastic_forces_and_moments_sum_to_zero(torsion, forces):
+    evaluator, start = at_rest(model_of(bilayer(torsion=torsion)), LONG)
+    shape, model = deformed(evaluator, start), evaluator.model
+    evaluator.evaluate(shape, None if forces == "all" else (forces,))
+    gradient = evaluator.first.unknowns
+    forces = gradient[model.layout.node[:, None] + np.arange(3)]
+    about_tangent = gradient[model.layout.edge]
     moment = np.cross(shape.position, forces).sum(axis=0) + about_tangent @ shape.tangent[: model.edge_count]
     scale = np.abs(forces).sum()
     assert np.abs(forces.sum(axis=0)).max() < 1e-12 * scale
@@ -100,19 +86,19 @@ def test_elastic_forces_and_moments_sum_to_zero(torsion):
 @pytest.mark.parametrize("torsion", ["laminate", "layers"])
 def test_twist_of_a_bonded_strip_costs_its_torsional_stiffness_at_every_mesh(torsion, stations):
     rate, length = 0.5, 0.1  # [rad/m], [m]: so small that the stretch of the outer fibres does not count
-    model, potential, start = at_rest(bilayer(stations, torsion, length))
-    shape = Configuration(model)
+    evaluator, start = at_rest(model_of(bilayer(stations, torsion, length)), LONG)
+    model, shape = evaluator.model, evaluator.new()
     x = start.position[:, 0]
     angle = rate * x
     shape.position[:] = np.stack(
         [x, -start.position[:, 2] * np.sin(angle), start.position[:, 2] * np.cos(angle)], axis=1
     )
     middle = 0.5 * (angle[model.edge_node] + angle[model.edge_node + 1])
-    shape.carry_frames(start, middle)
+    evaluator.carry_frames(start, middle, shape)
     sections = [rectangle(model.scene.materials["gel"], 0.01, t) for t in (1e-3, 1.5e-3)]
     tilt = bond(*sections, model.scene.coupling, torsion).tilt
     stiffness = sum(s.twisting_stiffness for s in sections) + tilt * (0.5 * 2.5e-3) ** 2
-    energy = elastic_energy(potential, shape)
+    energy = elastic_energy(evaluator, shape)
     # twist has elements at inner nodes only: half an edge at either end is rigid
     stored = 0.5 * rate**2 * stiffness * length
     missing = 0.5 * rate**2 * sum(s.twisting_stiffness for s in sections) * length / (stations - 1)

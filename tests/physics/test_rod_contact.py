@@ -4,21 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluations import Problem, at_rest
 from sample_scenes import contact, layer, rod, scene
 from slips import dissipation
 
 from bilayer_core import load_scene
 from bilayer_core.contact.broad_phase import near_pairs
-from bilayer_core.integrate.integrators import INTEGRATORS
-from bilayer_core.integrate.stages import predict, start_point
-from bilayer_core.integrate.stepper import Stepper
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
-from bilayer_core.model.rest_strains import RestStrains
 from bilayer_core.model.rod_surfaces import NearPairs
-from bilayer_core.model.state import initial_state
-from bilayer_core.solve.configuration import Configuration
-from bilayer_core.solve.rod_contact import RodContact
 
 D_HAT = 1e-3
 
@@ -73,6 +67,45 @@ def folded_rod(rng):
 CASES = {"parallel": parallel_rods, "crossed": crossed_rods, "folded": folded_rod}
 
 
+class Rods:
+    """Contact of the rods of a model at positions of their nodes, as steps evaluate it."""
+
+    def __init__(self, model):
+        self.evaluator, self.at = at_rest(model, 0.01)
+        self.layout = model.layout
+
+    def start(self, position, origin=None):
+        """Freeze contacts for friction; nodes come from `origin`."""
+        self.at.position[:] = position
+        self.evaluator.start_stage(self.at)
+        if origin is not None:
+            self.evaluator.stage.origin_position[:] = origin
+
+    def evaluate(self, position, force="rod barrier"):
+        """Energy and gradient."""
+        self.at.position[:] = position
+        energy = self.evaluator.forces(self.at, (force,))[force]
+        return energy, self.evaluator.first.node.copy()
+
+    def bound(self, position, node_step):
+        """How far a step of nodes may go."""
+        self.at.position[:] = position
+        step = np.zeros(self.layout.size)
+        step[self.layout.node[:, None] + np.arange(3)] = node_step
+        self.evaluator.evaluate(self.at, ("rod barrier", "rod friction"))
+        return self.evaluator.bound(self.at, step, np.zeros((0, 6)))
+
+    @property
+    def contacts(self):
+        """Those found last."""
+        return self.evaluator.rods.contacts
+
+    @property
+    def lagged(self):
+        """Those of friction."""
+        return self.evaluator.rods.sliding
+
+
 def dense(contacts, nodes):
     """Second derivatives of all contacts, from what the kernels leave for the matrix."""
     hessian = np.zeros((nodes, 3, nodes, 3))
@@ -103,18 +136,10 @@ def differences(function, position, h):
 @pytest.mark.parametrize("case", CASES)
 def test_derivatives_of_rod_contact_agree_with_differences(case, term):
     model, position = CASES[case](np.random.default_rng(3))
-    rods = RodContact(model)
-    origin = position + 2e-6 * np.random.default_rng(4).standard_normal(position.shape)
-    rods.start_step(position)
-
-    def evaluate(at):
-        gradient = np.zeros_like(at)
-        if term == "barrier":
-            return rods.barrier(at, gradient), gradient
-        return rods.friction(at, origin, 0.01, gradient), gradient
-
-    energy, gradient = evaluate(position)
-    found = rods.contacts if term == "barrier" else rods.sliding
+    rods, force = Rods(model), f"rod {term}"
+    rods.start(position, position + 2e-6 * np.random.default_rng(4).standard_normal(position.shape))
+    energy, gradient = rods.evaluate(position, force)
+    found = rods.contacts if term == "barrier" else rods.lagged
     hessian = dense(found, model.node_count)
     assert energy > 0.0 and found.count >= 4
     if term == "barrier":
@@ -124,8 +149,8 @@ def test_derivatives_of_rod_contact_agree_with_differences(case, term):
         assert case != "parallel" or not inner.all()
     errors = []
     for h in (1e-9, 3e-9, 1e-8, 3e-8):
-        by_energy = differences(lambda at: evaluate(at)[0], position, h)
-        by_gradient = differences(lambda at: evaluate(at)[1].ravel(), position, h)
+        by_energy = differences(lambda at: rods.evaluate(at, force)[0], position, h)
+        by_gradient = differences(lambda at: rods.evaluate(at, force)[1].ravel(), position, h)
         errors.append(
             (
                 np.abs(by_energy - gradient.ravel()).max() / np.abs(gradient).max(),
@@ -139,14 +164,14 @@ def test_derivatives_of_rod_contact_agree_with_differences(case, term):
 @pytest.mark.parametrize("case", CASES)
 def test_friction_between_rods_along_a_step_is_that_of_the_ways_of_contacts(case):
     model, position = CASES[case](np.random.default_rng(3))
-    rods, rng, length = RodContact(model), np.random.default_rng(4), 0.01
+    rods, rng = Rods(model), np.random.default_rng(4)
     origin = position + 2e-6 * rng.standard_normal(position.shape)
     step = 1e-5 * rng.standard_normal(position.shape)
-    rods.start_step(position)
-    way, threshold = rods.slip_along(position, origin, length, step), model.scene.contact.friction.speed_threshold
+    rods.start(position, origin)
+    way, threshold = rods.bound(position, step).slip, model.scene.contact.friction.speed_threshold
     assert len(way) >= 4
     for fraction in (0.0, 0.3, 1.0):
-        energy = rods.friction(position + fraction * step, origin, length, np.zeros_like(position))
+        energy, _ = rods.evaluate(position + fraction * step, "rod friction")
         assert energy == pytest.approx(dissipation(way, fraction, threshold), rel=1e-9)
 
 
@@ -158,10 +183,9 @@ def moved_rigidly(position):
 @pytest.mark.parametrize("case", CASES)
 def test_the_barrier_between_rods_feels_no_rigid_motion_and_exerts_no_force_or_moment_in_all(case):
     model, position = CASES[case](np.random.default_rng(5))
-    rods = RodContact(model)
-    gradient = np.zeros_like(position)
-    energy = rods.barrier(position, gradient)
-    assert rods.barrier(moved_rigidly(position), np.zeros_like(position)) == pytest.approx(energy, rel=1e-9)
+    rods = Rods(model)
+    energy, gradient = rods.evaluate(position)
+    assert rods.evaluate(moved_rigidly(position))[0] == pytest.approx(energy, rel=1e-9)
     assert energy > 0.0
     scale = np.abs(gradient).sum()
     center = position.mean(axis=0)
@@ -171,13 +195,12 @@ def test_the_barrier_between_rods_feels_no_rigid_motion_and_exerts_no_force_or_m
 
 def test_friction_between_rods_is_opposite_on_the_two_and_opposes_the_slip():
     model, position = parallel_rods(np.random.default_rng(5))
-    rods = RodContact(model)
-    rods.start_step(position)
+    rods = Rods(model)
+    rods.start(position, position)
     slipped = position.copy()
     slipped[:6, 0] += 1e-4  # far above the threshold in 10 ms
-    gradient = np.zeros_like(position)
-    rods.friction(slipped, position, 0.01, gradient)
-    load = rods.sliding.load[: rods.sliding.count].sum()
+    _, gradient = rods.evaluate(slipped, "rod friction")
+    load = rods.lagged.load[: rods.lagged.count].sum()
     first, second = -gradient[:6].sum(axis=0), -gradient[6:].sum(axis=0)
     assert first == pytest.approx(-second, abs=1e-12 * load)
     assert first[0] == pytest.approx(-0.4 * load, rel=0.05)  # normals lean by the noise of the shape
@@ -190,8 +213,7 @@ MESHES = [(3, 3), (11, 12), (21, 38), (81, 55)]
 def test_parallel_ribbons_press_on_each_other_with_the_same_force_on_any_meshes(stations):
     lower, upper = (rod([layer()], stations=n, name=name) for n, name in zip(stations, "ab", strict=True))
     model = model_of([lower, {**upper, "path": {**upper["path"], "start": [0, 0, 1.8e-3]}}])
-    gradient = np.zeros((model.node_count, 3))
-    RodContact(model).barrier(np.array(model.start_position), gradient)
+    _, gradient = Rods(model).evaluate(model.start_position)
     gap = 0.8e-3
     s = gap - D_HAT
     force = 1e7 * (2.0 * s * np.log(gap / D_HAT) + s * s / gap) * 0.1
@@ -211,58 +233,46 @@ def pressed(hub):
     return scene([arms, under, held], bodies=bodies, contact=law)
 
 
+def without_elasticity(model):
+    """Its gradient has symmetric differences only up to the holonomy of frames."""
+    stiff = ("axial_stiffness", "joint_stiffness", "pair_stiffness")
+    return replace(model, **{name: 0.0 * getattr(model, name) for name in stiff})
+
+
+def closer(content):
+    """The scene with the rod in the middle nearer to the one above it than the barrier distance."""
+    content["rods"][1]["path"]["start"][2] += 0.6e-3
+    return content
+
+
 @pytest.mark.parametrize("hub", ["prescribed", "free"])
 def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hub):
-    model = build_model(load_scene(pressed(hub)))
-    # without elasticity, whose gradient has symmetric differences only up to the holonomy of frames
-    stiff = ("axial_stiffness", "joint_stiffness", "pair_stiffness")
-    model = replace(model, **{name: 0.0 * getattr(model, name) for name in stiff})
-    stepper = Stepper(model, INTEGRATORS["implicit_euler"], 1e-5, 1e-9, 50, 0)
-    state, rng = initial_state(model), np.random.default_rng(2)
-    start = Configuration(model)
-    free = np.setdiff1d(np.arange(model.node_count), model.attached_node)
-    state.position[free] += 5e-5 * rng.standard_normal((len(free), 3))
-    under = model.strands[2]
-    state.position[under.first_node : under.first_node + under.node_count, 2] += 0.9e-3 - 0.3e-3
-    start.take_state(state)
-    start.carry_frames(start, np.zeros(model.edge_count))
-    undriven = RestStrains(model.rest_strain, model.joint_rest), np.zeros(0)
-    origin, turned = start_point(model, state, start), np.zeros(model.edge_count)
-    stepper.potential.start_step(predict(model, origin, start, turned, 1e-5, *undriven))
-    potential, size = stepper.potential, model.layout.size
-    held = (model.layout.node[model.attached_node][:, None] + np.arange(3)).ravel()
-    bodies = 6 * model.free_count
-
-    def moved(base, vector):
-        at = Configuration(model)
-        at.set_moved(base, vector[:size], vector[size:].reshape(-1, 6), 1.0)
-        return at
-
-    scale = np.full(size + bodies, 1.0)
-    scale[model.layout.edge] = 200.0
-    scale[size:].reshape(-1, 6)[:, 3:] = 100.0
-    shift = 2e-6 * rng.standard_normal(size + bodies) * scale
-    shift[held] = 0.0
-    at = moved(start, shift)
+    rng = np.random.default_rng(2)
+    problem = Problem(
+        closer(pressed(hub)), rng, h=1e-5, noise=5e-5, origin_noise=1e-6, turns=0.0, change=without_elasticity
+    )
+    evaluator, model, size = problem.evaluator, problem.model, problem.size
+    scale, held = problem.scale, np.setdiff1d(np.arange(len(problem.scale)), problem.free)
 
     def gradient(vector):
-        potential.evaluate(moved(at, vector), False)
-        body = potential.body_gradient.copy()  # in the chart of rotations at the moved place; wanted is that at `at`
+        problem.value(vector / scale)
+        body = evaluator.first.body.copy()  # in the chart of rotations at the moved place; wanted is that at `at`
         body[:, 3:] -= 0.5 * np.cross(vector[size:].reshape(-1, 6)[:, 3:], body[:, 3:])
-        return np.concatenate([potential.gradient, body.ravel()])
+        return np.concatenate([evaluator.first.unknowns, body.ravel()])
 
-    potential.evaluate(at, True)
-    assert potential.factorise(at)
-    matrix = potential.matrix
-    assert (matrix.shift, matrix.simplified) == (0.0, 0)
-    assert potential.terms["rod barrier"] > 0.0 and potential.terms["rod friction"] > 0.0
-    touching = matrix.rods.contacts.node[: matrix.rods.contacts.count]
+    terms = evaluator.evaluate(problem.at, second=True)
+    assert evaluator.factorise(problem.at) == (0.0, 0)
+    assert terms["rod barrier"] > 0.0 and terms["rod friction"] > 0.0
+    touching = evaluator.rods.contacts.node[: evaluator.rods.contacts.count]
     assert np.isin(touching, model.attached_node).any()
+    loads = []
     for _ in range(3):
-        load = rng.standard_normal(size + bodies) / scale
+        load = rng.standard_normal(len(scale)) / scale
         load[held] = 0.0
-        step = np.concatenate([part.ravel() for part in matrix.newton_step(load[:size], load[size:].reshape(-1, 6))])
+        step = np.concatenate([p.ravel() for p in evaluator.newton_step(load[:size], load[size:].reshape(-1, 6))])
         step[held] = 0.0
+        loads.append((load, step))
+    for load, step in loads:
         errors = []
         for h in (1e-8, 3e-8, 1e-7):
             unit = step * h / np.abs(step / scale).max()
@@ -351,22 +361,23 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
 def test_contacts_and_the_bound_of_a_step_do_not_depend_on_the_way_that_led_there(size):
     rng = np.random.default_rng(5)
     model, position = folded_rod(rng)
-    rods, nodes = RodContact(model), position.shape
+    rods, nodes = Rods(model), position.shape
     made, touching, bounded = 0, 0, 0
     drift = np.zeros(nodes)
     for move in range(200):
         if move % 20 == 0:  # straight on for a while, then elsewhere
             drift = size * rng.standard_normal(nodes)
         step = drift + 0.1 * size * rng.standard_normal(nodes) + np.array([1e-2, 0.0, 0.0])
-        fresh, base = RodContact(model), rods.base.copy()
-        assert rods.barrier(position, np.zeros(nodes)) == fresh.barrier(position, np.zeros(nodes))
-        assert rods.min_gap == fresh.min_gap
+        fresh, base = Rods(model), rods.evaluator.rods.base.copy()
+        assert rods.evaluate(position)[0] == fresh.evaluate(position)[0]
         assert rods.contacts.count == fresh.contacts.count
-        for ours, theirs in zip(rods.contacts.found, fresh.contacts.found, strict=True):
+        for name in ("point", "edge", "fraction", "inner", "times", "gap"):
+            ours, theirs = getattr(rods.contacts, name), getattr(fresh.contacts, name)
             np.testing.assert_array_equal(ours[: fresh.contacts.count], theirs[: fresh.contacts.count])
-        fraction, node = fresh.step_bound(position, step)
-        assert rods.step_bound(position, step) == (fraction, node)
-        made += not np.array_equal(base, rods.base)
+        fraction = fresh.bound(position, step).fraction
+        assert rods.bound(position, step).fraction == fraction
+        assert rods.evaluator.gap == fresh.evaluator.gap
+        made += not np.array_equal(base, rods.evaluator.rods.base)
         touching += fresh.contacts.count > 0
         bounded += fraction < 1.0
         position = position + 0.8 * fraction * step
