@@ -70,7 +70,8 @@ setup(
         "click>=8.1",
         "lz4>=4.3",
         "mcap>=1.6,<2",
-        "numba>=0.68,<0.69",  # `bilayer_core.jit` replaces parts of its insides
+        "numba>=0.67,<0.69",  # the two minor releases for which the tests pass
+        "platformdirs>=4",
         "numpy>=1.26",
         "pint>=0.24",
         "pydantic>=2.9,<3",

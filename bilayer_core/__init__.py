@@ -9,13 +9,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bilayer_core.integrate.simulator import Simulator
     from bilayer_core.scene.loader import load_scene
+    from bilayer_core.simulation.simulator import Simulator
 
     __version__: str
 
 DISTRIBUTION = "bilayer_sim_ros"
-_HOME = {"Simulator": "bilayer_core.integrate.simulator", "load_scene": "bilayer_core.scene.loader"}
+_HOME = {"Simulator": "bilayer_core.simulation.simulator", "load_scene": "bilayer_core.scene.loader"}
 
 __all__ = ["Simulator", "__version__", "load_scene"]
 

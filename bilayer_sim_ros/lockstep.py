@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.observer import TIME_ROUNDING
+from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_sim_ros.periods import Periods
 from bilayer_sim_ros.stimulus import StimulusInputs
 

@@ -9,9 +9,9 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
-from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.record.encoders import FrameEncoder
 from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec, output_topics
+from bilayer_core.simulation.frame import Description, Frame
 from bilayer_sim_ros.conversions import to_time
 
 CLOCK_TOPIC = "/clock"

@@ -6,8 +6,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.simulation.frame import Description, Frame
 
 RRD_ENDING = ".rrd"
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bilayer_core.integrate.stepper import StepReport
+from bilayer_core.simulation.stepper import StepReport
 
 # Real time between two reports [s].
 STATUS_PERIOD = 1.0

@@ -11,10 +11,10 @@ from concurrent.futures import Future
 from typing import Protocol
 
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.frame import Frame
-from bilayer_core.integrate.observer import TIME_ROUNDING
-from bilayer_core.integrate.result import Termination
-from bilayer_core.integrate.simulator import Simulator
+from bilayer_core.simulation.frame import Frame
+from bilayer_core.simulation.observers import TIME_ROUNDING
+from bilayer_core.simulation.result import Termination
+from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.lockstep import Control
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.periods import Periods

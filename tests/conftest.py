@@ -1,9 +1,7 @@
 """Surroundings of all tests: a kernel cache that fits the sources, and ROS 2 on this machine alone."""
 
-import hashlib
 import os
 import shutil
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,28 +10,30 @@ ROOT = Path(__file__).resolve().parents[1]
 CACHES = ROOT / ".pytest_cache" / "kernels"
 
 
-def _source_hash() -> str:
-    """Fingerprint of everything that compiled kernels depend on."""
-    digest = hashlib.sha256(sys.version.encode())
-    for path in sorted((ROOT / "bilayer_core").rglob("*.py")):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _use_fitting_kernel_cache() -> None:
-    """numba does not notice edits in a file that a kernel's own file imports: each state of the sources has a cache."""
-    cache = CACHES / _source_hash()
+def _use_own_kernel_cache() -> None:
+    """Kernels of the tests, in a folder of their own: those of other states of the sources are deleted."""
+    CACHES.mkdir(parents=True, exist_ok=True)
+    os.environ["NUMBA_CACHE_DIR"] = str(CACHES)
     if "PYTEST_XDIST_WORKER" not in os.environ:
+        from bilayer_core.jit.cache import cache_folder
+
         for other in CACHES.glob("*"):
-            if other != cache:
+            if other != cache_folder():
                 shutil.rmtree(other, ignore_errors=True)
-    cache.mkdir(parents=True, exist_ok=True)
-    os.environ["NUMBA_CACHE_DIR"] = str(cache)
+
+
+def pytest_configure(config):
+    """Compile all kernels before several processes run tests."""
+    if getattr(config.option, "numprocesses", None) and "PYTEST_XDIST_WORKER" not in os.environ:
+        from bilayer_core.jit.compile_all import compile_all, is_complete
+
+        if not is_complete():
+            compile_all()
 
 
 # Before anything imports numba or rclpy.
 if "NUMBA_CACHE_DIR" not in os.environ:
-    _use_fitting_kernel_cache()
+    _use_own_kernel_cache()
 os.environ |= {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from bilayer_core.integrate.surroundings import Surroundings
+from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.march.evaluator import Evaluator
 from bilayer_core.model.build import build_model
 from bilayer_core.model.rest_strains import RestStrains
 from bilayer_core.model.state import initial_state
 from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.stage_inputs import Surroundings
 
 GRADIENT_LIMIT = 1e-7  # of the largest entry
 HESSIAN_LIMIT = 1e-6
@@ -99,10 +99,10 @@ class Problem:
         start = self.start = evaluator.new()
         evaluator.take_state(state, start)
         origin = evaluator.start_point(state, start)  # of a later stage: not where that is solved from
-        origin.position[:] += origin_noise * draw(model.node_count)
+        origin.displacement[:] += origin_noise * draw(model.node_count)
         turned = 0.0
         if in_space:
-            origin.body_position[:] += origin_noise * draw(len(origin.body_position))
+            origin.body_displacement[:] += origin_noise * draw(len(origin.body_displacement))
             for b in range(len(origin.rotation)):
                 origin.rotation[b] = rotation_matrix(1e3 * origin_noise * rng.standard_normal(3)) @ origin.rotation[b]
             turned = 1e3 * origin_noise * rng.standard_normal(model.edge_count)

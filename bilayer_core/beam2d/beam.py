@@ -2,7 +2,7 @@
 
 Both minimise E(x) − Σ m g·x + ½ |x − x̃|²_m/h² + ½ α |x − xₙ|²_m/h with Newton's method and a line search: a step of
 implicit Euler takes x̃ = xₙ + h v and its length for h, a search for equilibrium x̃ = xₙ and ever larger h (see
-`integrate.statics`). α is the damping.
+`simulation.equilibrium`). α is the damping.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from itertools import product
 
 from ..errors import SceneError
-from ..integrate.integrators import INTEGRATORS
+from ..integrators.register import INTEGRATORS
 from ..model.plan import DIMENSIONS, MODELS, make_plan
 from ..scene.config import SceneConfig
 

@@ -10,8 +10,8 @@ from operator import itemgetter
 import numpy as np
 
 from ..errors import SceneError, SimulationError
-from ..integrate.result import Termination
-from ..integrate.simulator import Simulator
+from ..simulation.result import Termination
+from ..simulation.simulator import Simulator
 from .configurations import Configuration
 from .problems import Problem
 from .track import Track

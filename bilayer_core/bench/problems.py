@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..errors import InputError
-from ..integrate.integrators import INTEGRATORS
+from ..integrators.register import INTEGRATORS
 from ..scene.config import SceneConfig
 from ..scene.faults import suggestion
 from ..scene.loader import load_scene

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .configurations import shapes
 from .results import Results
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..converge.quantities import peak
-from ..integrate.simulator import Simulator
+from ..simulation.simulator import Simulator
 
 Array = np.ndarray
 

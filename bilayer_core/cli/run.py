@@ -14,8 +14,8 @@ from bilayer_core.cli.watch import Interrupt, notice_of_compilation, progress_ba
 from bilayer_core.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
-    from bilayer_core.integrate.simulator import Simulator
     from bilayer_core.scene.config import SceneConfig
+    from bilayer_core.simulation.simulator import Simulator
 
 SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
 TOLERANCE_HELP = (
@@ -66,7 +66,6 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
 
 def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     """The recorders; whatever cannot be written is refused here, before anything is computed."""
-    from bilayer_core.record.mcap_log import McapRecorder
     from bilayer_core.record.paths import check_output_path
 
     force, output = options["force"], config.output
@@ -77,6 +76,8 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
             raise InputError(f"{path}: is named for two outputs; give each a file of its own")
     observers, rate = [], options["log_rate"] or output.rate
     if options["log"]:
+        from bilayer_core.record.mcap_log import McapRecorder
+
         observers.append(McapRecorder(options["log"], rate, output.marker_rate, force))
     if options["rrd"]:
         from bilayer_core.view.rerun_view import RrdRecorder
@@ -87,7 +88,7 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
 
 def _make_simulator(config: SceneConfig, from_state: str | None, budget: bool, quiet: bool) -> Simulator:
     """A simulator that is ready to step."""
-    from bilayer_core.integrate.simulator import Simulator
+    from bilayer_core.simulation.simulator import Simulator
 
     simulator = Simulator(config, budget=budget)
     if from_state is not None:
@@ -133,7 +134,7 @@ def _finish(
     simulator: Simulator, duration: float, failure: SimulationError | None, options: dict[str, Any], quiet: bool
 ) -> None:
     """Write the last state and the summary, and tell the user what happened."""
-    from bilayer_core.integrate.result import Termination
+    from bilayer_core.simulation.result import Termination
 
     summary = {**simulator.summary(), "duration": duration}
     if failure is not None:

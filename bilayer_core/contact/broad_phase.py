@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from ..jit import inner, kernel
+from ..jit import entry, kernel
 from .segment import square_distance
 
 
@@ -30,7 +30,7 @@ def _square_distance(position, i, s, j):
     return square_distance(p0, p1, p2, position, j)
 
 
-@inner
+@kernel
 def _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, touch):
     """Whether a point at `arc` [m] may touch the segment k of a rod that its own meets: it is far enough along that rod
     (`exclusion`, −inf for another rod), and where bodies join the two they do not touch by construction.
@@ -50,7 +50,7 @@ GROUP = 4
 """Edges next to each other for which the tree is searched together, a power of two."""
 
 
-@inner
+@kernel
 def _come_near(box, a, b, reach):
     """Whether two boxes of the tree are nearer than `reach` along each axis."""
     for c in range(3):
@@ -59,7 +59,7 @@ def _come_near(box, a, b, reach):
     return True
 
 
-@inner
+@kernel
 def _goes_on(position, tip, i, d0, d1, d2, least):
     """Whether the edge (i, i+1) goes by `least` [m] at least along a unit vector, at either end of its motion."""
     if _along(position, i, d0, d1, d2) < least:
@@ -67,7 +67,7 @@ def _goes_on(position, tip, i, d0, d1, d2, least):
     return _along(tip, i, d0, d1, d2) >= least
 
 
-@inner
+@kernel
 def _along(position, i, d0, d1, d2):
     """Part of the edge (i, i+1) along a unit vector [m]."""
     return (
@@ -81,7 +81,7 @@ RUN = 2.0
 """Half of the longest run that is looked for, in units of the arc distance from which a rod sees itself."""
 
 
-@inner
+@kernel
 def _run_about(first, last, position, tip, near, exclusion, edge_node, edge_first, edge_arc):
     """The run [begin, end) of edges of one strand about those from `first` to `last`, no two of which come nearer to
     each other than `near` [m], if they are `exclusion` [m] apart on the path; empty if there is none.
@@ -114,7 +114,7 @@ def _run_about(first, last, position, tip, near, exclusion, edge_node, edge_firs
     return begin, end
 
 
-@inner
+@kernel
 def _meet(box, leaves, own, reach, begin, end, met_out):
     """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending, but for
     those from `begin` to `end`, in the first row of `met_out`; return how many there are.
@@ -138,7 +138,7 @@ def _meet(box, leaves, own, reach, begin, end, met_out):
     return count
 
 
-@kernel
+@entry
 def near_pairs(
     position,
     tip,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner, kernel
+from ..jit import kernel
 from .shapes import PLANE, shape_distance
 
 
@@ -165,7 +165,7 @@ def largest_motion(node_step, node_free, body_motion, body_reach, surface_body, 
     return largest + fastest
 
 
-@inner
+@kernel
 def _motion(body_motion, b, reach):
     """|δX| + |δφ| reach"""
     shift = body_motion[b, 0] ** 2 + body_motion[b, 1] ** 2 + body_motion[b, 2] ** 2

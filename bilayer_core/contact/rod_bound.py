@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner, kernel
+from ..jit import kernel
 from .segment import SLACK
 from .step_bound import KEPT_FRACTION
 
@@ -93,7 +93,7 @@ def rod_step_bound(
     return alpha, blocking
 
 
-@inner
+@kernel
 def _square_distance(position, step, fraction, i, s, j):
     """Square of the distance of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step [m²]."""
     p0 = (1.0 - s) * (position[i, 0] + fraction * step[i, 0]) + s * (position[i + 1, 0] + fraction * step[i + 1, 0])

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner, kernel
+from ..jit import kernel
 from .broad_phase import near_pairs
 
 MARGIN = 0.3
@@ -44,7 +44,7 @@ def reachable(step, unit):
     return move, largest / move if move > largest else 1.0
 
 
-@inner
+@kernel
 def _mean(vectors):
     m0, m1, m2 = 0.0, 0.0, 0.0
     count = vectors.shape[0]
@@ -55,7 +55,7 @@ def _mean(vectors):
     return m0 / count, m1 / count, m2 / count
 
 
-@inner
+@kernel
 def _go_on(position, last):
     """Take nodes, the mean of all taken off, to where they are; return the largest distance from where they were
     last [m].
@@ -70,7 +70,7 @@ def _go_on(position, last):
     return math.sqrt(square)
 
 
-@inner
+@kernel
 def _stray(position, step, fraction, base, tip):
     """Largest distance of a node at x + fraction · step from a list's motion, at the moment of this that is nearest to
     all [m], the mean of all taken off, as in `base` and `tip`.
@@ -96,7 +96,7 @@ def _stray(position, step, fraction, base, tip):
     return math.sqrt(largest)
 
 
-@inner
+@kernel
 def _set_out(position, step, length, base, tip, last):
     """A motion from x to x + length · step, the mean of all taken off at either end; nodes go on from there."""
     m0, m1, m2 = _mean(position)

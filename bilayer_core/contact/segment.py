@@ -22,10 +22,10 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner, kernel
+from ..jit import kernel
 
 
-@inner
+@kernel
 def fraction_along(p0, p1, p2, position, j):
     """τ of a point on the segment (j, j+1), not clamped."""
     x0, x1, x2 = position[j, 0], position[j, 1], position[j, 2]
@@ -34,7 +34,7 @@ def fraction_along(p0, p1, p2, position, j):
     return along / (e0 * e0 + e1 * e1 + e2 * e2)
 
 
-@inner
+@kernel
 def distance_at(p0, p1, p2, position, j, t):
     """Distance [m] of a point from that at fraction t of the segment (j, j+1)."""
     d0 = p0 - (1.0 - t) * position[j, 0] - t * position[j + 1, 0]

@@ -19,8 +19,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.simulator import Simulator
 from bilayer_core.scene.faults import suggestion
+from bilayer_core.simulation.simulator import Simulator
 
 AXES = "xyz"
 NEGLIGIBLE = 1e-3

@@ -13,12 +13,12 @@ from multiprocessing import get_context
 from bilayer_core.converge.order import Estimate, estimate
 from bilayer_core.converge.quantities import check_names, headline, measure
 from bilayer_core.errors import InputError, SimulationError
-from bilayer_core.integrate.integrators import INTEGRATORS
-from bilayer_core.integrate.simulator import Simulator
-from bilayer_core.integrate.steps import choose_steps
+from bilayer_core.integrators.register import INTEGRATORS
 from bilayer_core.model.plan import make_plan
 from bilayer_core.scene.config import LARGEST_TOLERANCE, SceneConfig
 from bilayer_core.scene.loader import load_scene, parse_scene, scene_text
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.simulation.step_choice import choose_steps
 
 BASE = "the scene as it is"
 COARSER_STEP, FINER_STEP = "twice the step", "half the step"

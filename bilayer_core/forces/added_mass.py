@@ -29,7 +29,7 @@ In time: over a stage of length h from an origin where the fluid had the momentu
 
     R = (P − P̄)/h′ − ∂T/∂q,    all at the end of the stage; for spins j (ω − ω̄)/h′,
 
-h′ being the length over which momenta advance (`integrate.method`; h for most integrators).
+h′ being the length over which momenta advance (`integrators.method`; h for most integrators).
 
 That is the integrator's own rule, for momenta, and has its order: 1 for implicit Euler, 2 for SDIRK2 and implicit
 midpoint (measured: 0.96, 1.98, 1.87; vibrations too fast for the step reduce SDIRK2's, as they do without a fluid). R
@@ -46,10 +46,10 @@ halved.
 
 from __future__ import annotations
 
-from ..jit import kernel
+from ..jit import entry, kernel
 
 
-@kernel
+@entry
 def fluid_momentum(
     mass,
     edge_node,

@@ -18,8 +18,8 @@ Mass damping is the same with R̃ = Rₙ and α/h in place of 1/h².
 
 from __future__ import annotations
 
-from ..jit import inner, kernel
-from ..kinematics.stack import stack_matrix
+from ..jit import kernel
+from ..jit.stack import stack_matrix
 from ..kinematics.turning import real_part
 
 
@@ -84,7 +84,7 @@ def body_spring(
     return energy
 
 
-@inner
+@kernel
 def _second_moment_turned(second_moment, f, rotation, out):
     """S = R J Rᵀ of free body f in the world's axes [kg m²], shape (3, 3)."""
     for i in range(3):
@@ -95,7 +95,7 @@ def _second_moment_turned(second_moment, f, rotation, out):
                     out[i, j] += rotation[f, i, k] * second_moment[f, k, m] * rotation[f, j, m]
 
 
-@inner
+@kernel
 def _turn_less_one(turned, f, out):
     """N = E − 1 for the quaternion with the vector part turned[f], shape (3, 3)."""
     q0, q1, q2, w = turned[f, 0], turned[f, 1], turned[f, 2], real_part(turned, f)
@@ -105,14 +105,14 @@ def _turn_less_one(turned, f, out):
     out[1, 2], out[2, 1] = 2.0 * (q1 * q2 - w * q0), 2.0 * (q1 * q2 + w * q0)
 
 
-@inner
+@kernel
 def _times_transposed(left, right, out):
     for i in range(3):
         for j in range(3):
             out[i, j] = left[i, 0] * right[j, 0] + left[i, 1] * right[j, 1] + left[i, 2] * right[j, 2]
 
 
-@inner
+@kernel
 def moment_of_turn(second_moment, f, reference_rotation, turned):
     """ax(A) [kg m²] of free body f, as a tuple; parameters as for `body_inertia`."""
     s, n, a = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
@@ -122,7 +122,7 @@ def moment_of_turn(second_moment, f, reference_rotation, turned):
     return a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]
 
 
-@inner
+@kernel
 def body_inertia(
     mass,
     second_moment,

@@ -23,8 +23,8 @@ import math
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
 from ..contact.near import gap_normal
 from ..contact.shapes import shape_curvature
-from ..jit import inner, kernel
-from ..kinematics.stack import stack_matrix, stack_vector
+from ..jit import kernel
+from ..jit.stack import stack_matrix, stack_vector
 from .coupled import add_coupled, add_force
 
 
@@ -150,7 +150,7 @@ def surface_contact(
     return energy, min_gap, links
 
 
-@inner
+@kernel
 def _in_world(turn, s, factor, h, m_out):
     """Upper triangle of factor R h Rᵀ, h a symmetric matrix as (h₀₀, h₀₁, h₀₂, h₁₁, h₁₂, h₂₂)."""
     for i in range(3):

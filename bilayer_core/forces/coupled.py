@@ -6,18 +6,18 @@ J = (1, −[a]×, −1, [ρ]×) the motion's derivative with respect to (x or X_
 
     gradient (g, a × g, −g, −ρ × g),   Hessian Jᵀ M J + T_A ± T_B (+ cross terms),   T = ½ (a gᵀ + g aᵀ) − (a·g) 1
 
-(arms turn to second order, as in `solve.clamps`). Where the normal turns with the surface (barrier) T_B counts + and
-the cross terms are −[g]×, −[a]× [g]× and [g]× with φ_B; where it is frozen (friction) T_B counts − and there are none.
+(arms turn to second order, as in `engine.linear.attachments`). Where the normal turns with the surface (barrier) T_B
+counts + and the cross terms are −[g]×, −[a]× [g]× and [g]× with φ_B; where it is frozen (friction) T_B counts − and there are none.
 Blocks between a node and a free body ("links") are listed: the node, the body, and ∂²/∂x ∂(X, φ).
 """
 
 from __future__ import annotations
 
-from ..jit import inner
-from ..kinematics.stack import stack_matrix
+from ..jit import kernel
+from ..jit.stack import stack_matrix
 
 
-@inner
+@kernel
 def add_force(contact_out, body, sign, arm, g):
     """Add ± (g, arm × g) to the gradient of a body's (X, φ)."""
     contact_out[body, 0] += sign * g[0]
@@ -28,7 +28,7 @@ def add_force(contact_out, body, sign, arm, g):
     contact_out[body, 5] += sign * (arm[0] * g[1] - arm[1] * g[0])
 
 
-@inner
+@kernel
 def _skew(a, out):
     """out = [a]×, shape (3, 3)."""
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
@@ -36,7 +36,7 @@ def _skew(a, out):
     out[1, 0], out[2, 0], out[2, 1] = a[2], -a[1], a[0]
 
 
-@inner
+@kernel
 def _local_hessian(m, g, arm, lever, turning, local):
     """The Hessian with respect to (x or X_A, φ_A, X_B, φ_B), shape (12, 12)."""
     jacobian = stack_matrix(3, 12)
@@ -78,7 +78,7 @@ def _local_hessian(m, g, arm, lever, turning, local):
                 local[9 + q, 3 + p] += value
 
 
-@inner
+@kernel
 def add_coupled(
     m,
     g,
@@ -125,7 +125,7 @@ def add_coupled(
         for p in range(3):
             for q in range(p, 3):
                 node_hessian_out[i, p, q] += m[p, q]
-    if free_index is None:
+    if free_index.shape[0] == 0:
         return links
     free_a, free_b = free_index[a] if a >= 0 else -1, free_index[b]
     if free_a < 0 and free_b < 0:

@@ -26,7 +26,7 @@ V = Σ_{α=1,2} Q_α m_α, V′ = Q₁ m2 − Q₂ m1, Q_α = ½ k_T l (p·m̄_�
 
 from __future__ import annotations
 
-from ..jit import inner, kernel
+from ..jit import kernel
 from ..kinematics.vector import (
     add_column,
     add_identity,
@@ -43,7 +43,7 @@ from ..kinematics.vector import (
 )
 
 
-@inner
+@kernel
 def _force_on_frame(edge, p, q1, q2, q3, length, t, m1, m2, edge_gradient_out):
     """First derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ)."""
     inverse = 1.0 / length
@@ -53,7 +53,7 @@ def _force_on_frame(edge, p, q1, q2, q3, length, t, m1, m2, edge_gradient_out):
     edge_gradient_out[edge, 3] += q1 * dot(p, m2) - q2 * dot(p, m1)
 
 
-@inner
+@kernel
 def _curvature_on_frame(edge, pair, p, q1, q2, q3, length, t, m1, m2, edge_hessian_out, mixed_hessian_out):
     """Second derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ), and to p and these."""
     inverse = 1.0 / length
@@ -72,7 +72,7 @@ def _curvature_on_frame(edge, pair, p, q1, q2, q3, length, t, m1, m2, edge_hessi
     add_column(mixed_hessian_out, pair, 3, 1.0, v_turned)
 
 
-@inner
+@kernel
 def _strain_gradients(p, length, t, m1, m2):
     """∂(p·m_α/2)/∂ε for α = 1, 2, 3 and ∂/∂θ for α = 1, 2 of one edge."""
     half = 0.5 / length

@@ -28,8 +28,8 @@ import math
 from ..contact.barrier import barrier_gradient
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from ..contact.near import gap_normal
-from ..jit import inner, kernel
-from ..kinematics.stack import stack_matrix, stack_vector
+from ..jit import kernel
+from ..jit.stack import stack_matrix, stack_vector
 from .coupled import add_coupled, add_force
 
 
@@ -124,7 +124,7 @@ def lag_axes(count, first, normal, node_edges, node_axis, tangent, director1, ax
         axis_out[k, 0], axis_out[k, 1], axis_out[k, 2] = x, y, z
 
 
-@inner
+@kernel
 def _slip(body, turn, origin_turn, place, origin_place, arm, k, sign, arm_now, slip):
     """Add ± the displacement of a point of a body since the origin, and write its arm now."""
     for i in range(3):
@@ -136,7 +136,7 @@ def _slip(body, turn, origin_turn, place, origin_place, arm, k, sign, arm_now, s
         slip[i] += sign * (place[body, i] - origin_place[body, i] + (now - before))
 
 
-@inner
+@kernel
 def _slip_rate(body, body_motion, arm, sign, rate):
     """Add ± the displacement of a point of a body in a step of its position and rotation vector."""
     p0, p1, p2 = body_motion[body, 3], body_motion[body, 4], body_motion[body, 5]

@@ -21,7 +21,7 @@ last, as drag does, and is then one of these: the step ends with the direction t
 from __future__ import annotations
 
 from ..jit import kernel
-from ..kinematics.stack import stack_matrix
+from ..jit.stack import stack_matrix
 
 
 @kernel

@@ -11,7 +11,7 @@ N = ∂E/∂l and a moment T = ∂E/∂φ of each edge; second ones those of l a
 
     ∂l/∂e = t,   ∂φ/∂e = m,   ∂²l/∂e² = l m mᵀ,   ∂²φ/∂e² = −(t mᵀ + m tᵀ)/l
 
-take them to edge vectors: the gradient is N t + T m; `solve.planar_assembly` does the same with second derivatives.
+take them to edge vectors: the gradient is N t + T m; `engine.linear.planar_assembly` does so with second derivatives.
 
 Bending, with c = 1 + a·b:   κ = 2 σ a×b/c,   ∂κ/∂Δ = 2 σ/c,   ∂²κ/∂Δ² = κ/c. Off the neutral axis κ̄ depends on
 lengths, ∂κ̄/∂l_i = s_i (`forces.stretch_bend`): ½ k r² with r = κ − κ̄ has all second derivatives k ∂r ∂r + k r ∂²κ.

@@ -13,7 +13,7 @@ angle of an edge carries
 
 from __future__ import annotations
 
-from ..jit import inner, kernel
+from ..jit import kernel
 
 
 @kernel
@@ -29,7 +29,7 @@ def node_spring(mass, factor, position, reference, node_gradient_out):
     return energy
 
 
-@inner
+@kernel
 def departure_spring(mass, factor, departure, node_gradient_out):
     """Add ½ factor Σ m |d|² and return it [J]: `node_spring` of the departures d from a reference [m].
 

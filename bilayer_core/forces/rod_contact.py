@@ -38,7 +38,7 @@ import math
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from ..jit import kernel
-from ..kinematics.stack import stack_vector
+from ..jit.stack import stack_vector
 
 
 @kernel

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from ..contact.friction_law import friction_over_speed, friction_slope
-from ..jit import inner, kernel
+from ..jit import kernel
 
 WAY = 9
 """Numbers of a contact's way."""
@@ -28,7 +28,7 @@ PASSED = 0.1
 MAX_HALVINGS = 50
 
 
-@inner
+@kernel
 def _rate(way, k, fraction):
     """D′ of a contact, and what its speed and the square of its slip are there."""
     forward, side = way[k, 0] + fraction * way[k, 1], way[k, 2] + fraction * way[k, 3]
@@ -38,7 +38,7 @@ def _rate(way, k, fraction):
     return speed, work, ca * way[k, 1] ** 2 + cs * way[k, 3] ** 2
 
 
-@inner
+@kernel
 def _force_along(count, way, threshold, fraction):
     """Σ D′(α) [J]"""
     total = 0.0
@@ -48,7 +48,7 @@ def _force_along(count, way, threshold, fraction):
     return total
 
 
-@inner
+@kernel
 def _curvature(count, way, threshold):
     """Σ D″(0) [J]"""
     total = 0.0

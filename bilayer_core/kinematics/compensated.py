@@ -6,10 +6,10 @@ an unevaluated sum x + r, with r at most half the last digit of x, to which disp
 
 from __future__ import annotations
 
-from ..jit import exact
+from ..jit.kernel import exact_kernel
 
 
-@exact
+@exact_kernel
 def add_exactly(value, low, increment):
     """(x, r) with x + r = value + low + increment, x the nearest number to it, as a tuple.
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner
+from ..jit import kernel
 
 
-@inner
+@kernel
 def turn_by(v0, v1, v2, matrix, b, out, c):
     """out[c] = exp([v]×) matrix[b] for a rotation vector v [rad], by Rodrigues' formula; `out[c]` is not `matrix[b]`.
 
@@ -30,7 +30,7 @@ def turn_by(v0, v1, v2, matrix, b, out, c):
         out[c, 2, j] = u2 + s * w2 + k * (v0 * w1 - v1 * w0)
 
 
-@inner
+@kernel
 def turn_between(first, a, last, b):
     """Rotation vector [rad] of last[b] first[a]ᵀ, by less than half a turn, as a tuple."""
     q00 = q11 = q22 = q21 = q12 = q02 = q20 = q10 = q01 = 0.0
@@ -50,7 +50,7 @@ def turn_between(first, a, last, b):
     return factor * x, factor * y, factor * z
 
 
-@inner
+@kernel
 def turn_further(v0, v1, v2, turned, out, f):
     """out[f] = vector part of the unit quaternion of exp([v]×) after that of turned[f]; they may be the same array.
 
@@ -72,13 +72,13 @@ def turn_further(v0, v1, v2, turned, out, f):
     out[f, 2] = sign * (w * q2 + u * p2 + (p0 * q1 - p1 * q0))
 
 
-@inner
+@kernel
 def real_part(turned, f):
     """Of the unit quaternion with the vector part turned[f], by less than half a turn."""
     return math.sqrt(max(1.0 - turned[f, 0] ** 2 - turned[f, 1] ** 2 - turned[f, 2] ** 2, 0.0))
 
 
-@inner
+@kernel
 def turned_by(turned, f, u0, u1, u2):
     """(E − 1) u = 2 w q×u + 2 q×(q×u) for the rotation E of the quaternion with the vector part q = turned[f], as a
     tuple.
@@ -93,7 +93,7 @@ def turned_by(turned, f, u0, u1, u2):
     )
 
 
-@inner
+@kernel
 def spin_of(v0, v1, v2, u0, u1, u2):
     """Angular velocity of exp([v]×) while v changes at the rate u, as a tuple; see `kinematics.rotation`."""
     angle2 = v0 * v0 + v1 * v1 + v2 * v2
@@ -110,7 +110,7 @@ def spin_of(v0, v1, v2, u0, u1, u2):
     )
 
 
-@inner
+@kernel
 def product_transposed(left, a, right, b, out, c):
     """out[c] = left[a] right[b]ᵀ"""
     for i in range(3):
@@ -120,7 +120,7 @@ def product_transposed(left, a, right, b, out, c):
             )
 
 
-@inner
+@kernel
 def inertia_tensor(second_moment, f, rotation, b, out):
     """R (tr(J) 1 − J) Rᵀ in the world's axes [kg m²], J the second moment of free body f, R = rotation[b]; (3, 3)."""
     trace = second_moment[f, 0, 0] + second_moment[f, 1, 1] + second_moment[f, 2, 2]
@@ -133,7 +133,7 @@ def inertia_tensor(second_moment, f, rotation, b, out):
             out[i, j] = total
 
 
-@inner
+@kernel
 def solve_three(matrix, x, y, z):
     """Solution of a regular 3 × 3 system by Cramer's rule, as a tuple."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from ..jit import inner, kernel
+from ..jit import kernel
 
 SMALL_ANGLE = 0.05
 """Tangent up to which six terms of the series of the inverse tangent are exact to rounding."""
 
 
-@inner
+@kernel
 def row(array, k):
     """Row k of an (n, ≥3) array as a tuple."""
     return array[k, 0], array[k, 1], array[k, 2]
@@ -22,7 +22,7 @@ def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inner
+@kernel
 def cross(a, b):
     """a × b"""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
@@ -38,7 +38,7 @@ def angle(cosine, sine):
     return math.atan2(sine, cosine)
 
 
-@inner
+@kernel
 def scaled(s, a):
     """s a"""
     return s * a[0], s * a[1], s * a[2]
@@ -50,13 +50,13 @@ def combine(s, a, t, b):
     return s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]
 
 
-@inner
+@kernel
 def combine3(s, a, t, b, r, c):
     """s a + t b + r c"""
     return s * a[0] + t * b[0] + r * c[0], s * a[1] + t * b[1] + r * c[1], s * a[2] + t * b[2] + r * c[2]
 
 
-@inner
+@kernel
 def add_row(array, k, s, a):
     """array[k, :3] += s a"""
     array[k, 0] += s * a[0]
@@ -64,7 +64,7 @@ def add_row(array, k, s, a):
     array[k, 2] += s * a[2]
 
 
-@inner
+@kernel
 def add_column(array, k, column, s, a):
     """array[k, :3, column] += s a"""
     array[k, 0, column] += s * a[0]
@@ -72,7 +72,7 @@ def add_column(array, k, column, s, a):
     array[k, 2, column] += s * a[2]
 
 
-@inner
+@kernel
 def add_outer(array, k, s, a, b):
     """array[k, :3, :3] += s a bᵀ"""
     for j in range(3):
@@ -82,7 +82,7 @@ def add_outer(array, k, s, a, b):
         array[k, 2, j] += sb * a[2]
 
 
-@inner
+@kernel
 def add_identity(array, k, s):
     """array[k, :3, :3] += s I"""
     array[k, 0, 0] += s
@@ -90,7 +90,7 @@ def add_identity(array, k, s):
     array[k, 2, 2] += s
 
 
-@inner
+@kernel
 def add_upper_outer(array, k, s, a):
     """Upper triangle of array[k, :3, :3] += s a aᵀ"""
     t0, t1 = s * a[0], s * a[1]
@@ -102,7 +102,7 @@ def add_upper_outer(array, k, s, a):
     array[k, 2, 2] += s * a[2] * a[2]
 
 
-@inner
+@kernel
 def add_upper_symmetric(array, k, s, a, b):
     """Upper triangle of array[k, :3, :3] += s (a bᵀ + b aᵀ)"""
     array[k, 0, 0] += 2.0 * s * a[0] * b[0]
@@ -113,14 +113,14 @@ def add_upper_symmetric(array, k, s, a, b):
     array[k, 2, 2] += 2.0 * s * a[2] * b[2]
 
 
-@inner
+@kernel
 def add_upper_projector(array, k, s, a):
     """Upper triangle of array[k, :3, :3] += s (I − a aᵀ), a a unit vector"""
     add_identity(array, k, s)
     add_upper_outer(array, k, -s, a)
 
 
-@inner
+@kernel
 def add_upper_outer_sum(array, k, s, a, x, b, y, c, z):
     """Upper triangle of array[k, :3, :3] += s (a xᵀ + b yᵀ + c zᵀ), a sum that is symmetric"""
     array[k, 0, 0] += s * (a[0] * x[0] + b[0] * y[0] + c[0] * z[0])
@@ -131,7 +131,7 @@ def add_upper_outer_sum(array, k, s, a, x, b, y, c, z):
     array[k, 2, 2] += s * (a[2] * x[2] + b[2] * y[2] + c[2] * z[2])
 
 
-@inner
+@kernel
 def add_outer_sum(array, k, s, a, x, b, y):
     """array[k, :3, :3] += s (a xᵀ + b yᵀ)"""
     for j in range(3):

@@ -1,7 +1,8 @@
 """The list of forces, from which the plan, the engine, the energy budget and the documentation take theirs.
 
 A force has its line here and its formula in `forces/`; the part of the engine that computes it asks for its place by
-name (`march.terms.place_of`). An engine refuses to be built for a scene that needs a force nobody asked a place for.
+name (`model.force_places.place_of`). An engine refuses to be built for a scene that needs a force that no term of
+`forces.register` computes.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 
 import numpy as np
 
-from bilayer_core.integrate.frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
+from bilayer_core.simulation.frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
 
 
 def _plain(value):

@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.record.cdr import Template
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.topics import FRAME_ID, output_topics
+from bilayer_core.simulation.frame import Description, Frame
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
 SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")

@@ -17,13 +17,13 @@ import numpy as np
 
 from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.frame import Description
 from bilayer_core.record import encoders
 from bilayer_core.record.cdr import NANOSECONDS, Template, decode, nanoseconds, read_float64_multi_array
 from bilayer_core.record.description_text import from_text
 from bilayer_core.record.node_frames import node_order
 from bilayer_core.record.run_data import RunData
 from bilayer_core.record.topics import LOG_NAMESPACE, MULTI_ARRAY, output_topics
+from bilayer_core.simulation.frame import Description
 
 CUT_OFF = "cut off"
 _RECORD_HEAD = 9  # opcode and length of a record [bytes]

@@ -15,13 +15,13 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from bilayer_core.errors import InputError, SimulationError
-from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64
 from bilayer_core.record.paths import check_output_path
 from bilayer_core.record.schemas import schema_text
 from bilayer_core.record.topics import DisplayGate, Rate, stimulus_topics
+from bilayer_core.simulation.frame import Description, Frame
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
 FLUSH_PERIOD = 0.5  # longest time a message waits for its chunk to be written [s of wall time]
@@ -157,7 +157,7 @@ class _LogFile:
         import mcap
         from mcap.writer import CompressionType, Writer
 
-        from bilayer_core.integrate.observe import versions
+        from bilayer_core.simulation.observation import versions
 
         self._gate = gate
         self._encoder = FrameEncoder(description)

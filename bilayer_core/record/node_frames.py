@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.integrate.frame import Description, Frame
 from bilayer_core.jit import kernel
 from bilayer_core.kinematics.vector import combine, cross, dot, row, scaled
+from bilayer_core.simulation.frame import Description, Frame
 
 
 @kernel

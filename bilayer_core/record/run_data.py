@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bilayer_core.integrate.frame import Description, Strand
+from bilayer_core.simulation.frame import Description, Strand
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.frame import Description
+from bilayer_core.simulation.frame import Description
 
 LOG_SUFFIX = ".mcap"
 

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from bilayer_core.integrate.frame import Description
+from bilayer_core.simulation.frame import Description
 
 LOG_NAMESPACE = "/bilayer_sim"
 FRAME_ID = "world"

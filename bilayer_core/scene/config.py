@@ -205,7 +205,7 @@ class Output(Part):
     """How often a run is recorded, in simulated time."""
 
     rate: PositiveRate = 50.0
-    """Of poses, forces, energies and the state."""
+    """Of poses, forces, energies and the state. Adaptive steps end at these times, whoever records and how often."""
     marker_rate: PositiveRate = 20.0
     """Of the large messages, nodes, points and markers; not above `rate`."""
 

@@ -8,8 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .case import Case
 from .parts import GEL, fixed, layer, rod, scene
 from .references import EULER_FREE_END, FIRST_MODE, GREENHILL, bonded_bending_stiffness, heavy_cantilever

@@ -11,8 +11,8 @@ from functools import cache
 import numpy as np
 
 from ..beam2d.scene import beam_of, set_stimuli
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .case import Case
 from .parts import GEL, fixed, layer, rod, scene
 from .references import timoshenko

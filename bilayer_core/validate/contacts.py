@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from scipy.optimize import brentq
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .case import Case
 from .parts import GROUND, ball, contact, fixed, layer, rod, scene
 from .references import oblique_slide

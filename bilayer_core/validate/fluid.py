@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .case import Case
 from .motion import let_go
 from .parts import GEL, layer, rod, scene

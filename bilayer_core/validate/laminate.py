@@ -10,8 +10,8 @@ from functools import cache
 
 import numpy as np
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from . import bending, helix, torsion
 from .case import Case
 from .parts import GEL, fixed, layer, rod, scene

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .beams import BENDING, LENGTH, SOFT, THICKNESS, beam
 from .case import Case
 from .parts import fixed, layer, rod, scene

@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from ..integrate.integrators import INTEGRATORS
-from ..integrate.simulator import Simulator
+from ..integrators.register import INTEGRATORS
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .case import Case
 from .parts import fixed, layer, rod, scene
 

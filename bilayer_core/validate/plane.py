@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from . import beams, bending
 from .case import Case
 from .references import timoshenko

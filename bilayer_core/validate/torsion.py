@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from ..integrate.simulator import Simulator
 from ..scene.loader import load_scene
+from ..simulation.simulator import Simulator
 from .case import Case
 from .parts import GEL, fixed, layer, rod, scene
 from .references import strip_torsion, timoshenko

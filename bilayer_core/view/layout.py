@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import rerun.blueprint as rrb
 
-from bilayer_core.integrate.observe import versions
 from bilayer_core.record.run_data import RunData
+from bilayer_core.simulation.observation import versions
 from bilayer_core.view.scales import Scales
 
 TIMELINE = "sim_time"

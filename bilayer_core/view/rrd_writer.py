@@ -10,10 +10,10 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.frame import ShapeInfo
 from bilayer_core.record.colours import STRAIN_MAP, strain_colours
 from bilayer_core.record.node_frames import layer_rows
 from bilayer_core.record.run_data import RunData
+from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
 from bilayer_core.view.layout import CHANNEL_COLOURS, TIMELINE, blueprint, summary
 from bilayer_core.view.scales import Scales, choose_scales

@@ -46,6 +46,27 @@ def test_help_and_the_list_of_scenes_import_nothing_that_is_slow():
     assert python(program) == "(0, 0) []"
 
 
+def test_a_run_without_a_log_imports_neither_the_units_library_nor_that_of_logs():
+    program = (
+        "import sys; from bilayer_core.cli import main\n"
+        "code = main(['run', 'cantilever', '--duration', '1 ms', '--quiet'])\n"
+        "print(code, sorted({'mcap', 'pint', 'rich.progress', 'rerun'} & set(sys.modules)))"
+    )
+    assert python(program) == "0 []"
+
+
+def test_the_garbage_collector_rests_while_a_command_runs_and_at_the_end_of_the_process():
+    program = (
+        "import atexit, gc; from bilayer_core.cli.program import main, program\n"
+        "atexit.register(lambda: print(gc.get_freeze_count() > 1000))\n"
+        "before, during = gc.get_threshold(), []\n"
+        "program.main = lambda *_, **__: during.append(gc.get_threshold())\n"
+        "main(['scenes'])\n"
+        "print(during[0][0] > 10 * before[0], gc.get_threshold() == before, gc.get_freeze_count() > 1000)"
+    )
+    assert python(program).split() == ["True", "True", "False", "True"]
+
+
 def test_help_names_every_verb_and_every_exit_code(capsys):
     assert main(["--help"]) == 0
     text = capsys.readouterr().out

@@ -84,6 +84,30 @@ def test_a_run_shows_on_request_where_its_energy_went(here, capsys):
     assert "numerical" not in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("steps", [["--dt", "1 ms"], ["--tolerance", "1e-4"]], ids=["fixed", "adaptive"])
+def test_the_end_of_a_run_is_the_same_bit_for_bit_whatever_records_it(here, steps):
+    watched = [
+        [],
+        ["--log", "slow.mcap", "--log-rate", "7"],
+        ["--log", "fast.mcap", "--log-rate", "1 kHz"],
+        ["--log", "own.mcap", "--rrd", "run.rrd"],
+        ["--rrd", "other.rrd", "--log-rate", "30"],
+        ["--budget"],
+    ]
+    for place, options in enumerate(watched):
+        run = ["run", "cantilever", "--duration", "0.33", "--quiet", "--save-state", f"{place}.npz"]
+        assert main([*run, *steps, *options]) == 0
+    states = [np.load(f"{place}.npz")["state"] for place in range(len(watched))]
+    for state in states[1:]:
+        np.testing.assert_array_equal(state, states[0])
+    slow, fast = read_log("slow.mcap").times, read_log("fast.mcap").times
+    assert slow[-1] == fast[-1] == pytest.approx(0.33) and len(slow) == 4 < len(fast)
+    assert (slow[:3] >= np.arange(3) / 7.0).all()
+    if "--tolerance" in steps:
+        assert slow[1] > 1 / 7.0 + 1e-6  # the first step that ends later, and not one that was made to end there
+        assert set(slow) <= set(fast)  # which has all steps
+
+
 def test_the_log_holds_the_scene_with_all_changes(here):
     options = ["--dt", "2 ms", "--set", "rods.strip.stations=21", "--log-rate", "10", "--quiet", "--log", "run.mcap"]
     assert main(["run", "cantilever", "--duration", "0.01", *options]) == 0
@@ -167,7 +191,7 @@ def no_simulation(monkeypatch):
     def refuse(scene):
         raise AssertionError("a simulation was started")
 
-    monkeypatch.setattr("bilayer_core.integrate.simulator.Simulator", refuse)
+    monkeypatch.setattr("bilayer_core.simulation.simulator.Simulator", refuse)
 
 
 @pytest.mark.parametrize("option", ["--log", "--rrd", "--summary", "--save-state"])

@@ -8,15 +8,15 @@ from evaluations import end_of_step, left_of_step
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.forces.drag import drag, node_directions
-from bilayer_core.integrate.fluid import energy_of_fluid, momentum_of_fluid
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.march.evaluator import Evaluator
 from bilayer_core.model.build import build_model
 from bilayer_core.model.layout import columns
 from bilayer_core.model.section import rectangle
 from bilayer_core.model.state import initial_state
+from bilayer_core.simulation.fluid_energy import energy_of_fluid, momentum_of_fluid
 
 WIDTH, THICKNESS = 0.01, 2e-3
 OWN = 1000.0 * WIDTH * THICKNESS  # [kg/m]

@@ -9,11 +9,11 @@ from budgets import EXACT, SOFT, clamped, driven, moving, run, throw
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.engine.modes import STEP
+from bilayer_core.engine.newton_report import NewtonStatus
 from bilayer_core.errors import InputError, SimulationError
-from bilayer_core.integrate.integrators import INTEGRATORS
-from bilayer_core.march.modes import STEP
-from bilayer_core.march.newton_report import NewtonStatus
-from bilayer_core.march.status import MAX_ITERATIONS
+from bilayer_core.integrators.register import INTEGRATORS
+from bilayer_core.model.records.status import MAX_ITERATIONS
 
 # what the integrator loses
 

@@ -9,8 +9,8 @@ from moving_scenes import EXACT, PROBLEMS, SOFT, cantilever, driven, part, spinn
 from sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.integrate.integrators import INTEGRATORS
-from bilayer_core.integrate.method import Method
+from bilayer_core.integrators.method import Method
+from bilayer_core.integrators.register import INTEGRATORS
 
 HISTORY = [name for name, method in INTEGRATORS.items() if method.history is not None]
 SECOND_ORDER = [name for name, method in INTEGRATORS.items() if method.order == 2]

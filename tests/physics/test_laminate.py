@@ -8,10 +8,10 @@ from sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, s
 import bilayer_core.model.laminate as laminate
 from bilayer_core import Simulator, load_scene
 from bilayer_core.beam2d.scene import beam_of, set_stimuli
-from bilayer_core.integrate.surroundings import Surroundings
-from bilayer_core.march.evaluator import Evaluator
+from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.model.build import build_model
 from bilayer_core.model.plan import leanest_model, make_plan
+from bilayer_core.simulation.stage_inputs import Surroundings
 from bilayer_core.validate.bending import PAIRS, THICKNESS, strip
 from bilayer_core.validate.references import timoshenko
 

@@ -8,11 +8,11 @@ from oracles import discrete_rod
 
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, factor_signed, solve_band, width
 from bilayer_core.forces.bend_twist import bend_twist
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 from bilayer_core.kinematics.vector import angle
-from bilayer_core.solve.band import backward_band, eliminate_band, factor_band, factor_signed, solve_band, width
 
 
 def random_frames(rng, count):

@@ -7,7 +7,7 @@ from sample_scenes import PAPER, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.integrate.integrators import INTEGRATORS
+from bilayer_core.integrators.register import INTEGRATORS
 from bilayer_core.model.plan import MODELS
 
 SAME = 1e-8

@@ -9,8 +9,8 @@ from budgets import EXACT, clamped, driven, extrapolated, moving, run
 from sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.integrate.ledger import BARRIERS
-from bilayer_core.integrate.motion import PARTS
+from bilayer_core.simulation.energy_budget import BARRIERS
+from bilayer_core.simulation.motion import PARTS
 
 
 def bouncing():

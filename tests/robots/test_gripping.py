@@ -5,6 +5,8 @@ import pytest
 from paper import TWO_RODS
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.record.memory import MemoryRecorder
 
 pytestmark = pytest.mark.slow
 
@@ -47,6 +49,26 @@ def test_the_gripper_has_the_papers_parameters():
     assert scene.gravity == (0.0, 0.0, -10.0)
     assert {(m.youngs_modulus, m.density) for m in scene.materials.values()} == {(1e8, 1000.0)}
     assert (scene.contact.barrier_distance, scene.contact.stiffness) == (1e-3, 1e7)
+
+
+@pytest.mark.parametrize("steps", [{}, {"dt": 2e-3}], ids=["adaptive", "fixed"])
+def test_arms_touch_the_ball_in_the_same_bits_whatever_watches_them(steps, tmp_path):
+    simulator = Simulator(load_scene("gripping"), **steps)
+    simulator.run(12.6)
+    start, ends = simulator.save_state(), []
+    observers = [
+        [],
+        [McapRecorder(tmp_path / "7.mcap", 7.0)],
+        [McapRecorder(tmp_path / "1000.mcap", 1000.0)],
+        [McapRecorder(tmp_path / "50.mcap", 50.0), MemoryRecorder(30.0)],
+    ]
+    for watching in observers:
+        simulator.load_state(start)
+        simulator.run(0.5, observers=watching)
+        ends.append((simulator.save_state(), simulator.statistics.bodies["ball"].first_contact))
+    for state, contact in ends[1:]:
+        np.testing.assert_array_equal(state, ends[0][0])
+        assert contact == ends[0][1] == pytest.approx(12.77, abs=0.03)
 
 
 def test_the_arms_close_on_the_ball_before_the_stimulus_is_complete(gripped):

@@ -9,7 +9,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosgraph_msgs.msg import Clock
 
-from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_core import Simulator, load_scene
+from bilayer_core.record.log_reader import read_info, read_log, read_state
 
 FAST = {"scene": "bending", "real_time_factor": 0}
 
@@ -58,16 +59,18 @@ def test_a_rerun_recording_is_written_when_the_run_ends(start, domain, tmp_path)
     assert recording.stat().st_size > 10_000
 
 
-def test_frames_at_another_rate_are_those_of_the_first_steps_after_their_times(
-    start, domain, tmp_path
-):
+def test_frames_at_another_rate_are_those_of_the_first_steps_after_their_times(start, domain, tmp_path):
     log = tmp_path / "run.mcap"
-    node = start("sim_node", domain, FAST | {"log": log, "rate": 30.0, "duration": 0.5, "tolerance": 1e-3})
+    parameters = {"rate": 30.0, "duration": 0.5, "tolerance": 1e-3, "stimulus_fallback": "schedule"}
+    node = start("sim_node", domain, FAST | parameters | {"log": log})
     assert node.wait() == 0, node.output
     late = np.array(read_log(log).times) - np.arange(16) / 30.0
     assert (late >= -1e-9).all() and late[[0, -1]] == pytest.approx([0.0, 0.0], abs=1e-9)  # logs count nanoseconds
     assert 1e-6 < late.max() < 0.02
     assert read_info(log).complete and read_info(log).settings["tolerance"] == "0.001"
+    unwatched = Simulator(load_scene("bending"), tolerance=1e-3)
+    unwatched.run(0.5)
+    np.testing.assert_array_equal(read_state(log)[0], unwatched.save_state())
 
 
 def test_dt_alone_asks_for_fixed_steps(start, domain, tmp_path):

@@ -13,7 +13,8 @@ ROOT = Path(__file__).resolve().parents[2]
 BASE = {"errors", "jit"}
 GEOMETRY = BASE | {"kinematics", "contact"}
 MECHANICS = GEOMETRY | {"scene", "model", "forces"}
-NUMERICS = MECHANICS | {"solve", "march", "integrate"}
+ENGINE = MECHANICS | {"integrators", "engine"}
+NUMERICS = ENGINE | {"simulation"}
 ALLOWED = {
     "errors": set(),
     "jit": {"errors"},
@@ -22,9 +23,9 @@ ALLOWED = {
     "contact": BASE | {"kinematics"},
     "model": GEOMETRY | {"scene"},
     "forces": GEOMETRY | {"scene", "model"},
-    "solve": MECHANICS,
-    "march": MECHANICS | {"solve"},
-    "integrate": MECHANICS | {"solve", "march"},
+    "integrators": MECHANICS,
+    "engine": MECHANICS | {"integrators"},
+    "simulation": ENGINE,
     "record": NUMERICS,
     "view": NUMERICS | {"record"},
     "converge": NUMERICS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bilayer_core.solve.dense import count_negative_dense
+from bilayer_core.engine.linear.dense import count_negative_dense
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -1,226 +1,212 @@
-"""What is special about how kernels are compiled: functions inside them, and elements of arrays."""
+"""Records that kernels read, pieces that are called through their addresses, and arrays on the stack of a kernel."""
 
-import gc
-import operator
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
-from numba import njit
-from numba.core import types
-from numba.core.compiler import Flags
 from numba.core.errors import TypingError
-from numba.core.registry import cpu_target
-from numba.core.typing.templates import signature
 
-from bilayer_core.errors import InputError
-from bilayer_core.jit import inner, kernel
-from bilayer_core.jit.collector import few_collections
-from bilayer_core.jit.flags import KernelFlags
-from bilayer_core.jit.operators import RESULTS, TARGET
+from bilayer_core.jit import Address, addresses, call, caller, kernel, piece, record, record_at
+from bilayer_core.jit.kernel import exact_kernel
+from bilayer_core.jit.record import Flags, IndexTable, Indices, Vector
+from bilayer_core.jit.stack import stack_matrix, stack_vector
 
 
-@inner
-def _twice(x):
-    return 2.0 * x
+@record
+class Inner:
+    values: Vector
+    scale: float
 
 
-@inner
-def _thrice(x):
-    return _twice(x) + x
+@record
+class Outer:
+    flag: bool
+    count: int
+    nothing: Inner
+    table: IndexTable
+    marks: Flags
+    inner: Inner
+    others: Indices  # addresses of records
+    last: float
 
 
-@kernel
-def _sum_of_triples(values):
+inner_at = record_at(Inner)
+
+
+def _outer():
+    inner = Inner(values=np.arange(3.0), scale=2.0)
+    other = Inner(values=np.array([7.0, 8.0]), scale=-0.5)
+    outer = Outer(
+        flag=True,
+        count=5,
+        nothing=Inner.absent(),
+        table=np.arange(12, dtype=np.int64).reshape(3, 4),
+        marks=np.array([False, True]),
+        inner=inner,
+        others=np.array([inner.address, other.address]),
+        last=0.25,
+    )
+    return outer, other
+
+
+@piece(float, Outer, int, Vector)
+def read_for_a_test(o, which, out):
+    chosen = inner_at(o.others[which])
+    out[0], out[1], out[2], out[3] = o.flag, o.count, o.table[2, 1], o.table.shape[1]
+    out[4], out[5], out[6], out[7] = o.marks[1], o.inner.scale, chosen.values[-1], o.nothing.exists
+    return o.last
+
+
+@record
+class Reading:
+    outer: Outer
+    out: Vector
+    read_for_a_test: Address
+
+
+@piece(float, Reading, int)
+def read_through_an_address(r, which):
+    return call(r.read_for_a_test, (r.outer, which, r.out))
+
+
+@piece(float, Outer)
+def change_for_a_test(o):
+    o.inner.values[1] = 42.0
+    return 0.0
+
+
+def _read(which):
+    outer, other = _outer()
+    reading = Reading(outer=outer, out=np.zeros(8), read_for_a_test=read_for_a_test.address)
+    assert read_through_an_address(reading, which) == 0.25
+    return reading.out.tolist(), other
+
+
+def test_a_piece_reads_every_kind_of_field_through_another_piece():
+    assert _read(0)[0] == [1, 5, 9, 4, 1, 2, 2, 0]
+    assert _read(1)[0] == [1, 5, 9, 4, 1, 2, 8, 0]
+
+
+def test_what_a_piece_writes_is_seen_by_all_who_hold_the_array():
+    outer, _ = _outer()
+    change_for_a_test(outer)
+    assert outer.inner.values[1] == 42.0
+
+
+def test_a_record_keeps_its_arrays_alive():
+    outer, _ = _outer()
+    garbage = [np.full(12, -1) for _ in range(100)]
+    change_for_a_test(outer)
+    assert all(array[0] == -1 for array in garbage)
+
+
+def test_an_absent_record_has_arrays_of_length_zero():
+    nothing = Inner.absent()
+    assert nothing.values.shape == (0,) and not nothing.exists and _outer()[0].inner.exists
+
+
+def test_a_record_takes_the_fields_of_its_class_with_their_types_and_nothing_else():
+    with pytest.raises(TypeError, match="Inner: these fields are missing or unknown: other, scale"):
+        Inner(values=np.zeros(1), other=1)
+    with pytest.raises(TypeError, match="Inner.values: int64, shape"):
+        Inner(values=np.zeros(1, dtype=np.int64), scale=1.0)
+    with pytest.raises(TypeError, match="Inner.values: float64, shape .* is not a contiguous array of 1 indices"):
+        Inner(values=np.zeros((4, 2))[:, 0], scale=1.0)
+    with pytest.raises(TypeError, match="Reading.outer: a Inner is no Outer"):
+        Reading(outer=Inner.absent(), out=np.zeros(1), read_for_a_test=0)
+
+
+@record
+class Wrong:
+    change_for_a_test: Address
+    inner: Inner
+
+
+def test_a_call_with_other_types_than_declared_is_an_error_of_compilation():
+    @piece(float, Wrong)
+    def call_with_the_wrong_record(w):
+        return call(w.change_for_a_test, (w.inner,))
+
+    with pytest.raises(TypingError, match="is called with .*Inner.*; it takes .*Outer"):
+        _ = call_with_the_wrong_record.address
+
+
+def test_addresses_are_those_of_the_needed_pieces_alone():
+    @record
+    class Calls:
+        read_for_a_test: Address
+        change_for_a_test: Address
+
+    calls = addresses(Calls, ["change_for_a_test"])
+    assert calls.read_for_a_test == 0 and calls.change_for_a_test == change_for_a_test.address
+
+
+call_reading = caller("call_reading", lambda address: read_through_an_address.signature)
+
+
+@record
+class Table:
+    addresses: Indices
+    reading: Reading
+
+
+@piece(float, Table)
+def sum_of_a_table(t):
     total = 0.0
-    for i in range(values.shape[0]):
-        total += _thrice(values[i])
+    for k in range(t.addresses.shape[0]):
+        total += call_reading(t.addresses[k], (t.reading, k))
     return total
 
 
-def test_functions_within_functions_are_compiled_into_the_kernel():
-    assert _sum_of_triples(np.array([1.0, 2.0, 4.0])) == 21.0
+def test_pieces_in_a_table_are_called_by_their_common_signature():
+    outer, _ = _outer()
+    reading = Reading(outer=outer, out=np.zeros(8), read_for_a_test=read_for_a_test.address)
+    table = Table(addresses=np.full(2, read_through_an_address.address), reading=reading)
+    assert sum_of_a_table(table) == 0.5
 
-
-def test_the_interpreter_cannot_call_what_only_kernels_call():
-    with pytest.raises(TypeError, match="_twice is called by kernels alone"):
-        _twice(1.0)
-
-
-def test_a_kernel_within_a_kernel_gets_an_entry_only_when_the_interpreter_calls_it():
-    @kernel
-    def half(x):  # made here, it is not taken from the cache
-        return 0.5 * x
-
-    @kernel
-    def sum_of_halves(values):
-        total = 0.0
-        for i in range(values.shape[0]):
-            total += half(values[i])
-        return total
-
-    assert sum_of_halves(np.array([1.0, 2.0, 4.0])) == 3.5
-    assert half.signatures == [] and len(half.inside.signatures) == 1
-    assert half(3.0) == 1.5
-    assert half.signatures == half.inside.signatures and len(half.signatures) == 1
-
-
-def test_the_collector_is_left_as_it_was():
-    before = gc.get_threshold()
-    with pytest.raises(InputError), few_collections():
-        assert gc.get_threshold() != before
-        raise InputError("none")
-    assert gc.get_threshold() == before
-
-
-LEAF = """
-from bilayer_core.jit import inner
-
-@inner
-def leaf(x):
-    return {}
-"""
-MIDDLE = """
-from bilayer_core.jit import inner
-from leaf import leaf
-
-@inner
-def middle(x):
-    return 2 * leaf(x)
-"""
-ENTRY = """
-import sys
-from bilayer_core.jit import kernel
-from middle import middle
 
 @kernel
-def {0}(x):
-    return middle(x) + max(x, 0.0)
+def _products(n):
+    a, m = stack_vector(3), stack_matrix(3, 4)
+    total = 0.0
+    for k in range(n):
+        for i in range(3):
+            a[i] = k + i
+            for j in range(4):
+                m[i, j] = a[i] * j
+        total += m[2, 3] + m[1, 1]
+    return total
 
-print({0}(3.0), sum(middle._cache_hits.values()))
-"""
+
+def test_arrays_on_the_stack_hold_what_is_written():
+    assert _products(4) == sum(3 * (k + 2) + (k + 1) for k in range(4))
 
 
-def test_what_kernels_call_comes_from_the_cache_unless_it_calls_something_else_now(tmp_path):
+@exact_kernel
+def _rounding_error(a, b):
+    total = a + b
+    return (a - (total - (total - a))) + (b - (total - a))
+
+
+def test_exact_kernels_keep_rounding_errors():
+    assert _rounding_error(1.0, 1e-17) == 1e-17
+
+
+def test_importing_and_compiling_leaves_numba_as_it_was():
+    before = numba.config.CACHE_DIR
+    _ = change_for_a_test.address
+    assert before == numba.config.CACHE_DIR
+
+
+def test_the_documented_ways_of_numba_alone_give_the_same():
+    program = "import test_jit as t; print(t._read(1)[0])"
     environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), str(tmp_path)]),
-        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-        "PYTHONDONTWRITEBYTECODE": "1",
+        "BILAYER_JIT_PUBLIC": "1",
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), str(Path(__file__).parent)]),
     }
-
-    def run(entry):
-        (tmp_path / f"{entry}.py").write_text(ENTRY.format(entry))
-        done = subprocess.run(
-            [sys.executable, "-m", entry], env=environment, capture_output=True, text=True, check=True
-        )
-        return done.stdout.split()
-
-    (tmp_path / "leaf.py").write_text(LEAF.format("x + 1"))
-    (tmp_path / "middle.py").write_text(MIDDLE)
-    assert run("first") == ["11.0", "0"]
-    assert run("second") == ["11.0", "1"]
-    (tmp_path / "leaf.py").write_text(LEAF.format("7"))  # an integer now
-    assert run("third") == ["17.0", "0"]
-    assert run("fourth") == ["17.0", "1"]
-
-
-@kernel
-def _ends(a, m, c, k):
-    return a[-1], a[k], m[-2, 1], m[k, -1], c[1, -1, 0], c[k, k, k]
-
-
-@kernel
-def _write(a, m, flags, counts, k):
-    a[k] = 7
-    m[-1, k] += 0.5
-    flags[0, k] = True
-    counts[k] -= 2
-
-
-@kernel
-def _row(m, k):
-    return m[k].sum() + m[:, 1].sum()
-
-
-def test_elements_of_arrays_count_from_either_end():
-    a, m, c = np.arange(5.0), np.arange(12.0).reshape(3, 4), np.arange(24.0).reshape(2, 3, 4)
-    for k in (0, 1):
-        assert _ends(a, m, c, k) == (a[-1], a[k], m[-2, 1], m[k, -1], c[1, -1, 0], c[k, k, k])
-
-
-def test_variables_count_from_either_end_in_what_is_no_kernel():
-    ends, write = njit(_ends.py_func), njit(_write.py_func)
-    a, m, c = np.arange(5.0), np.arange(12.0).reshape(3, 4), np.arange(24.0).reshape(2, 3, 4)
-    assert ends(a, m, c, -1) == (a[-1], a[-1], m[-2, 1], m[-1, -1], c[1, -1, 0], c[-1, -1, -1])
-    flags, counts = np.zeros((1, 3), dtype=bool), np.zeros(3, dtype=np.int64)
-    write(a, m, flags, counts, -2)
-    assert a[-2] == 7 and flags.tolist() == [[False, True, False]] and counts.tolist() == [0, -2, 0]
-
-
-def test_elements_of_every_kind_are_written():
-    a, m, flags, counts = np.zeros(3), np.zeros((2, 3)), np.zeros((1, 3), dtype=bool), np.zeros(3, dtype=np.int64)
-    _write(a, m, flags, counts, 1)
-    assert a.tolist() == [0, 7, 0] and m.tolist() == [[0, 0, 0], [0, 0.5, 0]]
-    assert flags.tolist() == [[False, True, False]] and counts.tolist() == [0, -2, 0]
-
-
-def test_strided_arrays_and_slices_mean_the_same():
-    m = np.arange(12.0).reshape(3, 4)
-    assert _row(m, 1) == m[1].sum() + m[:, 1].sum()
-    strided = np.arange(24.0).reshape(3, 8)[:, ::2]
-    assert _ends(np.arange(10.0)[::2], strided, np.arange(24.0).reshape(4, 3, 2).T, 1)[2] == strided[-2, 1]
-
-
-def _found_by_numba(operation, arguments):
-    """Signature that numba finds without what this package registers."""
-    context = cpu_target.typing_context
-    context.refresh()
-    templates = context.resolve_value_type(operation).templates
-    own = [of for of in templates if getattr(of, "metadata", None) is TARGET]
-    assert len(own) == 1
-    return types.Function([of for of in templates if of not in own]).get_call_type(context, arguments, {})
-
-
-@pytest.mark.parametrize("operation", RESULTS)
-def test_operations_have_the_types_that_numba_finds(operation):
-    for arguments, result in RESULTS[operation].items():
-        assert _found_by_numba(operation, arguments) == signature(result, *arguments)
-
-
-@pytest.mark.parametrize("index", [types.int64, types.UniTuple(types.int64, 2), types.UniTuple(types.int64, 3)])
-@pytest.mark.parametrize("number", [types.float64, types.int64, types.boolean])
-def test_elements_have_the_types_that_numba_finds(number, index):
-    array = types.Array(number, len(index) if isinstance(index, types.UniTuple) else 1, "C")
-    assert _found_by_numba(operator.getitem, (array, index)).return_type == number
-    for value in (number, types.int64):
-        found = _found_by_numba(operator.setitem, (array, index, value))
-        assert (
-            cpu_target.typing_context.resolve_value_type(operator.setitem).get_call_type(
-                cpu_target.typing_context, (array, index, value), {}
-            )
-            == found
-        )
-
-
-def test_read_only_arrays_are_not_written():
-    @kernel
-    def write(a):
-        a[0] = 1.0
-
-    values = np.zeros(2)
-    values.flags.writeable = False
-    with pytest.raises(TypingError, match="readonly"):
-        write(values)
-
-
-def test_flags_that_are_looked_up_are_one_object_for_equal_values_and_do_not_change():
-    flags = KernelFlags(Flags())
-    flags.nrt = False
-    first, again = flags.copy(), KernelFlags(flags).copy()
-    flags.nrt = True
-    assert first is again and first is not flags.copy() and not first.nrt
-    with pytest.raises(TypeError):
-        first.nrt = True
+    run = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == str(_read(1)[0])

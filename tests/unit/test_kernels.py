@@ -1,4 +1,4 @@
-"""Each kernel is compiled for one set of types: a second one costs seconds at every first start."""
+"""What the interpreter enters: pieces of the engine, and the few kernels with which models are built."""
 
 import json
 import os
@@ -6,61 +6,22 @@ import subprocess
 import sys
 from pathlib import Path
 
-# In an interpreter of its own: other tests call kernels with arrays that the simulator never makes.
-SURVEY = """
-import importlib, json, pkgutil
+PROGRAM = """
+import gc, json
 from numba.core.registry import CPUDispatcher
-from bilayer_core.jit.inner_compiler import InnerFunction
-from planar_scenes import AHEAD, everything_in_plane
-from sample_scenes import contact, everything, layer, rod, scene
-from bilayer_core import Simulator, load_scene
-
-ribbons = [rod([layer()], name="a"), rod([layer(), layer("top")], name="b", start=(0, 0, 2.3e-3))]
-touching = scene(ribbons, contact=contact(coefficient=0.5), gravity=[0, 0, -10])
-def run(description, **settings):
-    simulator = Simulator(load_scene(description), **settings)
-    simulator.run(0.005)
-    return simulator
-
-for description in (everything(), everything(stations=7), scene([rod([layer()])]), touching):
-    for model in ("two_rod", "laminate"):
-        run(description, model=model, budget=True).frame()
-        run(description, model=model, tolerance=1e-3)
-for description in (everything_in_plane(AHEAD["oblique"]), scene([rod([layer()])]), touching):
-    for model in ("two_rod", "laminate"):
-        run(description, model=model, dimension=2, budget=True)
-run(scene([rod([layer(), layer("top")])])).solve_static()
-
-used = {}
-for part in ("kinematics", "contact", "forces", "solve", "integrate"):
-    package = importlib.import_module(f"bilayer_core.{part}")
-    for info in pkgutil.iter_modules(package.__path__):
-        for name, value in vars(importlib.import_module(f"bilayer_core.{part}.{info.name}")).items():
-            # what only kernels call is compiled within them
-            if isinstance(value, CPUDispatcher) and not isinstance(value, InnerFunction) and value.signatures:
-                if value.py_func.__module__.endswith(".band"):  # one for each half-bandwidth
-                    continue
-                used[f"{value.py_func.__module__}.{name}"] = len(value.signatures)
-print(json.dumps(used))
-"""
-
-PLAIN_RUN = """
-import importlib, json, pkgutil
-from bilayer_core.jit import KernelFunction
 from sample_scenes import everything
 from bilayer_core import Simulator, load_scene
+from bilayer_core.jit.piece import PIECES
 
-simulator = Simulator(load_scene(everything()), dt=1e-3)
+simulator = Simulator(load_scene(everything()), dt=1e-3, budget=True)
 simulator.run(0.003)
 simulator.contact_forces, simulator.curvatures
-entries = []
-for part in ("forces", "solve", "march"):
-    package = importlib.import_module(f"bilayer_core.{part}")
-    for info in pkgutil.iter_modules(package.__path__):
-        for name, value in vars(importlib.import_module(f"bilayer_core.{part}.{info.name}")).items():
-            if isinstance(value, KernelFunction) and value.signatures:
-                entries.append(name)
-print(json.dumps(entries))
+compiled = [
+    f"{of.py_func.__module__}.{of.py_func.__name__}"
+    for of in gc.get_objects()
+    if isinstance(of, CPUDispatcher) and of.py_func.__module__.startswith("bilayer_core") and of.signatures
+]
+print(json.dumps([sorted(compiled), sorted(name for name, of in PIECES.items() if of.seconds)]))
 """
 
 
@@ -71,11 +32,10 @@ def _printed_by(program):
     return json.loads(found.stdout)
 
 
-def test_a_run_in_a_loop_enters_no_other_kernels():
-    assert set(_printed_by(PLAIN_RUN)) == {"take_steps"}
-
-
-def test_scenes_of_all_kinds_use_one_specialisation_of_each_kernel():
-    used = _printed_by(SURVEY)
-    assert len(used) > 15
-    assert {name: count for name, count in used.items() if count > 1} == {}
+def test_a_run_with_compiled_kernels_compiles_nothing_and_loads_no_piece_that_it_does_not_need():
+    _printed_by(PROGRAM)  # compiles what is not in the cache
+    compiled, loaded = _printed_by(PROGRAM)
+    entries = {"bilayer_core.contact.broad_phase.near_pairs", "bilayer_core.forces.added_mass.fluid_momentum"}
+    assert set(compiled) <= entries
+    assert "assemble_in_space" in loaded and "make_step" in loaded
+    assert not {"assemble_in_plane", "add_elasticity_in_plane", "adapt", "factor_5"} & set(loaded)

@@ -1,0 +1,270 @@
+"""Where everything is: frames, and what bodies carry."""
+
+from __future__ import annotations
+
+from ..jit import call, kernel, piece
+from ..jit.record import Vector
+from ..kinematics.copying import copy, copy_matrix, copy_row
+from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
+from ..kinematics.turning import turn_between, turn_by, turn_further, turned_by
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Place
+
+
+@kernel
+def take_step(step, alpha, node_unknown, edge_unknown, position, turn, position_out, angle_out, turn_out):
+    """x + α δx of nodes, α δθ of edges and their turn since the start of the step."""
+    for i in range(node_unknown.shape[0]):
+        d = node_unknown[i]
+        for c in range(3):
+            position_out[i, c] = position[i, c] + alpha * step[d + c]
+    for k in range(edge_unknown.shape[0]):
+        angle = alpha * step[edge_unknown[k]]
+        angle_out[k] = angle
+        turn_out[k] = turn[k] + angle
+
+
+@kernel
+def second_director(tangent, director1, director2_out):
+    """m2 = t × m1."""
+    for k in range(tangent.shape[0]):
+        director2_out[k, 0] = tangent[k, 1] * director1[k, 2] - tangent[k, 2] * director1[k, 1]
+        director2_out[k, 1] = tangent[k, 2] * director1[k, 0] - tangent[k, 0] * director1[k, 2]
+        director2_out[k, 2] = tangent[k, 0] * director1[k, 1] - tangent[k, 1] * director1[k, 0]
+
+
+@kernel
+def carry_points(body, local, position, rotation, arm_out, place_out):
+    """X + R r of points r of bodies, and the arms R r [m]."""
+    for k in range(body.shape[0]):
+        b = body[k]
+        for i in range(3):
+            arm = rotation[b, i, 0] * local[k, 0] + rotation[b, i, 1] * local[k, 1] + rotation[b, i, 2] * local[k, 2]
+            arm_out[k, i] = arm
+            place_out[k, i] = position[b, i] + arm
+
+
+@kernel
+def carry_walls(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
+    """t and m1 of walls, edges from `first` on, turned with their bodies, and m2 = t × m1."""
+    for k in range(body.shape[0]):
+        b, w = body[k], first + k
+        for i in range(3):
+            tangent[w, i] = director1[w, i] = 0.0
+            for j in range(3):
+                tangent[w, i] += rotation[b, i, j] * local_tangent[k, j]
+                director1[w, i] += rotation[b, i, j] * local_director1[w, j]
+        director2[w, 0] = tangent[w, 1] * director1[w, 2] - tangent[w, 2] * director1[w, 1]
+        director2[w, 1] = tangent[w, 2] * director1[w, 0] - tangent[w, 0] * director1[w, 2]
+        director2[w, 2] = tangent[w, 0] * director1[w, 1] - tangent[w, 1] * director1[w, 0]
+
+
+@kernel
+def carry_turns(body, local, rotation, turn_out):
+    """R L of matrices L of bodies."""
+    for k in range(body.shape[0]):
+        b = body[k]
+        for i in range(3):
+            for j in range(3):
+                total = 0.0
+                for m in range(3):
+                    total += rotation[b, i, m] * local[k, m, j]
+                turn_out[k, i, j] = total
+
+
+@kernel
+def put_held(held, strands, at):
+    """Nodes and clamps' directions that bodies hold."""
+    carry_points(held.body, held.position, at.place, at.rotation, at.arm, at.held)
+    for k in range(held.node.shape[0]):
+        for c in range(3):
+            at.position[held.node[k], c] = at.held[k, c]
+    carry_walls(
+        held.wall_body,
+        held.wall_tangent,
+        held.wall_director1,
+        at.rotation,
+        strands.edge_count,
+        at.tangent,
+        at.director1,
+        at.director2,
+    )
+
+
+@kernel
+def put_surfaces(surfaces, at):
+    """Points of bodies and surfaces."""
+    if not surfaces.exists:
+        return
+    carry_points(surfaces.point_body, surfaces.point_position, at.place, at.rotation, at.point_arm, at.point)
+    carry_points(surfaces.body, surfaces.position, at.place, at.rotation, at.surface_arm, at.surface_place)
+    carry_turns(surfaces.body, surfaces.turn, at.rotation, at.surface_turn)
+
+
+@kernel
+def put_carried(bodies, held, surfaces, strands, at):
+    """What bodies carry, to where these are: free ones take their place in the list of all first."""
+    for f in range(bodies.body_of_free.shape[0]):
+        b = bodies.body_of_free[f]
+        copy_row(at.body_position, f, at.place, b)
+        copy_matrix(at.body_rotation, f, at.rotation, b)
+    put_held(held, strands, at)
+    put_surfaces(surfaces, at)
+
+
+@kernel
+def carry_frames(space, plane, strands, base, at, angle):
+    """Frames of `base`, carried to the present positions and turned by `angle` [rad]; in a plane those of positions."""
+    _carry_in_space(space, strands, base, at, angle)
+    _carry_in_plane(plane, strands, at)
+
+
+@kernel
+def _carry_in_space(space, strands, base, at, angle):
+    if not space.exists:
+        return
+    edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
+    transport_directors(
+        strands.edge_count,
+        base.tangent,
+        base.director1,
+        base.director2,
+        angle,
+        at.tangent,
+        at.director1,
+        at.director2,
+    )
+
+
+@kernel
+def _carry_in_plane(plane, strands, at):
+    if not plane.exists:
+        return
+    planar_frames(
+        at.position,
+        strands.edge_node,
+        plane.normal,
+        plane.side,
+        at.length,
+        at.tangent,
+        at.director1,
+        at.director2,
+    )
+
+
+@piece(int, Problem, Place)
+def place_carried(p, at):
+    """`put_carried`"""
+    put_carried(p.bodies, p.held, p.surfaces, p.strands, at)
+    return READY
+
+
+@piece(int, Problem, Place, Place, Vector)
+def place_frames(p, base, at, angle):
+    """`carry_frames`"""
+    carry_frames(p.space, p.plane, p.strands, base, at, angle)
+    return READY
+
+
+@kernel
+def copy_prescribed(bodies, source_place, source_rotation, at):
+    """Take the poses of prescribed bodies."""
+    for k in range(bodies.prescribed.shape[0]):
+        b = bodies.prescribed[k]
+        copy_row(source_place, b, at.place, b)
+        copy_matrix(source_rotation, b, at.rotation, b)
+
+
+@kernel
+def move(p, base, alpha, stage, at):
+    """Become `base` moved by α times the step in `System`."""
+    bodies, strands, step, body_step = p.bodies, p.strands, p.system.step, p.system.body_step
+    copy_prescribed(bodies, base.place, base.rotation, at)
+    take_step(
+        step,
+        alpha,
+        strands.node_unknown,
+        strands.edge_unknown,
+        base.position,
+        base.turn,
+        at.position,
+        at.angle,
+        at.turn,
+    )
+    for i in range(strands.node_unknown.shape[0]):
+        d = strands.node_unknown[i]
+        for c in range(3):
+            at.departure[i, c] = base.departure[i, c] + alpha * step[d + c]
+    for b in range(bodies.mass.shape[0]):
+        for c in range(3):
+            at.body_position[b, c] = base.body_position[b, c] + alpha * body_step[b, c]
+            at.body_departure[b, c] = base.body_departure[b, c] + alpha * body_step[b, c]
+        v0, v1, v2 = alpha * body_step[b, 3], alpha * body_step[b, 4], alpha * body_step[b, 5]
+        turn_by(v0, v1, v2, base.body_rotation, b, at.body_rotation, b)
+        turn_further(v0, v1, v2, base.body_turned, at.body_turned, b)
+    call(p.calls.place_carried, (p, at))
+    put_departure_of_held(p.held, stage, at)
+    call(p.calls.place_frames, (p, base, at, at.angle))
+
+
+@kernel
+def put_departure_of_held(held, stage, at):
+    """Departure of what bodies hold: that of a free body, and of the arm R̃ r with it; a prescribed one has digits to
+    spare, because its inertia moves nothing.
+    """
+    for k in range(held.node.shape[0]):
+        f, i = held.free[k], held.node[k]
+        if f < 0:
+            for c in range(3):
+                at.departure[i, c] = at.position[i, c] - stage.predicted_position[i, c]
+            continue
+        u = stage.held_arm[k, 0], stage.held_arm[k, 1], stage.held_arm[k, 2]
+        turned = turned_by(at.body_turned, f, u[0], u[1], u[2])
+        for c in range(3):
+            at.departure[i, c] = at.body_departure[f, c] + turned[c] + stage.held_lag[k, c]
+
+
+@kernel
+def clear_departure(at):
+    """Be where inertia takes everything."""
+    at.departure[:] = 0.0
+    at.body_departure[:] = 0.0
+    at.body_turned[:] = 0.0
+
+
+@kernel
+def measure_departure(bodies, stage, at):
+    """Departure of a configuration that was not moved from where inertia takes everything: to last digits of its
+    positions.
+    """
+    for i in range(at.position.shape[0]):
+        for c in range(3):
+            at.departure[i, c] = at.position[i, c] - stage.predicted_position[i, c]
+    for f in range(bodies.mass.shape[0]):
+        for c in range(3):
+            at.body_departure[f, c] = at.body_position[f, c] - stage.predicted_body_position[f, c]
+            at.body_turned[f, c] = 0.0
+        x, y, z = turn_between(stage.predicted_body_rotation, f, at.body_rotation, f)
+        turn_further(x, y, z, at.body_turned, at.body_turned, f)
+
+
+@kernel
+def take_state(p, state, at):
+    """Start from a state."""
+    bodies, strands = p.bodies, p.strands
+    copy(state.position, at.position)
+    clear_departure(at)
+    for k in range(strands.edge_count):
+        at.turn[k] = 0.0
+        for c in range(3):
+            at.director1[k, c] = state.director1[k, c]
+    for k in range(state.twist.shape[0]):
+        at.joint_strain[k, 2] = state.twist[k]
+    for f in range(bodies.mass.shape[0]):
+        copy_row(state.body_position, bodies.body_of_free[f], at.body_position, f)
+        copy_matrix(state.body_rotation, bodies.body_of_free[f], at.body_rotation, f)
+    copy_prescribed(bodies, state.body_position, state.body_rotation, at)
+    call(p.calls.place_carried, (p, at))
+    edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
+    second_director(at.tangent, at.director1, at.director2)

@@ -1,0 +1,32 @@
+"""Addresses of the pieces that a problem needs: of its dimension, its half-bandwidth, and of what touches what."""
+
+from __future__ import annotations
+
+from ..jit.piece import PIECES
+from ..model.model import Model
+from ..model.records.problem import Calls
+from .linear.widths import NAMES, addresses_for
+
+IN_SPACE = {"assemble_in_space"}
+IN_PLANE = {"assemble_in_plane", "gradient_in_plane", "step_in_plane"}
+OF_BODIES = {"assemble_bodies", "restrict_bodies"}
+OF_BORDER = {"factor_border", "solve_bordered"}
+OF_SURFACES = {"bound_at_surfaces"}
+OF_RODS = {"bound_between_rods_of", "find_rod_contacts", "take_rod_contacts", "move_to_border"}
+OF_FRICTION = {"where_friction_holds"}
+
+
+def calls_of(model: Model) -> Calls:
+    """Addresses for a model; 0 for what it does not need."""
+    rods, friction = model.rod_surfaces is not None, model.scene.contact and model.scene.contact.friction
+    skipped = IN_SPACE if model.plane is not None else IN_PLANE
+    skipped = skipped | (OF_BODIES if model.free_count == 0 else set())
+    skipped |= OF_BORDER if model.free_count == 0 and not rods else set()
+    skipped |= set() if model.meets_surfaces else OF_SURFACES
+    skipped |= set() if rods else OF_RODS
+    skipped |= set() if friction and friction.acts else OF_FRICTION
+    pieces = {name for name in Calls.names if name not in NAMES}
+    return Calls(
+        **{name: 0 if name in skipped else PIECES[name].address for name in pieces},
+        **addresses_for(model.solved_layout.half_bandwidth),
+    )

@@ -1,0 +1,197 @@
+"""L D Lᵀ of a symmetric band matrix, and solution for one or several right-hand sides.
+
+Storage is by columns of the lower triangle: ``band[j, r] = A[j + r, j]``, 0 ≤ r ≤ half-bandwidth, with as many rows
+of padding at the end as the half-bandwidth. It is given as the length of a tuple, which is a compile-time constant:
+inner loops have fixed lengths. Cost: n b² and 4 n b per right-hand side.
+"""
+
+from __future__ import annotations
+
+from ...jit import kernel
+from ...jit.stack import stack_vector
+
+
+def width(half_bandwidth: int) -> tuple[int, ...]:
+    """A half-bandwidth as the functions below take it."""
+    return (0,) * half_bandwidth
+
+
+@kernel
+def factor_band(band, n, bandwidth):
+    """Factorise in place; return −1, or the first column whose pivot is not positive."""
+    b = len(bandwidth)
+    for j in range(n):
+        pivot = band[j, 0]
+        if not pivot > 0.0:
+            return j
+        inverse = 1.0 / pivot
+        for r in range(1, b + 1):
+            multiplier = band[j, r] * inverse
+            for s in range(r, b + 1):
+                band[j + r, s - r] -= multiplier * band[j, s]
+        for r in range(1, b + 1):
+            band[j, r] *= inverse
+    return -1
+
+
+@kernel
+def factor_signed(band, n, bandwidth):
+    """Factorise a matrix that need not be positive definite, in place; return the number of its negative pivots, which
+    is that of negative eigenvalues (Sylvester's law of inertia).
+    """
+    b = len(bandwidth)
+    negative = 0
+    for j in range(n):
+        pivot = band[j, 0]
+        negative += pivot < 0.0
+        inverse = 1.0 / pivot
+        for r in range(1, b + 1):
+            multiplier = band[j, r] * inverse
+            for s in range(r, b + 1):
+                band[j + r, s - r] -= multiplier * band[j, s]
+        for r in range(1, b + 1):
+            band[j, r] *= inverse
+    return negative
+
+
+@kernel
+def forward_band(band, n, bandwidth, right):
+    """Overwrite `right`, of n + b values whose last b are zero, with L⁻¹ times it.
+
+    The last b found are kept in registers: they would not be in memory in time for the next. (Each moves on where it is
+    used: a loop for that alone would become one move in memory.)
+    """
+    b = len(bandwidth)
+    found = stack_vector(bandwidth)
+    for j in range(b):
+        for r in range(1, b - j):
+            right[j + r] -= band[j, r] * right[j]
+        found[b - 1 - j] = right[j]
+    for first in range(n - b):
+        value = right[first + b]
+        for r in range(b - 1, 0, -1):
+            value -= band[first + b - 1 - r, r + 1] * found[r]
+            found[r] = found[r - 1]
+        value -= band[first + b - 1, 1] * found[0]
+        found[0] = value
+        right[first + b] = value
+
+
+@kernel
+def backward_band(band, n, bandwidth, right):
+    """Overwrite the first n values of `right` with (D Lᵀ)⁻¹ times them."""
+    b = len(bandwidth)
+    found = stack_vector(bandwidth)
+    for r in range(b):
+        found[r] = 0.0
+    for j in range(n - 1, -1, -1):
+        value = right[j] / band[j, 0]
+        for r in range(b - 1, 0, -1):  # what was found last is needed last
+            value -= band[j, r + 1] * found[r]
+            found[r] = found[r - 1]
+        value -= band[j, 1] * found[0]
+        found[0] = value
+        right[j] = value
+
+
+@kernel
+def solve_band(band, n, bandwidth, right):
+    """Overwrite `right`, of n + b values whose last b are zero, with the solution of the factorised system."""
+    forward_band(band, n, bandwidth, right)
+    backward_band(band, n, bandwidth, right)
+
+
+@kernel
+def eliminate_band(band, n, b, m, border, scaled_out, corner):
+    """Eliminate the factorised band A = L D Lᵀ from a matrix with m more columns and rows,
+
+        [ A   U ]
+        [ Uᵀ  C ]
+
+    Parameters
+    ----------
+    b, m : int
+        Half-bandwidth of A, and number of columns.
+    border : Array
+        U by columns, shape (≥ m, n + b), zeros at the end; overwritten with L⁻¹ U.
+    scaled_out : Array
+        Written: D⁻¹ L⁻¹ U, shape (≥ m, n + b).
+    corner : Array
+        C, shape (≥ m, ≥ m); overwritten with the Schur complement C − Uᵀ A⁻¹ U.
+
+    Notes
+    -----
+    With z = L⁻¹ r, the solution for a right-hand side (r, s) is y = S⁻¹ (s − (D⁻¹ L⁻¹ U)ᵀ z) and
+    x = (D Lᵀ)⁻¹ (z − (L⁻¹ U) y), S being the Schur complement. Most of U is zero, and so is much of L⁻¹ U: a column
+    begins where U does, and blocks of A that it does not touch stay zero.
+    """
+    for a in range(m):
+        begin, end = n, 0
+        for j in range(n):
+            value = border[a, j]
+            scaled_out[a, j] = value / band[j, 0]
+            if value == 0.0:
+                continue
+            begin, end = min(begin, j), j + 1
+            for r in range(1, b + 1):
+                border[a, j + r] -= band[j, r] * value
+        for c in range(a + 1):
+            total = 0.0
+            for j in range(begin, end):
+                total += scaled_out[a, j] * border[c, j]
+            corner[a, c] -= total
+            if c < a:
+                corner[c, a] -= total
+
+
+@kernel
+def factor_any(band, n):
+    """`factor_band` for a half-bandwidth that only the band knows."""
+    b = band.shape[1] - 1
+    for j in range(n):
+        pivot = band[j, 0]
+        if not pivot > 0.0:
+            return j
+        _eliminate_column(band, j, b, 1.0 / pivot)
+    return -1
+
+
+@kernel
+def count_any(band, n):
+    """`factor_signed` for a half-bandwidth that only the band knows."""
+    b, negative = band.shape[1] - 1, 0
+    for j in range(n):
+        pivot = band[j, 0]
+        negative += pivot < 0.0
+        _eliminate_column(band, j, b, 1.0 / pivot)
+    return negative
+
+
+@kernel
+def _eliminate_column(band, j, b, inverse):
+    for r in range(1, b + 1):
+        multiplier = band[j, r] * inverse
+        for s in range(r, b + 1):
+            band[j + r, s - r] -= multiplier * band[j, s]
+    for r in range(1, b + 1):
+        band[j, r] *= inverse
+
+
+@kernel
+def forward_any(band, n, right):
+    """`forward_band` for a half-bandwidth that only the band knows."""
+    for j in range(n):
+        for r in range(1, band.shape[1]):
+            right[j + r] -= band[j, r] * right[j]
+    for j in range(n, right.shape[0]):
+        right[j] = 0.0
+
+
+@kernel
+def backward_any(band, n, right):
+    """`backward_band` for a half-bandwidth that only the band knows."""
+    for j in range(n - 1, -1, -1):
+        value = right[j] / band[j, 0]
+        for r in range(1, band.shape[1]):
+            value -= band[j, r] * right[j + r]
+        right[j] = value

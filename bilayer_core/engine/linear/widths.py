@@ -1,0 +1,104 @@
+"""The band solver as pieces, one set for each half-bandwidth that models have, and one for any other.
+
+With the half-bandwidth known to the compiler inner loops have fixed lengths, and what the next row needs stays in
+registers: for 200 nodes in space two to three times as fast as the set for any width.
+"""
+
+from __future__ import annotations
+
+from ...jit import piece
+from ...jit.piece import Piece
+from ...jit.record import Matrix, Vector
+from ...model.layout import HALF_BANDWIDTH
+from ...model.records.problem import Wide
+from ...model.records.status import READY
+from .band import (
+    backward_any,
+    backward_band,
+    count_any,
+    eliminate_band,
+    factor_any,
+    factor_band,
+    factor_signed,
+    forward_any,
+    forward_band,
+    width,
+)
+
+NAMES = ("factor_band", "count_band", "forward_band", "backward_band", "eliminate_band")
+KNOWN = tuple(sorted({b for of_layers in HALF_BANDWIDTH.values() for b in of_layers.values()}))
+"""Half-bandwidths that have a set of their own."""
+
+
+def _declare(function, suffix: str, result: type, *arguments) -> Piece:
+    function.__name__ = f"{function.__name__}_{suffix}"
+    return piece(result, *arguments)(function)
+
+
+def _of_width(half_bandwidth: int) -> dict[str, Piece]:
+    """The set for a half-bandwidth."""
+    bandwidth, suffix = width(half_bandwidth), str(half_bandwidth)
+
+    def factor(band, n):
+        return factor_band(band, n, bandwidth)
+
+    def count(band, n):
+        return factor_signed(band, n, bandwidth)
+
+    def forward(band, n, right):
+        forward_band(band, n, bandwidth, right)
+        return READY
+
+    def backward(band, n, right):
+        backward_band(band, n, bandwidth, right)
+        return READY
+
+    def eliminate(band, n, wide):
+        eliminate_band(band, n, half_bandwidth, wide.width[0], wide.border, wide.scaled, wide.schur)
+        return READY
+
+    return _set(factor, count, forward, backward, eliminate, suffix)
+
+
+def _set(factor, count, forward, backward, eliminate, suffix: str) -> dict[str, Piece]:
+    pieces = (
+        _declare(factor, suffix, int, Matrix, int),
+        _declare(count, suffix, int, Matrix, int),
+        _declare(forward, suffix, int, Matrix, int, Vector),
+        _declare(backward, suffix, int, Matrix, int, Vector),
+        _declare(eliminate, suffix, int, Matrix, int, Wide),
+    )
+    return dict(zip(NAMES, pieces, strict=True))
+
+
+def _of_any_width() -> dict[str, Piece]:
+    """The set that takes the half-bandwidth from the band itself."""
+
+    def factor(band, n):
+        return factor_any(band, n)
+
+    def count(band, n):
+        return count_any(band, n)
+
+    def forward(band, n, right):
+        forward_any(band, n, right)
+        return READY
+
+    def backward(band, n, right):
+        backward_any(band, n, right)
+        return READY
+
+    def eliminate(band, n, wide):
+        eliminate_band(band, n, band.shape[1] - 1, wide.width[0], wide.border, wide.scaled, wide.schur)
+        return READY
+
+    return _set(factor, count, forward, backward, eliminate, "any")
+
+
+_SETS = {half_bandwidth: _of_width(half_bandwidth) for half_bandwidth in KNOWN}
+_ANY = _of_any_width()
+
+
+def addresses_for(half_bandwidth: int) -> dict[str, int]:
+    """Addresses of the set for a half-bandwidth, by the names of their fields in `problem.Calls`."""
+    return {name: found.address for name, found in _SETS.get(half_bandwidth, _ANY).items()}

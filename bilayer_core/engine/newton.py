@@ -1,0 +1,409 @@
+"""Newton's method on the incremental potential, with line search and a step bound.
+
+The Hessian is exact. Once factorised it serves several corrections as long as each is less than `KEEP_FACTOR_BELOW`
+times the one before;
+a new correction of the gradient at hand costs a fraction of a new factorisation. The measure of convergence is the
+speed of the fastest material point in the last of them [m/s], which is still taken.
+What the potential takes at the configuration (`potential.follow`) moves along with every correction.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..contact.near import largest_motion
+from ..contact.step_bound import step_bound
+from ..forces.rod_term import bound_between_rods
+from ..forces.surface_term import list_pairs
+from ..jit import call, kernel, piece
+from ..jit.record import Matrix, Stack
+from ..kinematics.copying import copy
+from ..kinematics.turning import turn_between, turn_by, turn_further
+from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS, SWAPPED
+from ..model.records.problem import Problem
+from ..model.records.status import (
+    BLOCKED,
+    CONVERGED,
+    LINE_SEARCH,
+    MAX_ITERATIONS,
+    NO_ROOM_FOR_RODS,
+    NOT_FINITE,
+    READY,
+)
+from ..model.records.step import Place, Stage
+from .configuration import copy_prescribed, move, put_departure_of_held
+from .linear.newton_matrix import factorise, solve
+from .modes import NEGATIVE, VALUE
+from .potential import evaluate, follow
+
+ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 2006, ch. 3)
+KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
+BACKTRACKING = 0.5
+MAX_BACKTRACKS = 30
+ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the potential below it mean nothing
+
+
+@kernel
+def largest_move(step, node_unknown, edge_unknown, half_width):
+    """Largest displacement of a node, or of an edge's border by its turn [m]; NaN if any is."""
+    largest, total = 0.0, 0.0
+    for i in range(node_unknown.shape[0]):
+        d = node_unknown[i]
+        square = step[d] * step[d] + step[d + 1] * step[d + 1] + step[d + 2] * step[d + 2]
+        total += square
+        largest = max(largest, square)
+    largest = math.sqrt(largest)
+    for k in range(edge_unknown.shape[0]):
+        size = abs(step[edge_unknown[k]]) * half_width[k]
+        total += size
+        largest = max(largest, size)
+    return total if math.isnan(total) else largest
+
+
+@kernel
+def correction_speed(strands, bodies, system, length):
+    """Largest displacement of a material point in the present step over a length of time [m/s]; NaN if any is."""
+    largest = largest_move(system.step, strands.node_unknown, strands.edge_unknown, strands.half_width)
+    for f in range(bodies.mass.shape[0]):
+        shift, turn = 0.0, 0.0
+        for c in range(3):
+            shift += system.body_step[f, c] * system.body_step[f, c]
+            turn += system.body_step[f, 3 + c] * system.body_step[f, 3 + c]
+        size = math.sqrt(shift) + bodies.reach[bodies.body_of_free[f]] * math.sqrt(turn)
+        if math.isnan(size):
+            return size
+        largest = max(largest, size)
+    return largest / length
+
+
+@kernel
+def rounding_speed(at, length):
+    """Speed of a correction that moves the node farthest out by a few of its last digits over a length of time [m/s].
+
+    Elasticity sees positions no better than that, so Newton cannot do better where it outweighs inertia.
+    """
+    farthest = 0.0
+    for i in range(at.position.shape[0]):
+        for c in range(3):
+            farthest = max(farthest, abs(at.position[i, c]))
+    return LAST_DIGITS * farthest / length
+
+
+LAST_DIGITS = 4.0 * 2.0**-52
+"""Relative error of a coordinate by four units of its last digit."""
+
+
+@kernel
+def bound(p, at):
+    """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open, the near pair that sets it
+    (−1: none), and whether that could be found.
+    """
+    _move_held(p.held, p.system, at)
+    fraction, pair, status = 1.0, -1, READY
+    if p.surfaces.exists:
+        fraction = call(p.calls.bound_at_surfaces, (p, at))
+        pair, status = p.outcome.counts[PAIR], p.outcome.counts[STATUS]
+    if status != READY or not p.threads.exists:
+        return fraction, pair, status
+    between = call(p.calls.bound_between_rods_of, (p, at))
+    status = p.outcome.counts[STATUS]
+    if between < fraction:
+        return between, -1, status
+    return fraction, pair, status
+
+
+@kernel
+def _bound_at_surfaces(surfaces, bodies, system, at):
+    if not surfaces.exists:
+        return 1.0, -1, READY
+    motion = _motion_at_surfaces(surfaces, bodies, system)
+    status, anew = list_pairs(surfaces, at, motion)
+    if status != READY:
+        return 0.0, -1, status
+    if anew:
+        motion = _motion_at_surfaces(surfaces, bodies, system)  # extents of surfaces are those of the list
+    fraction, pair = step_bound(
+        surfaces.near_count[0],
+        surfaces.near_carrier,
+        surfaces.near_surface,
+        at.carrier,
+        surfaces.radius,
+        surfaces.follows,
+        system.node_step,
+        surfaces.kind,
+        surfaces.size,
+        surfaces.rounding,
+        at.surface_place,
+        at.surface_turn,
+        surfaces.body,
+        at.place,
+        system.motion,
+        motion,
+    )
+    return fraction, pair, READY
+
+
+@kernel
+def _motion_at_surfaces(surfaces, bodies, system):
+    return largest_motion(
+        system.node_step, surfaces.node_free, system.motion, bodies.reach, surfaces.body, surfaces.extent
+    )
+
+
+@piece(float, Problem, Place)
+def bound_at_surfaces(p, at):
+    """`bound` by surfaces; the pair and the status are left in `Outcome`."""
+    counts = p.outcome.counts
+    fraction, counts[PAIR], counts[STATUS] = _bound_at_surfaces(p.surfaces, p.bodies, p.system, at)
+    return fraction
+
+
+@piece(float, Problem, Place)
+def bound_between_rods_of(p, at):
+    """`bound` by other rods; the status is left in `Outcome`."""
+    fraction, listed = bound_between_rods(p.threads, p.strands, p.system, at)
+    p.outcome.counts[STATUS] = READY if listed else NO_ROOM_FOR_RODS
+    return fraction
+
+
+@kernel
+def _move_held(held, system, at):
+    """Displacements of nodes that bodies hold."""
+    for k in range(held.node.shape[0]):
+        i, b = held.node[k], held.body[k]
+        r0, r1, r2 = system.motion[b, 3], system.motion[b, 4], system.motion[b, 5]
+        system.node_step[i, 0] = system.motion[b, 0] + r1 * at.arm[k, 2] - r2 * at.arm[k, 1]
+        system.node_step[i, 1] = system.motion[b, 1] + r2 * at.arm[k, 0] - r0 * at.arm[k, 2]
+        system.node_step[i, 2] = system.motion[b, 2] + r0 * at.arm[k, 1] - r1 * at.arm[k, 0]
+
+
+@kernel
+def _move_prescribed(bodies, start, position, rotation, motion):
+    """Displacements and rotation vectors of prescribed bodies from a configuration to the given poses of all."""
+    for k in range(bodies.prescribed.shape[0]):
+        b = bodies.prescribed[k]
+        for c in range(3):
+            motion[b, c] = position[b, c] - start.place[b, c]
+            motion[b, 3 + c] = 0.0
+        if bodies.turns[b]:
+            motion[b, 3], motion[b, 4], motion[b, 5] = turn_between(start.rotation, b, rotation, b)
+
+
+@kernel
+def first_guess(p, start, position, rotation, stage, guess, whole):
+    """Set `guess` to `start` moved to where inertia takes it, or as far as no gap closes, prescribed bodies to given
+    poses.
+
+    Returns a status: `BLOCKED` with the blocking pair if prescribed motion would close a gap, or, where the `whole` way
+    is asked for, if it cannot be gone.
+    """
+    bodies, system = p.bodies, p.system
+    free = bodies.mass.shape[0]
+    _move_prescribed(bodies, start, position, rotation, system.motion)
+    fraction, pair = 1.0, -1
+    for attempt in range(3):
+        for f in range(free):
+            b = bodies.body_of_free[f]
+            for c in range(3):
+                system.motion[b, c] = fraction * stage.body_way[f, c]
+                system.motion[b, 3 + c] = fraction * stage.body_turn[f, c]
+        for i in range(system.node_step.shape[0]):
+            for c in range(3):
+                system.node_step[i, c] = fraction * stage.way[i, c]
+        alpha, pair, status = bound(p, start)
+        if status != READY:
+            return status, -1
+        if alpha >= 1.0:
+            break
+        if attempt == 2 or whole:
+            return BLOCKED, pair
+        fraction *= (0.5 if attempt == 0 else 0.0) * alpha
+    for i in range(system.node_step.shape[0]):
+        for c in range(3):
+            guess.position[i, c] = start.position[i, c] + fraction * stage.way[i, c]
+            guess.departure[i, c] = (fraction - 1.0) * stage.way[i, c]
+    for k in range(p.strands.edge_count):
+        guess.turn[k] = fraction * stage.predicted_turn[k]
+    copy_prescribed(bodies, position, rotation, guess)
+    for f in range(free):
+        for c in range(3):
+            guess.body_position[f, c] = start.body_position[f, c] + fraction * stage.body_way[f, c]
+            guess.body_departure[f, c] = (fraction - 1.0) * stage.body_way[f, c]
+            guess.body_turned[f, c] = 0.0
+        turn_by(
+            fraction * stage.body_turn[f, 0],
+            fraction * stage.body_turn[f, 1],
+            fraction * stage.body_turn[f, 2],
+            start.body_rotation,
+            f,
+            guess.body_rotation,
+            f,
+        )
+        short = fraction - 1.0
+        turn_further(
+            short * stage.body_turn[f, 0],
+            short * stage.body_turn[f, 1],
+            short * stage.body_turn[f, 2],
+            guess.body_turned,
+            guess.body_turned,
+            f,
+        )
+    call(p.calls.place_carried, (p, guess))
+    put_departure_of_held(p.held, stage, guess)
+    call(p.calls.place_frames, (p, start, guess, guess.turn))
+    for k in range(stage.twist.shape[0]):
+        guess.joint_strain[k, 2] = stage.twist[k]
+    return READY, -1
+
+
+FACTORISE, FOLLOW, SEARCH = 0, 1, 2
+"""What an evaluation is for: a new matrix, a gradient in which only what follows the configuration has changed, a step
+of the line search."""
+
+
+@kernel
+def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
+    """Move `at` to the minimum of the potential, or only do there what is `wanted` (`modes`); `trial` is scratch.
+
+    All evaluations are at one place, because the compiler would make as many copies of them as there are places. Where
+    a new matrix is likely to be needed at the end of a step, it is evaluated with second derivatives at once.
+
+    The correction that is small enough is the last one, and it is taken, as far as gaps stay open: a linear problem is
+    solved exactly, however slow the motion. The potential is not evaluated again after it. Energies, forces and gaps
+    are those of the configuration before it, which is nearer than the tolerance times the length of the stage.
+
+    Returns
+    -------
+    status : int
+    swapped : bool
+        Whether the minimum is `trial` and not `at`.
+    iterations, factorisations, backtracks : int
+    residual : float
+        Speed of the last correction [m/s].
+    gap : float
+        Smallest gap to a surface or another rod [m].
+    """
+    follow(p, at, stage)
+    swapped, fresh, bounded, short, task = False, True, False, False, FACTORISE
+    settled = False  # whether what is left to do is the last correction
+    found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
+    iterations = factorisations = backtracks = halvings = 0
+    residual = previous = gap = math.inf
+    energy = alpha = slope = noise = 0.0
+    while True:
+        if task == SEARCH:
+            move(p, at, alpha, stage, trial)
+            if settled:
+                copy(at.joint_strain, trial.joint_strain)  # twists, by which turns are counted, are near enough
+                swapped, status = not swapped, CONVERGED
+                break
+            found, curved = False, short or factorisations > 1
+        if task != FACTORISE or not curved:
+            place = trial if task == SEARCH else at
+            if not found and p.threads.exists and not call(p.calls.find_rod_contacts, (p, place)):
+                status = NO_ROOM_FOR_RODS
+                break
+            found, curved = True, curved or task == FACTORISE and wanted != VALUE
+            value, new_gap = evaluate(p, place, stage, curved, task == FOLLOW)
+            if wanted == VALUE:
+                gap, status = new_gap, CONVERGED
+                break
+        if task == SEARCH:
+            if not value <= energy + ARMIJO * alpha * slope + noise:
+                alpha *= BACKTRACKING
+                halvings += 1
+                if halvings < MAX_BACKTRACKS:
+                    continue
+                if fresh:
+                    status = LINE_SEARCH
+                    break
+                found, curved, task = False, False, FACTORISE  # a direction of an old matrix: try that of a new one
+                continue
+            energy, gap = value, new_gap
+            backtracks += halvings + bounded
+            iterations += not fresh
+            fresh, previous = False, residual
+            at, trial, swapped = trial, at, not swapped
+            if follow(p, at, stage):
+                curved, task = False, FOLLOW
+            if short or halvings > 0:
+                task = FACTORISE
+            if task != SEARCH:
+                continue
+        else:
+            energy, gap = value, gap if task == FOLLOW else new_gap
+            if task == FACTORISE:
+                if factorisations == 0 and not math.isfinite(energy):
+                    status = NOT_FINITE
+                    break
+                factorisations += 1
+                status, _, _ = factorise(p, at, stage, wanted == NEGATIVE)
+                if wanted == NEGATIVE and status == READY:
+                    status = CONVERGED
+                if status != READY:
+                    break
+                iterations += 1
+                fresh = True
+        solve(p)
+        residual = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
+        if not math.isfinite(residual):
+            status = NOT_FINITE
+            break
+        settled = residual <= tolerance or residual <= rounding_speed(at, stage.lengths[0])
+        if not settled and iterations >= max_iterations:
+            status = MAX_ITERATIONS
+            break
+        if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:
+            task = FACTORISE
+            continue
+        slope, noise = look_ahead(p.strands, p.bodies, p.sums, p.system)
+        alpha, _, status = bound(p, at)
+        if status != READY:
+            break
+        bounded, halvings, task = alpha < 1.0, 0, SEARCH
+        if fresh and not settled and p.slips.exists:
+            alpha = call(p.calls.where_friction_holds, (p, at, stage, slope, alpha))
+        short = alpha < 1.0
+    return status, swapped, iterations, factorisations, backtracks, residual, gap
+
+
+@kernel
+def look_ahead(strands, bodies, sums, system):
+    """Slope of the potential along the present step, and the difference below which its values mean nothing [J]; the
+    motion of nodes and bodies is left for the bound.
+    """
+    slope, noise = 0.0, 0.0
+    for j in range(system.step.shape[0]):
+        slope += sums.gradient[j] * system.step[j]
+    for f in range(bodies.mass.shape[0]):
+        for c in range(6):
+            slope += sums.body[f, c] * system.body_step[f, c]
+            system.motion[bodies.body_of_free[f], c] = system.body_step[f, c]
+    for k in range(sums.energy.shape[0]):
+        noise += abs(sums.energy[k])
+    for k in range(bodies.prescribed.shape[0]):
+        for c in range(6):
+            system.motion[bodies.prescribed[k], c] = 0.0
+    for i in range(strands.node_unknown.shape[0]):
+        for c in range(3):
+            system.node_step[i, c] = system.step[strands.node_unknown[i] + c]
+    return slope, ROUNDING * noise
+
+
+@piece(int, Problem, Place, Matrix, Stack, Stage, Place, bool)
+def first_guess_of(p, start, position, rotation, stage, guess, whole):
+    """`first_guess`; the pair is left in `Outcome`."""
+    status, p.outcome.counts[PAIR] = first_guess(p, start, position, rotation, stage, guess, whole)
+    return status
+
+
+@piece(int, Problem, Place, Place, Stage, float, int, int)
+def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
+    """`minimise`; all but the status is left in `Outcome`."""
+    counts, figures = p.outcome.counts, p.outcome.figures
+    status, swapped, iterations, factorisations, backtracks, residual, gap = minimise(
+        p, at, trial, stage, tolerance, max_iterations, wanted
+    )
+    counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
+    counts[BACKTRACKS], figures[RESIDUAL], figures[GAP] = backtracks, residual, gap
+    return status

@@ -1,0 +1,139 @@
+"""The incremental potential: the sum of the forces that act."""
+
+from __future__ import annotations
+
+import math
+
+from numba import types
+
+from ..forces.surface_term import clear_contact, hand_on_contact
+from ..jit import call, caller, kernel, piece
+from ..kinematics.copying import copy
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Place, Stage
+from .linear.assembly import expand_gradient
+from .linear.attachments import hand_gradient_to_bodies
+
+
+def _signature(result, *more):
+    """Of a piece of a force, which takes its own record first."""
+    records = (record.numba_type() for record in (Problem, Place, Stage))
+    return result(types.int64, *records, *more)
+
+
+call_add = caller("a force", lambda _: _signature(types.float64, types.boolean))
+call_start = caller("the start of a force", lambda _: _signature(types.int64))
+call_follow = caller("a force that follows", lambda _: _signature(types.boolean))
+
+
+@kernel
+def start_stage(p, start, stage):
+    """Freeze what a stage depends on: near pairs, friction's contacts, loads. Returns whether it can go on."""
+    forces = p.forces
+    for k in range(forces.start.shape[0]):
+        if forces.start[k] != 0:
+            status = call_start(forces.start[k], (forces.own[k], p, start, stage))
+            if status != READY:
+                return status
+    return READY
+
+
+@kernel
+def follow(p, at, stage):
+    """Let forces take from a configuration what they hold fixed between moves; whether any does."""
+    forces, moved = p.forces, False
+    for k in range(forces.lasting, forces.follow.shape[0]):
+        moved |= call_follow(forces.follow[k], (forces.own[k], p, at, stage))
+    return moved
+
+
+@kernel
+def evaluate(p, at, stage, with_hessian, again):
+    """Potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface or a rod [m].
+
+    Gradients always, second derivatives on request, are left in `Sums`. The contacts of rods are those found last. With
+    `again` the configuration is that of the last evaluation, and only what `follow` has changed since is found anew,
+    without second derivatives and the gap.
+    """
+    gap = add_forces(p, at, stage, with_hessian, again)
+    call(p.calls.expand_to_unknowns, (p, at))
+    energy = 0.0
+    for k in range(p.sums.energy.shape[0]):
+        energy += p.sums.energy[k]
+    return energy, gap
+
+
+@kernel
+def add_forces(p, at, stage, with_hessian, again):
+    """Energies and first derivatives by nodes, edges, pairs and bodies, second ones on request; parameters as for
+    `evaluate`. Returns the smallest gap [m].
+    """
+    forces, sums = p.forces, p.sums
+    count, gap = forces.add.shape[0], math.inf
+    if again:
+        copy(sums.lasting, sums.first)
+    else:
+        sums.energy[:] = 0.0
+        sums.first[:] = 0.0
+        if with_hessian:
+            sums.second[:] = 0.0
+            sums.links[0] = 0
+        clear_contact(p.meets, sums)
+    for k in range(forces.lasting if again else 0, count):
+        if k == forces.lasting and not again:
+            _keep_lasting(p)
+        gap = min(gap, call_add(forces.add[k], (forces.own[k], p, at, stage, with_hessian)))
+    if forces.lasting == count and not again:
+        hand_on_contact(p.meets, p.bodies, sums)
+    return gap
+
+
+@kernel
+def _keep_lasting(p):
+    """Keep what stays as it is when other parts follow the configuration."""
+    hand_on_contact(p.meets, p.bodies, p.sums)
+    copy(p.sums.first, p.sums.lasting)
+
+
+@kernel
+def expand(p, at):
+    """First derivatives from nodes, edges, pairs and bodies to the unknowns."""
+    held, strands, sums = p.held, p.strands, p.sums
+    _expand_edges(p.bonds, strands, sums)
+    hand_gradient_to_bodies(
+        held.unknown,
+        held.free,
+        at.arm,
+        held.wall_free,
+        at.tangent,
+        sums.edge,
+        strands.edge_count,
+        sums.gradient,
+        sums.attached,
+        sums.body,
+    )
+
+
+@kernel
+def _expand_edges(bonds, strands, sums):
+    top = bonds.top
+    bottom = bonds.bottom
+    expand_gradient(
+        strands.edge_node,
+        strands.node_unknown,
+        strands.edge_unknown,
+        top,
+        bottom,
+        sums.edge,
+        sums.pair,
+        sums.node,
+        sums.gradient,
+    )
+
+
+@piece(int, Problem, Place)
+def expand_to_unknowns(p, at):
+    """`expand`"""
+    expand(p, at)
+    return READY

@@ -1,1 +1,0 @@
-"""Time stepping: integrators, control of the step, and the `Simulator`."""

@@ -1,0 +1,1 @@
+"""Time integrators: tables of coefficients, one file each."""

@@ -1,0 +1,99 @@
+"""Where compiled code is kept: a folder named by the content of everything that can be compiled into it.
+
+numba looks at the file of the function that it compiled, not at those of the functions that this calls. So the folder's
+name is a fingerprint of every source that holds kernels, of numba, llvmlite, numpy and Python, of numba's settings, and
+of the processor: after an edit or an update the folder is another, and nothing of yesterday's code runs.
+
+The folders are in ``NUMBA_CACHE_DIR`` or else in the user's cache directory; those that no process has used for
+`DAYS_KEPT` days are deleted. ``BILAYER_JIT_CACHE=0`` keeps nothing.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import shutil
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+import llvmlite
+import llvmlite.binding
+import numba
+import numpy as np
+from platformdirs import user_cache_path
+
+PACKAGE = Path(__file__).resolve().parents[1]
+FOLDERS = ("jit", "kinematics", "contact", "scene", "model", "forces", "engine")
+"""Of the package: all that hold kernels (a test looks for others)."""
+DAYS_KEPT = 30
+DAY = 86400.0
+USED = "used"
+"""Name of an empty file in each folder, touched by who uses it."""
+_lock = threading.RLock()
+_log = logging.getLogger(__name__)
+
+
+@cache
+def fingerprint() -> str:
+    """Of all that compiled code depends on."""
+    digest = hashlib.blake2b(digest_size=12)
+    settings = sorted(item for item in os.environ.items() if item[0].startswith(("NUMBA_", "BILAYER_JIT_")))
+    target = llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()
+    versions = sys.version, numba.__version__, llvmlite.__version__, np.__version__
+    digest.update(repr((versions, target, [item for item in settings if not item[0].endswith("CACHE_DIR")])).encode())
+    for folder in FOLDERS:
+        for path in sorted((PACKAGE / folder).rglob("*.py")):
+            digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def cache_folder() -> Path | None:
+    """The folder for what this process compiles; None if nothing can be or is to be kept."""
+    if os.environ.get("BILAYER_JIT_CACHE", "1") == "0":
+        return None
+    root = Path(os.environ.get("NUMBA_CACHE_DIR") or user_cache_path("bilayer_core", appauthor=False))
+    folder = root / f"kernels-{fingerprint()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / USED).touch()
+    except OSError as error:
+        _log.warning(
+            "compiled kernels cannot be kept (%s), so every start compiles them again: "
+            "set NUMBA_CACHE_DIR to a directory that can be written to",
+            error,
+        )
+        return None
+    _delete_unused(root)
+    return folder
+
+
+def _delete_unused(root: Path) -> None:
+    """Delete folders of other fingerprints that nobody has used for long."""
+    oldest = time.time() - DAYS_KEPT * DAY
+    for other in root.glob("kernels-*"):
+        used = other / USED
+        if used.exists() and used.stat().st_mtime < oldest:
+            shutil.rmtree(other, ignore_errors=True)
+
+
+@contextmanager
+def cached() -> Iterator[None]:
+    """Let numba keep in the folder what is decorated meanwhile; its own setting is restored."""
+    folder = cache_folder()
+    if folder is None:
+        yield
+        return
+    with _lock:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(folder)
+        try:
+            yield
+        finally:
+            numba.config.CACHE_DIR = before

@@ -1,0 +1,36 @@
+"""The one place with numba options.
+
+``contract``, ``reassoc``, ``nsz`` and ``arcp`` allow fused and reordered arithmetic but keep NaN and infinity, so that
+a diverging iterate is seen. Finiteness is nevertheless tested outside kernels.
+"""
+
+from __future__ import annotations
+
+import numba
+
+from . import unofficial
+from .cache import cache_folder, cached
+
+FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
+EXACT = {"contract", "nsz"}
+"""For sums whose rounding errors are kept: their terms must not be reordered."""
+OPTIONS = dict(nogil=True, error_model="numpy", **unofficial.OPTIONS)
+
+
+def kernel(function):
+    """Compile `function` for kernels that call it: nopython, GIL released, NaN-preserving fast arithmetic.
+
+    The interpreter can call it, too, but then it is compiled by every process that does.
+    """
+    return numba.njit(**OPTIONS, fastmath=FASTMATH)(function)
+
+
+def exact_kernel(function):
+    """`kernel` without reordered arithmetic."""
+    return numba.njit(**OPTIONS, fastmath=EXACT)(function)
+
+
+def entry(function):
+    """Compile `function` for the interpreter, and keep it on disk."""
+    with cached():
+        return numba.njit(**OPTIONS, fastmath=FASTMATH, cache=cache_folder() is not None)(function)

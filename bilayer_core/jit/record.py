@@ -1,0 +1,211 @@
+"""Records: arrays and numbers under names, which kernels take as one argument and the interpreter as an object.
+
+A record is declared with the type of each field, so every kernel that takes one is compiled once, whatever a scene has:
+
+    @record
+    class Drag:
+        "Quadratic drag of nodes."
+
+        node: Indices  # nodes that it acts on, shape (n_drag,)
+        coefficient: Matrix  # along t, m1, m2 [kg/m], shape (n_drag, 3)
+
+In memory every field begins at a multiple of eight bytes: a number takes one word, an array the words of numba's own
+descriptor of it, a record one for its address. The first word says whether the record `exists`: what a scene lacks is
+there with arrays of length zero (`Record.absent`). A record holds what its fields refer to, so its address is good as
+long as it is. Fields are not changed afterwards; an array's values may be.
+
+(Arrays passed one by one, or in tuples, are seven words each: a function of a hundred takes a minute to compile.
+Numba's `structref` counts references at every access.)
+"""
+
+from __future__ import annotations
+
+import typing
+from typing import Any, dataclass_transform
+
+import numpy as np
+from llvmlite import ir
+from numba.core import types
+from numba.extending import intrinsic, models, register_model
+
+from .unofficial import add_attributes, add_field
+
+WORD = 8
+Vector, Matrix, Stack, Tensor, DeepTensor = (types.Array(types.float64, n, "C") for n in range(1, 6))
+"""Arrays of floats with one to five indices."""
+Indices, IndexTable = (types.Array(types.int64, n, "C") for n in (1, 2))
+"""Arrays of integers."""
+Flags, FlagTable = (types.Array(types.boolean, n, "C") for n in (1, 2))
+"""Arrays of booleans."""
+NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean}
+DTYPES = {types.float64: np.dtype(np.float64), types.int64: np.dtype(np.int64), types.boolean: np.dtype(np.bool_)}
+_WORD_TYPE, _BYTES = ir.IntType(8 * WORD), ir.IntType(8).as_pointer()
+
+
+class RecordType(types.Type):
+    """Type of a record in kernels.
+
+    Attributes
+    ----------
+    declared : type
+        The class of its records.
+    fields : dict
+        Numba type of each field.
+    offset : dict
+        Place of each field [words].
+    """
+
+    def __init__(self, declared: type[Record], fields: dict[str, types.Type]):
+        self.declared, self.fields, self.offset = declared, fields, {}
+        offset = 1
+        for name, kind in fields.items():
+            self.offset[name] = offset
+            offset += 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
+        super().__init__(f"{declared.__module__}.{declared.__qualname__}")
+
+
+class AddressType(types.Type):
+    """Type of the address of a piece, which knows whose it is: that of the name of its field."""
+
+    def __init__(self, piece: str):
+        self.piece = piece
+        super().__init__(f"address of {piece}")
+
+
+class Address:
+    """Declares a field of a record as the address of the piece of the same name."""
+
+
+class Record:
+    """Base of the classes that `record` makes.
+
+    Raises
+    ------
+    TypeError
+        If a value is missing, unknown, or not of the declared type.
+    """
+
+    names: tuple[str, ...] = ()
+
+    def __init__(self, **values: Any):
+        kind = type(self).numba_type()
+        if values.keys() != kind.fields.keys():
+            wrong = ", ".join(sorted(values.keys() ^ kind.fields.keys()))
+            raise TypeError(f"{type(self).__name__}: these fields are missing or unknown: {wrong}")
+        self.__dict__.update(values)
+        words = [1]
+        for name, of in kind.fields.items():
+            words += _words(values[name], of, f"{type(self).__name__}.{name}")
+        self._memory = np.array(words, dtype=np.int64)
+        self.address = int(self._memory.ctypes.data)
+
+    @property
+    def exists(self) -> bool:
+        """Whether the scene has it."""
+        return bool(self._memory[0])
+
+    @classmethod
+    def absent(cls) -> typing.Self:
+        """A record that says so, with arrays of length zero and numbers that are zero."""
+        values = {}
+        for name, of in cls.numba_type().fields.items():
+            if isinstance(of, types.Array):
+                values[name] = np.zeros((0,) * of.ndim, DTYPES[of.dtype])
+            else:
+                values[name] = of.declared.absent() if isinstance(of, RecordType) else 0
+        empty = cls(**values)
+        empty._memory[0] = 0
+        return empty
+
+    @classmethod
+    def numba_type(cls) -> RecordType:
+        """Its type in kernels."""
+        if "_numba_type" not in cls.__dict__:
+            hints = typing.get_type_hints(cls)
+            cls._numba_type = RecordType(
+                cls,
+                {
+                    name: AddressType(name) if hints[name] is Address else type_in_kernels(hints[name])
+                    for name in cls.names
+                },
+            )
+            for name in ("exists", *cls.names):
+                add_field(RecordType, name, _type_of_field, _read_field)
+        return cls._numba_type
+
+
+@dataclass_transform(kw_only_default=True)
+def record(declared: type) -> type:
+    """Make a class of annotated fields a record, made with keywords.
+
+    Fields are arrays of the types above, numbers, or other records.
+    """
+    body = {"__module__": declared.__module__, "__doc__": declared.__doc__, "__annotations__": declared.__annotations__}
+    return type(declared.__name__, (Record,), body | {"names": tuple(declared.__annotations__)})
+
+
+def type_in_kernels(declared: Any) -> types.Type:
+    """Numba type for what annotations and pieces declare: a number, an array, or a class of records."""
+    if isinstance(declared, types.Type):
+        return declared
+    return NUMBERS[declared] if declared in NUMBERS else declared.numba_type()
+
+
+def record_at(declared: type[Record]):
+    """A function for kernels: the record of a class at an address."""
+
+    @intrinsic
+    def at(typing_context, address):
+        def generate(context, builder, signature, arguments):
+            return builder.inttoptr(arguments[0], _BYTES)
+
+        return declared.numba_type()(types.int64), generate
+
+    return at
+
+
+def _words(value: Any, of: types.Type, name: str) -> list[int]:
+    """What stands in memory for a value."""
+    if isinstance(of, types.Array):
+        fits = isinstance(value, np.ndarray) and value.ndim == of.ndim and value.dtype == DTYPES[of.dtype]
+        if not (fits and value.flags.c_contiguous and value.flags.aligned):
+            found = f"{value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+            raise TypeError(f"{name}: {found} is not a contiguous array of {of.ndim} indices, {of.dtype}")
+        return [0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides]
+    if isinstance(of, RecordType):
+        if not isinstance(value, of.declared):
+            raise TypeError(f"{name}: a {type(value).__name__} is no {of.declared.__name__}")
+        return [value.address]
+    return [int(np.float64(value).view(np.int64)) if of == types.float64 else int(value)]
+
+
+@register_model(RecordType)
+class _RecordModel(models.OpaqueModel):
+    """In kernels a record is its address."""
+
+
+@register_model(AddressType)
+class _AddressModel(models.PrimitiveModel):
+    """An integer."""
+
+    def __init__(self, manager, of):
+        super().__init__(manager, of, _WORD_TYPE)
+
+
+def _type_of_field(of: RecordType, name: str) -> types.Type | None:
+    return types.boolean if name == "exists" else of.fields.get(name)
+
+
+def _read_field(context, builder, of: RecordType, address, name: str):
+    if name == "exists":
+        word = builder.load(builder.bitcast(address, _WORD_TYPE.as_pointer()))
+        return builder.icmp_signed("!=", word, ir.Constant(_WORD_TYPE, 0))
+    model = context.data_model_manager[of.fields[name]]
+    kind = model.get_data_type()
+    place = builder.gep(address, [ir.Constant(_WORD_TYPE, WORD * of.offset[name])])
+    value = builder.load(builder.bitcast(place, kind.as_pointer()), align=WORD)
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))  # fields do not change: out of loops with it
+    return value if kind == model.get_value_type() else model.from_data(builder, value)
+
+
+add_attributes(RecordType, _type_of_field, _read_field)

@@ -1,0 +1,36 @@
+"""Copies between arrays of one shape. (An assignment of slices compiles the text of its own error message: seconds.)"""
+
+from __future__ import annotations
+
+from ..jit import kernel
+
+
+@kernel
+def copy(source, target):
+    """target = source, for contiguous arrays."""
+    a, b = source.reshape(source.size), target.reshape(target.size)
+    for i in range(a.shape[0]):
+        b[i] = a[i]
+
+
+@kernel
+def add_scaled(target, factor, source):
+    """target += factor source, for contiguous arrays."""
+    a, b = source.reshape(source.size), target.reshape(target.size)
+    for i in range(a.shape[0]):
+        b[i] += factor * a[i]
+
+
+@kernel
+def copy_row(source, i, target, j):
+    """target[j] = source[i], for rows of three."""
+    for c in range(3):
+        target[j, c] = source[i, c]
+
+
+@kernel
+def copy_matrix(source, i, target, j):
+    """target[j] = source[i], for 3 × 3 matrices."""
+    for c in range(3):
+        for k in range(3):
+            target[j, c, k] = source[i, c, k]

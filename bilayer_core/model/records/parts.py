@@ -1,0 +1,343 @@
+"""What compiled loops take of a model: its arrays, in groups.
+
+What a scene does not need is there with arrays of length zero, and says that it does not exist (`jit.record`): one
+program serves all scenes of a dimension.
+"""
+
+from __future__ import annotations
+
+from ...jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
+
+
+@record
+class Strands:
+    """Numbering, sections and joints of rods; see `model.Model` and `model.layout`."""
+
+    size: int  # unknowns of the matrix
+    dimension: int  # of them at each node
+    edge_count: int
+    first_bend: int  # elements from this one up to `bend_count` are bends and twists, the rest are bonds
+    bend_count: int
+    bandwidth: int  # half of it, without the diagonal
+    axes: Matrix  # directions of a node's unknowns in the matrix, shape (dimension, 3)
+    row: Indices  # first of them in the matrix, shape (n_node,)
+    node_unknown: Indices  # place of a node in gradients and steps, which are vectors in space
+    edge_unknown: Indices  # likewise of an edge
+    edge_node: Indices
+    node_mass: Vector
+    spin_inertia: Vector
+    half_width: Vector
+    rest_length: Vector
+    axial_stiffness: Vector
+    joint_a: Indices
+    joint_b: Indices
+    joint_stiffness: Matrix
+
+
+@record
+class Drives:
+    """What stimuli change: rest strains of edges and joints."""
+
+    rest_strain: Vector
+    driven_edge: Indices
+    driven_law: Indices
+    driven_weight: Vector
+    joint_rest: Matrix
+    driven_joint: Indices
+    driven_joint_law: Indices
+    driven_joint_weight: Vector
+    law_channel: Indices
+    law_rising: Vector
+    law_falling: Vector
+    law_gain: Vector
+    law_reference: Vector
+    law_saturation: Vector
+
+
+@record
+class Space:
+    """What dimension 3 has: second derivatives of bonds. Absent in a plane."""
+
+    top_hessian: Stack
+    bottom_hessian: Stack
+    bond_hessian: Stack  # the part of cross_hessian that belongs to bonds
+
+
+@record
+class Plane:
+    """What dimension 2 has instead of frames and twist; see `forces.planar`."""
+
+    normal: Vector
+    side: Vector
+    joint_after: Indices
+    frame: Matrix
+    polar_gradient: Matrix
+    polar_hessian: Matrix
+    cross_hessian: Matrix
+    pair_hessian: Matrix
+    mixed_hessian: Matrix
+
+
+@record
+class OffAxis:
+    """Joints whose natural curvature depends on the strains of their edges; see `forces.stretch_bend`."""
+
+    joint: Indices
+    slope: Matrix
+    rest_out: Matrix
+    rest: Matrix  # the same, read-only
+
+
+@record
+class Bonds:
+    """Paired edges of two layers."""
+
+    top: Indices
+    bottom: Indices
+    stiffness: Vector
+    rest: Matrix
+
+
+@record
+class Bodies:
+    """Rigid bodies; the last place is the world."""
+
+    free_index: Indices
+    body_of_free: Indices
+    prescribed: Indices  # bodies without unknowns, shape (n_prescribed,)
+    mass: Vector
+    second_moment: Stack
+    inertia: Vector  # factor of the shift for each unknown of free bodies: m and tr(J), shape (6 n_free,)
+    freedom: Matrix
+    reach: Vector
+    turns: Flags  # whether a body can turn, bool
+
+
+@record
+class Held:
+    """Nodes and directions that bodies hold."""
+
+    node: Indices
+    unknown: Indices
+    row: Indices
+    body: Indices
+    free: Indices
+    position: Matrix  # in the body's frame
+    wall_body: Indices
+    wall_free: Indices
+    wall_tangent: Matrix  # in the body's frame
+    wall_director1: Matrix  # likewise, after the edges' own: shape (n_edge + n_wall, 3)
+
+
+@record
+class Grips:
+    """What free bodies among them hold: how it enters the border."""
+
+    holding: int  # how many nodes
+    unknown: Indices  # rows of the matrix
+    free: Indices
+    of_unknown: Indices
+    wall_free: Indices
+    wall_joint: Indices
+
+
+@record
+class Surfaces:
+    """Carriers, surfaces, and the list of near pairs with what it was made for; see `allocate.NearSurfaces`."""
+
+    d_hat: float
+    stiffness: float
+    radius: Vector
+    weight: Vector
+    carrier_body: Indices
+    free_index: Indices  # places of all bodies among the free ones; none if none is free
+    follows: Indices
+    node_free: Flags
+    group: Indices
+    point_position: Matrix  # of points and centres in their bodies' frames
+    point_body: Indices
+    kind: Indices
+    size: Matrix
+    rounding: Vector
+    bound: Vector
+    body: Indices
+    position: Matrix
+    turn: Stack
+    meets: FlagTable
+    near_carrier: Indices
+    near_surface: Indices
+    near_gap: Vector
+    near_count: Indices  # shape (1,)
+    margin: Vector  # shape (1,)
+    extent: Vector
+    listed_carrier: Matrix
+    listed_place: Matrix
+    listed_turn: Stack
+
+
+@record
+class Sliding:
+    """Friction of the contacts at the start of a stage; see `forces.friction`."""
+
+    acts: bool
+    threshold: float
+    coefficient: Matrix
+    node_edges: IndexTable
+    node_axis: Indices
+    count: Indices  # shape (1,)
+    first: Indices
+    surface: Indices
+    load: Vector
+    normal: Matrix
+    axis: Matrix
+    arm: Matrix
+    lever: Matrix
+    back: Stack
+    turn: Stack
+    origin_turn: Stack
+
+
+@record
+class Slips:
+    """Slip of all lagged contacts along a Newton step; see `forces.slip`."""
+
+    threshold: float
+    way: Matrix
+
+
+@record
+class Touches:
+    """Contacts of rods; see `forces.rod_contact`."""
+
+    counted: Indices  # shape (1,)
+    point: Indices
+    edge: Indices
+    fraction: Vector
+    inner: Flags
+    times: Indices
+    gap: Vector
+    node: IndexTable
+    weight: Matrix
+    normal: Matrix
+    load: Vector
+    matrix: Stack
+    side: Vector
+    turn: Stack
+    lean: Vector
+    along: Matrix
+
+
+@record
+class Threads:
+    """Rods that can meet: their geometry, the list of near pairs, and contacts; see `allocate.NearRods`."""
+
+    d_hat: float
+    stiffness: float
+    slides: bool
+    coefficient: float
+    threshold: float
+    unit: float  # barrier distance and thickest layer together
+    start_position: Matrix
+    edge_radius: Vector
+    edge_rod: Indices
+    edge_first: Flags
+    edge_arc: Matrix
+    first_point: Indices
+    point_edge: Indices
+    point_fraction: Vector
+    point_arc: Vector
+    point_weight: Vector
+    rod_meets: FlagTable
+    rod_joined: FlagTable
+    rod_exclusion: Vector
+    box: Matrix  # scratch of a search, see `contact.broad_phase.scratch`
+    sweep: Matrix
+    met: IndexTable
+    base: Matrix
+    tip: Matrix
+    last: Matrix
+    ways: Vector  # shape (4,)
+    counted: Indices  # shape (1,)
+    pair_point: Indices
+    pair_edge: Indices
+    pair_before: Flags
+    pair_after: Flags
+    pair_until: Vector
+    no_step: Matrix
+    scratch: Matrix  # a gradient that nobody wants
+    gap: Vector  # the smallest below the barrier distance, shape (1,)
+    contacts: Touches  # present ones
+    sliding: Touches  # of the start of the stage
+
+
+@record
+class Leaving:
+    """Contacts of rods in the Newton matrix, and nodes that leave the band; see `engine.linear.rod_columns`."""
+
+    counts: Indices  # of contacts and of nodes, shape (2,)
+    node: IndexTable
+    weight: Matrix
+    matrix: Stack
+    side: Vector
+    turn: Stack
+    strand: Indices
+    attached: Indices
+    mark: IndexTable
+    met: IndexTable
+    leaving: Indices
+    unknown: Indices  # the same, read-only
+    place: Indices
+
+
+@record
+class Flow:
+    """Drag."""
+
+    velocity: Vector
+    node: Indices
+    edge_before: Indices
+    edge_after: Indices
+    coefficient: Matrix
+    direction: Stack
+
+
+@record
+class Fluid:
+    """Added mass."""
+
+    velocity: Vector
+    mass: Matrix
+    direction1: Matrix
+    direction2: Matrix
+    shape_gradient: Matrix
+    momentum: Matrix
+    node_velocity: Matrix  # scratch
+    still: Vector
+
+
+@record
+class PointForces:
+    """Forces of fixed direction, or that turn with what they act on (then with the edges of their nodes)."""
+
+    node: Indices
+    node_load: Indices
+    node_vector: Matrix
+    body: Indices
+    body_load: Indices
+    body_vector: Matrix
+    on_nodes: Matrix  # the present ones
+    on_bodies: Matrix
+    edge_before: Indices
+    edge_after: Indices
+    direction: Stack
+
+
+@record
+class Moments:
+    """Moments on free bodies; the first `dead` keep their direction."""
+
+    dead: int
+    body: Indices
+    load: Indices
+    vector: Matrix
+    present: Matrix

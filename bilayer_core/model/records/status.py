@@ -1,0 +1,28 @@
+"""How a loop ends, or what keeps it from going on by itself."""
+
+from __future__ import annotations
+
+from ...engine.newton_report import NewtonStatus
+
+READY = 0
+NO_ROOM = 1
+"""There are more near pairs with surfaces than room for them."""
+NO_ROOM_FOR_RODS = 2
+"""Likewise of rods with rods, or more contacts."""
+NO_ROOM_IN_BORDER = 3
+"""More nodes leave the band than the border has room for."""
+JUMPED = 4
+"""Something has jumped: another integrator has to make this step."""
+CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND = 5, 10, 11, 12, 13, 14, 15
+"""How a step ended; from `MAX_ITERATIONS` on it failed."""
+TOO_INACCURATE = 20
+"""The error of a step exceeds its tolerance, however short it is."""
+
+FAILURES = {
+    MAX_ITERATIONS: NewtonStatus.MAX_ITERATIONS,
+    LINE_SEARCH: NewtonStatus.LINE_SEARCH,
+    INDEFINITE: NewtonStatus.INDEFINITE,
+    NOT_FINITE: NewtonStatus.NOT_FINITE,
+    BLOCKED: NewtonStatus.BLOCKED,
+    BEYOND: NewtonStatus.BEYOND,
+}

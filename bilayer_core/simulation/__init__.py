@@ -1,0 +1,1 @@
+"""Runs: the simulator, its observers, the energy budget, equilibria."""

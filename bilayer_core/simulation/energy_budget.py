@@ -1,0 +1,285 @@
+"""The energy budget of a run: where the work of stimuli, loads and prescribed bodies goes.
+
+Between two accepted configurations, a step h apart, with g the gradient of one term and Δq the displacement, both in
+edge space (`motion`), and η the eigenstrain:
+
+    work of a conservative force   W = −∫ g·dq, straight from qₙ to qₙ₊₁      by Simpson's rule: −ΔE to fourth order
+    work of a barrier              the same, on halves where it must be
+    work of a dissipative force    W = ½ h (Pₙ + Pₙ₊₁),  P = −g·v             second order, and never above zero
+    work of the stimulus           W = ∫ s·dη, along the same way,  s = ∂E/∂η = −EA (ε − η) |ē|, and likewise of
+                                   natural curvatures κ̄₁ that follow it, ∂E/∂κ̄₁ = −k₁ (κ₁ − κ̄₁)
+    work of prescribed bodies      what moves held nodes and surfaces against all these forces, and their kinetic energy
+
+Energies E and the kinetic energy T come from states alone, works from gradients alone, so that two sums measure
+something:
+
+    numerical  = Σ W of all forces and of prescribed bodies − ΔT
+    residual   = supplied − ΔT − ΔE − lost                     supplied: stimulus, prescribed bodies, loads
+                                                               lost: to dissipative forces, and numerical
+
+*Numerical* is what the theorem of work and kinetic energy lacks: the dissipation of the integrator, and its errors in
+forces (a lagged friction), at the integrator's order; implicit Euler takes h ∫ v̇·M v̇ dt. Under an integrator of
+second order the error of the quadrature is in it with as much. The *residual* is the failure of works to be the
+differences of energies: the error of the quadrature, of second order, and any error of a gradient.
+
+A barrier is so steep that an impact happens within a step: at its two ends little or nothing may be left of it. All
+else is taken at the accepted ends of steps with the velocities there; stages of an integrator are not looked at. The
+powers of friction and drag are taken rather than force times displacement because each is of one sign however sharply
+the force depends on the velocity. Friction has the normal forces of either end there, where a step of the integrator
+has those of its start. What jumps between two steps (a load, a stimulus) is taken as a change over the second: an error
+of first order in the step in which it happens.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..engine.evaluator import Evaluator
+from ..engine.modes import MOMENT
+from ..kinematics.rotation import rotation_matrix
+from ..model.force_list import Kind, kinds
+from ..model.model import Model
+from ..model.records.step import Place
+from ..model.rest_strains import RestStrains
+from ..model.state import State
+from .fluid_energy import survey_fluid
+from .motion import Gradient, Motion, displacement, of_prescribed, velocity
+from .observation import kinetic_energy
+from .quadrature import simpson
+
+Array = np.ndarray
+BARRIERS = ("barrier", "rod barrier")
+BARRIER_ERROR = 1e-4
+"""Of the work of a barrier over a step, as a part of its energy."""
+BARRIER_HALVINGS = 10
+
+
+@dataclass(frozen=True)
+class _Fluid:
+    """Inertia of the fluid: its kinetic energy in the world, over that of the undisturbed flow [J], and its forces."""
+
+    energy: float
+    momentum: Array  # P at nodes [N s], shape (n_node, 3)
+    shape_gradient: Array  # ∂T/∂(e, θ) of edges, shape (n_edge, 4)
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """A state with its energies [J], forces and powers [W].
+
+    `power` has for every dissipative term that of all forces, and that of those on what prescribed bodies impose.
+    """
+
+    at: Place
+    kinetic: float
+    imposed_kinetic: float
+    fluid: _Fluid | None
+    velocity: Array  # of nodes [m/s], shape (n_node, 3)
+    rest: RestStrains
+    load_factor: Array
+    resistance: tuple[Array, Array]  # ∂E/∂η of edges [J], ∂E/∂κ̄₁ of joints [N m], shapes (n_edge,), (bend_count,)
+    energy: dict[str, float]
+    gradient: dict[str, Gradient]
+    power: dict[str, tuple[float, float]]
+
+
+class EnergyLedger:
+    """Sums works since `begin`, from `record` after every accepted part of a step.
+
+    `mark` and `roll_back` serve a step that is not accepted after all, or after some of its parts were.
+    """
+
+    def __init__(self, model: Model):
+        self._model = model
+        self._evaluator = Evaluator(model)  # with arrays of its own: those of the run stay as they are
+        self._imposed_mass = np.zeros(model.node_count)
+        imposed = model.attached_node[model.attached_free < 0]
+        self._imposed_mass[imposed] = model.node_mass[imposed]
+        self._kinds = {name: kinds()[name] for name in model.forces}
+        self._watched = [name for name, kind in self._kinds.items() if kind is not Kind.INERTIAL]
+        self._first: _Instant | None = None
+
+    def begin(self, state: State, rest: RestStrains, load_factor: Array) -> None:
+        """Start from zero at a state, with the rest strains and the factors of loads there."""
+        self._first = self._last = self._look(state, rest, load_factor)
+        self._work: dict[str, float] = defaultdict(float)  # of each force [J]
+        self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
+        self._stimulus = 0.0
+        self.mark()
+
+    def mark(self) -> None:
+        """Remember all sums."""
+        self._marked = (self._last, self._work.copy(), self._imposed.copy(), self._stimulus)
+
+    def roll_back(self) -> None:
+        """Go back to the sums that were marked last."""
+        self._last, work, imposed, self._stimulus = self._marked
+        self._work, self._imposed = work.copy(), imposed.copy()
+
+    def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
+        """Add the works of a step of length `h` [s] that has just been accepted."""
+        before, after = self._last, self._look(state, rest, load_factor)
+        moved = displacement(self._model, before.at, after.at)
+        imposed = of_prescribed(self._model, moved)
+        way = _Way(self._model, self._evaluator, before, state, moved)
+        halfway = before.rest.halfway_to(rest)
+        middle = self._look_at(way.at(0.5), way.state, halfway, 0.5 * (before.load_factor + load_factor))
+        for name, gradient in after.gradient.items():
+            three = before.gradient[name], middle.gradient[name], gradient
+            rates = [np.array([motion.work(each) for motion in (moved, imposed)]) for each in three]
+            if name in BARRIERS and max(before.energy[name], after.energy[name]) > 0.0:
+                works = self._work_of_barrier(name, way, rates, (moved, imposed), before, after)
+            else:
+                works = (rates[0] + 4.0 * rates[1] + rates[2]) / 6.0
+            for sums, work in zip((self._work, self._imposed), works, strict=True):
+                sums[name] += work
+        for name, power in after.power.items():
+            for sums, start, end in zip((self._work, self._imposed), before.power[name], power, strict=True):
+                sums[name] += 0.5 * h * (start + end)
+        if after.fluid is not None:
+            self._imposed["fluid"] += self._work_of_fluid(before, after, imposed)
+        bends = slice(self._model.bend_count)
+        rises = after.rest.edge - before.rest.edge, after.rest.joint[bends, 0] - before.rest.joint[bends, 0]
+        for rise, *three in zip(rises, before.resistance, middle.resistance, after.resistance, strict=True):
+            self._stimulus += float((three[0] + 4.0 * three[1] + three[2]) @ rise) / 6.0
+        self._last = after
+
+    def budget(self) -> dict:
+        """Rows since `begin` [J].
+
+        Returns
+        -------
+        dict
+            `supplied`, `stored` and `lost`, each a dictionary of rows; `work` of each force; `residual`, and
+            `relative_residual` to the largest row.
+        """
+        first, last, work = self._first, self._last, self._work
+        of_kind = {kind: [name for name, own in self._kinds.items() if own is kind] for kind in Kind}
+        imposed_kinetic = last.imposed_kinetic - first.imposed_kinetic
+        prescribed = imposed_kinetic - sum(self._imposed.values())
+        kinetic = last.kinetic - first.kinetic
+        supplied = {"stimulus": self._stimulus, "prescribed motion": prescribed}
+        supplied |= {name: work[name] for name in of_kind[Kind.EXTERNAL]}
+        stored = {"kinetic": kinetic}
+        if last.fluid is not None:
+            stored["fluid"] = last.fluid.energy - first.fluid.energy
+        stored |= {name: last.energy[name] - first.energy[name] for name in of_kind[Kind.CONSERVATIVE]}
+        lost = {name: -work[name] for name in of_kind[Kind.DISSIPATIVE]}
+        lost["numerical"] = sum(work.values()) + prescribed - kinetic - stored.get("fluid", 0.0)
+        residual = sum(supplied.values()) - sum(stored.values()) - sum(lost.values())
+        largest = max(abs(value) for rows in (supplied, stored, lost) for value in rows.values())
+        return {
+            "supplied": supplied,
+            "stored": stored,
+            "lost": lost,
+            "work": {name: work[name] for name in self._watched},
+            "residual": residual,
+            "relative_residual": residual / largest if largest > 0.0 else 0.0,
+        }
+
+    def _work_of_barrier(
+        self,
+        name: str,
+        way: _Way,
+        rates: list[Array],
+        motions: tuple[Motion, Motion],
+        before: _Instant,
+        after: _Instant,
+    ) -> Array:
+        """Work [J] of a barrier over each of the motions; `rates` are those at the start, in the middle, at the end."""
+
+        def rate(part: float) -> Array:
+            _, gradient = self._force(name, way.at(part))
+            return np.array([motion.work(gradient) for motion in motions])
+
+        energy = max(before.energy[name], after.energy[name])
+        return simpson(rate, (0.0, 1.0), tuple(rates), BARRIER_ERROR * energy, BARRIER_HALVINGS)
+
+    def _work_of_fluid(self, before: _Instant, after: _Instant, imposed: Motion) -> float:
+        """Work [J] of the fluid's inertia, dP/dt − ∂T/∂q, on what prescribed bodies impose."""
+        held = self._imposed_mass > 0.0
+        pushed = after.fluid.momentum[held] - before.fluid.momentum[held]
+        turned = 0.5 * (before.fluid.shape_gradient + after.fluid.shape_gradient)
+        work = float(np.vdot(turned, imposed.edge[: self._model.edge_count]))
+        return work - 0.5 * float(np.vdot(pushed, before.velocity[held] + after.velocity[held]))
+
+    def _force(self, name: str, at: Place) -> tuple[float, Gradient]:
+        """Energy [J] and derivatives of one force at a configuration."""
+        energy = self._evaluator.forces(at, (name,))[name]
+        return energy, Gradient.copy_of(self._evaluator.first, self._model)
+
+    def _look_at_fluid(self, at: Place, state: State) -> _Fluid | None:
+        model = self._model
+        if not len(model.fluid_mass):
+            return None
+        momentum, shape_gradient = np.empty((model.node_count, 3)), np.empty((model.edge_count, 4))
+        relative = survey_fluid(model, at, state.velocity, state.spin, momentum, shape_gradient)
+        carried = float(momentum.sum(axis=0) @ np.array(model.scene.fluid.velocity))
+        return _Fluid(relative + carried, momentum, shape_gradient)
+
+    def _look(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
+        at = self._evaluator.new()
+        self._evaluator.take_state(state, at)
+        return self._look_at(at, state, rest, load_factor)
+
+    def _look_at(self, at: Place, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
+        model, evaluator = self._model, self._evaluator
+        moving = velocity(model, at, state)
+        imposed = of_prescribed(model, moving)
+        evaluator.stand_still(state, at, MOMENT, rest.edge, rest.joint, load_factor)
+        evaluator.start_stage(at)
+        energy, gradient, power = {}, {}, {}
+        for name in self._watched:
+            value, found = self._force(name, at)
+            if self._kinds[name] is Kind.DISSIPATIVE:
+                power[name] = (moving.work(found), imposed.work(found))
+            else:
+                energy[name], gradient[name] = value, found
+        return _Instant(
+            at=at,
+            kinetic=kinetic_energy(model, state),
+            fluid=self._look_at_fluid(at, state),
+            velocity=state.velocity.copy(),
+            imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
+            rest=rest,
+            load_factor=load_factor.copy(),
+            resistance=_resistance(model, at, rest),
+            energy=energy,
+            gradient=gradient,
+            power=power,
+        )
+
+
+def _resistance(model: Model, at: Place, rest: RestStrains) -> tuple[Array, Array]:
+    """Derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
+    strain = at.length[: model.edge_count] / model.rest_length - 1.0
+    bend = at.joint_strain[:, 0] - rest.joint[:, 0]
+    of_edges = np.concatenate([strain, np.zeros(model.wall_count)])
+    coupled = np.stack([model.joint_a, model.joint_b], axis=1)[model.coupled_joint]
+    bend[model.coupled_joint] -= np.einsum("ki,ki->k", model.strain_coupling, of_edges[coupled])
+    moment = model.joint_stiffness[:, 0] * bend
+    return -model.axial_stiffness * (strain - rest.edge) * model.rest_length, -moment[: model.bend_count]
+
+
+class _Way:
+    """The straight way from an instant to a state: positions along lines, turns at constant rates."""
+
+    def __init__(self, model: Model, evaluator: Evaluator, begin: _Instant, end: State, moved: Motion):
+        self._model, self._evaluator, self._begin, self._moved = model, evaluator, begin.at, moved
+        self.state = end.copy()
+
+    def at(self, part: float) -> Place:
+        """Configuration after a part of the way; `state` goes along, its velocities apart."""
+        begin, moved, state, evaluator = self._begin, self._moved, self.state, self._evaluator
+        state.position[:] = begin.position + part * moved.node
+        state.twist[:] = begin.joint_strain[:, 2]
+        state.body_position[:] = begin.place[:-1] + part * moved.contact[:-1, :3]
+        for b, turn in enumerate(moved.contact[:-1, 3:]):
+            state.body_rotation[b] = rotation_matrix(part * turn) @ begin.rotation[b]
+        at = evaluator.new()
+        evaluator.take_state(state, at)
+        evaluator.carry_frames(begin, part * moved.edge[: self._model.edge_count, 3], at)
+        return at

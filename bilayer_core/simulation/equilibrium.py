@@ -1,0 +1,147 @@
+"""Static equilibrium: the potential's minimum without inertia, reached by steps that are no motion.
+
+Each round minimises V(q) + ½ |q − q_k|²_M/h² from the shape q_k of the round before: an implicit Euler step of length h
+that forgets all velocity (the proximal point method). Whatever h is, V falls in every round, and the rounds end only
+where ∂V/∂q = 0; h grows tenfold while Newton's method succeeds, so that the last rounds are Newton's method on V alone.
+What depends on velocities vanishes there: friction, mass damping, and drag but for that of a fluid which flows.
+Forces that turn with what they act on, and moments on bodies, are taken at q_k and agree with the shape in the end.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..engine.modes import COUNT, SETTLE
+from ..engine.newton_report import NewtonStatus
+from ..errors import InputError, SimulationError
+from ..model.state import State
+from .stepper import Stepper
+
+FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
+"""Length h of the first round [s], its factors after success and failure, and the length at which to give up [s]."""
+SETTLED, LONGEST = 1.0, 100.0
+"""Two rounds at least so long [s] must find the shape at rest, one after the other but for failures, which come
+from rounding where nothing holds the robot; no round is longer than the second."""
+MAX_ROUNDS = 300
+WORTH_KEEPING = 1e-6
+"""Of the longest rod: displacement of a round without convergence that is no rounding."""
+OUT_OF_SIGHT = 100.0
+"""Times the longest rod: displacement at which to conclude that nothing holds the robot."""
+RELATIVE_TOLERANCE = 1e-10
+"""Of the scene's longest rod: displacement that a round may make and still count as rest."""
+
+
+@dataclass(frozen=True)
+class StaticReport:
+    """How the search for an equilibrium went.
+
+    Attributes
+    ----------
+    stable : bool
+        Whether every small disturbance decays or stays as it is.
+    unstable_directions : int
+        Dimension of the space of those that grow: negative eigenvalues of the Hessian.
+    residual : float
+        Largest displacement that Newton would still make [m].
+    rounds, iterations, factorisations : int
+        Potentials minimised, Newton corrections, and factorised Hessians.
+    """
+
+    stable: bool
+    unstable_directions: int
+    residual: float
+    rounds: int
+    iterations: int
+    factorisations: int
+
+
+def solve_static(stepper: Stepper, state: State, tolerance: float | None = None) -> StaticReport:
+    """Bring a state to rest in an equilibrium under its present stimuli and loads; its time stays.
+
+    Lagging layers are taken as settled, prescribed bodies stay where they are. From an unstable equilibrium nothing
+    leads away but a disturbance: the report then says that it is unstable.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    state : State
+        Changed in place on success.
+    tolerance : float, optional
+        Displacement that counts as rest [m]; default: `RELATIVE_TOLERANCE` of the longest rod.
+
+    Raises
+    ------
+    SimulationError
+        If none is found; `state` is unchanged then, and the message says how close it came.
+    """
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError(f"tolerance: {tolerance} is not allowed; it must be a positive number of metres")
+    before = state.copy()
+    try:
+        return _Search(stepper, state, tolerance).run()
+    except BaseException:
+        state.take(before)
+        raise
+
+
+class _Search:
+    """Rounds of the compiled step's modes for statics, and what to make of them."""
+
+    def __init__(self, stepper: Stepper, state: State, tolerance: float | None):
+        model = stepper.model
+        self.stepper, self.state = stepper, state
+        self.time = float(state.time[0])
+        self.size = max(rod.path.length for rod in model.scene.rods)
+        self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
+        if len(state.transduction):
+            state.transduction[:] = stepper.surroundings.stimulus_at(state, self.time)[model.law_channel]
+        for still in (state.velocity, state.spin, state.body_velocity, state.body_angular_velocity, state.kept):
+            still.fill(0.0)
+        rest = stepper.surroundings.rest_strains_of(state.transduction)
+        stepper.engine.set_drive(rest, stepper.surroundings.load_factor(self.time))
+        self.rounds = self.iterations = self.factorisations = 0
+
+    def run(self) -> StaticReport:
+        state, engine = self.state, self.stepper.engine
+        first_position, start = state.position.copy(), state.copy()
+        length, moved, settled = FIRST, math.inf, 0
+        while self.rounds < MAX_ROUNDS:
+            attempt = self.stepper.do_once(state, SETTLE, length, self.tolerance / length).newton
+            self.rounds += 1
+            self.iterations += attempt.iterations
+            self.factorisations += attempt.factorisations
+            lost = not attempt.converged and attempt.status is not NewtonStatus.MAX_ITERATIONS
+            if lost or (not attempt.converged and engine.moved < WORTH_KEEPING * self.size):
+                state.take(start)
+                length *= SHRINKAGE
+                if length < SHORTEST:
+                    raise self._failure(attempt.status.value, moved)
+                continue
+            moved = engine.moved
+            if np.abs(state.position - first_position).max() > OUT_OF_SIGHT * self.size:
+                raise self._failure("nothing holds the robot, or not all of it", moved)
+            start.take(state)
+            if not attempt.converged:  # V has fallen all the same
+                length, settled = SHRINKAGE * length, 0
+                continue
+            settled = settled + 1 if moved <= self.tolerance and length >= SETTLED else 0
+            if settled == 2:
+                return self._report(attempt.residual * length)
+            length = min(GROWTH * length, LONGEST)
+        raise self._failure("the shape does not come to rest", moved)
+
+    def _report(self, residual: float) -> StaticReport:
+        counted = self.stepper.do_once(self.state, COUNT).newton
+        if not counted.converged:
+            raise SimulationError(f"the stability of the equilibrium cannot be told: {counted.status.value}", self.time)
+        self.stepper.restart(self.state)
+        unstable = self.stepper.engine.unstable
+        return StaticReport(unstable == 0, unstable, residual, self.rounds, self.iterations, self.factorisations)
+
+    def _failure(self, reason: str, moved: float) -> SimulationError:
+        near = f"the last round moved it by {moved:.3g} m, allowed {self.tolerance:.3g} m"
+        counts = f"{self.rounds} rounds, {self.iterations} iterations"
+        return SimulationError(f"no static equilibrium found: {reason} ({near}; {counts})", self.time)

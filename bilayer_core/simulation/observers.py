@@ -1,0 +1,99 @@
+"""Who looks at a run, and when."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Protocol
+
+from .frame import Description, Frame
+
+if TYPE_CHECKING:
+    from .simulator import Simulator
+
+
+TIME_ROUNDING = 1e-9
+"""Part of a period by which a time may be off and is still the time at which something is due."""
+_NUMBER_ROUNDING = 4.0 * sys.float_info.epsilon
+"""By which part of itself a product of time and rate may be off; more than the above after ten million periods."""
+
+
+def completed(time: float, rate: float) -> int:
+    """Periods of `rate` [1/s] from time 0 to `time` [s]."""
+    periods = time * rate
+    return math.floor(periods + TIME_ROUNDING + _NUMBER_ROUNDING * abs(periods))
+
+
+def next_end(time: float, rate: float) -> float:
+    """When the period ends that has not ended at `time` [s]."""
+    return (completed(time, rate) + 1) / rate
+
+
+class Observer(Protocol):
+    """Something that looks at a run `rate` times in each simulated second: when the first step ends after each multiple
+    of its period, or exactly there. No step is another for it.
+    """
+
+    rate: float
+
+    def start(self, description: Description) -> None:
+        """Called once, before the first frame."""
+
+    def observe(self, frame: Frame) -> None:
+        """Called with every frame that is due, the first and the last included."""
+
+    def close(self, complete: bool, termination: str = "") -> None:
+        """Called once at the end; `complete` is false if the run was cut short, `termination` says why it ended."""
+
+
+class Schedule:
+    """Which observer is due when; a frame is made once for all that are due."""
+
+    def __init__(self, observers: Sequence[Observer], simulator: Simulator):
+        self._observers = list(observers)
+        self._simulator = simulator
+        self._count = [completed(simulator.time, of.rate) for of in self._observers]
+        self._last_seen: list[float | None] = [None] * len(self._observers)
+
+    def start(self) -> None:
+        if self._observers:
+            description = self._simulator.description
+            for observer in self._observers:
+                observer.start(description)
+            self._show(range(len(self._observers)))
+
+    def next_due(self) -> float:
+        """The earliest time of a step's end at which an observer is to look [s]; infinite without any."""
+        due = zip(self._count, self._observers, strict=True)
+        return min(((count + 1 - TIME_ROUNDING) / of.rate for count, of in due), default=math.inf)
+
+    def steps_until_due(self, most: float) -> int:
+        """Fixed steps until the next observer is due, at most `most`."""
+        due, dt = self.next_due(), self._simulator.dt
+        return int(most) if math.isinf(due) else int(min(most, max(1.0, math.ceil((due - self._simulator.time) / dt))))
+
+    def observe_due(self) -> None:
+        done = [completed(self._simulator.time, of.rate) for of in self._observers]
+        due = [i for i, (count, before) in enumerate(zip(done, self._count, strict=True)) if count > before]
+        if due:
+            self._count = done
+            self._show(due)
+
+    def _show(self, which) -> None:
+        frame = self._simulator.frame()
+        for i in which:
+            self._observers[i].observe(frame)
+            self._last_seen[i] = frame.time
+
+    def finish(self, complete: bool, termination: str) -> None:
+        """Show the last frame to whom it is missing, and close all, whatever goes wrong with one of them."""
+        if not self._observers:
+            return
+        with ExitStack() as closing:
+            for observer in reversed(self._observers):
+                closing.callback(observer.close, complete, termination)
+            missing = [i for i, seen in enumerate(self._last_seen) if seen not in (None, self._simulator.time)]
+            if missing:
+                self._show(missing)

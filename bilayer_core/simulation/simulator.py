@@ -1,0 +1,444 @@
+"""The simulator: a scene, its state, and the loop that advances it."""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ..errors import InputError, SimulationError
+from ..integrators.register import INTEGRATORS
+from ..model.build import build_model
+from ..model.fingerprint import fingerprint_of
+from ..model.plan import make_plan
+from ..model.state import State, initial_state, refuse_out_of_plane
+from ..scene.config import SceneConfig
+from ..scene.loader import scene_text
+from . import observation as observe
+from .adaptive_stepper import AdaptiveStepper
+from .energy_budget import EnergyLedger
+from .equilibrium import StaticReport, solve_static
+from .frame import Description, Frame
+from .observers import TIME_ROUNDING, Observer, Schedule, next_end
+from .result import BodyView, RunResult, Termination
+from .statistics import RunStatistics, center_of_mass
+from .step_choice import choose_steps
+from .stepper import Stepper, StepReport
+
+Array = np.ndarray
+STEPS_AT_ONCE = 64
+"""That a compiled loop makes before anyone is asked whether to go on."""
+
+
+class Simulator:
+    """A scene in motion.
+
+    Parameters
+    ----------
+    scene : SceneConfig
+        From `bilayer_core.load_scene`.
+    model, dimension, integrator : str or int
+        Override the scene's; ``"auto"`` keeps them.
+    dt : float, optional
+        Alone: fixed steps of this length [s], whatever the scene says; with `tolerance` the first adaptive one.
+    tolerance : float, optional
+        Overrides the scene's: the largest error per step, relative to the longest rod. With one, steps are adaptive.
+        It is no bound on the error of a whole run, which is larger; ``bilayer converge`` measures that.
+    budget : bool
+        Keep the energy budget of the run (`budget`), in two to three times the time.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be simulated as asked.
+    PenetrationError
+        If it starts with surfaces inside each other.
+    """
+
+    def __init__(
+        self,
+        scene: SceneConfig,
+        *,
+        model="auto",
+        dimension="auto",
+        integrator="auto",
+        dt: float | None = None,
+        tolerance: float | None = None,
+        budget: bool = False,
+    ):
+        self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
+        method = INTEGRATORS[self.plan.integrator]
+        self.steps = choose_steps(scene, method, dt, tolerance)
+        self.dt, self.tolerance = self.steps.dt, self.steps.tolerance
+        self.scene = scene
+        self.model = build_model(scene, self.plan.model, self.plan.dimension)
+        self._keeps_history = method.history is not None
+        self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
+        solver = scene.solver
+        newton = self.steps.newton_tolerance, solver.max_newton_iterations
+        if self.tolerance is None:
+            self._stepper = Stepper(self.model, method, self.dt, *newton, self.steps.max_halvings)
+        else:
+            lengths = self.steps.shortest, self.steps.longest
+            self._stepper = AdaptiveStepper(self.model, method, self.dt, *newton, self.tolerance, *lengths)
+        self.keeps_budget = budget
+        self._ledger = EnergyLedger(self.model) if budget else None
+        self._state = self._initial_state()
+        self._compile_time: float | None = None
+        self._start_over()
+
+    def _initial_state(self) -> State:
+        return initial_state(self.model, self._keeps_history, self._fingerprint)
+
+    def _start_over(self) -> None:
+        self.statistics = RunStatistics(com_max_height=float(self.com[2]))
+        self._stepper.engine.start_over(self.statistics.com_max_height)
+        self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
+        self.termination = Termination.COMPLETED.value
+        self.cpu_time = self.wall_time = 0.0
+
+    def _begin_budget(self) -> None:
+        if self._ledger is not None:
+            surroundings = self._stepper.surroundings
+            rest = surroundings.rest_strains_of(self._state.transduction)
+            self._ledger.begin(self._state, rest, surroundings.load_factor(self.time))
+            self._stepper.ledger = self._ledger
+
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Why `model`, `dimension`, `integrator` and `stepping` are what they are."""
+        return {**self.plan.reasons, "stepping": self.steps.reason}
+
+    # what the scene looks like now
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._state.time[0])
+
+    @property
+    def positions(self) -> Array:
+        """Positions of nodes, layer by layer, then of contact points of bodies [m], shape (nodes, 3)."""
+        return observe.positions_with_points(self.model, self._state)
+
+    @property
+    def velocities(self) -> Array:
+        """Their velocities [m/s], shape (nodes, 3)."""
+        return observe.velocities_with_points(self.model, self._state)
+
+    @property
+    def contact_forces(self) -> Array:
+        """Barrier and friction force on each of them [N], shape (nodes, 3)."""
+        self.compile()
+        return observe.contact_forces(self._stepper)
+
+    @property
+    def com(self) -> Array:
+        """Mass centre of the rods [m], shape (3,)."""
+        return center_of_mass(self.model, self._state)
+
+    @property
+    def stimulus(self) -> dict[str, float]:
+        """Value of each channel over the last step, in its unit."""
+        self.compile()
+        return dict(zip(self.scene.stimuli, self._stepper.stimulus.tolist(), strict=True))
+
+    @property
+    def bodies(self) -> dict[str, BodyView]:
+        """Pose of every body."""
+        state = self._state
+        return {
+            name: BodyView(state.body_position[i].copy(), observe.quaternion_from_matrix(state.body_rotation[i]))
+            for i, name in enumerate(self.model.bodies.names)
+        }
+
+    @property
+    def curvatures(self) -> Array:
+        """Curvature χ through the thickness at every node [1/m], shape (nodes,)."""
+        self.compile()
+        return observe.node_curvature(self.model, self._stepper)
+
+    def energy(self) -> dict[str, float]:
+        """Energy of each term [J]."""
+        self.compile()
+        return observe.energies(self._stepper, self._state)
+
+    def budget(self) -> dict:
+        """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
+
+        Raises
+        ------
+        InputError
+            If it is not kept.
+        """
+        if self._ledger is None:
+            raise InputError("budget: is not kept; make the simulator with budget=True")
+        self.compile()
+        return self._ledger.budget()
+
+    @property
+    def description(self) -> Description:
+        """What does not change during the run."""
+        settings = {
+            "model": self.plan.model,
+            "dimension": str(self.plan.dimension),
+            "integrator": self.plan.integrator,
+            "dt": repr(self.dt),
+            "tolerance": "none" if self.tolerance is None else repr(self.tolerance),
+            "newton_tolerance": repr(self.steps.newton_tolerance),
+            **observe.versions(),
+        }
+        return observe.describe(self.model, self._state, settings, scene_text(self.scene))
+
+    def frame(self) -> Frame:
+        """A snapshot."""
+        self.compile()
+        return observe.make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
+
+    # what changes it
+
+    def set_stimulus(self, channel: str, value: float | None) -> None:
+        """Set a channel from the next step on, in its unit; None gives it back to the scene's schedule.
+
+        Raises
+        ------
+        InputError
+            If there is no such channel, or the value is not finite or out of the channel's range; nothing is changed
+            then.
+        """
+        if channel not in self.scene.stimuli:
+            known = ", ".join(self.scene.stimuli) or "none"
+            raise InputError(f"stimulus {channel!r}: no such channel; the scene {self.scene.name!r} has: {known}")
+        index = list(self.scene.stimuli).index(channel)
+        if value is None:
+            self._override(index, math.nan)
+            return
+        allowed = self.scene.stimuli[channel]
+        if not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
+            raise InputError(
+                f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
+                f"to {allowed.maximum:g} (unit {allowed.unit})"
+            )
+        self._override(index, float(value))
+
+    def _override(self, channel: int, value: float) -> None:
+        override = self._state.override
+        if not np.array_equal(override[channel], value, equal_nan=True):
+            self._stepper.restart(self._state)
+        override[channel] = value
+
+    def compile(self) -> float:
+        """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took.
+
+        Whatever needs them calls it; calling it first keeps its time apart from that of the simulation.
+        """
+        if self._compile_time is None:
+            begin = clock.thread_time()
+            self._compile_time = 0.0
+            self._stepper.rest(self._state)
+            self._stepper.compile(self._state)
+            self._stepper.rest(self._state)
+            self.statistics.take_shape(self._stepper, self._state)
+            self._begin_budget()
+            self._compile_time = clock.thread_time() - begin
+        return self._compile_time
+
+    def step(self, until: float = math.inf) -> StepReport:
+        """Advance by one step.
+
+        Parameters
+        ----------
+        until : float
+            Simulated time [s] at which an adaptive step ends at the latest, if the scene's next output time is not
+            earlier; a fixed one is as long as ever.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot be made; the state is that of the last step.
+        """
+        self.compile()
+        begin, wall = clock.thread_time(), clock.perf_counter()
+        until = self._stop_before(until)
+        found = self._stepper.march(self._state, 1, until)
+        if found is not None:
+            self.statistics.update_with(found, self._stepper)
+            report = StepReport.of(found, self.time)
+        else:
+            report = self._advance(until)
+        self.cpu_time += clock.thread_time() - begin
+        self.wall_time += clock.perf_counter() - wall
+        return report
+
+    def _advance(self, until: float) -> StepReport:
+        """A step that is none for a compiled loop, or cannot be made."""
+        try:
+            report = self._stepper.advance(self._state, until)
+        except SimulationError:
+            self._stepper.rest(self._state)
+            self.termination = Termination.FAILED.value
+            raise
+        self.statistics.update(report, self._stepper, self._state)
+        return report
+
+    def _stop_before(self, end: float) -> float:
+        """The scene's next output time, or `end` [s]: where adaptive steps end whether or not anybody observes, so that
+        a run does not depend on who does.
+        """
+        rate = self.scene.output.rate
+        due = next_end(self.time + TIME_ROUNDING * self.dt, rate)  # no step can be as short as that
+        return due if due < end - TIME_ROUNDING / rate else end
+
+    def _march(self, steps: int, until: float, due: float) -> int:
+        """Advance by at most so many steps, adaptive ones to `until` [s] at the latest, and by none after one that has
+        reached `due` [s]; returns how many.
+        """
+        begin, wall = clock.thread_time(), clock.perf_counter()
+        found = self._stepper.march(self._state, steps, until, due)
+        if found is not None:
+            self.statistics.update_with(found, self._stepper)
+        else:
+            self._advance(until)
+        self.cpu_time += clock.thread_time() - begin
+        self.wall_time += clock.perf_counter() - wall
+        return 1 if found is None else found.done
+
+    def run(
+        self,
+        duration: float | None = None,
+        *,
+        observers: Sequence[Observer] = (),
+        stop: Callable[[], bool] | None = None,
+        progress: Callable[[float], None] | None = None,
+        each_step: Callable[[float], None] | None = None,
+    ) -> RunResult:
+        """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
+
+        Fixed steps end within half a step of it. Adaptive ones end exactly there, and at the scene's output times
+        (`output.rate`, counted from time 0), whether or not anybody observes: the run is the same bit for bit whatever
+        watches it. So is a run in parts that meet at output times; at another time the end of a part is one more end
+        of a step.
+
+        Parameters
+        ----------
+        duration : float, optional
+        observers : sequence of Observer
+            Each sees the first frame, the last, and at its rate between that of the first step which ends at or after
+            each due time; all are closed whatever happens.
+        stop : callable, optional
+            Asked every few steps; true ends the run as interrupted.
+        progress : callable, optional
+            Called every few steps with the simulated time [s].
+        each_step : callable, optional
+            Called with the simulated time [s] after each step, which is then made alone: that takes a little longer.
+
+        Raises
+        ------
+        SimulationError
+            If a step cannot be made. Observers have then seen the last accepted frame and are closed.
+        """
+        left = self.scene.duration - self.time if duration is None else duration
+        if not (math.isfinite(left) and left >= 0.0):
+            raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
+        adaptive = self.tolerance is not None
+        steps = math.inf if adaptive else int(round(left / self.dt))
+        if left > 0.0 and steps == 0:
+            raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
+        self.compile()
+        begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
+        end = begin + left if adaptive else math.inf
+        termination = Termination.INTERRUPTED
+        most = STEPS_AT_ONCE if each_step is None else 1
+        schedule = Schedule(observers, self)
+        try:
+            schedule.start()
+            while done < steps and self.time < end:
+                at_once = most if adaptive else schedule.steps_until_due(min(steps - done, most))
+                done += self._march(at_once, self._stop_before(end), schedule.next_due())
+                schedule.observe_due()
+                if each_step is not None:
+                    each_step(self.time)
+                if progress is not None:
+                    progress(self.time)
+                if stop is not None and done < steps and self.time < end and stop():
+                    break
+            else:
+                termination = Termination.COMPLETED
+        except SimulationError:
+            termination = Termination.FAILED
+            raise
+        finally:
+            self.termination = termination.value
+            schedule.finish(termination is Termination.COMPLETED, termination.value)
+        return RunResult(
+            termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
+        )
+
+    def solve_static(self, tolerance: float | None = None) -> StaticReport:
+        """Go to an equilibrium under the present stimuli and loads, not in time; see `simulation.equilibrium`.
+
+        Parameters
+        ----------
+        tolerance : float, optional
+            Displacement that counts as rest [m]; default: 1e-10 of the longest rod.
+
+        Returns
+        -------
+        StaticReport
+            How it went, and whether the equilibrium is stable.
+
+        Raises
+        ------
+        SimulationError
+            If none is found; nothing is changed then.
+        """
+        self.compile()
+        begin, wall = clock.thread_time(), clock.perf_counter()
+        try:
+            return solve_static(self._stepper, self._state, tolerance)
+        finally:
+            self._stepper.rest(self._state)
+            self.statistics.take_shape(self._stepper, self._state)
+            self._begin_budget()
+            self.cpu_time += clock.thread_time() - begin
+            self.wall_time += clock.perf_counter() - wall
+
+    def save_state(self) -> Array:
+        """Flat copy of the state; `load_state` continues from it bit for bit.
+
+        Its last values are a fingerprint of the scene (`model.fingerprint`), so that no other scene takes it.
+        """
+        return self._state.flat()
+
+    def load_state(self, snapshot: Array) -> None:
+        """Go to a saved state of the same scene, or of one that differs only in schedules of stimuli, loads, gravity,
+        contact, friction, damping, drag, steps, tolerances or output.
+
+        Raises
+        ------
+        InputError
+            If it is of another scene or model, or does not fit; nothing is changed then.
+        """
+        loaded = self._initial_state()
+        loaded.set_flat(snapshot)
+        refuse_out_of_plane(self.model, loaded)
+        self._state.set_flat(snapshot)
+        self.compile()
+        self._stepper.rest(self._state)
+        self._start_over()
+        self.statistics.take_shape(self._stepper, self._state)
+        self._begin_budget()
+
+    def reset(self) -> None:
+        """Go back to the start of the scene; stimuli set from outside are forgotten."""
+        self.load_state(self._initial_state().flat())
+
+    def summary(self) -> dict:
+        """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for
+        ``--summary``.
+        """
+        from .summary import summarise
+
+        return summarise(self)

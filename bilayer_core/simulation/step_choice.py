@@ -1,0 +1,125 @@
+"""How long steps are: all the same, or as long as their error allows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ..errors import InputError
+from ..integrators.method import Method
+from ..scene.config import DEFAULT_DT, DEFAULT_TOLERANCE, LARGEST_TOLERANCE, SceneConfig
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Lengths of the steps of a run, and why they are these.
+
+    Attributes
+    ----------
+    dt : float
+        Length of a fixed step, or of the first adaptive one [s].
+    tolerance : float or None
+        Largest error of one adaptive step: displacement over the length of the longest rod; errors of steps add up
+        over a run. None: steps are fixed.
+    longest : float
+        Length of the longest adaptive step [s].
+    max_halvings : int
+        Of a fixed step that fails.
+    shortest : float
+        Length of the shortest adaptive step [s].
+    newton_tolerance : float
+        Speed of a material point below which Newton's correction is the last [m/s].
+    reason : str
+    """
+
+    dt: float
+    tolerance: float | None
+    longest: float
+    max_halvings: int
+    shortest: float
+    newton_tolerance: float
+    reason: str
+
+    @property
+    def adaptive(self) -> bool:
+        """Whether steps are as long as their error allows."""
+        return self.tolerance is not None
+
+    def __str__(self) -> str:
+        if self.tolerance is None:
+            return f"fixed, {1e3 * self.dt:g} ms"
+        return f"adaptive, error per step at most {self.tolerance:g} of the longest rod"
+
+
+def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, tolerance: float | None = None) -> Steps:
+    """The steps that a caller and a scene ask for; by default adaptive ones.
+
+    A `tolerance` asks for adaptive steps, `dt` alone for fixed ones; what the caller asks for comes before what the
+    scene says.
+
+    Parameters
+    ----------
+    scene : SceneConfig
+    method : Method
+    dt, tolerance : float, optional
+        Of the caller [s; part of the longest rod].
+
+    Raises
+    ------
+    InputError
+        If one of them is not a length of a step or a tolerance.
+    """
+    if dt is not None and not (math.isfinite(dt) and dt > 0.0):
+        raise InputError(f"dt: {dt} is not a time step; allowed is a positive number of seconds")
+    if tolerance is not None and not 0.0 < tolerance <= LARGEST_TOLERANCE:
+        allowed = f"a part of the longest rod above 0 and at most {LARGEST_TOLERANCE:g}"
+        raise InputError(f"tolerance: {tolerance} is not allowed; it must be {allowed}")
+    solver, reason = scene.solver, "asked for"
+    if dt is None and tolerance is None:
+        dt, tolerance = solver.dt, solver.tolerance
+        reason = f"set by `solver.{'dt' if tolerance is None else 'tolerance'}`"
+    elif dt is None:
+        dt = solver.dt
+    if dt is None and tolerance is None:
+        if method.estimate is None:
+            reason = f"{method.name} has no estimate of its error, and no `dt` is given"
+        else:
+            tolerance = DEFAULT_TOLERANCE
+            reason = "neither `dt` nor `tolerance` is given; this one keeps the bundled robots' figures within 1 %"
+    longest = 1.0 / scene.output.rate if solver.max_step is None else solver.max_step
+    newton = solver.newton_tolerance
+    if newton is None:
+        length = max(rod.path.length for rod in scene.rods)
+        newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / longest
+    dt, halvings = dt or DEFAULT_DT, solver.max_halvings
+    shortest = min(dt, longest) / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings)
+    if halvings is None:
+        halvings, shortest = DEFAULT_HALVINGS, min(shortest, SHORTEST_PART * _time_of_sound(scene))
+    return Steps(dt, tolerance, longest, halvings, shortest, newton, reason)
+
+
+def _time_of_sound(scene: SceneConfig) -> float:
+    """Least time in which a stretching wave passes an edge [s]."""
+    return min(
+        rod.path.length / (rod.stations - 1) * math.sqrt(material.density / material.youngs_modulus)
+        for rod in scene.rods
+        for material in (scene.materials[layer.material] for layer in rod.layers)
+    )
+
+
+DEFAULT_HALVINGS = 10
+SHORTEST_PART = 1e-3
+"""Of the time in which sound passes an edge: in steps so short even the stiffest spring of a rod is soft, so where they
+do not help, none do."""
+
+
+NEWTON_PART = 1e-2
+"""What Newton's last correction may come to, as a part of the error that a step may have.
+
+A correction at speed u moves a point by at most u h in a step of length h. With u = part × tolerance × L/h_max, L the
+longest rod, that is at most this part of the error allowed in the longest step, and of a smaller one in proportion.
+The correction is taken, so what is left is less by another factor: below `engine.newton.KEEP_FACTOR_BELOW` where
+the matrix is an old one, by the correction itself where it is new. The scales are the scene's own, so u fits
+robots of a micrometre, which move in microseconds, as it fits one of a kilometre; for a rod of 50 mm recorded at 50 Hz
+it is 2.5e-6 m/s. Where this is less than positions can express, the last digit of a position counts (`engine.newton`).
+"""

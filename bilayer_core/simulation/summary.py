@@ -1,0 +1,105 @@
+"""The summary of a run: a plain dictionary, the content of ``--summary``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..model.validity import LARGE_STRAIN
+from . import observation as observe
+from .result import Termination
+
+if TYPE_CHECKING:
+    from .simulator import Simulator
+
+
+def summarise(simulator: Simulator) -> dict:
+    """Figures of a run since its start; lengths in m, times in s, forces in N, energies in J, curvatures in 1/m.
+
+    Of the run, over the start and the ends of all accepted steps: ``max_curvature`` (through the thickness),
+    ``max_strain`` (of an edge, without its eigenstrain), ``com_max_height``, ``min_gap``, ``max_contact_force``, and of
+    bodies ``lift``, the greatest height over that at the start, ``first_contact`` and ``most_contact_nodes``. Of the
+    end: ``com_end``, ``mean_curvature``, ``tip_positions``, ``energy``, and of bodies ``end``, ``lift_end`` and
+    ``contact_nodes``. ``warnings`` tell where the run left the range in which the model is meant to be used.
+    """
+    model, statistics, plan = simulator.model, simulator.statistics, simulator.plan
+    positions = simulator.positions
+    curvature = np.abs(simulator.curvatures[: model.node_count])
+    simulated = simulator.time - simulator.start_time
+    cpu = simulator.cpu_time
+    min_gap = statistics.min_gap
+    return {
+        "scene": simulator.scene.name,
+        "model": plan.model,
+        "dimension": plan.dimension,
+        "integrator": plan.integrator,
+        "stepping": str(simulator.steps),
+        "reasons": simulator.reasons,
+        "nodes": len(positions),
+        "dof": model.unknowns,
+        "dt": simulator.dt,
+        "tolerance": simulator.tolerance,
+        "duration": simulator.scene.duration,
+        "simulated": simulated,
+        "steps": statistics.steps,
+        "substeps": statistics.substeps,
+        "rejected_steps": statistics.rejected,
+        "inaccurate_steps": statistics.inaccurate,
+        "step_length": {
+            "shortest": statistics.shortest if statistics.steps else None,
+            "longest": statistics.longest if statistics.steps else None,
+            "mean": simulated / statistics.steps if statistics.steps else None,
+        },
+        "newton_iterations": statistics.iterations,
+        "factorisations": statistics.factorisations,
+        "cpu_time": cpu,
+        "wall_time": simulator.wall_time,
+        "compile_time": simulator.compile(),
+        "real_time_factor": simulated / cpu if cpu > 0.0 else None,
+        "converged": simulator.termination != Termination.FAILED.value,  # no other step is accepted
+        "largest_residual": statistics.largest_residual,
+        "termination": simulator.termination,
+        "terms": plan.terms,
+        "com_start": simulator.start_com.tolist(),
+        "com_end": simulator.com.tolist(),
+        "com_max_height": statistics.com_max_height,
+        "max_curvature": statistics.max_curvature,
+        "mean_curvature": float(np.average(curvature, weights=model.carriers.weight[: model.node_count])),
+        "tip_positions": {s.name: positions[s.first_node + s.node_count - 1].tolist() for s in model.strands},
+        "max_strain": statistics.max_strain,
+        "min_gap": min_gap if np.isfinite(min_gap) else None,
+        "max_contact_force": statistics.max_contact_force,
+        "energy": simulator.energy(),
+        **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
+        "bodies": _bodies(simulator),
+        "warnings": list(_warnings(statistics.max_strain)),
+        "versions": observe.versions(),
+    }
+
+
+def _warnings(strain: float) -> Iterator[str]:
+    if strain > LARGE_STRAIN:
+        yield (
+            f"largest strain of an edge {100 * strain:.3g} % (at most {100 * LARGE_STRAIN:g} %): "
+            "the law of the material is linear"
+        )
+
+
+def _bodies(simulator: Simulator) -> dict:
+    """Where each body began and is, and how nodes touched it."""
+    found = {}
+    for index, name in enumerate(simulator.model.bodies.names):
+        start, end = simulator.start_bodies[index], simulator.bodies[name].position
+        contact = simulator.statistics.bodies.get(name)
+        found[name] = {
+            "start": start.tolist(),
+            "end": end.tolist(),
+            "lift": simulator.statistics.body_tops[name] - float(start[2]),
+            "lift_end": float(end[2] - start[2]),
+            "first_contact": contact.first_contact if contact else None,
+            "contact_nodes": contact.nodes if contact else 0,
+            "most_contact_nodes": contact.most_nodes if contact else 0,
+        }
+    return found

@@ -1,1 +1,0 @@
-"""The Newton matrix: from second derivatives to a band with a border, and its factors."""
