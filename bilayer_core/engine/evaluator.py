@@ -279,7 +279,8 @@ class Evaluator:
 
     def assemble(self, at: Place) -> tuple[Array, Array, Array]:
         """The matrix of the last evaluation with second derivatives, that of `at`: A as a band
-        (`engine.linear.band`), U and D of free bodies, shapes (size + half-bandwidth, half-bandwidth + 1), (size, 6 n_free), (6 n_free, 6 n_free).
+        (`engine.linear.band`), U and D of free bodies, shapes (size + half-bandwidth, half-bandwidth + 1),
+        (size, 6 n_free), (6 n_free, 6 n_free).
 
         What contacts of rods couple between two edges is in none of them, see `newton_step`.
         """

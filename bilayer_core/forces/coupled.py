@@ -7,7 +7,8 @@ J = (1, −[a]×, −1, [ρ]×) the motion's derivative with respect to (x or X_
     gradient (g, a × g, −g, −ρ × g),   Hessian Jᵀ M J + T_A ± T_B (+ cross terms),   T = ½ (a gᵀ + g aᵀ) − (a·g) 1
 
 (arms turn to second order, as in `engine.linear.attachments`). Where the normal turns with the surface (barrier) T_B
-counts + and the cross terms are −[g]×, −[a]× [g]× and [g]× with φ_B; where it is frozen (friction) T_B counts − and there are none.
+counts + and the cross terms are −[g]×, −[a]× [g]× and [g]× with φ_B;
+where it is frozen (friction) T_B counts − and there are none.
 Blocks between a node and a free body ("links") are listed: the node, the body, and ∂²/∂x ∂(X, φ).
 """
 
