@@ -32,8 +32,9 @@ class Gaps:
 @pytest.fixture(scope="module", params=[0.5, 0.0], ids=["friction", "no friction"])
 def gripped(request):
     """A whole run, with the scene's friction and without any."""
-    simulator = Simulator(load_scene("gripping", [f"contact.friction.coefficient={request.param}"]))
     gaps = Gaps()
+    often = f"output.rate={gaps.rate}"  # steps are longer than its period
+    simulator = Simulator(load_scene("gripping", [f"contact.friction.coefficient={request.param}", often]))
     simulator.run(observers=[gaps])
     return simulator, gaps
 
