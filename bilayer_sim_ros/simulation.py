@@ -13,6 +13,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
+from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_sim_ros.conversions import PATIENCE, to_diagnostics
 from bilayer_sim_ros.lockstep import SHORTEST_PERIOD, Asynchronous, Lockstep, tick_rate
 from bilayer_sim_ros.pacing import Pacer
@@ -24,6 +25,8 @@ from bilayer_sim_ros.status import Status
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 from bilayer_sim_ros.worker import SimulationWorker
 
+COMPILATION_PERIOD = 5.0
+"""Between two messages about compilation [s]."""
 WARNING_PERIOD = 1.0
 """Real time between two warnings about refused messages [s]."""
 
@@ -45,7 +48,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     if lockstep:
         shortest = simulator.dt if simulator.tolerance is None else SHORTEST_PERIOD
         ticks = tick_rate(parameters["control_period"], rate, clock, shortest)
-    node.get_logger().info("compiling, the first start on a machine takes about half a minute ...")
+    ensure_compiled(_progress_of_compilation(node))
     seconds = simulator.compile()
     description = simulator.description
     inputs = StimulusInputs(
@@ -106,6 +109,18 @@ def _diagnostics(node: Node, real_time_factor: float) -> Callable[[Status], None
             publisher.publish(to_diagnostics(status, name, real_time_factor))
 
     return publish
+
+
+def _progress_of_compilation(node: Node) -> Callable[[int, int], None]:
+    """Says now and then how many pieces of the engine are compiled."""
+
+    def report(done: int, total: int) -> None:
+        node.get_logger().info(
+            f"compiling kernels, once for this version on this machine: {done} of {total} pieces",
+            throttle_duration_sec=COMPILATION_PERIOD,
+        )
+
+    return report
 
 
 def _subscribe(node: Node, inputs: StimulusInputs, channels: tuple[str, ...]) -> None:

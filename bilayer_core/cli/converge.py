@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from bilayer_core.cli.options import Duration, Verb, scene_argument, set_option
-from bilayer_core.cli.watch import notice_of_compilation
+from bilayer_core.cli.watch import compile_kernels
 from bilayer_core.errors import InputError
 
 
@@ -48,8 +48,8 @@ def converge(
         if not quiet:
             click.echo(f"  run {done} of {runs} done: {name}", err=True)
 
-    with notice_of_compilation(quiet):
-        found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
+    compile_kernels(quiet)
+    found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
     click.echo(f"{config.name}: {found.integrator}, steps {found.stepping}")
     _print_table(found.rows)
     for name, reason in found.missing.items():

@@ -10,7 +10,7 @@ import click
 
 from bilayer_core.cli.options import INTERRUPTED, Duration, Rate, Verb, scene_argument, set_option
 from bilayer_core.cli.report import summary_lines
-from bilayer_core.cli.watch import Interrupt, notice_of_compilation, progress_bar
+from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
 from bilayer_core.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
@@ -99,8 +99,8 @@ def _make_simulator(config: SceneConfig, from_state: str | None, budget: bool, q
             simulator.load_state(state)
         except InputError as error:
             raise InputError(f"{from_state}: {error}") from error
-    with notice_of_compilation(quiet):
-        simulator.compile()
+    compile_kernels(quiet)
+    simulator.compile()
     return simulator
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bilayer_core.cli.options import Verb
-from bilayer_core.cli.watch import notice_of_compilation
+from bilayer_core.cli.watch import compile_kernels
 from bilayer_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,9 +43,9 @@ def validate(out: str | None, json_file: str | None, only: str | None, quick: bo
         from bilayer_core.record.paths import check_output_path
 
         check_output_path(json_file, force=True)
+    compile_kernels(quiet=False)
     _print_line(("case", "computed", "reference", "error", "limit", ""), "bold")
-    with notice_of_compilation(False):
-        results = register.run(cases, _print_result)
+    results = register.run(cases, _print_result)
     if json_file:
         report.write_json(results, Path(json_file))
     if directory is not None:

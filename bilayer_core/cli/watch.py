@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import signal
 import sys
-import threading
 import time as clock
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import click
 
-COMPILING_NOTICE = 2.0
-"""Wall time after which a start is not one from the cache, and the user is told [s]."""
+COMPILING_NOTICE = "compiling kernels, once for this version on this machine (about a minute) ..."
 REFRESH = 0.1
 """Wall time between two updates of the progress bar [s]."""
 
@@ -48,18 +46,37 @@ class Interrupt:
         self.wished = True
 
 
+def compile_kernels(quiet: bool) -> None:
+    """Compile all kernels if that was not done yet, and tell the user why nothing else happens."""
+    from bilayer_core.jit.compile_all import ensure_compiled
+
+    if quiet:
+        ensure_compiled(lambda done, total: None)
+        return
+    shown: list[Callable[[int, int], None]] = []
+
+    def report(done: int, total: int) -> None:
+        if not shown:
+            click.echo(COMPILING_NOTICE, err=True)
+            shown.append(stack.enter_context(pieces_bar(total)))
+        shown[0](done, total)
+
+    with ExitStack() as stack:
+        ensure_compiled(report)
+
+
 @contextmanager
-def notice_of_compilation(quiet: bool) -> Iterator[None]:
-    """Tell the user why nothing seems to happen, when it takes long."""
-    text = "compiling kernels (first start, cached afterwards) ..."
-    timer = threading.Timer(COMPILING_NOTICE, click.echo, (text,), {"err": True})
-    timer.daemon = True
-    if not quiet:
-        timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
+def pieces_bar(total: int) -> Iterator[Callable[[int, int], None]]:
+    """A bar on stderr over pieces that are compiled. Yields the function that takes how many are done, of how many."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
+
+    with Progress(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=Console(stderr=True)) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done, total: bar.update(task, completed=done)
 
 
 @contextmanager

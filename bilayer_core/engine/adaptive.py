@@ -6,7 +6,7 @@ import numpy as np
 
 from ..model.model import Model
 from ..model.records.outcome import GAP, PAIR, PLACE, STATUS
-from ..model.records.status import CONVERGED, FAILURES
+from ..model.records.status import CONVERGED
 from ..model.records.step import Course, Method, StateArrays
 from ..model.state import State
 from .actuation import Acting
@@ -15,7 +15,7 @@ from .error_norm import Yardstick
 from .integrate import Adaptation, Clock, Control, adapt, clear, room_for_counts
 from .loop import Loop
 from .modes import STEP
-from .newton_report import NewtonReport, NewtonStatus
+from .newton_report import FAILURES, NewtonReport, NewtonStatus
 
 
 def yardstick_of(model: Model) -> Yardstick:

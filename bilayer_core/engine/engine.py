@@ -22,14 +22,14 @@ from ..model.records.outcome import (
     RESIDUAL,
     STATUS,
 )
-from ..model.records.status import CONVERGED, FAILURES, TOO_INACCURATE
+from ..model.records.status import CONVERGED, TOO_INACCURATE
 from ..model.records.step import Course, Method, Place, StateArrays, Tally
 from ..model.rest_strains import RestStrains
 from ..model.state import State
 from .allocate import configuration
 from .loop import Counted, Loop
 from .modes import STEP
-from .newton_report import NewtonReport, NewtonStatus
+from .newton_report import FAILURES, NewtonReport, NewtonStatus
 from .step import count_step, take_steps
 from .storage import Storage
 from .workspace import work_of

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from ..model.records.status import BEYOND, BLOCKED, INDEFINITE, LINE_SEARCH, MAX_ITERATIONS, NOT_FINITE
+
 
 class NewtonStatus(Enum):
     """How an attempt at a step ended; the value is the message."""
@@ -16,6 +18,17 @@ class NewtonStatus(Enum):
     NOT_FINITE = "the potential or its gradient is not finite"
     BEYOND = "the end of the step, beyond its last stage, lies behind a surface"
     BLOCKED = "prescribed motion would push a surface through another one"
+
+
+FAILURES = {
+    MAX_ITERATIONS: NewtonStatus.MAX_ITERATIONS,
+    LINE_SEARCH: NewtonStatus.LINE_SEARCH,
+    INDEFINITE: NewtonStatus.INDEFINITE,
+    NOT_FINITE: NewtonStatus.NOT_FINITE,
+    BLOCKED: NewtonStatus.BLOCKED,
+    BEYOND: NewtonStatus.BEYOND,
+}
+"""Statuses of a step that failed."""
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import queue
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +22,7 @@ from .piece import PIECES
 COMPLETE = "complete"
 """Name of an empty file in the folder in which all pieces are."""
 MOST_PROCESSES = 2
+_log = logging.getLogger(__name__)
 PACKAGES = Path(__file__).resolve().parents[2]
 WORKER = "bilayer_core.jit.worker"
 ENGINE = "bilayer_core.engine"
@@ -41,6 +44,22 @@ def is_complete() -> bool:
     """Whether all pieces are in the cache, or nothing is kept at all."""
     folder = cache_folder()
     return folder is None or (folder / COMPLETE).exists()
+
+
+def ensure_compiled(report: Callable[[int, int], None] | None = None) -> None:
+    """Compile all pieces if that was not done since the sources changed; ``BILAYER_JIT_AHEAD=0``: those needed, when
+    they are.
+
+    Parameters
+    ----------
+    report : callable, optional
+        As for `compile_all`; without one, the log says what happens.
+    """
+    if os.environ.get("BILAYER_JIT_AHEAD", "1") == "0" or is_complete():
+        return
+    if report is None:
+        _log.warning("compiling all kernels, once for this version on this machine: about a minute")
+    compile_all(report)
 
 
 def compile_all(report: Callable[[int, int], None] | None = None) -> None:
@@ -109,3 +128,19 @@ def _feed(left: queue.SimpleQueue, done: queue.SimpleQueue, printed: list[str]) 
                 done.put(None)
                 return
             done.put(name)
+
+
+def main() -> None:
+    """Compile all pieces, and say so: what `make install` runs."""
+    begin = time.perf_counter()
+    if cache_folder() is None:
+        raise SystemExit("kernels are not kept on this machine: there is nothing to compile ahead of time")
+    if not is_complete():
+        bar = sys.stderr.isatty()
+        print("compiling kernels, once for this version on this machine ...", flush=True)
+        compile_all((lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr)) if bar else None)
+        print(f"{len(PIECES)} pieces compiled in {time.perf_counter() - begin:.0f} s: {cache_folder()}")
+
+
+if __name__ == "__main__":
+    main()

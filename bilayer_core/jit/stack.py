@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.typing import signature
 from numba.extending import intrinsic
 
 
@@ -46,7 +45,7 @@ def stack_vector(typingctx, n):
     def make(context, builder, signature, arguments):
         return _on_stack(context, builder, array_type, [size])
 
-    return signature(array_type, n), make
+    return array_type(n), make
 
 
 @intrinsic(prefer_literal=True)
@@ -59,4 +58,4 @@ def stack_matrix(typingctx, rows, columns):
     def make(context, builder, signature, arguments):
         return _on_stack(context, builder, array_type, [rows.literal_value, columns.literal_value])
 
-    return signature(array_type, rows, columns), make
+    return array_type(rows, columns), make

@@ -14,7 +14,8 @@ from .model import Bodies, Model
 from .planarity import require_plane
 from .plane import InPlane, Plane
 from .points import add_point_masses, build_loads
-from .rod_surfaces import build_rod_surfaces, refuse_meeting_rods
+from .rod_penetration import refuse_meeting_rods
+from .rod_surfaces import build_rod_surfaces
 from .rods import add_bonded_rods
 from .strands import Collected, turn_of_copy
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from ..errors import PenetrationError
 from ..scene.config import SceneConfig
-from .model import Bodies, Carriers, Model, StrandArrays, Surfaces
+from .model import Bodies, Carriers, Model, Surfaces
 from .parties import RODS, Party, parties, points_meet, shapes_meet
 from .shapes import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
+from .strand_arrays import StrandArrays
 from .strands import Collected
 
 

@@ -12,8 +12,8 @@ from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod
 from .immersed import add_fluid
 from .laminate_section import LayerHalves, WholeSection, layer_halves, side
-from .model import StrandArrays
 from .section import Section, outline, sections
+from .strand_arrays import StrandArrays
 from .strands import Collected, StrandElements, Turn, add_strand, strand_shape
 from .validity import Figure
 

@@ -12,28 +12,11 @@ from .layout import Layout, ReadOnlyArrays
 from .plane import InPlane
 from .rod_surfaces import RodSurfaces
 from .shapes import Shape
+from .strand_arrays import StrandArrays
 
 Array = np.ndarray
 AXES = np.eye(3)
 AXES.flags.writeable = False  # as a model's arrays
-
-
-@dataclass(frozen=True)
-class StrandArrays(ReadOnlyArrays):
-    """One layer of one rod, or all of them: where its nodes and edges stand."""
-
-    name: str
-    rod: str
-    layer: str
-    first_station: int
-    first_node: int
-    node_count: int
-    first_edge: int
-    width: Array  # at its nodes [m], shape (node_count,)
-    thickness: Array  # likewise
-    offset: Array  # of the middle between its faces from its nodes, along m1 [m], likewise
-    curvature: Array  # of its nodes' curve at the start [1/m], likewise
-    layers: tuple[StrandArrays, ...] = ()  # of a strand that stands for several: each on those nodes where it is
 
 
 @dataclass(frozen=True)

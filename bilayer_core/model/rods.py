@@ -9,8 +9,8 @@ from ..scene.config import SceneConfig
 from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod
 from .immersed import add_fluid
-from .model import StrandArrays
 from .section import Section, bond, sections
+from .strand_arrays import StrandArrays
 from .strands import Collected, Span, StrandElements, StrandShape, Turn, add_strand, strand_shape
 
 Array = np.ndarray

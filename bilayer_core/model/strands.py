@@ -12,7 +12,7 @@ from ..kinematics.rotation import rotation_matrix
 from ..scene.config import SceneConfig
 from ..scene.eigenstrain import Eigenstrain
 from ..scene.rod import ArcPath, Rod, SpiralPath
-from .model import StrandArrays
+from .strand_arrays import StrandArrays
 
 Array = np.ndarray
 Span = tuple[int, int, int, int]

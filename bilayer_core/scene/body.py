@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from bilayer_core.scene import checks
-from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.faults import ROUNDING, Fault, refuse_all
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.schedule import faults_of_times, first_after
 from bilayer_core.scene.shape import RotationVector, Surface
@@ -39,7 +38,7 @@ class Free(Part):
 
     @model_validator(mode="after")
     def _check(self) -> Free:
-        refuse_all("Free", checks.faults_of_inertia(self))
+        refuse_all("Free", faults_of_inertia(self))
         return self
 
 
@@ -118,3 +117,15 @@ class Body(Part):
     """What others touch; without one nothing does."""
     contact_points: list[ContactPoint] = []
     """Points by which the body itself touches surfaces."""
+
+
+def faults_of_inertia(motion: Free) -> list[Fault]:
+    """Whether the moments of inertia can be those of a body."""
+    if motion.inertia is None:
+        return []
+    if motion.shell:
+        return [(("shell",), True, "must be left out where `inertia` is given")]
+    small, middle, large = sorted(motion.inertia)
+    if large > (1.0 + ROUNDING) * (small + middle):
+        return [(("inertia",), motion.inertia, "must be such that none exceeds the sum of the other two")]
+    return []

@@ -2,146 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
-from bilayer_core.scene.faults import Fault, Location, one_of
-from bilayer_core.scene.profile import Profile, extremes
-
-if TYPE_CHECKING:
-    from bilayer_core.scene.body import Free
-    from bilayer_core.scene.config import SceneConfig, Stimulus
-    from bilayer_core.scene.eigenstrain import Eigenstrain
-    from bilayer_core.scene.load import Load, PointMass
-    from bilayer_core.scene.rod import Layer, Rod, SpiralPath
-
-ROUNDING = 1e-9
-"""Relative difference of typed numbers that is not taken for a fault."""
+from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
+from bilayer_core.scene.load import Load, PointMass
 
 
-def faults_of_range(stimulus: Stimulus) -> list[Fault]:
-    """The range of a channel, and the values that its schedule takes."""
-    low, high = stimulus.minimum, stimulus.maximum
-    if high <= low:
-        return [(("maximum",), high, f"must be above `minimum` ({low:g})")]
-    return [
-        (("schedule", *key), value, f"must lie in the range of the channel, {low:g} to {high:g} [{stimulus.unit}]")
-        for key, value in stimulus.schedule.points().items()
-        if not low <= value <= high
-    ]
+class SceneConfig(Protocol):
+    """A scene, as far as the checks look at it: see `bilayer_core.scene.config.SceneConfig`."""
 
-
-def faults_of_spiral(path: SpiralPath) -> list[Fault]:
-    """Radii that make it no spiral."""
-    if math.isclose(path.start_radius, path.end_radius, rel_tol=ROUNDING):
-        return [(("end_radius",), path.end_radius, "must differ from `start_radius`; with equal radii it is an `arc`")]
-    return []
-
-
-def faults_of_rod(rod: Rod) -> list[Fault]:
-    """Its normal, and where its layers begin and end."""
-    faults: list[Fault] = []
-    cosine = sum(a * b for a, b in zip(rod.normal, rod.path.direction, strict=True))
-    if abs(cosine) > ROUNDING:
-        tilt = math.degrees(math.asin(min(abs(cosine), 1.0)))
-        faults.append((("normal",), rod.normal, f"must be perpendicular to the path, is {tilt:.3g} deg off"))
-    names = [(("layers", index, "name"), layer.name) for index, layer in enumerate(rod.layers)]
-    faults += _repeated(names, "layers of a rod")
-    ordered = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
-
-    def is_ordered(interval: tuple[float, float]) -> bool:
-        return interval[0] < interval[1] <= rod.path.length * (1.0 + ROUNDING)
-
-    faults += _profiles(rod, (), ("width",), rod.path.length)
-    faults += _faces_of_path(rod)
-    for index, layer in enumerate(rod.layers):
-        varying = ("thickness", "stiffness", "natural_curvature", "natural_twist")
-        faults += _profiles(layer, ("layers", index), varying, rod.path.length)
-        for number, law in enumerate(layer.eigenstrain):
-            where: Location = ("layers", index, "eigenstrain", number, "interval")
-            if law.interval is not None and not is_ordered(law.interval):
-                faults.append((where, law.interval, ordered))
-            elif not rod.driven_edges(layer, law):
-                demand = f"must hold the middle of an edge of the layer; an edge is {rod.edge_length:g} m long"
-                faults.append((where, law.interval, demand))
-        if layer.interval is None:
-            continue
-        first, last = rod.covered_stations(layer)
-        if not is_ordered(layer.interval):
-            faults.append((("layers", index, "interval"), layer.interval, ordered))
-        elif last - first < 2:
-            demand = f"must span two edges or more; an edge is {rod.edge_length:g} m long"
-            faults.append((("layers", index, "interval"), layer.interval, demand))
-    if not faults and not any(rod.covered_stations(layer) == (0, rod.stations - 1) for layer in rod.layers):
-        faults.append((("layers",), [layer.interval for layer in rod.layers], "one layer must cover the whole path"))
-    return faults
-
-
-def _faces_of_path(rod: Rod) -> Iterator[Fault]:
-    """Whether the face on the inner side of a curved path has a length: the path's radius exceeds its distance."""
-    if rod.path.shape == "straight":
-        return
-    toward = rod.path.toward == "normal"
-    inner = rod.layers[-1 if toward else 0]
-    distance = extremes(inner.thickness)[1] * (0.5 if len(rod.layers) == 1 else 1.0)
-    ends = abs(rod.path.curvature_at(np.array([0.0, rod.path.length])))  # that of a spiral falls with its radius
-    radius = 1.0 / float(ends.max())
-    if radius > distance:
-        return
-    key = "radius" if rod.path.shape == "arc" else ("start_radius", "end_radius")[int(ends.argmax())]
-    demand = (
-        f"must be larger: the path has a radius of {radius:g} m, and the inner face of layer {inner.name}, "
-        f"{distance:g} m from it, would have no length"
-    )
-    yield ("path", key), getattr(rod.path, key), demand
-
-
-def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:
-    """Whether profiles along a path of given length [m] stay on it."""
-    for key in keys:
-        profile = getattr(part, key)
-        for index, place in enumerate(profile.at if isinstance(profile, Profile) else ()):
-            if place > length * (1.0 + ROUNDING):
-                yield (*where, key, "at", index), place, f"must be a length [m] along the path, from 0 to {length:g}"
-
-
-def faults_of_inertia(motion: Free) -> list[Fault]:
-    """Whether the moments of inertia can be those of a body."""
-    if motion.inertia is None:
-        return []
-    if motion.shell:
-        return [(("shell",), True, "must be left out where `inertia` is given")]
-    small, middle, large = sorted(motion.inertia)
-    if large > (1.0 + ROUNDING) * (small + middle):
-        return [(("inertia",), motion.inertia, "must be such that none exceeds the sum of the other two")]
-    return []
-
-
-def faults_of_load(load: Load) -> list[Fault]:
-    """Whether it acts on one thing, at one place, and what acts there."""
-    if (load.rod is None) == (load.body is None):
-        found = None if load.rod is None else f"{load.rod}, beside the body {load.body}"
-        return [(("rod",), found, "must be given, or `body` instead of it: a load acts on one of the two")]
-    faults: list[Fault] = []
-    if load.rod is not None and load.position is None:
-        faults.append((("position",), None, "must be given for a load on a rod: a length along its path"))
-    if load.body is not None and load.position is not None:
-        faults.append((("position",), load.position, "must be left out: a force on a body acts at its mass centre"))
-    if load.rod is not None and any(load.moment):
-        faults.append((("moment",), load.moment, "must be left out: only bodies take moments"))
-    if not any(load.force) and not any(load.moment):
-        faults.append((("force",), load.force, "must not be zero" + (" where `moment` is" if load.body else "")))
-    return faults
-
-
-def faults_of_rounding(rounding: float, largest: float, what: str) -> list[Fault]:
-    """Whether a shape has room for the radius of its edges."""
-    if rounding <= (1.0 + ROUNDING) * largest:
-        return []
-    return [(("rounding",), rounding, f"must be at most {what} ({largest:g} m)")]
+    rods: tuple
+    bodies: tuple
+    obstacles: tuple
+    masses: tuple
+    loads: tuple
+    materials: dict
+    stimuli: dict
 
 
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
@@ -157,17 +37,9 @@ def _names(scene: SceneConfig) -> Iterator[Fault]:
         *((("bodies", index, "name"), body.name) for index, body in enumerate(scene.bodies)),
         *((("obstacles", index, "name"), plane.name) for index, plane in enumerate(scene.obstacles)),
     ]
-    yield from _repeated(named, "rods, bodies and obstacles")
+    yield from repeated(named, "rods, bodies and obstacles")
     for key in ("masses", "loads"):
-        yield from _repeated([((key, i, "name"), part.name) for i, part in enumerate(getattr(scene, key))], key)
-
-
-def _repeated(named: list[tuple[Location, str]], among: str) -> Iterator[Fault]:
-    seen: set[str] = set()
-    for where, name in named:
-        if name in seen:
-            yield where, name, f"must be a name of its own among the {among}"
-        seen.add(name)
+        yield from repeated([((key, i, "name"), part.name) for i, part in enumerate(getattr(scene, key))], key)
 
 
 def _references(scene: SceneConfig) -> Iterator[Fault]:

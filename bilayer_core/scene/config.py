@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
-from bilayer_core.scene.faults import refuse, refuse_all
+from bilayer_core.scene.faults import Fault, refuse, refuse_all
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import Name, Part
 from bilayer_core.scene.rod import Rod
@@ -69,7 +69,7 @@ class Stimulus(Part):
 
     @model_validator(mode="after")
     def _check(self) -> Stimulus:
-        refuse_all("Stimulus", checks.faults_of_range(self))
+        refuse_all("Stimulus", faults_of_range(self))
         return self
 
 
@@ -256,3 +256,15 @@ class SceneConfig(Part):
     def _check(self) -> SceneConfig:
         refuse_all("SceneConfig", checks.faults_of_scene(self))
         return self
+
+
+def faults_of_range(stimulus: Stimulus) -> list[Fault]:
+    """The range of a channel, and the values that its schedule takes."""
+    low, high = stimulus.minimum, stimulus.maximum
+    if high <= low:
+        return [(("maximum",), high, f"must be above `minimum` ({low:g})")]
+    return [
+        (("schedule", *key), value, f"must lie in the range of the channel, {low:g} to {high:g} [{stimulus.unit}]")
+        for key, value in stimulus.schedule.points().items()
+        if not low <= value <= high
+    ]

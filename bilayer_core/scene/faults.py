@@ -8,11 +8,14 @@ from __future__ import annotations
 import difflib
 import json
 import types
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+
+ROUNDING = 1e-9
+"""Relative difference of typed numbers that is not taken for a fault."""
 
 LONGEST_VALUE = 60
 """Characters of a found value that are shown."""
@@ -210,3 +213,19 @@ def _expected(schema: type[BaseModel], location: Location) -> str:
     if bare is str:
         return "must be text"
     return "must be a mapping of keys to values"
+
+
+def repeated(named: list[tuple[Location, str]], among: str) -> Iterator[Fault]:
+    """Names that occur twice."""
+    seen: set[str] = set()
+    for where, name in named:
+        if name in seen:
+            yield where, name, f"must be a name of its own among the {among}"
+        seen.add(name)
+
+
+def faults_of_rounding(rounding: float, largest: float, what: str) -> list[Fault]:
+    """Whether a shape has room for the radius of its edges."""
+    if rounding <= (1.0 + ROUNDING) * largest:
+        return []
+    return [(("rounding",), rounding, f"must be at most {what} ({largest:g} m)")]

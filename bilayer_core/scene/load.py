@@ -6,8 +6,7 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from bilayer_core.scene import checks
-from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.faults import Fault, refuse_all
 from bilayer_core.scene.part import Name, Part
 from bilayer_core.scene.piece import Pieces
 from bilayer_core.scene.schedule import Hold, Schedule
@@ -52,10 +51,27 @@ class Load(Part):
 
     @model_validator(mode="after")
     def _check(self) -> Load:
-        refuse_all("Load", checks.faults_of_load(self))
+        refuse_all("Load", faults_of_load(self))
         return self
 
     @property
     def factor(self) -> Pieces:
         """What force and moment are multiplied with."""
         return ALWAYS if self.schedule is None else self.schedule
+
+
+def faults_of_load(load: Load) -> list[Fault]:
+    """Whether it acts on one thing, at one place, and what acts there."""
+    if (load.rod is None) == (load.body is None):
+        found = None if load.rod is None else f"{load.rod}, beside the body {load.body}"
+        return [(("rod",), found, "must be given, or `body` instead of it: a load acts on one of the two")]
+    faults: list[Fault] = []
+    if load.rod is not None and load.position is None:
+        faults.append((("position",), None, "must be given for a load on a rod: a length along its path"))
+    if load.body is not None and load.position is not None:
+        faults.append((("position",), load.position, "must be left out: a force on a body acts at its mass centre"))
+    if load.rod is not None and any(load.moment):
+        faults.append((("moment",), load.moment, "must be left out: only bodies take moments"))
+    if not any(load.force) and not any(load.moment):
+        faults.append((("force",), load.force, "must not be zero" + (" where `moment` is" if load.body else "")))
+    return faults

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, field_serializer, model_validator
 
-from bilayer_core.scene import checks
 from bilayer_core.scene.eigenstrain import Eigenstrain
-from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.faults import ROUNDING, Fault, Location, refuse_all, repeated
 from bilayer_core.scene.part import Direction, Name, Part, Point
-from bilayer_core.scene.profile import varying
+from bilayer_core.scene.profile import Profile, extremes, varying
 from bilayer_core.scene.units import (
     Curvature,
     NonNegativeLength,
@@ -109,7 +109,7 @@ class SpiralPath(Part):
 
     @model_validator(mode="after")
     def _check(self) -> SpiralPath:
-        refuse_all("SpiralPath", checks.faults_of_spiral(self))
+        refuse_all("SpiralPath", faults_of_spiral(self))
         return self
 
     @property
@@ -244,5 +244,79 @@ class Rod(Part):
 
     @model_validator(mode="after")
     def _check(self) -> Rod:
-        refuse_all("Rod", checks.faults_of_rod(self))
+        refuse_all("Rod", faults_of_rod(self))
         return self
+
+
+def faults_of_spiral(path: SpiralPath) -> list[Fault]:
+    """Radii that make it no spiral."""
+    if math.isclose(path.start_radius, path.end_radius, rel_tol=ROUNDING):
+        return [(("end_radius",), path.end_radius, "must differ from `start_radius`; with equal radii it is an `arc`")]
+    return []
+
+
+def faults_of_rod(rod: Rod) -> list[Fault]:
+    """Its normal, and where its layers begin and end."""
+    faults: list[Fault] = []
+    cosine = sum(a * b for a, b in zip(rod.normal, rod.path.direction, strict=True))
+    if abs(cosine) > ROUNDING:
+        tilt = math.degrees(math.asin(min(abs(cosine), 1.0)))
+        faults.append((("normal",), rod.normal, f"must be perpendicular to the path, is {tilt:.3g} deg off"))
+    names = [(("layers", index, "name"), layer.name) for index, layer in enumerate(rod.layers)]
+    faults += repeated(names, "layers of a rod")
+    ordered = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
+
+    def is_ordered(interval: tuple[float, float]) -> bool:
+        return interval[0] < interval[1] <= rod.path.length * (1.0 + ROUNDING)
+
+    faults += _profiles(rod, (), ("width",), rod.path.length)
+    faults += _faces_of_path(rod)
+    for index, layer in enumerate(rod.layers):
+        varying = ("thickness", "stiffness", "natural_curvature", "natural_twist")
+        faults += _profiles(layer, ("layers", index), varying, rod.path.length)
+        for number, law in enumerate(layer.eigenstrain):
+            where: Location = ("layers", index, "eigenstrain", number, "interval")
+            if law.interval is not None and not is_ordered(law.interval):
+                faults.append((where, law.interval, ordered))
+            elif not rod.driven_edges(layer, law):
+                demand = f"must hold the middle of an edge of the layer; an edge is {rod.edge_length:g} m long"
+                faults.append((where, law.interval, demand))
+        if layer.interval is None:
+            continue
+        first, last = rod.covered_stations(layer)
+        if not is_ordered(layer.interval):
+            faults.append((("layers", index, "interval"), layer.interval, ordered))
+        elif last - first < 2:
+            demand = f"must span two edges or more; an edge is {rod.edge_length:g} m long"
+            faults.append((("layers", index, "interval"), layer.interval, demand))
+    if not faults and not any(rod.covered_stations(layer) == (0, rod.stations - 1) for layer in rod.layers):
+        faults.append((("layers",), [layer.interval for layer in rod.layers], "one layer must cover the whole path"))
+    return faults
+
+
+def _faces_of_path(rod: Rod) -> Iterator[Fault]:
+    """Whether the face on the inner side of a curved path has a length: the path's radius exceeds its distance."""
+    if rod.path.shape == "straight":
+        return
+    toward = rod.path.toward == "normal"
+    inner = rod.layers[-1 if toward else 0]
+    distance = extremes(inner.thickness)[1] * (0.5 if len(rod.layers) == 1 else 1.0)
+    ends = abs(rod.path.curvature_at(np.array([0.0, rod.path.length])))  # that of a spiral falls with its radius
+    radius = 1.0 / float(ends.max())
+    if radius > distance:
+        return
+    key = "radius" if rod.path.shape == "arc" else ("start_radius", "end_radius")[int(ends.argmax())]
+    demand = (
+        f"must be larger: the path has a radius of {radius:g} m, and the inner face of layer {inner.name}, "
+        f"{distance:g} m from it, would have no length"
+    )
+    yield ("path", key), getattr(rod.path, key), demand
+
+
+def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:
+    """Whether profiles along a path of given length [m] stay on it."""
+    for key in keys:
+        profile = getattr(part, key)
+        for index, place in enumerate(profile.at if isinstance(profile, Profile) else ()):
+            if place > length * (1.0 + ROUNDING):
+                yield (*where, key, "at", index), place, f"must be a length [m] along the path, from 0 to {length:g}"

@@ -6,8 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from bilayer_core.scene import checks
-from bilayer_core.scene.faults import refuse_all
+from bilayer_core.scene.faults import faults_of_rounding, refuse_all
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.units import Angle, NonNegativeLength, PositiveLength, whole
 
@@ -39,7 +38,7 @@ class _Box(Part):
 
     @model_validator(mode="after")
     def _check(self) -> _Box:
-        refuse_all("Box", checks.faults_of_rounding(self.rounding, 0.5 * min(self.size), "half the shortest edge"))
+        refuse_all("Box", faults_of_rounding(self.rounding, 0.5 * min(self.size), "half the shortest edge"))
         return self
 
 
@@ -62,7 +61,7 @@ class _Cylinder(Part):
     @model_validator(mode="after")
     def _check(self) -> _Cylinder:
         largest = min(self.radius, 0.5 * self.length)
-        refuse_all("Cylinder", checks.faults_of_rounding(self.rounding, largest, "the radius and half the length"))
+        refuse_all("Cylinder", faults_of_rounding(self.rounding, largest, "the radius and half the length"))
         return self
 
 

@@ -46,8 +46,8 @@ from ..model.records.step import Place
 from ..model.rest_strains import RestStrains
 from ..model.state import State
 from .fluid_energy import survey_fluid
+from .kinetic_energy import kinetic_energy
 from .motion import Gradient, Motion, displacement, of_prescribed, velocity
-from .observation import kinetic_energy
 from .quadrature import simpson
 
 Array = np.ndarray

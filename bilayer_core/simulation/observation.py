@@ -7,11 +7,13 @@ import platform
 import numpy as np
 
 from ..kinematics.rotation import quaternion_from_matrix
-from ..model.model import Model, StrandArrays
+from ..model.model import Model
 from ..model.shapes import Shape, obstacle_pose, shape_of
 from ..model.state import State
+from ..model.strand_arrays import StrandArrays
 from .fluid_energy import energy_of_fluid
 from .frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
+from .kinetic_energy import kinetic_energy
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper
 
@@ -145,18 +147,6 @@ def node_curvature(model: Model, stepper: Stepper) -> Array:
             if end not in model.attached_node:
                 curvature[end] = curvature[neighbour]
     return curvature
-
-
-def kinetic_energy(model: Model, state: State) -> float:
-    """Of nodes, of edges about their tangents, and of free bodies [J]."""
-    kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
-    kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
-    for place, body in enumerate(model.bodies.body_of_free):
-        velocity, spin = state.body_velocity[body], state.body_angular_velocity[body]
-        rotation, second = state.body_rotation[body], model.bodies.second_moment[place]
-        inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
-        kinetic += 0.5 * float(model.bodies.mass[place] * velocity @ velocity + spin @ inertia @ spin)
-    return kinetic
 
 
 def energies(stepper: Stepper, state: State) -> dict[str, float]:

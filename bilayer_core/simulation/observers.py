@@ -6,13 +6,9 @@ import math
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from .frame import Description, Frame
-
-if TYPE_CHECKING:
-    from .simulator import Simulator
-
 
 TIME_ROUNDING = 1e-9
 """Part of a period by which a time may be off and is still the time at which something is due."""
@@ -29,6 +25,26 @@ def completed(time: float, rate: float) -> int:
 def next_end(time: float, rate: float) -> float:
     """When the period ends that has not ended at `time` [s]."""
     return (completed(time, rate) + 1) / rate
+
+
+class Observed(Protocol):
+    """What observers see of a simulator.
+
+    Attributes
+    ----------
+    time : float
+        Simulated [s].
+    dt : float
+        Length of a fixed step [s].
+    description : Description
+    """
+
+    time: float
+    dt: float
+    description: Description
+
+    def frame(self) -> Frame:
+        """A snapshot."""
 
 
 class Observer(Protocol):
@@ -51,7 +67,7 @@ class Observer(Protocol):
 class Schedule:
     """Which observer is due when; a frame is made once for all that are due."""
 
-    def __init__(self, observers: Sequence[Observer], simulator: Simulator):
+    def __init__(self, observers: Sequence[Observer], simulator: Observed):
         self._observers = list(observers)
         self._simulator = simulator
         self._count = [completed(simulator.time, of.rate) for of in self._observers]

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError, SimulationError
 from ..integrators.register import INTEGRATORS
+from ..jit.compile_all import ensure_compiled
 from ..model.build import build_model
 from ..model.fingerprint import fingerprint_of
 from ..model.plan import make_plan
@@ -235,6 +236,7 @@ class Simulator:
         Whatever needs them calls it; calling it first keeps its time apart from that of the simulation.
         """
         if self._compile_time is None:
+            ensure_compiled()
             begin = clock.thread_time()
             self._compile_time = 0.0
             self._stepper.rest(self._state)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,10 +17,8 @@ from ..integrators.sdirk2 import METHOD as SELF_STARTING
 from ..model.model import Model
 from ..model.records.step import Place
 from ..model.state import State
+from .energy_budget import EnergyLedger
 from .stage_inputs import Surroundings
-
-if TYPE_CHECKING:
-    from .energy_budget import EnergyLedger
 
 Array = np.ndarray
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -11,11 +11,8 @@ from ..model.validity import LARGE_STRAIN
 from . import observation as observe
 from .result import Termination
 
-if TYPE_CHECKING:
-    from .simulator import Simulator
 
-
-def summarise(simulator: Simulator) -> dict:
+def summarise(simulator: Any) -> dict:
     """Figures of a run since its start; lengths in m, times in s, forces in N, energies in J, curvatures in 1/m.
 
     Of the run, over the start and the ends of all accepted steps: ``max_curvature`` (through the thickness),
@@ -87,7 +84,7 @@ def _warnings(strain: float) -> Iterator[str]:
         )
 
 
-def _bodies(simulator: Simulator) -> dict:
+def _bodies(simulator: Any) -> dict:
     """Where each body began and is, and how nodes touched it."""
     found = {}
     for index, name in enumerate(simulator.model.bodies.names):

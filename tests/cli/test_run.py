@@ -13,6 +13,7 @@ from processes import TIMEOUT, command, environment
 
 from bilayer_core import load_scene
 from bilayer_core.cli import main, watch
+from bilayer_core.jit import compile_all
 from bilayer_core.record.log_reader import read_info, read_log, read_state, scene_from_log
 from bilayer_core.scene.loader import parse_scene
 
@@ -311,18 +312,26 @@ def test_on_a_terminal_progress_shows_simulated_time_and_real_time_factor(here):
     assert "0.50/0.5 s" in text and "real time x" in text and "left" in text
 
 
-def test_a_long_start_says_that_it_compiles_and_a_short_one_says_nothing(monkeypatch, capfd):
-    with watch.notice_of_compilation(quiet=False):
-        pass
+def _compiles(pieces):
+    """In place of `ensure_compiled`: reports as if it compiled so many pieces."""
+
+    def ensure_compiled(report):
+        for done in range(pieces and pieces + 1):
+            report(done, pieces)
+
+    return ensure_compiled
+
+
+def test_a_start_that_compiles_says_so_and_any_other_says_nothing(monkeypatch, capfd):
+    monkeypatch.setattr(compile_all, "ensure_compiled", _compiles(0))
+    watch.compile_kernels(quiet=False)
     assert capfd.readouterr().err == ""
-    monkeypatch.setattr(watch, "COMPILING_NOTICE", 0.01)
-    with watch.notice_of_compilation(quiet=False):
-        time.sleep(0.5)
-    assert capfd.readouterr().err == "compiling kernels (first start, cached afterwards) ...\n"
+    monkeypatch.setattr(compile_all, "ensure_compiled", _compiles(3))
+    watch.compile_kernels(quiet=False)
+    assert capfd.readouterr().err == f"{watch.COMPILING_NOTICE}\n"
 
 
 def test_a_quiet_start_does_not_say_that_it_compiles(monkeypatch, capfd):
-    monkeypatch.setattr(watch, "COMPILING_NOTICE", 0.01)
-    with watch.notice_of_compilation(quiet=True):
-        time.sleep(0.2)
+    monkeypatch.setattr(compile_all, "ensure_compiled", _compiles(3))
+    watch.compile_kernels(quiet=True)
     assert capfd.readouterr().err == ""

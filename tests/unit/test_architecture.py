@@ -74,6 +74,79 @@ def test_the_core_knows_neither_its_ros_adapter_nor_ros(path):
     assert not {top for top in tops if top in {"bilayer_sim_ros", "rclpy"} or top.endswith(("_msgs", "_srvs"))}
 
 
+def _modules_with_names(node, path):
+    """Modules of the package that an import statement means."""
+    package = path.relative_to(ROOT).with_suffix("").parts[:-1]
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    base = ".".join(package[: len(package) - node.level + 1]) if node.level else ""
+    module = ".".join(filter(None, (base, node.module)))
+    return [module, *(f"{module}.{alias.name}" for alias in node.names)]
+
+
+def imports_of_modules():
+    """Every module of the core, and those that it imports anywhere: late, or for the type checker alone, too."""
+    paths = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in modules()}
+    files = {name.removesuffix(".__init__"): path for path, name in paths.items()}
+    return {
+        name: {
+            target
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, (ast.Import, ast.ImportFrom))
+            for target in _modules_with_names(node, path)
+            if target in files and target != name and not files[target].name == "__init__.py"
+        }
+        for name, path in files.items()
+        if path.name != "__init__.py"
+    }
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    left = imports_of_modules()
+    while free := [name for name, targets in left.items() if not targets & left.keys()]:
+        for name in free:
+            del left[name]
+    while unused := left.keys() - set().union(*left.values()):
+        for name in unused:
+            del left[name]
+    assert sorted(left) == []
+
+
+PUBLIC_NUMBA = {"numba", "numba.extending", "numba.core.types", "numba.core.cgutils", "numba.types"}
+OFFERED = {"numba.core": {"cgutils", "types"}}
+"""What numba's documentation of extensions imports from its inside."""
+EXCEPTION = "bilayer_core/jit/unofficial.py"
+
+
+def test_only_one_short_file_uses_what_numba_does_not_document():
+    for path in modules():
+        name = path.relative_to(ROOT).as_posix()
+        if name == EXCEPTION:
+            assert len(path.read_text().splitlines()) <= 100
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "numba":
+                names = {alias.name for alias in node.names}
+                assert node.module in PUBLIC_NUMBA or names <= OFFERED.get(node.module, set()), f"{name}: {node.module}"
+            if isinstance(node, ast.Import):
+                used = {alias.name for alias in node.names if alias.name.split(".")[0] == "numba"}
+                assert used <= PUBLIC_NUMBA, name
+
+
+def test_every_file_with_kernels_is_part_of_the_fingerprint_of_the_cache():
+    from bilayer_core.jit.cache import FOLDERS
+
+    for path in modules():
+        decorators = {
+            getattr(getattr(of, "func", of), "id", "")
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, (ast.FunctionDef, ast.ClassDef))
+            for of in node.decorator_list
+        }
+        if decorators & {"kernel", "exact_kernel", "entry", "piece", "record", "intrinsic"}:
+            assert part_of(path) in FOLDERS, path
+
+
 def test_importing_the_core_imports_neither_ros_nor_viewer_nor_log_library():
     unwanted = {"rclpy", "rerun", "mcap", "matplotlib", "bilayer_sim_ros"}
     program = f"import sys, bilayer_core; print(*sorted({unwanted!r} & set(sys.modules)))"

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from ...engine.newton_report import NewtonStatus
-
 READY = 0
 NO_ROOM = 1
 """There are more near pairs with surfaces than room for them."""
@@ -17,12 +15,3 @@ CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND 
 """How a step ended; from `MAX_ITERATIONS` on it failed."""
 TOO_INACCURATE = 20
 """The error of a step exceeds its tolerance, however short it is."""
-
-FAILURES = {
-    MAX_ITERATIONS: NewtonStatus.MAX_ITERATIONS,
-    LINE_SEARCH: NewtonStatus.LINE_SEARCH,
-    INDEFINITE: NewtonStatus.INDEFINITE,
-    NOT_FINITE: NewtonStatus.NOT_FINITE,
-    BLOCKED: NewtonStatus.BLOCKED,
-    BEYOND: NewtonStatus.BEYOND,
-}

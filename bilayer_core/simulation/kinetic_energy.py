@@ -1,0 +1,20 @@
+"""Kinetic energy of a state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..model.model import Model
+from ..model.state import State
+
+
+def kinetic_energy(model: Model, state: State) -> float:
+    """Of nodes, of edges about their tangents, and of free bodies [J]."""
+    kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
+    kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
+    for place, body in enumerate(model.bodies.body_of_free):
+        velocity, spin = state.body_velocity[body], state.body_angular_velocity[body]
+        rotation, second = state.body_rotation[body], model.bodies.second_moment[place]
+        inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
+        kinetic += 0.5 * float(model.bodies.mass[place] * velocity @ velocity + spin @ inertia @ spin)
+    return kinetic

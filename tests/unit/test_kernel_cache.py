@@ -1,0 +1,99 @@
+"""Compiled code follows the sources, wherever they are edited."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+
+import numba
+import pytest
+
+from bilayer_core.jit import cache
+
+PROGRAM = """
+import numpy as np
+from bilayer_core import load_scene
+from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.model.build import build_model
+from bilayer_core.model.state import initial_state
+
+model = build_model(load_scene("cantilever"), "laminate", 2)
+evaluator, state = Evaluator(model), initial_state(model)
+at = evaluator.new()
+evaluator.take_state(state, at)
+evaluator.carry_frames(at, np.zeros(model.edge_count), at)
+nothing = np.zeros((len(model.joint_a), 3))
+evaluator.stand_still(state, at, 1.0, np.full(model.edge_count, 0.01), nothing, np.zeros(0))
+evaluator.start_stage(at)
+print(repr(evaluator.evaluate(at, ["stretching"])["stretching"]))
+"""
+CALLED, LENGTH = "bilayer_core/kinematics/frames.py", "math.sqrt(x * x + y * y + z * z)"
+"""A file of functions that kernels call, and what it takes for the length of an edge."""
+
+
+def _energy(tree, folder):
+    environment = os.environ | {"PYTHONPATH": str(tree), "NUMBA_CACHE_DIR": str(folder), "BILAYER_JIT_AHEAD": "0"}
+    run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, cwd=tree)
+    assert run.returncode == 0, run.stderr
+    return float(run.stdout)
+
+
+@pytest.mark.slow
+def test_an_edit_of_a_function_that_kernels_call_changes_the_result_at_once_and_again(root, tmp_path):
+    tree, folder = tmp_path / "tree", tmp_path / "cache"
+    for part in ("bilayer_core", "config"):
+        shutil.copytree(root / part, tree / part, ignore=shutil.ignore_patterns("__pycache__"))
+    path = tree / CALLED
+    source = path.read_text(encoding="utf-8")
+    assert LENGTH in source
+    first = _energy(tree, folder)
+    assert _energy(tree, folder) == first > 0.0  # ½ EA η² L
+    path.write_text(source.replace(LENGTH, f"1.01 * {LENGTH}"), encoding="utf-8")
+    assert _energy(tree, folder) < 1e-12 * first  # as long as the eigenstrain makes it
+    path.write_text(source.replace(LENGTH, f"1.03 * {LENGTH}"), encoding="utf-8")
+    assert _energy(tree, folder) == pytest.approx(4.0 * first, rel=1e-9)
+    assert len(list(folder.iterdir())) == 3
+
+
+def test_folders_that_nobody_has_used_for_long_are_deleted(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    old, young, foreign = tmp_path / "kernels-old", tmp_path / "kernels-young", tmp_path / "other"
+    for folder in (old, young, foreign):
+        folder.mkdir()
+        (folder / cache.USED).touch()
+    long_ago = time.time() - (cache.DAYS_KEPT + 1) * cache.DAY
+    for folder in (old, foreign):
+        os.utime(folder / cache.USED, (long_ago, long_ago))
+    cache.cache_folder.cache_clear()
+    try:
+        own = cache.cache_folder()
+    finally:
+        cache.cache_folder.cache_clear()
+    assert own.is_dir() and young.is_dir() and foreign.is_dir() and not old.exists()
+
+
+def test_the_fingerprint_is_another_for_other_settings_of_numba(monkeypatch):
+    before = cache.fingerprint.__wrapped__()
+    assert cache.fingerprint.__wrapped__() == before
+    monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
+    assert cache.fingerprint.__wrapped__() != before
+
+
+def test_a_folder_that_cannot_be_made_is_said_and_nothing_is_kept(tmp_path, monkeypatch, caplog):
+    blocked = tmp_path / "file"
+    blocked.touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(blocked))
+    cache.cache_folder.cache_clear()
+    try:
+        assert cache.cache_folder() is None
+    finally:
+        cache.cache_folder.cache_clear()
+    assert "cannot be kept" in caplog.text and "NUMBA_CACHE_DIR" in caplog.text
+
+
+def test_numbas_own_setting_is_restored():
+    before = numba.config.CACHE_DIR
+    with cache.cached():
+        assert str(cache.cache_folder()) == numba.config.CACHE_DIR
+    assert before == numba.config.CACHE_DIR
