@@ -18,6 +18,8 @@ ROS := wheels
 EXTRAS := ros,viewer,test
 endif
 STAMP := $(VENV)/installed-with-ros-$(ROS)
+# Tests that together run all pieces of the engine; `make bounds` says which are missing.
+BOUNDS := $(addprefix tests/physics/,test_bodies.py test_loads.py test_rods_that_meet.py test_solve_static.py test_planar.py)
 
 help:  ## Show what can be made.
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' $(MAKEFILE_LIST)
@@ -31,7 +33,10 @@ test: $(STAMP)  ## Run every test, the slow ones as well.
 lint: $(STAMP)  ## Check the code's style.
 	$(BIN)/ruff check .
 
-install: $(STAMP)  ## Install into .venv only.
+install: $(STAMP) kernels  ## Install into .venv, and compile the kernels.
+
+bounds: $(STAMP)  ## Run tests of all kernels with the bounds of arrays checked.
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest $(BOUNDS)
 
 clean:  ## Remove .venv and what runs and tests left.
 	rm -rf $(VENV) build install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
@@ -42,6 +47,9 @@ $(STAMP): setup.py pyproject.toml | system
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --editable '.[$(EXTRAS)]'
 	@touch $@
+
+kernels: $(STAMP)  ## Compile the kernels, once for each state of the sources.
+	$(BIN)/python -m bilayer_core.jit.compile_all
 
 # What the system must supply: Python's module venv, and for pictures Mesa's Vulkan driver, which needs no graphics card.
 # Debian and Ubuntu packages are installed where this command may, else the line to paste is printed.
@@ -67,4 +75,4 @@ system:
 	printf '\nSystem packages are missing. Install them with this line, then run make again:\n\n' >&2; \
 	printf '    sudo apt-get update && sudo apt-get install %s\n\n' "$$(echo $$missing)" >&2; exit 1
 
-.PHONY: help demo test lint install clean system
+.PHONY: help demo test bounds lint install kernels clean system

@@ -22,13 +22,31 @@ def _use_own_kernel_cache() -> None:
                 shutil.rmtree(other, ignore_errors=True)
 
 
+CHECKS_BOUNDS = os.environ.get("NUMBA_BOUNDSCHECK", "0") != "0"
+
+
 def pytest_configure(config):
-    """Compile all kernels before several processes run tests."""
-    if getattr(config.option, "numprocesses", None) and "PYTEST_XDIST_WORKER" not in os.environ:
+    """Compile all kernels before tests run where they will need most of them: in several processes, and for `make
+    bounds`.
+    """
+    several = getattr(config.option, "numprocesses", None) and "PYTEST_XDIST_WORKER" not in os.environ
+    if several or CHECKS_BOUNDS:
         from bilayer_core.jit.compile_all import compile_all, is_complete
 
         if not is_complete():
             compile_all()
+
+
+def pytest_sessionfinish(session):
+    """Where the bounds of arrays are checked, no piece of the engine may be left out."""
+    if CHECKS_BOUNDS and session.testscollected > 1:
+        from bilayer_core.jit.piece import PIECES
+
+        unused = sorted(name for name, piece in PIECES.items() if not piece.seconds and "test" not in name)
+        print(f"\n{len(PIECES) - len(unused)} pieces ran with the bounds of arrays checked")
+        if unused:
+            print(f"no test here runs: {', '.join(unused)}")
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 # Before anything imports numba or rclpy.

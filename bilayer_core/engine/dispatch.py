@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..forces import slip_term  # noqa: F401 (declares a piece that no force lists)
 from ..jit.piece import PIECES
 from ..model.model import Model
 from ..model.records.problem import Calls

@@ -210,3 +210,25 @@ def test_the_documented_ways_of_numba_alone_give_the_same():
     }
     run = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
     assert run.stdout.strip() == str(_read(1)[0])
+
+
+BEYOND = """
+import numpy as np, sys
+from test_jit import Inner, beyond_the_end
+sys.unraisablehook = lambda error: print(type(error.exc_value).__name__)
+beyond_the_end(Inner(values=np.zeros(3), scale=1.0), 3)
+"""
+
+
+@piece(float, Inner, int)
+def beyond_the_end(inner, index):
+    return inner.values[index]
+
+
+def test_with_bounds_checked_an_index_beyond_the_end_is_an_error():
+    environment = os.environ | {
+        "NUMBA_BOUNDSCHECK": "1",
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), str(Path(__file__).parent)]),
+    }
+    run = subprocess.run([sys.executable, "-c", BEYOND], env=environment, capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "IndexError"
