@@ -226,7 +226,7 @@ class ContactColumns:
     ----------
     node, weight, matrix, side, turn
         Contacts of barrier and friction in one list, see `take_contacts`.
-    strand, attached, mark, met, leaving, unknown, place
+    strand, attached, mark, met, leaving, place
         See `choose_leaving`.
     """
 
@@ -237,8 +237,6 @@ class ContactColumns:
         self.attached[model.attached_node] = np.arange(len(model.attached_node))
         self.mark, self.met = np.zeros((nodes, 3), dtype=np.int64), np.zeros((strands, strands), dtype=np.int64)
         self.leaving = np.zeros(nodes, dtype=np.int64)
-        self.unknown = self.leaving.view()
-        self.unknown.flags.writeable = False  # as those of attached nodes: one type for kernels
         self.place = np.zeros(model.solved_layout.size, dtype=np.int64)
         self.node, self.side = np.zeros((capacity, 2), dtype=np.int64), np.zeros(capacity)
         self.weight = np.zeros((capacity, 4))

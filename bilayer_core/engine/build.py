@@ -10,13 +10,13 @@ from ..forces.slip import WAY
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
 from ..model.records.parts import (
+    Attachments,
     Bodies,
     Bonds,
+    Constrained,
     Drives,
     Flow,
     Fluid,
-    Grips,
-    Held,
     Leaving,
     Moments,
     OffAxis,
@@ -30,7 +30,7 @@ from ..model.records.parts import (
     Threads,
     Touches,
 )
-from ..model.records.problem import Border, System, Wide
+from ..model.records.problem import Border, BorderedSystem, System
 from .allocate import ContactColumns, NearRods, NearSurfaces, RodContacts, SecondDerivatives, body_masses
 
 Array = np.ndarray
@@ -85,8 +85,8 @@ def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
             if free
             else Border.absent()
         ),
-        held=_held(model),
-        grips=_grips(model) if free else Grips.absent(),
+        constrained=_held(model),
+        attachments=_grips(model) if free else Attachments.absent(),
         flow=_flow(model) if scene.fluid is not None else Flow.absent(),
         fluid=_fluid(model) if scene.fluid is not None else Fluid.absent(),
         loads=_forces(model, model.dead_loads) if scene.loads else PointForces.absent(),
@@ -124,21 +124,13 @@ def _plane(model: Model, second: SecondDerivatives) -> Plane:
 
 
 def _off_axis(model: Model) -> OffAxis:
-    rest = np.zeros_like(model.joint_rest)
-    return OffAxis(joint=model.coupled_joint, slope=model.strain_slope, rest_out=rest, rest=read_only(rest))
+    return OffAxis(joint=model.coupled_joint, slope=model.strain_slope, rest=np.zeros_like(model.joint_rest))
 
 
-def read_only(array: Array) -> Array:
-    """A view of the type that arrays of models have: kernels are compiled for one type only."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
-
-
-def wide_of(model: Model, columns: int, width: Array) -> Wide:
+def wide_of(model: Model, columns: int, width: Array) -> BorderedSystem:
     """A border with room for so many columns."""
     rows = model.solved_layout.size + model.solved_layout.half_bandwidth
-    return Wide(
+    return BorderedSystem(
         border=np.zeros((columns, rows)),
         scaled=np.zeros((columns, rows)),
         schur=np.zeros((columns, columns)),
@@ -148,8 +140,8 @@ def wide_of(model: Model, columns: int, width: Array) -> Wide:
     )
 
 
-def _grips(model: Model) -> Grips:
-    return Grips(
+def _grips(model: Model) -> Attachments:
+    return Attachments(
         holding=int((model.attached_free >= 0).sum()),
         unknown=model.solved_layout.attached,
         free=model.attached_free,
@@ -159,8 +151,8 @@ def _grips(model: Model) -> Grips:
     )
 
 
-def _held(model: Model) -> Held:
-    return Held(
+def _held(model: Model) -> Constrained:
+    return Constrained(
         node=model.attached_node,
         unknown=model.layout.attached,
         row=model.solved_layout.attached,

@@ -156,7 +156,7 @@ def _carry_in_plane(plane, strands, at):
 @piece(int, Problem, Place)
 def place_carried(p, at):
     """`put_carried`"""
-    put_carried(p.bodies, p.held, p.surfaces, p.strands, at)
+    put_carried(p.bodies, p.constrained, p.surfaces, p.strands, at)
     return READY
 
 
@@ -204,7 +204,7 @@ def move(p, base, alpha, stage, at):
         turn_by(v0, v1, v2, base.body_rotation, b, at.body_rotation, b)
         turn_further(v0, v1, v2, base.body_turned, at.body_turned, b)
     call(p.calls.place_carried, (p, at))
-    put_departure_of_held(p.held, stage, at)
+    put_departure_of_held(p.constrained, stage, at)
     call(p.calls.place_frames, (p, base, at, at.angle))
 
 

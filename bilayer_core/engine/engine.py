@@ -162,7 +162,7 @@ class Engine:
     def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
         """What acts on the state that is looked at next, by settings that say so."""
         stage = self._work.stage
-        stage.rest_edge[:], stage.rest_joint_out[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
+        stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
 
     def make_room(self, status: int) -> bool:
         """Have the room that a loop lacked; false if that is not what it lacked: something has jumped."""

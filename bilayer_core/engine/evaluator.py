@@ -223,7 +223,7 @@ class Evaluator:
     def set_drive(self, rest_edge: Array, rest_joint: Array, load_factor: Array) -> None:
         """Strains without stress, and factors of loads."""
         stage = self.stage
-        stage.rest_edge[:], stage.rest_joint_out[:], stage.load_factor[:] = rest_edge, rest_joint, load_factor
+        stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest_edge, rest_joint, load_factor
 
     def start_stage(self, at: Place) -> None:
         """Freeze contacts for friction, and have everything follow the configuration that follows one."""

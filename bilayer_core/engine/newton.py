@@ -98,7 +98,7 @@ def bound(p, at):
     """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open, the near pair that sets it
     (−1: none), and whether that could be found.
     """
-    _move_held(p.held, p.system, at)
+    _move_held(p.constrained, p.system, at)
     fraction, pair, status = 1.0, -1, READY
     if p.surfaces.exists:
         fraction = call(p.calls.bound_at_surfaces, (p, at))
@@ -249,7 +249,7 @@ def first_guess(p, start, position, rotation, stage, guess, whole):
             f,
         )
     call(p.calls.place_carried, (p, guess))
-    put_departure_of_held(p.held, stage, guess)
+    put_departure_of_held(p.constrained, stage, guess)
     call(p.calls.place_frames, (p, start, guess, guess.turn))
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]

@@ -99,7 +99,7 @@ def _keep_lasting(p):
 @kernel
 def expand(p, at):
     """First derivatives from nodes, edges, pairs and bodies to the unknowns."""
-    held, strands, sums = p.held, p.strands, p.sums
+    held, strands, sums = p.constrained, p.strands, p.sums
     _expand_edges(p.bonds, strands, sums)
     hand_gradient_to_bodies(
         held.unknown,

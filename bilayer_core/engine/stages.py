@@ -489,7 +489,7 @@ def start_step_point(p, state, start, first):
 @piece(int, Problem, StateArrays, Point, Point, Place, Vector, Matrix, Stack, Matrix, Stage)
 def predict_stage(p, state, origin, previous, start, turned, position, rotation, rates, stage):
     """`predict`"""
-    predict(p.bodies, p.held, state, origin, previous, start, turned, position, rotation, rates, stage)
+    predict(p.bodies, p.constrained, state, origin, previous, start, turned, position, rotation, rates, stage)
     return READY
 
 
@@ -510,5 +510,5 @@ def end_stage(p, state, stage, origin, turned, reached, position, rotation, end)
 @piece(int, Problem, StateArrays, Point, Place, Matrix, Matrix)
 def write_end(p, state, last, at, position, rates):
     """`write_state`"""
-    write_state(p.bodies, p.held, p.fluid, p.strands, state, last, at, position, rates)
+    write_state(p.bodies, p.constrained, p.fluid, p.strands, state, last, at, position, rates)
     return READY

@@ -116,7 +116,7 @@ def _drive(drives, state, course, k, n, work, stage):
         lags = drives.law_rising[i], drives.law_falling[i]
         transduction[i] = lagged(state.transduction[i], first, last, lags[0], lags[1], course.elapsed[n])
         strain[i] = grown(transduction[i], drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i])
-    grow(drives, strain, stage.rest_edge, stage.rest_joint_out)
+    grow(drives, strain, stage.rest_edge, stage.rest_joint)
     for i in range(stage.load_factor.shape[0]):
         stage.load_factor[i] = course.load_factor[k, n, i]
 

@@ -9,7 +9,7 @@ from ..model.force_places import NAMES
 from ..model.model import Model
 from ..model.records.outcome import COUNTS, FIGURES
 from ..model.records.parts import Leaving, Sliding, Surfaces, Threads
-from ..model.records.problem import Outcome, Problem, Wide
+from ..model.records.problem import BorderedSystem, Outcome, Problem
 from ..model.records.status import NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
 from .allocate import ContactColumns, FirstDerivatives, NearRods, NearSurfaces, SecondDerivatives
 from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
@@ -59,9 +59,10 @@ class Storage:
         model, near, rods = self._model, self.near, self.rods
         capacity = near.capacity if near else 0
         of_rods = rods.contacts.capacity + rods.sliding.capacity if rods else 0
+        border = rods or model.free_count
         records = dict(
             **self._groups,
-            wide=wide_of(model, self._columns, self._width) if rods or model.free_count else Wide.absent(),
+            bordered=wide_of(model, self._columns, self._width) if border else BorderedSystem.absent(),
             surfaces=surfaces_of(model, near) if near else Surfaces.absent(),
             sliding=sliding_of(model, capacity) if near else Sliding.absent(),
             threads=threads_of(model, rods) if rods else Threads.absent(),

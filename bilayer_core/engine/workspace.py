@@ -9,7 +9,6 @@ from ..model.records.parts import OffAxis
 from ..model.records.problem import Sums
 from ..model.records.step import Place, Point, Stage, Work
 from .allocate import FirstDerivatives, SecondDerivatives, zeros_in_one
-from .build import read_only
 
 Array = np.ndarray
 
@@ -62,7 +61,6 @@ def stage_of(model: Model, off_axis: OffAxis) -> Stage:
     world = np.zeros((bodies + 1, 3, 3))
     world[-1] = np.eye(3)
     rest_joint = np.zeros_like(model.joint_rest)
-    read_only_rest = read_only(rest_joint)
     return Stage(
         lengths=np.zeros(2),
         origin_position=np.zeros((nodes, 3)),
@@ -77,9 +75,8 @@ def stage_of(model: Model, off_axis: OffAxis) -> Stage:
         predicted_body_rotation=np.zeros((free, 3, 3)),
         twist=np.zeros(len(model.joint_a)),
         rest_edge=np.zeros(edges),
-        rest_joint_out=rest_joint,
-        rest_joint=read_only_rest,
-        natural=off_axis.rest if off_axis.exists else read_only_rest,
+        rest_joint=rest_joint,
+        natural=off_axis.rest if off_axis.exists else rest_joint,
         load_factor=np.zeros(len(model.scene.loads)),
         body_turn=np.zeros((free, 3)),
         way=np.zeros((nodes, 3)),

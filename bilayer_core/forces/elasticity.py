@@ -72,7 +72,7 @@ def take_rest(off_axis, stage):
     """Natural curvature of a stage, but for what strains off the axis add."""
     if not off_axis.exists:
         return
-    copy(stage.rest_joint, off_axis.rest_out)
+    copy(stage.rest_joint, off_axis.rest)
 
 
 @kernel
@@ -88,7 +88,7 @@ def _bend_off_axis(off_axis, strands, at, stage):
         strands.rest_length,
         at.length,
         stage.rest_joint,
-        off_axis.rest_out,
+        off_axis.rest,
     )
 
 

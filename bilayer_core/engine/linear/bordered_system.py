@@ -190,7 +190,7 @@ def solve_border(wide, bodies, body_gradient, size, right, body_step):
     """The step of free bodies and of nodes that left the band; what it changes is taken off `right`, L⁻¹ times that of
     all others.
 
-    In `Wide.load` is what is wanted of nodes that left.
+    In `BorderedSystem.load` is what is wanted of nodes that left.
     """
     if not wide.exists:
         return
@@ -223,25 +223,26 @@ def solve_border(wide, bodies, body_gradient, size, right, body_step):
 @piece(int, Problem, Place)
 def assemble_bodies(p, at):
     """`assemble_border`"""
-    assemble_border(p.border, p.wide, p.grips, p.leaving, p.space, p.plane, p.strands, p.sums, p.system.band, at)
+    system, border = p.bordered, p.border
+    assemble_border(border, system, p.attachments, p.leaving, p.space, p.plane, p.strands, p.sums, p.system.band, at)
     return READY
 
 
 @piece(int, Problem, float)
 def restrict_bodies(p, shift):
     """`take_border`"""
-    take_border(p.border, p.wide, p.bodies, p.held, p.strands.dimension, p.strands.size, shift)
+    take_border(p.border, p.bordered, p.bodies, p.constrained, p.strands.dimension, p.strands.size, shift)
     return READY
 
 
 @piece(bool, Problem)
 def factor_border(p):
     """`factorise_border`"""
-    return factorise_border(p.wide)
+    return factorise_border(p.bordered)
 
 
 @piece(int, Problem)
 def solve_bordered(p):
     """`solve_border`"""
-    solve_border(p.wide, p.bodies, p.sums.body, p.strands.size, p.system.right, p.system.body_step)
+    solve_border(p.bordered, p.bodies, p.sums.body, p.strands.size, p.system.right, p.system.body_step)
     return READY

@@ -87,8 +87,8 @@ def hand_contacts_to_bodies(leaving, grips, strands, at, border):
 
 @kernel
 def leave(leaving, wide, strands, band):
-    """Move the nodes that leave from the band to the border; false if there is no room for them, but `Wide.width` is
-    what it would be.
+    """Move the nodes that leave from the band to the border; false if there is no room for them, but
+    `BorderedSystem.width` is what it would be.
     """
     if not leaving.exists:
         return True
@@ -105,7 +105,7 @@ def leave(leaving, wide, strands, band):
                 wide.border[a, i] = 0.0
     leave_band(
         nodes,
-        leaving.unknown,
+        leaving.leaving,
         strands.dimension,
         leaving.place,
         strands.bandwidth,
@@ -134,7 +134,7 @@ def leave(leaving, wide, strands, band):
 
 @kernel
 def take_leaving(leaving, wide, right):
-    """Move what is wanted of nodes that left the band from the right-hand side to `Wide.load`."""
+    """Move what is wanted of nodes that left the band from the right-hand side to `BorderedSystem.load`."""
     if not leaving.exists:
         return
     count = leaving.counts[NODES]
@@ -149,7 +149,7 @@ def take_leaving(leaving, wide, right):
 
 @kernel
 def put_leaving(leaving, wide, right):
-    """Move the step of nodes that left the band from `Wide.load` to that of all."""
+    """Move the step of nodes that left the band from `BorderedSystem.load` to that of all."""
     if not leaving.exists:
         return
     count = leaving.counts[NODES]
@@ -170,4 +170,4 @@ def take_rod_contacts(p, simplified):
 @piece(bool, Problem)
 def move_to_border(p):
     """`leave`"""
-    return leave(p.leaving, p.wide, p.strands, p.system.band)
+    return leave(p.leaving, p.bordered, p.strands, p.system.band)

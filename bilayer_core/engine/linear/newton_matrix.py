@@ -19,7 +19,7 @@ from numba import types
 from ...forces.rod_term import rods_touch
 from ...jit import call, caller, kernel, piece
 from ...jit.record import Matrix, Vector
-from ...model.records.problem import Problem, Wide
+from ...model.records.problem import BorderedSystem, Problem
 from ...model.records.status import INDEFINITE, NO_ROOM_IN_BORDER, NOT_FINITE, READY
 from ...model.records.step import Place
 from ..modes import SLOWEST_GROWTH
@@ -130,7 +130,7 @@ def _hold(held, strands, band):
 
 call_factor = caller("factor_band", lambda _: types.int64(Matrix, types.int64))
 call_solve = caller("forward_band", lambda _: types.int64(Matrix, types.int64, Vector))
-call_eliminate = caller("eliminate_band", lambda _: types.int64(Matrix, types.int64, Wide.numba_type()))
+call_eliminate = caller("eliminate_band", lambda _: types.int64(Matrix, types.int64, BorderedSystem.numba_type()))
 """What depends on the half-bandwidth; see `engine.linear.band`."""
 EXACT = np.int64(0)
 """How far contacts of rods are simplified at first. (The literal 0 has a type of its own, for which numba would compile
@@ -150,10 +150,10 @@ def assemble(p, at, factor, simplified):
         call(p.calls.assemble_in_plane, (p, at, factor))
     if p.threads.exists:
         call(p.calls.take_rod_contacts, (p, simplified))
-    start_border(p.wide, p.bodies)
+    start_border(p.bordered, p.bodies)
     if p.border.exists:
         call(p.calls.assemble_bodies, (p, at))
-    _hold(p.held, strands, band)
+    _hold(p.constrained, strands, band)
 
 
 @kernel
@@ -190,13 +190,13 @@ def factorise(p, at, stage, counts):
         else:
             negative = 0 if call_factor(p.calls.factor_band, (band, strands.size)) < 0 else 1
         if counts or negative == 0:
-            if p.wide.exists and p.wide.coupled[0] == 1:
-                call_eliminate(p.calls.eliminate_band, (band, strands.size, p.wide))
+            if p.bordered.exists and p.bordered.coupled[0] == 1:
+                call_eliminate(p.calls.eliminate_band, (band, strands.size, p.bordered))
             if counts:
-                of_border = count_negative_of_border(p.wide)
+                of_border = count_negative_of_border(p.bordered)
                 p.system.negative[0] = negative + of_border
                 return READY if of_border >= 0 else NOT_FINITE, shift, simplified
-            if not p.wide.exists or call(p.calls.factor_border, (p,)):
+            if not p.bordered.exists or call(p.calls.factor_border, (p,)):
                 return READY, shift, simplified
         if simplified < 2 and rods_touch(p.threads):
             simplified += 1
@@ -219,12 +219,12 @@ def solve(p):
         right[j] = -right[j]
     for j in range(size, right.shape[0]):
         right[j] = 0.0
-    take_leaving(p.leaving, p.wide, right)
+    take_leaving(p.leaving, p.bordered, right)
     call_solve(p.calls.forward_band, (system.band, size, right))
-    if p.wide.exists:
+    if p.bordered.exists:
         call(p.calls.solve_bordered, (p,))
     call_solve(p.calls.backward_band, (system.band, size, right))
-    put_leaving(p.leaving, p.wide, right)
+    put_leaving(p.leaving, p.bordered, right)
     if p.space.exists:
         for j in range(system.step.shape[0]):
             system.step[j] = right[j]

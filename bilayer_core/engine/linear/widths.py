@@ -10,7 +10,7 @@ from ...jit import piece
 from ...jit.piece import Piece
 from ...jit.record import Matrix, Vector
 from ...model.layout import HALF_BANDWIDTH
-from ...model.records.problem import Wide
+from ...model.records.problem import BorderedSystem
 from ...model.records.status import READY
 from .band import (
     backward_any,
@@ -66,7 +66,7 @@ def _set(factor, count, forward, backward, eliminate, suffix: str) -> dict[str, 
         _declare(count, suffix, int, Matrix, int),
         _declare(forward, suffix, int, Matrix, int, Vector),
         _declare(backward, suffix, int, Matrix, int, Vector),
-        _declare(eliminate, suffix, int, Matrix, int, Wide),
+        _declare(eliminate, suffix, int, Matrix, int, BorderedSystem),
     )
     return dict(zip(NAMES, pieces, strict=True))
 

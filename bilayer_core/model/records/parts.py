@@ -84,8 +84,7 @@ class OffAxis:
 
     joint: Indices
     slope: Matrix
-    rest_out: Matrix
-    rest: Matrix  # the same, read-only
+    rest: Matrix
 
 
 @record
@@ -114,7 +113,7 @@ class Bodies:
 
 
 @record
-class Held:
+class Constrained:
     """Nodes and directions that bodies hold."""
 
     node: Indices
@@ -130,7 +129,7 @@ class Held:
 
 
 @record
-class Grips:
+class Attachments:
     """What free bodies among them hold: how it enters the border."""
 
     holding: int  # how many nodes
@@ -285,7 +284,6 @@ class Leaving:
     mark: IndexTable
     met: IndexTable
     leaving: Indices
-    unknown: Indices  # the same, read-only
     place: Indices
 
 

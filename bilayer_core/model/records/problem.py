@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from ...jit.record import Address, Flags, Indices, Matrix, Stack, Vector, record
 from .parts import (
+    Attachments,
     Bodies,
     Bonds,
+    Constrained,
     Drives,
     Flow,
     Fluid,
-    Grips,
-    Held,
     Leaving,
     Moments,
     OffAxis,
@@ -75,7 +75,7 @@ class Border:
 
 
 @record
-class Wide:
+class BorderedSystem:
     """The border as it is eliminated: of bodies their freedom, then nodes that left the band.
 
     Rooms for columns are larger than what is in use; see `matrix`.
@@ -161,9 +161,9 @@ class Problem:
     bonds: Bonds
     bodies: Bodies
     border: Border
-    wide: Wide
-    held: Held
-    grips: Grips
+    bordered: BorderedSystem
+    constrained: Constrained
+    attachments: Attachments
     surfaces: Surfaces
     sliding: Sliding
     threads: Threads

@@ -54,8 +54,7 @@ class Stage:
     predicted_body_rotation: Stack  # R̃ of free bodies, shape (n_free, 3, 3)
     twist: Vector  # of joints at the start of the stage
     rest_edge: Vector  # strains without stress
-    rest_joint_out: Matrix
-    rest_joint: Matrix  # the same, read-only
+    rest_joint: Matrix
     natural: Matrix  # of joints, with what strains off the axis add; `rest_joint` itself where none do
     load_factor: Vector
     body_turn: Matrix  # rotation vector to where inertia takes free bodies
