@@ -69,6 +69,24 @@ def test_every_link_of_a_page_leads_to_a_file(root, page):
             assert ((root / page).parent / target).exists(), f"{page}: there is no {target}"
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_every_file_of_the_code_that_a_page_names_exists(root, page):
+    text = (root / page).read_text(encoding="utf-8")
+    made = re.findall(r"(?<=^New file )`(\S+)`|^\d+\. `(\S+)`(?=, new:)", text, re.M)
+    for name in set(re.findall(r"`((?:\w+/)+\w+\.py)\b", text)) - {name for names in made for name in names}:
+        assert any((root / top / name).is_file() for top in ("", "bilayer_core")), f"{page}: there is no {name}"
+
+
+def test_every_decision_of_the_design_is_short(root):
+    lines = (root / "docs/design.md").read_text(encoding="utf-8").splitlines()
+    assert max(map(len, lines)) <= 150
+    decisions = re.split(r"^(?=\d+\. |#)", "\n".join(lines), flags=re.M)
+    decisions = [part.strip() for part in decisions if part[:1].isdigit()]
+    assert len(decisions) > 20
+    for number, decision in enumerate(decisions, 1):
+        assert decision.startswith(f"{number}. ") and len(decision.splitlines()) <= 6, decision
+
+
 @pytest.mark.slow
 def test_the_programs_of_the_readme_run(root, tmp_path):
     programs = [block.text for block in blocks(root / "README.md") if block.info == "python"]
