@@ -53,6 +53,7 @@ def pytest_sessionfinish(session):
 if "NUMBA_CACHE_DIR" not in os.environ:
     _use_own_kernel_cache()
 os.environ |= {
+    "BILAYER_JIT_AHEAD": "0",  # programs that tests start compile what they need, if it is not there yet
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
     "ROS_PYTHON_CHECK_FIELDS": "1",

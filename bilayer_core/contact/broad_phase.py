@@ -17,8 +17,39 @@ import math
 
 import numpy as np
 
-from ..jit import entry, kernel
+from ..jit import kernel, piece, record
+from ..jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Vector
 from .segment import square_distance
+
+
+@record
+class RodSearch:
+    """A search for points and segments that come near each other, and what it finds; see `model.rod_surfaces`."""
+
+    start_position: Matrix  # of nodes at the start of the run [m], shape (n_node, 3)
+    base: Matrix  # where a straight motion of nodes begins [m], shape (n_node, 3)
+    tip: Matrix  # and ends
+    edge_node: Indices
+    edge_radius: Vector
+    edge_rod: Indices
+    edge_first: Flags
+    edge_arc: Matrix
+    first_point: Indices  # points of edge k are first_point[k] … first_point[k + 1] − 1
+    point_edge: Indices
+    point_fraction: Vector
+    point_arc: Vector
+    rod_meets: FlagTable
+    rod_joined: FlagTable
+    rod_exclusion: Vector
+    box: Matrix  # scratch: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last
+    sweep: Matrix  # of edges: middle, its motion, half of the length and, where ends move differently, the difference
+    met: IndexTable  # scratch: edges
+    count: Indices  # of pairs, more than are written if there is no room for them, shape (1,)
+    point: Indices  # the pairs
+    edge: Indices
+    before: Flags  # whether the point also sees the segment before, and
+    after: Flags  # that after, on the same strand
+    until: Vector  # path before which each stays beyond the barrier distance [m], see `contact.rod_list`
 
 
 @kernel
@@ -31,13 +62,17 @@ def _square_distance(position, i, s, j):
 
 
 @kernel
-def _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, touch):
-    """Whether a point at `arc` [m] may touch the segment k of a rod that its own meets: it is far enough along that rod
-    (`exclusion`, −inf for another rod), and where bodies join the two they do not touch by construction.
+def _sees(search, a, p, k, touch):
+    """Whether a point p of edge a may touch the segment k of a rod that its own meets: it is far enough along that rod,
+    if this is its own, and where bodies join the two they do not touch by construction.
     """
-    if max(edge_arc[k, 0] - arc, arc - edge_arc[k, 1]) < exclusion:
+    own, other, arc = search.edge_rod[a], search.edge_rod[k], search.point_arc[p]
+    if own == other and max(search.edge_arc[k, 0] - arc, arc - search.edge_arc[k, 1]) < search.rod_exclusion[own]:
         return False
-    return not joined or _square_distance(start_position, i, s, j) > (radii + touch) ** 2
+    if not search.rod_joined[own, other]:
+        return True
+    i, j, radii = search.edge_node[a], search.edge_node[k], search.edge_radius[a] + search.edge_radius[k]
+    return _square_distance(search.start_position, i, search.point_fraction[p], j) > (radii + touch) ** 2
 
 
 def scratch(edges: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -60,14 +95,6 @@ def _come_near(box, a, b, reach):
 
 
 @kernel
-def _goes_on(position, tip, i, d0, d1, d2, least):
-    """Whether the edge (i, i+1) goes by `least` [m] at least along a unit vector, at either end of its motion."""
-    if _along(position, i, d0, d1, d2) < least:
-        return False
-    return _along(tip, i, d0, d1, d2) >= least
-
-
-@kernel
 def _along(position, i, d0, d1, d2):
     """Part of the edge (i, i+1) along a unit vector [m]."""
     return (
@@ -77,16 +104,26 @@ def _along(position, i, d0, d1, d2):
     )
 
 
+@kernel
+def _goes_on(search, k, d0, d1, d2, share):
+    """Whether an edge goes by `share` of its arc length at least along a unit vector, at either end of its motion."""
+    i, least = search.edge_node[k], share * (search.edge_arc[k, 1] - search.edge_arc[k, 0])
+    return _along(search.base, i, d0, d1, d2) >= least and _along(search.tip, i, d0, d1, d2) >= least
+
+
 RUN = 2.0
 """Half of the longest run that is looked for, in units of the arc distance from which a rod sees itself."""
 
 
 @kernel
-def _run_about(first, last, position, tip, near, exclusion, edge_node, edge_first, edge_arc):
+def _run_about(search, first, last, near):
     """The run [begin, end) of edges of one strand about those from `first` to `last`, no two of which come nearer to
-    each other than `near` [m], if they are `exclusion` [m] apart on the path; empty if there is none.
+    each other than `near` [m], if they are on the path as far apart as a rod has to be to see itself; empty if there is
+    none.
     """
-    i, j = edge_node[first], edge_node[last] + 1
+    position, tip, edge_first, edge_arc = search.base, search.tip, search.edge_first, search.edge_arc
+    exclusion = search.rod_exclusion[search.edge_rod[first]]
+    i, j = search.edge_node[first], search.edge_node[last] + 1
     d0 = position[j, 0] - position[i, 0] + tip[j, 0] - tip[i, 0]
     d1 = position[j, 1] - position[i, 1] + tip[j, 1] - tip[i, 1]
     d2 = position[j, 2] - position[i, 2] + tip[j, 2] - tip[i, 2]
@@ -94,21 +131,15 @@ def _run_about(first, last, position, tip, near, exclusion, edge_node, edge_firs
     d0, d1, d2 = d0 * scale, d1 * scale, d2 * scale
     share = near / exclusion
     for k in range(first, last + 1):
-        if k > first and edge_first[k]:
-            return 0, 0
-        if not _goes_on(position, tip, edge_node[k], d0, d1, d2, share * (edge_arc[k, 1] - edge_arc[k, 0])):
+        if (k > first and edge_first[k]) or not _goes_on(search, k, d0, d1, d2, share):
             return 0, 0
     begin, end = first, last + 1
     reach = edge_arc[first, 0] - RUN * exclusion
-    while not edge_first[begin] and edge_arc[begin, 0] > reach:
-        least = share * (edge_arc[begin - 1, 1] - edge_arc[begin - 1, 0])
-        if not _goes_on(position, tip, edge_node[begin - 1], d0, d1, d2, least):
-            break
+    while not edge_first[begin] and edge_arc[begin, 0] > reach and _goes_on(search, begin - 1, d0, d1, d2, share):
         begin -= 1
     reach = edge_arc[last, 1] + RUN * exclusion
-    while end < edge_node.shape[0] and not edge_first[end] and edge_arc[end, 0] < reach:
-        least = share * (edge_arc[end, 1] - edge_arc[end, 0])
-        if not _goes_on(position, tip, edge_node[end], d0, d1, d2, least):
+    while end < edge_first.shape[0] and not edge_first[end] and edge_arc[end, 0] < reach:
+        if not _goes_on(search, end, d0, d1, d2, share):
             break
         end += 1
     return begin, end
@@ -138,59 +169,23 @@ def _meet(box, leaves, own, reach, begin, end, met_out):
     return count
 
 
-@entry
-def near_pairs(
-    position,
-    tip,
-    start_position,
-    touch,
-    reach,
-    edge_node,
-    edge_radius,
-    edge_rod,
-    edge_first,
-    edge_arc,
-    first_point,
-    point_fraction,
-    point_arc,
-    rod_meets,
-    rod_joined,
-    rod_exclusion,
-    box,
-    sweep,
-    met,
-    point_out,
-    edge_out,
-    before_out,
-    after_out,
-    until_out,
-):
+@piece(int, RodSearch, float, float)
+def near_pairs(search, touch, reach):
     """List points and segments that may come to a gap below `reach` in a straight motion of nodes, ordered by point,
     then by segment; return how many there are.
 
-    If there are more than the outputs have room for, the rest is counted but not written.
+    If there are more than there is room for, the rest is counted but not written.
 
     Parameters
     ----------
-    position, tip, start_position : Array
-        Of nodes: where the motion begins and ends, and at the start of the run [m], shape (n_node, 3).
+    search : RodSearch
+        In `until` is left how far each gap at the beginning is above `touch` [m].
     touch, reach : float
         Gap below which joined rods touch by construction, and gap below which pairs are listed [m].
-    edge_node, edge_radius, edge_rod, edge_first, edge_arc, first_point, point_fraction, point_arc
-        See `model.rod_surfaces`; the points of edge k are first_point[k] … first_point[k + 1] − 1.
-    rod_meets, rod_joined, rod_exclusion
-        See `model.rod_surfaces`.
-    box, sweep, met : Array
-        Scratch, see `scratch`: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last; of
-        edges the middle, its motion, and half of the length and, where the ends move differently, of the difference;
-        edges.
-    point_out, edge_out : Array
-        Written, int64.
-    before_out, after_out : Array
-        Written: whether the point also sees the segments before and after on the same strand, bool.
-    until_out : Array
-        Written: how far the gap at the beginning is above `touch` [m].
     """
+    position, tip, edge_node, edge_radius = search.base, search.tip, search.edge_node, search.edge_radius
+    edge_rod, edge_arc, box, sweep, met = search.edge_rod, search.edge_arc, search.box, search.sweep, search.met
+    first_point, edge_first = search.first_point, search.edge_first
     edges = edge_node.shape[0]
     leaves = box.shape[0] // 2
     for k in range(leaves):
@@ -215,26 +210,25 @@ def near_pairs(
             box[b, c] = min(box[2 * b, c], box[2 * b + 1, c])
             box[b, 3 + c] = max(box[2 * b, 3 + c], box[2 * b + 1, 3 + c])
     found = 0
-    room = point_out.shape[0]
+    room = search.point.shape[0]
     group = min(GROUP, leaves)
     meetings = 0
     for a in range(edges):
         if a % group == 0:
             last, near_by = min(a + group, edges) - 1, 2.0 * edge_radius[a] + reach
-            exclusion = rod_exclusion[edge_rod[a]]
-            run = _run_about(a, last, position, tip, near_by, exclusion, edge_node, edge_first, edge_arc)
-            meetings = _meet(box, leaves, (leaves + a) // group, reach, run[0], run[1], met)
+            begin, end = _run_about(search, a, last, near_by)
+            meetings = _meet(box, leaves, (leaves + a) // group, reach, begin, end, met)
         if first_point[a] == first_point[a + 1]:
             continue
         count = 0
         own, i = edge_rod[a], edge_node[a]
         for m in range(meetings):
             k = met[0, m]
-            if not rod_meets[own, edge_rod[k]]:
+            if not search.rod_meets[own, edge_rod[k]]:
                 continue
             if own == edge_rod[k]:
                 along = max(edge_arc[k, 0] - edge_arc[a, 0], edge_arc[a, 1] - edge_arc[k, 1])
-                if along < rod_exclusion[own]:
+                if along < search.rod_exclusion[own]:
                     continue
             away, moved = 0.0, 0.0
             for c in range(3):
@@ -249,10 +243,10 @@ def near_pairs(
         if count == 0:
             continue
         for p in range(first_point[a], first_point[a + 1]):
-            arc, s = point_arc[p], point_fraction[p]
+            s = search.point_fraction[p]
             for n in range(count):
                 k = met[1, n]
-                j, other = edge_node[k], edge_rod[k]
+                j = edge_node[k]
                 radii = edge_radius[a] + edge_radius[k]
                 left, right = 0.0, 0.0
                 for c in range(3):
@@ -266,20 +260,14 @@ def near_pairs(
                 away = math.sqrt(square)  # and no less than half of what is left of this and of that at the end
                 if away + math.sqrt(_square_distance(tip, i, s, j)) >= 2.0 * (radii + reach) + moved:
                     continue
-                exclusion, joined = rod_exclusion[own] if own == other else -math.inf, rod_joined[own, other]
-                if not _sees(arc, exclusion, joined, i, s, j, start_position, edge_arc, k, radii, touch):
+                if not _sees(search, a, p, k, touch):
                     continue
                 if found < room:
-                    point_out[found] = p
-                    edge_out[found] = k
-                    until_out[found] = away - radii - touch
-                    before_out[found] = not edge_first[k] and _sees(
-                        arc, exclusion, joined, i, s, j - 1, start_position, edge_arc, k - 1, radii, touch
-                    )
-                    after_out[found] = (
-                        k + 1 < edges
-                        and not edge_first[k + 1]
-                        and _sees(arc, exclusion, joined, i, s, j + 1, start_position, edge_arc, k + 1, radii, touch)
-                    )
+                    search.point[found], search.edge[found] = p, k
+                    search.until[found] = away - radii - touch
+                    before = not edge_first[k] and _sees(search, a, p, k - 1, touch)
+                    after = k + 1 < edges and not edge_first[k + 1] and _sees(search, a, p, k + 1, touch)
+                    search.before[found], search.after[found] = before, after
                 found += 1
+    search.count[0] = found
     return found

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
+from .rod_list import FIRST, PATH
 from .segment import SLACK
 from .step_bound import KEPT_FRACTION
 
@@ -20,53 +21,33 @@ FAR, NEAR = 8.0, 2.0  # barrier distances: `KEPT_FRACTION` of one and `TOUCH` of
 
 
 @kernel
-def path_to_look(path, way, d_hat):
-    """Path [m]: what stays beyond the barrier distance up to a longer one than this cannot set a bound in a step in
-    which gaps close by no more than `way` [m]. It keeps clear of the barrier, or keeps enough of its gap head-on.
-    """
-    return path + min(way, way / (1.0 - KEPT_FRACTION) - d_hat)
-
-
-@kernel
-def rod_step_bound(
-    position,
-    step,
-    limit,
-    d_hat,
-    pair_count,
-    pair_point,
-    pair_edge,
-    until,
-    path,
-    way,
-    edge_node,
-    edge_radius,
-    point_edge,
-    point_fraction,
-):
+def rod_step_bound(rods, position, step, limit, closing):
     """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
 
-    Parameters are as for `segment.facing_contacts`; `step` is that of nodes [m], shape (n_node, 3), and `way` by
-    how much gaps close in the part of it up to `limit` at most [m]. A pair that stays beyond the barrier distance
-    `d_hat` [m] sets no bound: of large gaps less is kept. So what is found does not depend on which of these pairs are
-    listed, or looked at.
+    A pair that stays beyond the barrier distance sets no bound: of large gaps less is kept. So what is found does not
+    depend on which of these pairs are listed, or looked at.
 
-    Returns
-    -------
-    alpha : float
-    blocking : int
-        Node that sets the bound, −1 if none.
+    Parameters
+    ----------
+    rods : RodContact
+    position, step : Array
+        Of nodes [m], shape (n_node, 3).
+    limit : float
+    closing : float
+        By how much gaps close in the part of the step up to `limit` at most [m].
     """
-    alpha = limit
-    blocking = -1
-    looked = path_to_look(path, way, d_hat)
-    for c in range(pair_count):
-        if until[c] > looked:
+    search, d_hat, alpha = rods.search, rods.d_hat, limit
+    # Up to this path a pair keeps clear of the barrier in the step, or keeps enough of its gap head-on.
+    looked = rods.ways[PATH] + min(closing, closing / (1.0 - KEPT_FRACTION) - d_hat)
+    if looked < rods.ways[FIRST]:
+        return limit
+    for c in range(search.count[0]):
+        if search.until[c] > looked:
             continue
-        p, k = pair_point[c], pair_edge[c]
-        a = point_edge[p]
-        i, j, s = edge_node[a], edge_node[k], point_fraction[p]
-        radii = edge_radius[a] + edge_radius[k]
+        p, k = search.point[c], search.edge[c]
+        a = search.point_edge[p]
+        i, j, s = search.edge_node[a], search.edge_node[k], search.point_fraction[p]
+        radii = search.edge_radius[a] + search.edge_radius[k]
         left, right = 0.0, 0.0
         for m in range(3):
             own = (1.0 - s) * step[i, m] + s * step[i + 1, m]
@@ -79,18 +60,17 @@ def rod_step_bound(
         gone, gap = 0.0, math.sqrt(square) - radii
         keep = KEPT_FRACTION * min(gap, FAR * d_hat)
         near = TOUCH * min(gap, NEAR * d_hat)
-        room = gap - keep
+        left_over = gap - keep
         part = 0
-        while gone < alpha and speed * (alpha - gone) > room:
-            if part > 0 and (room < near or part == MAX_PARTS):
+        while gone < alpha and speed * (alpha - gone) > left_over:
+            if part > 0 and (left_over < near or part == MAX_PARTS):
                 alpha = gone
-                blocking = i
                 break
-            gone += room / speed
+            gone += left_over / speed
             if gone < alpha:
-                room = math.sqrt(_square_distance(position, step, gone, i, s, j)) - radii - keep
+                left_over = math.sqrt(_square_distance(position, step, gone, i, s, j)) - radii - keep
             part += 1
-    return alpha, blocking
+    return alpha
 
 
 @kernel

@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
-from .broad_phase import near_pairs
 
 MARGIN = 0.3
 """Of a list, in units of the barrier distance and the thickest layer together."""
@@ -25,7 +24,8 @@ AHEAD, MOST_AHEAD = 1.0, 32.0
 LARGEST_MOVE = 8.0
 """In the same units; longer steps are cut short."""
 MADE, ROOM, PATH, FIRST = 0, 1, 2, 3
-"""Places in `ways`."""
+"""Places in `RodContact.ways`: margin of the list [m] (0: there is none), how far nodes may go on in any direction for
+it to serve, its path [m], and that before which none of its pairs comes to the barrier distance."""
 
 
 @kernel
@@ -56,25 +56,11 @@ def _mean(vectors):
 
 
 @kernel
-def _go_on(position, last):
-    """Take nodes, the mean of all taken off, to where they are; return the largest distance from where they were
-    last [m].
-    """
-    m0, m1, m2 = _mean(position)
-    square = 0.0
-    for i in range(position.shape[0]):
-        x0, x1, x2 = position[i, 0] - m0, position[i, 1] - m1, position[i, 2] - m2
-        d0, d1, d2 = x0 - last[i, 0], x1 - last[i, 1], x2 - last[i, 2]
-        last[i, 0], last[i, 1], last[i, 2] = x0, x1, x2
-        square = max(square, d0 * d0 + d1 * d1 + d2 * d2)
-    return math.sqrt(square)
-
-
-@kernel
-def _stray(position, step, fraction, base, tip):
+def _stray(search, position, step, fraction):
     """Largest distance of a node at x + fraction · step from a list's motion, at the moment of this that is nearest to
-    all [m], the mean of all taken off, as in `base` and `tip`.
+    all [m], the mean of all taken off, as in `RodSearch.base` and `tip`.
     """
+    base, tip = search.base, search.tip
     count = position.shape[0]
     m0, m1, m2, along, square = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(count):
@@ -97,8 +83,48 @@ def _stray(position, step, fraction, base, tip):
 
 
 @kernel
-def _set_out(position, step, length, base, tip, last):
-    """A motion from x to x + length · step, the mean of all taken off at either end; nodes go on from there."""
+def list_serves(rods, position, step, fraction, move):
+    """Whether the list holds all pairs nearer than the barrier distance at x + β step, 0 ≤ β ≤ `fraction`.
+
+    Parameters
+    ----------
+    rods : RodContact
+        Its path, and where nodes were last, are brought up to date.
+    position, step : Array
+        Of nodes: x and a step [m], shape (n_node, 3).
+    fraction : float
+    move : float
+        Largest motion in that part of the step, see `reachable` [m].
+    """
+    ways = rods.ways
+    if move == 0.0:  # nodes are at x now
+        last, square = rods.last, 0.0
+        m0, m1, m2 = _mean(position)
+        for i in range(position.shape[0]):
+            x0, x1, x2 = position[i, 0] - m0, position[i, 1] - m1, position[i, 2] - m2
+            d0, d1, d2 = x0 - last[i, 0], x1 - last[i, 1], x2 - last[i, 2]
+            last[i, 0], last[i, 1], last[i, 2] = x0, x1, x2
+            square = max(square, d0 * d0 + d1 * d1 + d2 * d2)
+        gone = math.sqrt(square)
+        ways[ROOM] -= gone
+        ways[PATH] += 2.0 * gone
+    if move <= ways[ROOM]:
+        return True
+    if ways[MADE] <= 0.0:
+        return False
+    ways[ROOM] = 0.5 * ways[MADE] - _stray(rods.search, position, step, 0.0)
+    if ways[ROOM] < 0.0:
+        return False
+    return move <= ways[ROOM] or _stray(rods.search, position, step, fraction) <= 0.5 * ways[MADE]
+
+
+@kernel
+def begin_list(rods, position, step, fraction, move):
+    """Have the motion for which a list is made next, the mean of all nodes taken off at either end; nodes go on from
+    its beginning. Parameters are as for `list_serves`; returns the margin [m].
+    """
+    ahead = min(max(AHEAD * rods.unit / move, 1.0), MOST_AHEAD) if move > 0.0 else 1.0
+    base, tip, last, length = rods.search.base, rods.search.tip, rods.last, ahead * fraction
     m0, m1, m2 = _mean(position)
     w0, w1, w2 = _mean(step)
     for i in range(position.shape[0]):
@@ -108,113 +134,20 @@ def _set_out(position, step, length, base, tip, last):
         tip[i, 0] = x0 + length * (step[i, 0] - w0)
         tip[i, 1] = x1 + length * (step[i, 1] - w1)
         tip[i, 2] = x2 + length * (step[i, 2] - w2)
+    margin = MARGIN * rods.unit
+    rods.ways[MADE], rods.ways[ROOM], rods.ways[PATH] = margin, 0.5 * margin, 0.0
+    return margin
 
 
 @kernel
-def list_rods(
-    position,
-    step,
-    fraction,
-    move,
-    unit,
-    touch,
-    start_position,
-    edge_node,
-    edge_radius,
-    edge_rod,
-    edge_first,
-    edge_arc,
-    first_point,
-    point_fraction,
-    point_arc,
-    rod_meets,
-    rod_joined,
-    rod_exclusion,
-    box,
-    sweep,
-    met,
-    base,
-    tip,
-    last,
-    ways,
-    count,
-    point_out,
-    edge_out,
-    before_out,
-    after_out,
-    until_out,
-):
-    """Have a list that holds all pairs nearer than the barrier distance at x + β step, 0 ≤ β ≤ `fraction`; false if
-    there is no room for it, and then there is none.
-
-    Parameters
-    ----------
-    position, step : Array
-        Of nodes: x and a step [m], shape (n_node, 3).
-    move : float
-        Largest motion in that part of the step, see `reachable` [m].
-    unit : float
-        Barrier distance and thickest layer together [m].
-    touch : float
-        Barrier distance [m].
-    start_position, edge_node … met, point_out … after_out
-        As for `near_pairs`.
-    base, tip, last : Array
-        Positions from which to which the list was made, and where nodes were last, their mean taken off [m], shape
-        (n_node, 3). Changed.
-    ways : Array
-        Margin of the list [m] (0: there is none), how far nodes may go on in any direction for it to serve, its
-        path [m], and that before which none of its pairs comes to the barrier distance, shape (4,). Changed.
-    count : Array
-        How many pairs the list has, shape (1,). Changed.
-    until_out : Array
-        Path before which each pair stays beyond the barrier distance [m].
-    """
-    if move == 0.0:
-        gone = _go_on(position, last)
-        ways[ROOM] -= gone
-        ways[PATH] += 2.0 * gone
-    if move <= ways[ROOM]:
-        return True
-    if ways[MADE] > 0.0:
-        ways[ROOM] = 0.5 * ways[MADE] - _stray(position, step, 0.0, base, tip)
-        if ways[ROOM] >= 0.0:
-            if move <= ways[ROOM] or _stray(position, step, fraction, base, tip) <= 0.5 * ways[MADE]:
-                return True
-    ahead = min(max(AHEAD * unit / move, 1.0), MOST_AHEAD) if move > 0.0 else 1.0
-    _set_out(position, step, ahead * fraction, base, tip, last)
-    ways[MADE], ways[ROOM], ways[PATH] = MARGIN * unit, 0.5 * MARGIN * unit, 0.0
-    count[0] = near_pairs(
-        base,
-        tip,
-        start_position,
-        touch,
-        touch + ways[MADE],
-        edge_node,
-        edge_radius,
-        edge_rod,
-        edge_first,
-        edge_arc,
-        first_point,
-        point_fraction,
-        point_arc,
-        rod_meets,
-        rod_joined,
-        rod_exclusion,
-        box,
-        sweep,
-        met,
-        point_out,
-        edge_out,
-        before_out,
-        after_out,
-        until_out,
-    )
-    if count[0] > point_out.shape[0]:
+def end_list(rods):
+    """Note from which path on pairs of the new list count; false if there is no room for it, and then there is none."""
+    search, ways = rods.search, rods.ways
+    if search.count[0] > search.point.shape[0]:
         ways[MADE], ways[ROOM] = 0.0, -1.0
         return False
     first = math.inf
-    for c in range(count[0]):
-        first = min(first, until_out[c])
+    for c in range(search.count[0]):
+        first = min(first, search.until[c])
     ways[FIRST] = first
     return True

@@ -59,66 +59,38 @@ SLACK = 1.0 + 1e-9
 
 
 @kernel
-def facing_contacts(
-    position,
-    pair_count,
-    pair_point,
-    pair_edge,
-    pair_before,
-    pair_after,
-    until,
-    path,
-    edge_node,
-    edge_radius,
-    point_edge,
-    point_fraction,
-    reach,
-    point_out,
-    edge_out,
-    fraction_out,
-    inner_out,
-    count_out,
-    gap_out,
-):
-    """List the contacts nearer than `reach` [m]; return how many, their smallest gap [m] (infinite without any), and
-    the path before which no pair has one.
+def facing_contacts(rods, position, path):
+    """List the contacts nearer than the barrier distance; return how many, their smallest gap [m] (infinite without
+    any), and the path before which no pair has one.
 
-    If there are more than the outputs have room for, the rest is counted but not written.
+    If there are more than there is room for, the rest is counted but not written.
 
     Parameters
     ----------
+    rods : RodContact
+        Written: points, multiplicities, gaps and so on of `contacts`; the path of `search.until` before which each pair
+        stays beyond the barrier distance [m], for those that are looked at (see `rod_list`).
     position : Array
         Of nodes [m], shape (n_node, 3).
-    pair_count, pair_point, pair_edge, pair_before, pair_after
-        From `broad_phase.near_pairs`: points, segments, and whether the point sees the segments before and after.
-    until, path : Array, float
-        Path before which each pair stays beyond `reach`, changed for those that are looked at, and the present one [m];
-        see `rod_list`.
-    edge_node, edge_radius : Array
-        First node and radius [m] of each edge, shape (n_edge,).
-    point_edge, point_fraction : Array
-        Edge of each point and s on it, shape (n_point,).
-    point_out, edge_out, fraction_out : Array
-        Written: point, segment, and t of each contact.
-    inner_out : Array
-        Written: whether t moves with the shape (0 < τ < 1), or is that of a node.
-    count_out, gap_out : Array
-        Written: +1 or −1, and d [m].
+    path : float
+        The present one [m].
     """
+    search, contacts, reach = rods.search, rods.contacts, rods.d_hat
+    until, edge_node = search.until, search.edge_node
+    node, weight, normal = contacts.node, contacts.weight, contacts.normal
     found = 0
-    smallest = math.inf
-    first = math.inf
-    for c in range(pair_count):
+    smallest = first = math.inf
+    for c in range(search.count[0]):
         if until[c] > path:
             first = min(first, until[c])
             continue
-        p, k = pair_point[c], pair_edge[c]
-        a = point_edge[p]
-        i, j, s = edge_node[a], edge_node[k], point_fraction[p]
+        p, k = search.point[c], search.edge[c]
+        a = search.point_edge[p]
+        i, j, s = edge_node[a], edge_node[k], search.point_fraction[p]
         p0 = (1.0 - s) * position[i, 0] + s * position[i + 1, 0]
         p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
         p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]
-        radii = edge_radius[a] + edge_radius[k]
+        radii = search.edge_radius[a] + search.edge_radius[k]
         square = square_distance(p0, p1, p2, position, j)
         until[c] = path + math.sqrt(square) - radii - reach
         first = min(first, until[c])
@@ -126,7 +98,7 @@ def facing_contacts(
             continue
         along = fraction_along(p0, p1, p2, position, j)
         at_start = 1 if along <= 0.0 else 0
-        if pair_before[c]:
+        if search.before[c]:
             at_start -= 1
             if fraction_along(p0, p1, p2, position, j - 1) >= 1.0:
                 at_start += 1
@@ -134,25 +106,29 @@ def facing_contacts(
             if kind == 0:
                 if not 0.0 < along < 1.0:
                     continue
-                times, t = 1, along
+                multiplicity, t = 1, along
             elif kind == 1:
                 if at_start == 0:
                     continue
-                times, t = at_start, 0.0
+                multiplicity, t = at_start, 0.0
             else:
-                if pair_after[c] or along < 1.0:
+                if search.after[c] or along < 1.0:
                     continue
-                times, t = 1, 1.0
+                multiplicity, t = 1, 1.0
             gap = distance_at(p0, p1, p2, position, j, t) - radii
-            if gap < reach:
-                smallest = min(smallest, gap)
-                found += 1
-                if found > point_out.shape[0]:
-                    continue
-                point_out[found - 1] = p
-                edge_out[found - 1] = k
-                fraction_out[found - 1] = t
-                inner_out[found - 1] = kind == 0
-                count_out[found - 1] = times
-                gap_out[found - 1] = gap
+            if not gap < reach:
+                continue
+            smallest = min(smallest, gap)
+            found += 1
+            if found > contacts.point.shape[0]:
+                continue
+            n = found - 1
+            contacts.point[n], contacts.multiplicity[n], contacts.inner[n] = p, multiplicity, kind == 0
+            contacts.gap[n], contacts.distance[n] = gap, gap + radii
+            node[n, 0], node[n, 1] = i, j
+            weight[n, 0], weight[n, 1], weight[n, 2], weight[n, 3] = 1.0 - s, s, t - 1.0, -t
+            for m in range(3):
+                between = weight[n, 0] * position[i, m] + weight[n, 1] * position[i + 1, m]
+                between += weight[n, 2] * position[j, m] + weight[n, 3] * position[j + 1, m]
+                normal[n, m] = between / contacts.distance[n]
     return found, smallest, first

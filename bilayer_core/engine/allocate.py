@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..model.model import Model
+from ..model.records.parts import RodContactList
 from ..model.records.step import Place
 from ..model.rod_surfaces import NearPairs
 
@@ -148,46 +149,48 @@ class NearSurfaces:
 
 
 class RodContacts:
-    """Contacts of rods; the first `count` are in use. See `forces.rod_contact`.
-
-    `counted` is their number, shape (1,).
-    """
+    """Contacts of rods; the first `count` are in use. See `forces.rod_contact`."""
 
     def __init__(self, capacity: int):
         self.capacity = capacity
-        self.counted = np.zeros(1, dtype=np.int64)
-        self.point, self.edge, self.times = (np.zeros(capacity, dtype=np.int64) for _ in range(3))
-        self.fraction, self.gap, self.inner = np.zeros(capacity), np.zeros(capacity), np.zeros(capacity, dtype=bool)
-        self.node = np.zeros((capacity, 2), dtype=np.int64)
-        self.weight, self.turn = np.zeros((capacity, 4)), np.zeros((capacity, 4, 3))
-        self.normal, self.load, self.side = np.zeros((capacity, 3)), np.zeros(capacity), np.zeros(capacity)
-        self.matrix = np.zeros((capacity, 3, 3))
-        self.lean, self.along = np.zeros(capacity), np.zeros((capacity, 3))
+        integers, inner = ("point", "multiplicity"), np.zeros(capacity, dtype=bool)
+        floats = ("gap", "distance", "normal_force", "tangential_stiffness")
+        self.record = RodContactList(
+            count=np.zeros(1, dtype=np.int64),
+            inner=inner,
+            node=np.zeros((capacity, 2), dtype=np.int64),
+            weight=np.zeros((capacity, 4)),
+            matrix=np.zeros((capacity, 3, 3)),
+            foot_gradient=np.zeros((capacity, 4, 3)),
+            **{name: np.zeros(capacity, dtype=np.int64) for name in integers},
+            **{name: np.zeros(capacity) for name in floats},
+            **{name: np.zeros((capacity, 3)) for name in ("normal", "segment_direction")},
+        )
 
     @property
     def count(self) -> int:
         """Contacts in use."""
-        return int(self.counted[0])
+        return int(self.record.count[0])
 
     def grown(self, capacity: int) -> RodContacts:
         """A copy with more capacity."""
         larger, used = RodContacts(capacity), slice(min(self.count, self.capacity))
-        for name, values in vars(self).items():
-            if name not in ("capacity", "counted"):
-                getattr(larger, name)[used] = values[used]
-        larger.counted[:] = self.counted
+        for name in RodContactList.names:
+            getattr(larger.record, name)[used] = getattr(self.record, name)[used]
+        larger.record.count[:] = self.record.count
         return larger
 
 
 class NearRods:
-    """The list of rods near each other, what it was made for, contacts, and the capacity for all of them.
+    """The list of rods near each other, contacts, and the capacity for all of them.
 
     Attributes
     ----------
-    pairs, base, tip, last, ways
-        The list, for which motion it was made, and the path since; see `contact.rod_list.list_rods`.
+    pairs : NearPairs
     unit : float
         Barrier distance and thickest layer together [m].
+    last, ways
+        Of the list; see `contact.rod_list`.
     contacts, sliding : RodContacts
         Present ones, and those that friction took at the start of a stage.
     """
@@ -196,51 +199,24 @@ class NearRods:
         surfaces = model.rod_surfaces
         self.unit = model.scene.contact.barrier_distance + 2.0 * float(surfaces.edge_radius.max())
         points = len(surfaces.point_edge)
-        self.pairs = NearPairs(surfaces, model.edge_node, PAIRS_PER_POINT * points)
-        self.base, self.tip, self.last = np.zeros((3, model.node_count, 3))
+        self.pairs = NearPairs(surfaces, model.edge_node, model.start_position, PAIRS_PER_POINT * points)
+        self.last, self.no_step = np.zeros((2, model.node_count, 3))
         self.ways = np.array([0.0, -1.0, 0.0, -np.inf])
-        self.start_position = np.array(model.start_position)
-        self.no_step, self.scratch = np.zeros((2, model.node_count, 3))
         self.contacts, self.sliding = RodContacts(points), RodContacts(points)
 
     @property
     def capacity(self) -> int:
         """Of pairs and contacts together: it changes whenever arrays are replaced by larger ones."""
-        return len(self.pairs.point) + self.contacts.capacity + self.sliding.capacity
+        return self.pairs.capacity + self.contacts.capacity + self.sliding.capacity
 
     def grow(self) -> None:
         """Enough capacity for what was counted and not written."""
-        if self.pairs.count > len(self.pairs.point):
-            self.pairs.make_room(2 * self.pairs.count)
-            self.pairs.counted[0] = 0
+        if self.pairs.count > self.pairs.capacity:
+            self.pairs.reserve(2 * self.pairs.count)
         if self.contacts.count > self.contacts.capacity:
             self.contacts = RodContacts(2 * self.contacts.count)
         if self.sliding.capacity < self.contacts.capacity:
             self.sliding = self.sliding.grown(self.contacts.capacity)
-
-
-class ContactColumns:
-    """Contacts of rods as the Newton matrix takes them, and the nodes that leave the band for them.
-
-    Attributes
-    ----------
-    node, weight, matrix, side, turn
-        Contacts of barrier and friction in one list, see `take_contacts`.
-    strand, attached, mark, met, leaving, place
-        See `choose_leaving`.
-    """
-
-    def __init__(self, model: Model, capacity: int):
-        nodes, strands, d = model.node_count, len(model.strands), model.solved_layout.dimension
-        self.strand = np.repeat(np.arange(strands), [s.node_count for s in model.strands])
-        self.attached = np.full(nodes, -1)
-        self.attached[model.attached_node] = np.arange(len(model.attached_node))
-        self.mark, self.met = np.zeros((nodes, 3), dtype=np.int64), np.zeros((strands, strands), dtype=np.int64)
-        self.leaving = np.zeros(nodes, dtype=np.int64)
-        self.place = np.zeros(model.solved_layout.size, dtype=np.int64)
-        self.node, self.side = np.zeros((capacity, 2), dtype=np.int64), np.zeros(capacity)
-        self.weight = np.zeros((capacity, 4))
-        self.matrix, self.turn = np.zeros((capacity, d, d)), np.zeros((capacity, 4, d))
 
 
 def body_masses(model: Model) -> Array:

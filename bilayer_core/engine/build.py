@@ -14,24 +14,23 @@ from ..model.records.parts import (
     Bodies,
     Bonds,
     Constrained,
+    ContactColumns,
     Drives,
     Flow,
     Fluid,
-    Leaving,
     Moments,
     OffAxis,
     Plane,
     PointForces,
+    RodContact,
     Sliding,
     Slips,
     Space,
     Strands,
     Surfaces,
-    Threads,
-    Touches,
 )
 from ..model.records.problem import Border, BorderedSystem, System
-from .allocate import ContactColumns, NearRods, NearSurfaces, RodContacts, SecondDerivatives, body_masses
+from .allocate import NearRods, NearSurfaces, SecondDerivatives, body_masses
 
 Array = np.ndarray
 NONE = np.zeros(0, dtype=np.int64)
@@ -225,44 +224,46 @@ def slips_of(model: Model, room: int) -> Slips:
     return Slips(threshold=law.speed_threshold, way=np.zeros((room, WAY)))
 
 
-def _touches(contacts: RodContacts) -> Touches:
-    return Touches(**{name: getattr(contacts, name) for name in Touches.names})
-
-
-def threads_of(model: Model, rods: NearRods) -> Threads:
-    pairs, surfaces, contact = rods.pairs, model.rod_surfaces, model.scene.contact
-    law, surface = contact.friction, ("edge_radius", "edge_rod", "edge_first", "edge_arc", "first_point")
-    points = ("point_edge", "point_fraction", "point_arc", "point_weight")
-    between = ("rod_meets", "rod_joined", "rod_exclusion")
-    box, sweep, met = pairs.scratch
-    return Threads(
+def rod_contact_of(model: Model, rods: NearRods) -> RodContact:
+    contact = model.scene.contact
+    law = contact.friction
+    return RodContact(
         d_hat=contact.barrier_distance,
         stiffness=contact.stiffness,
         slides=law is not None and law.acts and law.coefficient > 0.0,
         coefficient=law.coefficient if law is not None else 0.0,
         threshold=law.speed_threshold if law is not None else 1.0,
         unit=rods.unit,
-        **{name: getattr(surfaces, name) for name in (*surface, *points, *between)},
-        **{name: getattr(rods, name) for name in ("start_position", "base", "tip", "last", "ways")},
-        box=box,
-        sweep=sweep,
-        met=met,
+        point_weight=model.rod_surfaces.point_weight,
+        search=rods.pairs.search,
+        last=rods.last,
+        ways=rods.ways,
         no_step=rods.no_step,
-        scratch=rods.scratch,
-        counted=pairs.counted,
-        pair_point=pairs.point,
-        pair_edge=pairs.edge,
-        pair_before=pairs.before,
-        pair_after=pairs.after,
-        pair_until=pairs.until,
         gap=np.zeros(1),
-        contacts=_touches(rods.contacts),
-        sliding=_touches(rods.sliding),
+        contacts=rods.contacts.record,
+        sliding=rods.sliding.record,
     )
 
 
-def leaving_of(columns: ContactColumns) -> Leaving:
-    return Leaving(counts=np.zeros(2, dtype=np.int64), **{name: getattr(columns, name) for name in Leaving.names[1:]})
+def contact_columns_of(model: Model, capacity: int) -> ContactColumns:
+    """With room for so many contacts of barrier and friction together."""
+    nodes, strands, d = model.node_count, len(model.strands), model.solved_layout.dimension
+    attached = np.full(nodes, -1)
+    attached[model.attached_node] = np.arange(len(model.attached_node))
+    return ContactColumns(
+        counts=np.zeros(2, dtype=np.int64),
+        node=np.zeros((capacity, 2), dtype=np.int64),
+        weight=np.zeros((capacity, 4)),
+        matrix=np.zeros((capacity, d, d)),
+        stiffness=np.zeros(capacity),
+        foot_gradient=np.zeros((capacity, 4, d)),
+        strand=np.repeat(np.arange(strands), [s.node_count for s in model.strands]),
+        attached=attached,
+        mark=np.zeros((nodes, 3), dtype=np.int64),
+        met=np.zeros((strands, strands), dtype=np.int64),
+        row=np.zeros(nodes, dtype=np.int64),
+        column=np.zeros(model.solved_layout.size, dtype=np.int64),
+    )
 
 
 def _flow(model: Model) -> Flow:

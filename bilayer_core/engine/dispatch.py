@@ -13,7 +13,10 @@ IN_PLANE = {"assemble_in_plane", "gradient_in_plane", "step_in_plane"}
 OF_BODIES = {"assemble_bodies", "restrict_bodies"}
 OF_BORDER = {"factor_border", "solve_bordered"}
 OF_SURFACES = {"bound_at_surfaces"}
-OF_RODS = {"bound_between_rods_of", "find_rod_contacts", "take_rod_contacts", "move_to_border"}
+OF_RODS = {
+    *("bound_between_rods", "find_rod_contacts", "list_near_rods", "near_pairs"),
+    *("take_rod_contacts", "move_to_border"),
+}
 OF_FRICTION = {"where_friction_holds"}
 
 

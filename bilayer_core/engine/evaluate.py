@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ..forces.inertia import DAMPING, INERTIA
-from ..forces.rod_term import ROD_BARRIER, ROD_FRICTION
+from ..forces.rod_contact import ROD_BARRIER, ROD_FRICTION
 from ..forces.surface_term import list_pairs
 from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack, Vector, record
@@ -48,7 +48,7 @@ def _find(p, at):
     status = READY
     if p.surfaces.exists:
         status, _ = list_pairs(p.surfaces, at, 0.0)
-    if status == READY and p.threads.exists and not call(p.calls.find_rod_contacts, (p, at)):
+    if status == READY and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, at)):
         status = NO_ROOM_FOR_RODS
     return status
 
@@ -116,11 +116,11 @@ def evaluate_at(task, operation, base, at, with_hessian):
 
 
 @kernel
-def _leave_out(threads, selected):
+def _leave_out(rods, selected):
     """Leave contacts out that no selected force has; returns the numbers of those of the barrier and of friction."""
-    if not threads.exists:
+    if not rods.exists:
         return 0, 0
-    contacts, sliding = threads.contacts.counted, threads.sliding.counted
+    contacts, sliding = rods.contacts.count, rods.sliding.count
     before = contacts[0], sliding[0]
     if not selected[ROD_BARRIER]:
         contacts[0] = 0
@@ -130,10 +130,10 @@ def _leave_out(threads, selected):
 
 
 @kernel
-def _put_back(threads, before):
-    if not threads.exists:
+def _put_back(rods, before):
+    if not rods.exists:
         return
-    threads.contacts.counted[0], threads.sliding.counted[0] = before
+    rods.contacts.count[0], rods.sliding.count[0] = before
 
 
 @piece(int, Evaluation, int, Place)
@@ -166,9 +166,9 @@ def solve_at(task, operation, at):
             factor += 1.0 / (stage.lengths[0] * stage.lengths[1])
         if p.sums.selected[DAMPING]:
             factor += p.damping / stage.lengths[0]
-        before = _leave_out(p.threads, p.sums.selected)
+        before = _leave_out(p.rod_contact, p.sums.selected)
         assemble(p, at, factor, EXACT)
-        _put_back(p.threads, before)
+        _put_back(p.rod_contact, before)
     elif operation == FACTORISE:
         status, first, simplified = factorise(p, at, stage, False)
         second = float(simplified)

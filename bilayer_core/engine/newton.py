@@ -13,7 +13,6 @@ import math
 
 from ..contact.near import largest_motion
 from ..contact.step_bound import step_bound
-from ..forces.rod_term import bound_between_rods
 from ..forces.surface_term import list_pairs
 from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack
@@ -103,9 +102,9 @@ def bound(p, at):
     if p.surfaces.exists:
         fraction = call(p.calls.bound_at_surfaces, (p, at))
         pair, status = p.outcome.counts[PAIR], p.outcome.counts[STATUS]
-    if status != READY or not p.threads.exists:
+    if status != READY or not p.rod_contact.exists:
         return fraction, pair, status
-    between = call(p.calls.bound_between_rods_of, (p, at))
+    between = call(p.calls.bound_between_rods, (p, at))
     status = p.outcome.counts[STATUS]
     if between < fraction:
         return between, -1, status
@@ -158,14 +157,6 @@ def bound_at_surfaces(p, at):
     return fraction
 
 
-@piece(float, Problem, Place)
-def bound_between_rods_of(p, at):
-    """`bound` by other rods; the status is left in `Outcome`."""
-    fraction, listed = bound_between_rods(p.threads, p.strands, p.system, at)
-    p.outcome.counts[STATUS] = READY if listed else NO_ROOM_FOR_RODS
-    return fraction
-
-
 @kernel
 def _move_held(held, system, at):
     """Displacements of nodes that bodies hold."""
@@ -193,6 +184,9 @@ def _move_prescribed(bodies, start, position, rotation, motion):
 def first_guess(p, start, position, rotation, stage, guess, whole):
     """Set `guess` to `start` moved to where inertia takes it, or as far as no gap closes, prescribed bodies to given
     poses.
+
+    Frames are carried over Newton's iterates from here: a first iterate that is off by O(h), such as one whose bodies
+    have not turned, would leave a twist of O(h²) in every step.
 
     Returns a status: `BLOCKED` with the blocking pair if prescribed motion would close a gap, or, where the `whole` way
     is asked for, if it cannot be gone.
@@ -300,7 +294,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
             found, curved = False, short or factorisations > 1
         if task != FACTORISE or not curved:
             place = trial if task == SEARCH else at
-            if not found and p.threads.exists and not call(p.calls.find_rod_contacts, (p, place)):
+            if not found and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, place)):
                 status = NO_ROOM_FOR_RODS
                 break
             found, curved = True, curved or task == FACTORISE and wanted != VALUE

@@ -8,11 +8,11 @@ from ..forces.register import force_table, require_computed
 from ..model.force_places import NAMES
 from ..model.model import Model
 from ..model.records.outcome import COUNTS, FIGURES
-from ..model.records.parts import Leaving, Sliding, Surfaces, Threads
+from ..model.records.parts import ContactColumns, RodContact, Sliding, Surfaces
 from ..model.records.problem import BorderedSystem, Outcome, Problem
 from ..model.records.status import NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
-from .allocate import ContactColumns, FirstDerivatives, NearRods, NearSurfaces, SecondDerivatives
-from .build import lasting_groups, leaving_of, sliding_of, slips_of, surfaces_of, threads_of, wide_of
+from .allocate import FirstDerivatives, NearRods, NearSurfaces, SecondDerivatives
+from .build import contact_columns_of, lasting_groups, rod_contact_of, sliding_of, slips_of, surfaces_of, wide_of
 from .dispatch import calls_of
 from .workspace import sums_of
 
@@ -65,9 +65,9 @@ class Storage:
             bordered=wide_of(model, self._columns, self._width) if border else BorderedSystem.absent(),
             surfaces=surfaces_of(model, near) if near else Surfaces.absent(),
             sliding=sliding_of(model, capacity) if near else Sliding.absent(),
-            threads=threads_of(model, rods) if rods else Threads.absent(),
+            rod_contact=rod_contact_of(model, rods) if rods else RodContact.absent(),
             slips=slips_of(model, capacity + (rods.sliding.capacity if rods else 0)),
-            leaving=leaving_of(ContactColumns(model, of_rods)) if rods else Leaving.absent(),
+            contact_columns=contact_columns_of(model, of_rods) if rods else ContactColumns.absent(),
             sums=sums_of(self.first, self._second, self.energy, 2 * capacity),
         )
         return Problem(**records, calls=self._calls, outcome=self.outcome, forces=force_table(model, records))

@@ -26,7 +26,7 @@ from .load_terms import (
     follow_with_moments,
     start_dead_loads,
 )
-from .rod_term import add_rod_contact, start_rod_contact
+from .rod_contact import add_rod_contact, start_rod_contact
 from .surface_term import add_surface_contact, start_surface_contact
 
 
@@ -64,7 +64,7 @@ TERMS: tuple[Term, ...] = (
     Term(("inertia", "damping", "gravity"), lambda of: None, add_inertial_forces),
     Term(("loads",), lambda of: of["loads"], add_dead_loads, start_dead_loads),
     Term(("barrier", "friction"), lambda of: of["surfaces"], add_surface_contact, start_surface_contact),
-    Term(("rod barrier", "rod friction"), lambda of: of["threads"], add_rod_contact, start_rod_contact),
+    Term(("rod barrier", "rod friction"), lambda of: of["rod_contact"], add_rod_contact, start_rod_contact),
     Term(("followers",), lambda of: of["followers"], add_follower_loads, follow=follow_with_loads),
     Term(("moments",), lambda of: of["moments"], add_body_moments, follow=follow_with_moments),
     Term(("drag",), lambda of: of["flow"], add_drag_of_nodes, follow=follow_with_drag),

@@ -14,13 +14,13 @@ side, half each: K_c b per length, on any pair of meshes. With e the segment, u 
     ∂D/∂x_m = w_m n                                                        (t is the minimum: its change does not count)
     ∂²D/∂x_m ∂x_l = [w_m w_l (I − n nᵀ) − a_m a_lᵀ]/D,   a_m = w_m u + (D/|e|) β_m n,   β = (0, 0, −1, 1)
 
-where the second part, of the change δt = (e·δr + D n·δe)/|e|², is there if t lies within the segment, and a = 0 at a
-node. So each contact adds
+where a_m = |e| ∂t/∂x_m: the second part, of the change δt = (e·δr + D n·δe)/|e|², is there if t lies within the
+segment, and a = 0 at a node. So each contact adds
 
     w_m w_l M − κ a_m a_lᵀ,   M = c b″ n nᵀ + κ (I − n nᵀ),   κ = c b′/D ≤ 0,   c = ± ½ K_c Δl.
 
 κ is the tendency of two round things that are pressed together to slip off each other; along v, across both, nothing
-holds a pair of straight rods but friction. That is so for threads. The faces of ribbons are flat, and the width is not
+holds a pair of straight rods but friction. That is so for round rods. Faces of ribbons are flat, and the width is not
 seen here.
 
 **Friction** is lagged as in `forces.friction`: s, t, n and λ = −c b′ are those at the start of the step, and
@@ -29,6 +29,9 @@ seen here.
 
 The two forces are equal and opposite. They act on the two centrelines, a distance D apart along n, so a couple of D
 times the friction remains: rods have no moment about their tangent from friction on their faces.
+
+What is computed does not depend on the list of near pairs, which holds all contacts at any time, always in the same
+order; see `contact.rod_list`.
 """
 
 from __future__ import annotations
@@ -37,221 +40,216 @@ import math
 
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from ..jit import kernel
+from ..contact.rod_bound import rod_step_bound
+from ..contact.rod_list import FIRST, PATH, begin_list, end_list, list_serves, reachable
+from ..contact.segment import facing_contacts
+from ..jit import call, kernel, piece
+from ..jit.record import Matrix
 from ..jit.stack import stack_vector
+from ..model.force_places import place_of
+from ..model.records.outcome import STATUS
+from ..model.records.parts import RodContact
+from ..model.records.problem import Problem
+from ..model.records.status import NO_ROOM_FOR_RODS, READY
+from ..model.records.step import Place, Stage
+
+ROD_BARRIER, ROD_FRICTION = map(place_of, ("rod barrier", "rod friction"))
+
+
+@piece(bool, Problem, Matrix, Matrix, float, float)
+def list_near_rods(p, position, step, fraction, move):
+    """Have a list of near pairs for a part of a step of nodes from `position`, in which they move by `move` [m]; false
+    if there is no room for it.
+    """
+    rods = p.rod_contact
+    if list_serves(rods, position, step, fraction, move):
+        return True
+    margin = begin_list(rods, position, step, fraction, move)
+    call(p.calls.near_pairs, (rods.search, rods.d_hat, rods.d_hat + margin))
+    return end_list(rods)
+
+
+@piece(bool, Problem, Place)
+def find_rod_contacts(p, at):
+    """Find where rods are nearer to each other than the barrier distance; false if there is no room for that."""
+    rods = p.rod_contact
+    if not call(p.calls.list_near_rods, (p, at.position, rods.no_step, 0.0, 0.0)):
+        return False
+    found, gap = rods.contacts.count, math.inf
+    found[0] = 0
+    if rods.ways[PATH] >= rods.ways[FIRST]:
+        found[0], gap, rods.ways[FIRST] = facing_contacts(rods, at.position, rods.ways[PATH])
+    rods.gap[0] = gap
+    return found[0] <= rods.contacts.point.shape[0]
+
+
+@piece(float, Problem, Place)
+def bound_between_rods(p, at):
+    """Largest fraction of `System.node_step` that keeps rods apart; the status is left in `Outcome`."""
+    rods, step, status = p.rod_contact, p.system.node_step, p.outcome.counts
+    status[STATUS] = READY
+    move, limit = reachable(step, rods.unit)
+    if not call(p.calls.list_near_rods, (p, at.position, step, limit, limit * move)):
+        status[STATUS] = NO_ROOM_FOR_RODS
+        return 0.0
+    return rod_step_bound(rods, at.position, step, limit, 2.0 * limit * move)
+
+
+@piece(int, RodContact, Problem, Place, Stage)
+def start_rod_contact(rods, p, start, stage):
+    """Freeze the contacts of friction."""
+    if not call(p.calls.find_rod_contacts, (p, start)):
+        return NO_ROOM_FOR_RODS
+    found, sliding = rods.contacts, rods.sliding
+    sliding.count[0] = found.count[0] if rods.slides else 0
+    for c in range(sliding.count[0]):
+        scale = 0.5 * found.multiplicity[c] * rods.stiffness * rods.point_weight[found.point[c]]
+        sliding.normal_force[c] = -scale * barrier_gradient(found.gap[c], rods.d_hat)
+        sliding.node[c, 0], sliding.node[c, 1] = found.node[c, 0], found.node[c, 1]
+        for m in range(3):
+            sliding.normal[c, m] = found.normal[c, m]
+        for m in range(4):
+            sliding.weight[c, m] = found.weight[c, m]
+    return READY
+
+
+@piece(float, RodContact, Problem, Place, Stage, bool)
+def add_rod_contact(rods, p, at, stage, with_hessian):
+    """Barrier and friction at the contacts found last; returns the smallest gap below the barrier distance [m]."""
+    sums = p.sums
+    if rods.contacts.count[0] > 0 and sums.selected[ROD_BARRIER]:
+        sums.energy[ROD_BARRIER] = _add_barrier(rods, at.position, sums.carrier)
+    if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
+        sums.energy[ROD_FRICTION] = _add_friction(rods, stage, at.position, sums.carrier)
+    return rods.gap[0]
 
 
 @kernel
-def rod_barrier(
-    d_hat,
-    stiffness,
-    position,
-    contact_count,
-    point,
-    edge,
-    fraction,
-    inner,
-    times,
-    gap,
-    edge_node,
-    edge_radius,
-    point_edge,
-    point_fraction,
-    point_weight,
-    gradient_out,
-    node_out,
-    weight_out,
-    normal_out,
-    load_out,
-    matrix_out,
-    side_out,
-    turn_out,
-    lean_out,
-    along_out,
-):
-    """Add the barrier of contacts and return its energy [J], infinite if a gap is closed.
+def rods_touch(rods):
+    """Whether any contacts were found."""
+    return rods.exists and rods.contacts.count[0] > 0
 
-    Parameters
-    ----------
-    d_hat, stiffness : float
-        d̂ [m] and K_c [Pa].
-    position : Array
-        Of nodes [m], shape (n_node, 3).
-    contact_count, point, edge, fraction, inner, times, gap
-        From `contact.segment.facing_contacts`.
-    edge_node, edge_radius, point_edge, point_fraction, point_weight
-        See `model.rod_surfaces`.
-    gradient_out : Array
-        Of nodes [N], shape (≥ n_node, 3); added to.
-    node_out, weight_out : Array
-        Written: i and j, and w_m, of each contact, shapes (·, 2), (·, 4).
-    normal_out, load_out : Array
-        Written: n, shape (·, 3), and λ [N].
-    matrix_out, side_out, turn_out : Array
-        Written: M, κ (0 at a node) and a_m, shapes (·, 3, 3), (·,), (·, 4, 3).
-    lean_out, along_out : Array
-        Written: κ (at nodes, too) and u, shapes (·,), (·, 3).
+
+@kernel
+def _add_barrier(rods, position, gradient):
+    """Add the gradient of the contacts found last, write their second derivatives, and return their energy [J],
+    infinite if a gap is closed.
     """
-    energy = 0.0
-    for c in range(contact_count):
-        d = gap[c]
+    contacts, d_hat, energy = rods.contacts, rods.d_hat, 0.0
+    node, weight, normal, matrix = contacts.node, contacts.weight, contacts.normal, contacts.matrix
+    direction, foot_gradient = contacts.segment_direction, contacts.foot_gradient
+    for c in range(contacts.count[0]):
+        d, distance = contacts.gap[c], contacts.distance[c]
         if d <= 0.0:
             return math.inf
-        p, k = point[c], edge[c]
-        a = point_edge[p]
-        i, j, s, t = edge_node[a], edge_node[k], point_fraction[p], fraction[c]
-        node_out[c, 0], node_out[c, 1] = i, j
-        w0, w1, w2, w3 = 1.0 - s, s, t - 1.0, -t
-        weight_out[c, 0], weight_out[c, 1], weight_out[c, 2], weight_out[c, 3] = w0, w1, w2, w3
-        distance = d + edge_radius[a] + edge_radius[k]
-        scale = 0.5 * times[c] * stiffness * point_weight[p]
+        i, j = node[c, 0], node[c, 1]
+        w0, w1, w2, w3 = weight[c, 0], weight[c, 1], weight[c, 2], weight[c, 3]
+        scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]
         energy += scale * barrier(d, d_hat)
         slope = scale * barrier_gradient(d, d_hat)
-        curve = scale * barrier_hessian(d, d_hat)
-        side = slope / distance
-        load_out[c] = -slope
-        lean_out[c] = side
-        side_out[c] = side if inner[c] else 0.0
-        size = 0.0
+        curvature = scale * barrier_hessian(d, d_hat)
+        tangential = slope / distance
+        contacts.tangential_stiffness[c] = tangential
+        square = 0.0
         for m in range(3):
-            normal_out[c, m] = (
-                w0 * position[i, m] + w1 * position[i + 1, m] + w2 * position[j, m] + w3 * position[j + 1, m]
-            ) / distance
-            force = slope * normal_out[c, m]
-            gradient_out[i, m] += w0 * force
-            gradient_out[i + 1, m] += w1 * force
-            gradient_out[j, m] += w2 * force
-            gradient_out[j + 1, m] += w3 * force
-            size += (position[j + 1, m] - position[j, m]) ** 2
-        size = math.sqrt(size)
+            force = slope * normal[c, m]
+            gradient[i, m] += w0 * force
+            gradient[i + 1, m] += w1 * force
+            gradient[j, m] += w2 * force
+            gradient[j + 1, m] += w3 * force
+            square += (position[j + 1, m] - position[j, m]) ** 2
+        length = math.sqrt(square)
         for m in range(3):
             for n in range(3):
-                matrix_out[c, m, n] = (curve - side) * normal_out[c, m] * normal_out[c, n]
-            matrix_out[c, m, m] += side
-            along = (position[j + 1, m] - position[j, m]) / size
-            along_out[c, m] = along
-            across = distance / size * normal_out[c, m]
-            turn_out[c, 0, m] = w0 * along
-            turn_out[c, 1, m] = w1 * along
-            turn_out[c, 2, m] = w2 * along - across
-            turn_out[c, 3, m] = w3 * along + across
+                matrix[c, m, n] = (curvature - tangential) * normal[c, m] * normal[c, n]
+            matrix[c, m, m] += tangential
+            along = (position[j + 1, m] - position[j, m]) / length
+            direction[c, m] = along
+            across = distance / length * normal[c, m]
+            foot_gradient[c, 0, m] = w0 * along
+            foot_gradient[c, 1, m] = w1 * along
+            foot_gradient[c, 2, m] = w2 * along - across
+            foot_gradient[c, 3, m] = w3 * along + across
     return energy
 
 
 @kernel
-def rod_friction(
-    coefficient,
-    threshold,
-    step_length,
-    position,
-    origin_position,
-    contact_count,
-    node,
-    weight,
-    normal,
-    load,
-    gradient_out,
-    matrix_out,
-):
-    """Add the dissipation potential of lagged contacts and return it [J].
+def _moved(vectors, origin, contacts, c, m):
+    """Component m of Σ w_m (x_m − x_m⁰) at a contact [m]."""
+    i, j, weight = contacts.node[c, 0], contacts.node[c, 1], contacts.weight
+    return (
+        weight[c, 0] * (vectors[i, m] - origin[i, m])
+        + weight[c, 1] * (vectors[i + 1, m] - origin[i + 1, m])
+        + weight[c, 2] * (vectors[j, m] - origin[j, m])
+        + weight[c, 3] * (vectors[j + 1, m] - origin[j + 1, m])
+    )
 
-    Parameters
-    ----------
-    coefficient, threshold, step_length : float
-        μ, ε_v [m/s], h [s].
-    position, origin_position : Array
-        Of nodes now and where their velocity is counted from [m], shape (≥ n_node, 3).
-    contact_count, node, weight, normal, load
-        As `rod_barrier` wrote them at the start of the step.
-    gradient_out : Array
-        Of nodes [N]; added to.
-    matrix_out : Array
-        Written: M of each contact, shape (·, 3, 3).
+
+@kernel
+def _add_friction(rods, stage, position, gradient):
+    """Add the gradient of the dissipation potential of lagged contacts, write its second derivatives, and return it
+    [J].
     """
-    energy = 0.0
-    for c in range(contact_count):
-        i, j = node[c, 0], node[c, 1]
-        n0, n1, n2 = normal[c, 0], normal[c, 1], normal[c, 2]
-        w0, w1, w2, w3 = weight[c, 0], weight[c, 1], weight[c, 2], weight[c, 3]
-        g0, g1, g2 = 0.0, 0.0, 0.0
+    contacts, h, threshold, energy = rods.sliding, stage.lengths[0], rods.threshold, 0.0
+    origin, weight, normal, matrix = stage.origin_position, contacts.weight, contacts.normal, contacts.matrix
+    slip = stack_vector(3)
+    for c in range(contacts.count[0]):
+        i, j = contacts.node[c, 0], contacts.node[c, 1]
+        along, square = 0.0, 0.0
         for m in range(3):
-            moved = (
-                w0 * (position[i, m] - origin_position[i, m])
-                + w1 * (position[i + 1, m] - origin_position[i + 1, m])
-                + w2 * (position[j, m] - origin_position[j, m])
-                + w3 * (position[j + 1, m] - origin_position[j + 1, m])
-            )
-            if m == 0:
-                g0 = moved
-            elif m == 1:
-                g1 = moved
-            else:
-                g2 = moved
-        along = g0 * n0 + g1 * n1 + g2 * n2
-        g0, g1, g2 = g0 - along * n0, g1 - along * n1, g2 - along * n2
-        speed = math.sqrt(g0 * g0 + g1 * g1 + g2 * g2) / step_length
-        limit = coefficient * load[c]
-        energy += limit * step_length * friction_potential(speed, threshold)
-        ratio = limit * friction_over_speed(speed, threshold) / step_length
-        excess = 0.0
+            slip[m] = _moved(position, origin, contacts, c, m)
+            along += slip[m] * normal[c, m]
+        for m in range(3):
+            slip[m] -= along * normal[c, m]
+            square += slip[m] * slip[m]
+        speed = math.sqrt(square) / h
+        limit = rods.coefficient * contacts.normal_force[c]
+        energy += limit * h * friction_potential(speed, threshold)
+        over_speed = friction_over_speed(speed, threshold)
+        ratio, excess = limit * over_speed / h, 0.0
         if speed > 0.0:
-            bend = friction_slope(speed, threshold) - friction_over_speed(speed, threshold)
-            excess = limit * bend / (speed * speed * step_length**3)
+            excess = limit * (friction_slope(speed, threshold) - over_speed) / (speed * speed * h**3)
         for m in range(3):
-            nm = n0 if m == 0 else (n1 if m == 1 else n2)
-            gm = g0 if m == 0 else (g1 if m == 1 else g2)
-            gradient_out[i, m] += w0 * ratio * gm
-            gradient_out[i + 1, m] += w1 * ratio * gm
-            gradient_out[j, m] += w2 * ratio * gm
-            gradient_out[j + 1, m] += w3 * ratio * gm
-            matrix_out[c, m, 0] = excess * gm * g0 - ratio * nm * n0
-            matrix_out[c, m, 1] = excess * gm * g1 - ratio * nm * n1
-            matrix_out[c, m, 2] = excess * gm * g2 - ratio * nm * n2
-            matrix_out[c, m, m] += ratio
+            gradient[i, m] += weight[c, 0] * ratio * slip[m]
+            gradient[i + 1, m] += weight[c, 1] * ratio * slip[m]
+            gradient[j, m] += weight[c, 2] * ratio * slip[m]
+            gradient[j + 1, m] += weight[c, 3] * ratio * slip[m]
+            for n in range(3):
+                matrix[c, m, n] = excess * slip[m] * slip[n] - ratio * normal[c, m] * normal[c, n]
+            matrix[c, m, m] += ratio
     return energy
 
 
 @kernel
-def rod_slip_along(
-    coefficient,
-    step_length,
-    position,
-    origin_position,
-    contact_count,
-    node,
-    weight,
-    normal,
-    load,
-    node_step,
-    begin,
-    way_out,
-):
+def rod_slip_along(rods, stage, position, node_step, begin, way_out):
     """Write the way of every lagged contact in a Newton step, see `forces.slip`: a is the direction of the slip.
 
     Parameters
     ----------
-    coefficient … load
-        As for `rod_friction`.
-    node_step : Array
-        Displacement of nodes [m], shape (n_node, 3).
+    rods : RodContact
+    stage : Stage
+    position, node_step : Array
+        Of nodes, and their displacement [m], shape (n_node, 3).
     begin : int
         Row of the first contact.
     way_out : Array
-        Written: shape (≥ begin + contact_count, `slip.WAY`).
+        Written: shape (≥ begin + number of contacts, `slip.WAY`).
+
+    Returns
+    -------
+    end : int
+        Row after the last contact.
     """
+    contacts, origin, coefficient = rods.sliding, stage.origin_position, rods.coefficient
+    node, weight, normal = contacts.node, contacts.weight, contacts.normal
     slip, rate = stack_vector(3), stack_vector(3)
-    for c in range(contact_count):
+    for c in range(contacts.count[0]):
         i, j = node[c, 0], node[c, 1]
-        w0, w1, w2, w3 = weight[c, 0], weight[c, 1], weight[c, 2], weight[c, 3]
         of_slip, of_rate = 0.0, 0.0
         for m in range(3):
-            rate[m] = w0 * node_step[i, m] + w1 * node_step[i + 1, m] + w2 * node_step[j, m] + w3 * node_step[j + 1, m]
-            slip[m] = (
-                w0 * (position[i, m] - origin_position[i, m])
-                + w1 * (position[i + 1, m] - origin_position[i + 1, m])
-                + w2 * (position[j, m] - origin_position[j, m])
-                + w3 * (position[j + 1, m] - origin_position[j + 1, m])
-            )
+            slip[m] = _moved(position, origin, contacts, c, m)
+            rate[m] = weight[c, 0] * node_step[i, m] + weight[c, 1] * node_step[i + 1, m]
+            rate[m] += weight[c, 2] * node_step[j, m] + weight[c, 3] * node_step[j + 1, m]
             of_slip += slip[m] * normal[c, m]
             of_rate += rate[m] * normal[c, m]
         square, together, total = 0.0, 0.0, 0.0
@@ -266,4 +264,5 @@ def rod_slip_along(
         way_out[k, 0], way_out[k, 1] = size, along
         way_out[k, 2], way_out[k, 3] = 0.0, math.sqrt(max(total - along * along, 0.0))
         way_out[k, 4] = way_out[k, 5] = way_out[k, 6] = coefficient * coefficient
-        way_out[k, 7], way_out[k, 8] = load[c], coefficient * step_length
+        way_out[k, 7], way_out[k, 8] = contacts.normal_force[c], coefficient * stage.lengths[0]
+    return begin + contacts.count[0]

@@ -11,12 +11,13 @@ from .slip import held_up
 
 
 @kernel
-def hold_up(slips, sliding, surfaces, threads, system, stage, at, slope, bound):
+def hold_up(slips, sliding, surfaces, rods, system, stage, at, slope, bound):
     """Fraction of the present step, at most `bound`, at which friction holds it up; the matrix is that of `at`."""
     if not slips.exists:
         return bound
     count = _at_surfaces(slips, sliding, surfaces, system, stage, at)
-    count = _between_rods(slips, threads, system, stage, at, count)
+    if rods.exists:
+        count = rod_slip_along(rods, stage, at.position, system.node_step, count, slips.way)
     if count == 0:
         return bound
     return held_up(count, slips.way, slips.threshold, slope, bound)
@@ -53,30 +54,7 @@ def _at_surfaces(slips, sliding, surfaces, system, stage, at):
     return sliding.count[0]
 
 
-@kernel
-def _between_rods(slips, threads, system, stage, at, begin):
-    if not threads.exists:
-        return begin
-    sliding = threads.sliding
-    if sliding.counted[0] > 0:
-        rod_slip_along(
-            threads.coefficient,
-            stage.lengths[0],
-            at.position,
-            stage.origin_position,
-            sliding.counted[0],
-            sliding.node,
-            sliding.weight,
-            sliding.normal,
-            sliding.load,
-            system.node_step,
-            begin,
-            slips.way,
-        )
-    return begin + sliding.counted[0]
-
-
 @piece(float, Problem, Place, Stage, float, float)
 def where_friction_holds(p, at, stage, slope, bound):
     """`hold_up`"""
-    return hold_up(p.slips, p.sliding, p.surfaces, p.threads, p.system, stage, at, slope, bound)
+    return hold_up(p.slips, p.sliding, p.surfaces, p.rod_contact, p.system, stage, at, slope, bound)

@@ -31,6 +31,7 @@ from platformdirs import user_cache_path
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("jit", "kinematics", "contact", "scene", "model", "forces", "engine")
 """Of the package: all that hold kernels (a test looks for others)."""
+CACHE_DIR = "NUMBA_CACHE_DIR"
 DAYS_KEPT = 30
 DAY = 86400.0
 USED = "used"
@@ -43,10 +44,11 @@ _log = logging.getLogger(__name__)
 def fingerprint() -> str:
     """Of all that compiled code depends on."""
     digest = hashlib.blake2b(digest_size=12)
-    settings = sorted(item for item in os.environ.items() if item[0].startswith(("NUMBA_", "BILAYER_JIT_")))
+    settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] != CACHE_DIR)
+    settings.append(("BILAYER_JIT_PUBLIC", os.environ.get("BILAYER_JIT_PUBLIC", "0")))
     target = llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()
     versions = sys.version, numba.__version__, llvmlite.__version__, np.__version__
-    digest.update(repr((versions, target, [item for item in settings if not item[0].endswith("CACHE_DIR")])).encode())
+    digest.update(repr((versions, target, settings)).encode())
     for folder in FOLDERS:
         for path in sorted((PACKAGE / folder).rglob("*.py")):
             digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
@@ -58,7 +60,7 @@ def cache_folder() -> Path | None:
     """The folder for what this process compiles; None if nothing can be or is to be kept."""
     if os.environ.get("BILAYER_JIT_CACHE", "1") == "0":
         return None
-    root = Path(os.environ.get("NUMBA_CACHE_DIR") or user_cache_path("bilayer_core", appauthor=False))
+    root = Path(os.environ.get(CACHE_DIR) or user_cache_path("bilayer_core", appauthor=False))
     folder = root / f"kernels-{fingerprint()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -28,7 +28,7 @@ WORKER = "bilayer_core.jit.worker"
 ENGINE = "bilayer_core.engine"
 """Module that imports all that declare pieces."""
 LONGEST = {
-    "start_rod_contact",
+    "near_pairs",
     "minimise_potential",
     "make_step",
     "add_surface_contact",

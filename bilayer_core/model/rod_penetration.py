@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..contact.segment import facing_contacts
 from ..errors import PenetrationError
 from .model import Model
 from .rod_surfaces import NearPairs
@@ -21,34 +20,19 @@ def refuse_meeting_rods(model: Model) -> None:
     surfaces = model.rod_surfaces
     if surfaces is None:
         return
-    position = np.array(model.start_position)
-    pairs = NearPairs(surfaces, model.edge_node)
-    pairs.find(position, position, model.scene.contact.barrier_distance, 0.0)
+    position = model.start_position
+    pairs = NearPairs(surfaces, model.edge_node, position)
+    pairs.find(position, model.scene.contact.barrier_distance, 0.0)
     if pairs.count == 0:
         return
-    room = 2 * pairs.count
-    point, edge, times = (np.empty(room, dtype=np.int64) for _ in range(3))
-    fraction, gap, inner = np.empty(room), np.empty(room), np.empty(room, dtype=bool)
-    found, _, _ = facing_contacts(
-        position,
-        pairs.count,
-        *pairs.outputs,
-        0.0,
-        model.edge_node,
-        surfaces.edge_radius,
-        surfaces.point_edge,
-        surfaces.point_fraction,
-        0.0,
-        point,
-        edge,
-        fraction,
-        inner,
-        times,
-        gap,
-    )
-    worst = int(np.argmin(gap[:found]))
-    places = [_place(model, surfaces.point_edge[point[worst]], surfaces.point_fraction[point[worst]])]
-    places.append(_place(model, edge[worst], fraction[worst]))
+    point, edge = pairs.search.point[: pairs.count], pairs.search.edge[: pairs.count]
+    own, i, j = surfaces.point_edge[point], model.edge_node[surfaces.point_edge[point]], model.edge_node[edge]
+    s, along = surfaces.point_fraction[point][:, None], position[j + 1] - position[j]
+    between = (1.0 - s) * position[i] + s * position[i + 1] - position[j]
+    t = np.clip((between * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
+    gap = np.linalg.norm(between - t[:, None] * along, axis=1) - surfaces.edge_radius[own] - surfaces.edge_radius[edge]
+    worst = int(np.argmin(gap))
+    places = [_place(model, own[worst], s[worst, 0]), _place(model, edge[worst], t[worst])]
     raise PenetrationError(
         f"{model.scene.name}: the scene starts in penetration: "
         f"{places[0]} is {-1e3 * gap[worst]:.4g} mm inside {places[1]}"

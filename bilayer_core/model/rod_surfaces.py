@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..contact.broad_phase import near_pairs, scratch
+from ..contact.broad_phase import RodSearch, near_pairs, scratch
 from ..scene.config import SceneConfig
 from .layout import ReadOnlyArrays
 from .meeting import meetings
@@ -139,52 +139,53 @@ class NearPairs:
 
     Attributes
     ----------
-    counted : Array
-        Number of pairs, as compiled loops share it, shape (1,).
-    point, edge, before, after : Array
-        The pairs, see `contact.broad_phase.near_pairs`; only the first `count` count.
-    until : Array
-        Path before which each stays beyond the barrier distance [m], see `contact.rod_list`.
-    geometry : tuple
-        What `near_pairs` takes of the rods, its scratch last.
-    scratch : tuple of Array
+    search : RodSearch
+        What `near_pairs` takes and writes; another object after `reserve`.
     """
 
-    def __init__(self, surfaces: RodSurfaces, edge_node: Array, room: int = 0):
-        s = surfaces
-        self.scratch = scratch(len(edge_node))
-        self.geometry = (
-            *(edge_node, s.edge_radius, s.edge_rod, s.edge_first, s.edge_arc),
-            *(s.first_point, s.point_fraction, s.point_arc, s.rod_meets, s.rod_joined, s.rod_exclusion),
-            *self.scratch,
+    def __init__(self, surfaces: RodSurfaces, edge_node: Array, start_position: Array, capacity: int = 0):
+        box, sweep, met = scratch(len(edge_node))
+        base, tip = np.zeros((2, *start_position.shape))
+        names = ("edge_radius", "edge_rod", "edge_first", "edge_arc", "first_point", "point_edge", "point_fraction")
+        names += ("point_arc", "rod_meets", "rod_joined", "rod_exclusion")
+        self._geometry = dict(
+            start_position=np.array(start_position),
+            base=base,
+            tip=tip,
+            edge_node=edge_node,
+            **{name: getattr(surfaces, name) for name in names},
+            box=box,
+            sweep=sweep,
+            met=met,
         )
-        self.counted = np.zeros(1, dtype=np.int64)
-        self.make_room(room)
+        self.reserve(capacity)
 
     @property
     def count(self) -> int:
         """Pairs in the list."""
-        return int(self.counted[0])
-
-    def make_room(self, room: int) -> None:
-        """Have room for so many pairs, none of which is listed then."""
-        self.point, self.edge = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
-        self.before, self.after = np.empty(room, dtype=bool), np.empty(room, dtype=bool)
-        self.until = np.empty(room)
+        return int(self.search.count[0])
 
     @property
-    def outputs(self) -> tuple[Array, ...]:
-        """The pairs, as `near_pairs` writes them."""
-        return self.point, self.edge, self.before, self.after, self.until
+    def capacity(self) -> int:
+        """For how many there is room."""
+        return len(self.search.point)
 
-    def find(self, position: Array, start_position: Array, touch: float, reach: float) -> None:
-        """List the pairs with a gap below `reach` [m] at positions of nodes [m], shape (n_node, 3); for `touch` see
-        `near_pairs`.
+    def reserve(self, capacity: int) -> None:
+        """Have room for so many pairs, none of which is listed then."""
+        self.search = RodSearch(
+            **self._geometry,
+            count=np.zeros(1, dtype=np.int64),
+            point=np.empty(capacity, dtype=np.int64),
+            edge=np.empty(capacity, dtype=np.int64),
+            before=np.empty(capacity, dtype=bool),
+            after=np.empty(capacity, dtype=bool),
+            until=np.empty(capacity),
+        )
+
+    def find(self, base: Array, touch: float, reach: float, tip: Array | None = None) -> None:
+        """List the pairs with a gap below `reach` [m] where nodes are, or on their straight way from `base` to `tip`
+        [m], shape (n_node, 3); for `touch` see `near_pairs`.
         """
-        while True:
-            self.counted[0] = near_pairs(
-                position, position, start_position, touch, reach, *self.geometry, *self.outputs
-            )
-            if self.count <= len(self.point):
-                return
-            self.make_room(2 * self.count)
+        self.search.base[:], self.search.tip[:] = base, base if tip is None else tip
+        while near_pairs(self.search, touch, reach) > self.capacity:
+            self.reserve(2 * self.count)

@@ -1,6 +1,7 @@
 """Stiffness and inertia of rectangular sections, alone and bonded in pairs (thickness h through the layer, width w).
 
-All of them are given at some places along a path; arrays have shape (n_place,).
+All of them are given at some places along a path; arrays have shape (n_place,). Where a section changes along a rod,
+masses, axial stiffness and bonds take that in the middle of an edge; bending, twist, contact and drag that at the node.
 """
 
 from __future__ import annotations

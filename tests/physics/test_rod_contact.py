@@ -9,7 +9,6 @@ from sample_scenes import contact, layer, rod, scene
 from slips import dissipation
 
 from bilayer_core import load_scene
-from bilayer_core.contact.broad_phase import near_pairs
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
 from bilayer_core.model.rod_surfaces import NearPairs
@@ -98,21 +97,22 @@ class Rods:
     @property
     def contacts(self):
         """Those found last."""
-        return self.evaluator.rods.contacts
+        return self.evaluator.rods.contacts.record
 
     @property
     def lagged(self):
         """Those of friction."""
-        return self.evaluator.rods.sliding
+        return self.evaluator.rods.sliding.record
 
 
 def dense(contacts, nodes):
     """Second derivatives of all contacts, from what the kernels leave for the matrix."""
     hessian = np.zeros((nodes, 3, nodes, 3))
-    for c in range(contacts.count):
+    for c in range(contacts.count[0]):
         i, j = contacts.node[c]
         places = [i, i + 1, j, j + 1]
-        w, m, side, a = contacts.weight[c], contacts.matrix[c], contacts.side[c], contacts.turn[c]
+        w, m, a = contacts.weight[c], contacts.matrix[c], contacts.foot_gradient[c]
+        side = contacts.tangential_stiffness[c] if contacts.inner[c] else 0.0
         for k, row in enumerate(places):
             for n, column in enumerate(places):
                 hessian[row, :, column, :] += w[k] * w[n] * m - side * np.outer(a[k], a[n])
@@ -141,11 +141,11 @@ def test_derivatives_of_rod_contact_agree_with_differences(case, term):
     energy, gradient = rods.evaluate(position, force)
     found = rods.contacts if term == "barrier" else rods.lagged
     hessian = dense(found, model.node_count)
-    assert energy > 0.0 and found.count >= 4
+    assert energy > 0.0 and found.count[0] >= 4
     if term == "barrier":
-        times, inner = found.times[: found.count], found.inner[: found.count]
+        multiplicity, inner = found.multiplicity[: found.count[0]], found.inner[: found.count[0]]
         assert inner.any()
-        assert case != "folded" or times.min() < 0  # a corner seen from inside
+        assert case != "folded" or multiplicity.min() < 0  # a corner seen from inside
         assert case != "parallel" or not inner.all()
     errors = []
     for h in (1e-9, 3e-9, 1e-8, 3e-8):
@@ -200,7 +200,7 @@ def test_friction_between_rods_is_opposite_on_the_two_and_opposes_the_slip():
     slipped = position.copy()
     slipped[:6, 0] += 1e-4  # far above the threshold in 10 ms
     _, gradient = rods.evaluate(slipped, "rod friction")
-    load = rods.lagged.load[: rods.lagged.count].sum()
+    load = rods.lagged.normal_force[: rods.lagged.count[0]].sum()
     first, second = -gradient[:6].sum(axis=0), -gradient[6:].sum(axis=0)
     assert first == pytest.approx(-second, abs=1e-12 * load)
     assert first[0] == pytest.approx(-0.4 * load, rel=0.05)  # normals lean by the noise of the shape
@@ -263,7 +263,8 @@ def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hu
     terms = evaluator.evaluate(problem.at, second=True)
     assert evaluator.factorise(problem.at) == (0.0, 0)
     assert terms["rod barrier"] > 0.0 and terms["rod friction"] > 0.0
-    touching = evaluator.rods.contacts.node[: evaluator.rods.contacts.count]
+    contacts = evaluator.rods.contacts
+    touching = contacts.record.node[: contacts.count]
     assert np.isin(touching, model.attached_node).any()
     loads = []
     for _ in range(3):
@@ -282,6 +283,11 @@ def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hu
         assert min(errors) < 1e-6
 
 
+def _listed(pairs):
+    """Points and segments of near pairs."""
+    return pairs.search.point[: pairs.count].tolist(), pairs.search.edge[: pairs.count].tolist()
+
+
 def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_length():
     counts = []
     for stations in (201, 401, 801):
@@ -290,13 +296,13 @@ def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_
         rods[1]["path"]["start"] = [0.7e-3, 0, 1.8e-3]
         model = model_of(rods)
         surfaces = model.rod_surfaces
-        pairs, start = NearPairs(surfaces, model.edge_node), np.array(model.start_position)
-        pairs.find(start, start, D_HAT, D_HAT)
+        pairs = NearPairs(surfaces, model.edge_node, model.start_position)
+        pairs.find(model.start_position, D_HAT, D_HAT)
         counts.append(pairs.count)
         if stations > 201:
             continue
         position = model.start_position + 2e-4 * np.sin(np.arange(3 * model.node_count)).reshape(-1, 3)
-        pairs.find(position, start, D_HAT, D_HAT)
+        pairs.find(position, D_HAT, D_HAT)
         first = model.edge_node[surfaces.point_edge]
         s = surfaces.point_fraction[:, None]
         points = (1 - s) * position[first] + s * position[first + 1]
@@ -307,7 +313,7 @@ def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_
             distance = np.linalg.norm(points - position[j] - t * e, axis=1)
             other = surfaces.edge_rod[surfaces.point_edge] != surfaces.edge_rod[k]
             expected |= {(int(p), k) for p in np.flatnonzero(other & (distance - 1e-3 < D_HAT))}
-        found = list(zip(pairs.point[: pairs.count].tolist(), pairs.edge[: pairs.count].tolist(), strict=True))
+        found = list(zip(*_listed(pairs), strict=True))
         assert found == sorted(expected) and len(found) > 1000
     assert counts[2] - counts[1] == 2 * (counts[1] - counts[0])
 
@@ -327,7 +333,7 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
     parts = [layer(name) for name in ("bottom", "top")[:layers]]
     model = model_of([rod(parts, length=spacing * (stations - 1), stations=stations)])
     surfaces = model.rod_surfaces
-    pairs, start = NearPairs(surfaces, model.edge_node, 100_000), np.array(model.start_position)
+    pairs = NearPairs(surfaces, model.edge_node, model.start_position, 100)
     s, edge = surfaces.point_fraction[:, None], surfaces.point_edge
     exclusion, radii = surfaces.rod_exclusion[0], surfaces.edge_radius[edge][:, None] + surfaces.edge_radius
     arc = surfaces.point_arc[:, None]
@@ -336,11 +342,10 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
     for _ in range(40):
         base = np.concatenate([winding_path(rng, stations, spacing) + [0, 0, 1e-3 * k] for k in range(layers)])
         tip = base + np.tile(winding_path(rng, stations, spacing) * rng.choice([0.0, 0.1, 1.0]), (layers, 1))
-        geometry = (*pairs.geometry, *pairs.outputs)
-        count = near_pairs(base, tip, start, D_HAT, reach, *geometry)
-        found = set(zip(pairs.point[:count].tolist(), pairs.edge[:count].tolist(), strict=True))
-        order = np.lexsort((pairs.edge[:count], pairs.point[:count]))
-        assert np.array_equal(order, np.arange(count))
+        pairs.find(base, D_HAT, reach, tip)
+        point, segment = _listed(pairs)
+        found = set(zip(point, segment, strict=True))
+        assert np.array_equal(np.lexsort((segment, point)), np.arange(pairs.count))
         for part in np.linspace(0.0, 1.0, 11):
             position = base + part * (tip - base)
             points = (1 - s) * position[model.edge_node[edge]] + s * position[model.edge_node[edge] + 1]
@@ -352,8 +357,8 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
             assert near <= found
             met += len(near)
             if part == 0.0:
-                point, k = pairs.point[:count], pairs.edge[:count]
-                np.testing.assert_allclose(pairs.until[:count], gap[point, k] - D_HAT, rtol=0, atol=1e-15)
+                until = pairs.search.until[: pairs.count]
+                np.testing.assert_allclose(until, gap[point, segment] - D_HAT, rtol=0, atol=1e-15)
     assert met > 1000
 
 
@@ -368,17 +373,18 @@ def test_contacts_and_the_bound_of_a_step_do_not_depend_on_the_way_that_led_ther
         if move % 20 == 0:  # straight on for a while, then elsewhere
             drift = size * rng.standard_normal(nodes)
         step = drift + 0.1 * size * rng.standard_normal(nodes) + np.array([1e-2, 0.0, 0.0])
-        fresh, base = Rods(model), rods.evaluator.rods.base.copy()
+        fresh, base = Rods(model), rods.evaluator.rods.pairs.search.base.copy()
         assert rods.evaluate(position)[0] == fresh.evaluate(position)[0]
-        assert rods.contacts.count == fresh.contacts.count
-        for name in ("point", "edge", "fraction", "inner", "times", "gap"):
+        count = fresh.contacts.count[0]
+        assert rods.contacts.count[0] == count
+        for name in ("point", "node", "weight", "inner", "multiplicity", "gap", "distance", "normal"):
             ours, theirs = getattr(rods.contacts, name), getattr(fresh.contacts, name)
-            np.testing.assert_array_equal(ours[: fresh.contacts.count], theirs[: fresh.contacts.count])
+            np.testing.assert_array_equal(ours[:count], theirs[:count])
         fraction = fresh.bound(position, step).fraction
         assert rods.bound(position, step).fraction == fraction
         assert rods.evaluator.gap == fresh.evaluator.gap
-        made += not np.array_equal(base, rods.evaluator.rods.base)
-        touching += fresh.contacts.count > 0
+        made += not np.array_equal(base, rods.evaluator.rods.pairs.search.base)
+        touching += count > 0
         bounded += fraction < 1.0
         position = position + 0.8 * fraction * step
         if move % 5 == 4:  # as a line search that returns

@@ -1,1 +1,1 @@
-"""The Newton matrix: assembly, band solver, border of bodies and of nodes that left the band."""
+"""The Newton matrix: assembly, band solver, border of bodies and of contact columns."""

@@ -1,4 +1,4 @@
-"""The border of the Newton matrix: free bodies, and nodes that left the band for it."""
+"""The border of the Newton matrix: free bodies, and columns of contacts of rods."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def add_links(axes, links, link_node, link_body, link_hessian, node_unknown, bor
 
 
 @kernel
-def assemble_border(border, wide, grips, leaving, space, plane, strands, sums, band, at):
+def assemble_border(border, wide, grips, columns, space, plane, strands, sums, band, at):
     """U and D of free bodies: links of contact, and what they hold. Whether U is not zero is left in `coupled`."""
     if not border.exists:
         return
@@ -41,17 +41,17 @@ def assemble_border(border, wide, grips, leaving, space, plane, strands, sums, b
         wide.coupled[0] = 1
         links = sums.link_node, sums.link_body, sums.link_hessian
         add_links(strands.axes, sums.links[0], links[0], links[1], links[2], strands.row, border.border)
-    _hand_to_bodies(wide, grips, leaving, space, plane, border, strands, at, sums, band)
+    _hand_to_bodies(wide, grips, columns, space, plane, border, strands, at, sums, band)
 
 
 @kernel
-def _hand_to_bodies(wide, grips, leaving, space, plane, border, strands, at, sums, band):
+def _hand_to_bodies(wide, grips, columns, space, plane, border, strands, at, sums, band):
     if not grips.exists:
         return
     if grips.holding == 0:
         return
     wide.coupled[0] = 1
-    hand_contacts_to_bodies(leaving, grips, strands, at, border)
+    hand_contacts_to_bodies(columns, grips, strands, at, border)
     hand_rows_to_bodies(strands.axes, grips.unknown, grips.free, at.arm, border.border, border.corner)
     hand_nodes_to_bodies(
         strands.axes,
@@ -187,10 +187,10 @@ def count_negative_of_border(wide):
 
 @kernel
 def solve_border(wide, bodies, body_gradient, size, right, body_step):
-    """The step of free bodies and of nodes that left the band; what it changes is taken off `right`, L⁻¹ times that of
-    all others.
+    """The step of free bodies and of nodes with contact columns; what it changes is taken off `right`, L⁻¹ times that
+    of all others.
 
-    In `BorderedSystem.load` is what is wanted of nodes that left.
+    In `BorderedSystem.load` is what is wanted of nodes with contact columns.
     """
     if not wide.exists:
         return
@@ -223,8 +223,8 @@ def solve_border(wide, bodies, body_gradient, size, right, body_step):
 @piece(int, Problem, Place)
 def assemble_bodies(p, at):
     """`assemble_border`"""
-    system, border = p.bordered, p.border
-    assemble_border(border, system, p.attachments, p.leaving, p.space, p.plane, p.strands, p.sums, p.system.band, at)
+    contact, band = p.contact_columns, p.system.band
+    assemble_border(p.border, p.bordered, p.attachments, contact, p.space, p.plane, p.strands, p.sums, band, at)
     return READY
 
 

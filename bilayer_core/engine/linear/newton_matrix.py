@@ -5,7 +5,7 @@
 
 A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the
 motions that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
-Some nodes of rods that touch leave the band for the border, too (`engine.linear.rod_columns`).
+Some nodes of rods that touch have their columns in the border, too (`engine.linear.contact_columns`).
 
 If a pivot is not positive the matrix is not convex there; what is negative in the contact of rods is left out, then
 multiples of the mass matrix are added until it is, so that the step is a descent direction.
@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from ...forces.rod_term import rods_touch
+from ...forces.rod_contact import rods_touch
 from ...jit import call, caller, kernel, piece
 from ...jit.record import Matrix, Vector
 from ...model.records.problem import BorderedSystem, Problem
@@ -28,7 +28,7 @@ from .bordered_system import (
     count_negative_of_border,
     start_border,
 )
-from .contact_columns import put_leaving, take_leaving
+from .contact_columns import gather_columns, scatter_columns
 from .planar_assembly import expand_in_plane, expand_pairs_in_plane, put_in_space, take_in_plane
 
 FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
@@ -148,7 +148,7 @@ def assemble(p, at, factor, simplified):
         call(p.calls.assemble_in_space, (p, factor))
     else:
         call(p.calls.assemble_in_plane, (p, at, factor))
-    if p.threads.exists:
+    if p.rod_contact.exists:
         call(p.calls.take_rod_contacts, (p, simplified))
     start_border(p.bordered, p.bodies)
     if p.border.exists:
@@ -183,7 +183,7 @@ def factorise(p, at, stage, counts):
         of_bodies = factor if counts else shift * factor
         if p.border.exists:
             call(p.calls.restrict_bodies, (p, of_bodies))
-        if p.leaving.exists and not call(p.calls.move_to_border, (p,)):
+        if p.contact_columns.exists and not call(p.calls.move_to_border, (p,)):
             return NO_ROOM_IN_BORDER, shift, simplified
         if counts:
             negative = call_factor(p.calls.count_band, (band, strands.size))
@@ -198,7 +198,7 @@ def factorise(p, at, stage, counts):
                 return READY if of_border >= 0 else NOT_FINITE, shift, simplified
             if not p.bordered.exists or call(p.calls.factor_border, (p,)):
                 return READY, shift, simplified
-        if simplified < 2 and rods_touch(p.threads):
+        if simplified < 2 and rods_touch(p.rod_contact):
             simplified += 1
             continue
         shift = max(FIRST_SHIFT, shift * SHIFT_GROWTH)
@@ -219,12 +219,12 @@ def solve(p):
         right[j] = -right[j]
     for j in range(size, right.shape[0]):
         right[j] = 0.0
-    take_leaving(p.leaving, p.bordered, right)
+    gather_columns(p.contact_columns, p.bordered, right)
     call_solve(p.calls.forward_band, (system.band, size, right))
     if p.bordered.exists:
         call(p.calls.solve_bordered, (p,))
     call_solve(p.calls.backward_band, (system.band, size, right))
-    put_leaving(p.leaving, p.bordered, right)
+    scatter_columns(p.contact_columns, p.bordered, right)
     if p.space.exists:
         for j in range(system.step.shape[0]):
             system.step[j] = right[j]

@@ -6,6 +6,7 @@ program serves all scenes of a dimension.
 
 from __future__ import annotations
 
+from ...contact.broad_phase import RodSearch
 from ...jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
 
 
@@ -205,30 +206,28 @@ class Slips:
 
 
 @record
-class Touches:
+class RodContactList:
     """Contacts of rods; see `forces.rod_contact`."""
 
-    counted: Indices  # shape (1,)
+    count: Indices  # shape (1,)
     point: Indices
-    edge: Indices
-    fraction: Vector
-    inner: Flags
-    times: Indices
-    gap: Vector
-    node: IndexTable
-    weight: Matrix
-    normal: Matrix
-    load: Vector
-    matrix: Stack
-    side: Vector
-    turn: Stack
-    lean: Vector
-    along: Matrix
+    multiplicity: Indices  # +1 or −1
+    inner: Flags  # whether t moves with the shape, or is that of a node
+    gap: Vector  # d [m]
+    distance: Vector  # D [m]
+    node: IndexTable  # i and j, shape (·, 2)
+    weight: Matrix  # w_m, shape (·, 4)
+    normal: Matrix  # n
+    normal_force: Vector  # λ [N]; those of friction alone
+    matrix: Stack  # M [N/m]
+    tangential_stiffness: Vector  # κ [N/m]
+    segment_direction: Matrix  # u
+    foot_gradient: Stack  # a_m, shape (·, 4, 3)
 
 
 @record
-class Threads:
-    """Rods that can meet: their geometry, the list of near pairs, and contacts; see `allocate.NearRods`."""
+class RodContact:
+    """Rods that can meet: the search for near pairs, and contacts; see `allocate.NearRods`."""
 
     d_hat: float
     stiffness: float
@@ -236,55 +235,32 @@ class Threads:
     coefficient: float
     threshold: float
     unit: float  # barrier distance and thickest layer together
-    start_position: Matrix
-    edge_radius: Vector
-    edge_rod: Indices
-    edge_first: Flags
-    edge_arc: Matrix
-    first_point: Indices
-    point_edge: Indices
-    point_fraction: Vector
-    point_arc: Vector
     point_weight: Vector
-    rod_meets: FlagTable
-    rod_joined: FlagTable
-    rod_exclusion: Vector
-    box: Matrix  # scratch of a search, see `contact.broad_phase.scratch`
-    sweep: Matrix
-    met: IndexTable
-    base: Matrix
-    tip: Matrix
-    last: Matrix
-    ways: Vector  # shape (4,)
-    counted: Indices  # shape (1,)
-    pair_point: Indices
-    pair_edge: Indices
-    pair_before: Flags
-    pair_after: Flags
-    pair_until: Vector
-    no_step: Matrix
-    scratch: Matrix  # a gradient that nobody wants
+    search: RodSearch
+    last: Matrix  # where nodes were last, their mean taken off [m], shape (n_node, 3)
+    ways: Vector  # of the list; see `contact.rod_list`, shape (4,)
+    no_step: Matrix  # zeros, shape (n_node, 3)
     gap: Vector  # the smallest below the barrier distance, shape (1,)
-    contacts: Touches  # present ones
-    sliding: Touches  # of the start of the stage
+    contacts: RodContactList  # present ones
+    sliding: RodContactList  # of the start of the stage
 
 
 @record
-class Leaving:
-    """Contacts of rods in the Newton matrix, and nodes that leave the band; see `engine.linear.rod_columns`."""
+class ContactColumns:
+    """Contacts of rods in the Newton matrix, and their columns in the border; see `engine.linear.contact_columns`."""
 
     counts: Indices  # of contacts and of nodes, shape (2,)
-    node: IndexTable
+    node: IndexTable  # of contacts of barrier and friction in one list
     weight: Matrix
-    matrix: Stack
-    side: Vector
-    turn: Stack
-    strand: Indices
-    attached: Indices
-    mark: IndexTable
-    met: IndexTable
-    leaving: Indices
-    place: Indices
+    matrix: Stack  # M along the unknowns of nodes
+    stiffness: Vector  # κ, 0 where the nearest point is a node
+    foot_gradient: Stack  # a_m along the unknowns of nodes
+    strand: Indices  # of each node
+    attached: Indices  # place of each node among those that bodies hold, which are in the border already, or −1
+    mark: IndexTable  # scratch, shape (n_node, 3)
+    met: IndexTable  # scratch, shape (n_strand, n_strand)
+    row: Indices  # in the band, of each node that has columns, ascending
+    column: Indices  # of each unknown among the contact columns, −1 without one
 
 
 @record

@@ -8,20 +8,20 @@ from .parts import (
     Bodies,
     Bonds,
     Constrained,
+    ContactColumns,
     Drives,
     Flow,
     Fluid,
-    Leaving,
     Moments,
     OffAxis,
     Plane,
     PointForces,
+    RodContact,
     Sliding,
     Slips,
     Space,
     Strands,
     Surfaces,
-    Threads,
 )
 
 
@@ -76,7 +76,7 @@ class Border:
 
 @record
 class BorderedSystem:
-    """The border as it is eliminated: of bodies their freedom, then nodes that left the band.
+    """The border as it is eliminated: of bodies their freedom, then the columns of contacts of rods.
 
     Rooms for columns are larger than what is in use; see `matrix`.
     """
@@ -110,8 +110,10 @@ class Calls:
     place_carried: Address
     place_frames: Address
     bound_at_surfaces: Address
-    bound_between_rods_of: Address
+    bound_between_rods: Address
     find_rod_contacts: Address
+    list_near_rods: Address
+    near_pairs: Address
     where_friction_holds: Address
     first_guess_of: Address
     expand_to_unknowns: Address
@@ -166,9 +168,9 @@ class Problem:
     attachments: Attachments
     surfaces: Surfaces
     sliding: Sliding
-    threads: Threads
+    rod_contact: RodContact
     slips: Slips
-    leaving: Leaving
+    contact_columns: ContactColumns
     meets: bool  # whether anything can touch anything
     flow: Flow
     fluid: Fluid

@@ -8,7 +8,7 @@ NO_ROOM = 1
 NO_ROOM_FOR_RODS = 2
 """Likewise of rods with rods, or more contacts."""
 NO_ROOM_IN_BORDER = 3
-"""More nodes leave the band than the border has room for."""
+"""Contacts of rods have more columns than the border has room for."""
 JUMPED = 4
 """Something has jumped: another integrator has to make this step."""
 CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND = 5, 10, 11, 12, 13, 14, 15
