@@ -1,4 +1,4 @@
-"""What friction dissipates along a straight step, from the ways of its contacts (`bilayer_core.forces.slip`)."""
+"""What friction dissipates along a straight step, from the slip paths of its contacts (`forces.friction_limit`)."""
 
 import numpy as np
 

@@ -1,15 +1,15 @@
 """The largest fraction of a step over which every gap keeps a tenth of its present size.
 
-The gap of a carrier and a convex surface is a convex function of the carrier's place p in the surface's frame. So from
-a moment t of the step on
+The gap of a contact point and a convex surface is a convex function of the point's position p in the surface's frame.
+So from a moment t of the step on
 
-    d(t + τ) ≥ d + d′ τ − ½ C τ²,   |p″| ≤ C = |φ_A|² |a| + 2 |φ_B| V + |φ_B|² (|ρ| + V),   V = |δX_A − δX_B| + |φ_A|
-    |a|
+    d(t + τ) ≥ d + d′ τ − ½ C τ²,   |p″| ≤ C = |φ_A|² |a| + 2 |φ_B| V + |φ_B|² (|ρ| + V),
+    V = |δX_A − δX_B| + |φ_A| |a|
 
-for a carrier that body A carries at the arm a, a surface of body B and ρ between them; C is zero where nothing turns.
+for a contact point of body A at the arm a, a surface of body B and ρ between them; C is zero where nothing turns.
 Advancing to the τ at which the right side falls to the kept gap, again and again, approaches the first moment at which
-d does from below: without turning this is Newton's method on a convex function, exact for a plane at once. A carrier
-cannot jump over a surface however long the step (continuous collision detection; Li et al. 2020, sec. 5).
+d does from below: without turning this is Newton's method on a convex function, exact for a plane at once. A contact
+point cannot jump over a surface however long the step (continuous collision detection; Li et al. 2020, sec. 5).
 """
 
 from __future__ import annotations
@@ -42,43 +42,48 @@ def _turned(v0, v1, v2, t, r0, r1, r2):
 
 
 @kernel
-def step_bound(
-    count,
-    near_carrier,
-    near_surface,
-    carrier,
-    radius,
-    carrier_body,
-    node_step,
-    kind,
-    size,
-    rounding,
-    place,
-    turn,
-    surface_body,
-    body_position,
-    body_motion,
-    motion,
-):
+def _fastest(motion, b, extent):
+    """|δX| + |δφ| extent of a body in a step [m]."""
+    shift = motion[b, 0] ** 2 + motion[b, 1] ** 2 + motion[b, 2] ** 2
+    angle = motion[b, 3] ** 2 + motion[b, 4] ** 2 + motion[b, 5] ** 2
+    return math.sqrt(shift) + math.sqrt(angle) * extent
+
+
+@kernel
+def motion_of_points(surfaces, bodies, system):
+    """Largest motion of a contact point in a step [m]."""
+    step, square = system.node_step, 0.0
+    for i in range(surfaces.node_free.shape[0]):
+        if surfaces.node_free[i]:
+            square = max(square, step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2)
+    largest = math.sqrt(square)
+    for b in range(bodies.reach.shape[0]):
+        largest = max(largest, _fastest(system.motion, b, bodies.reach[b]))
+    return largest
+
+
+@kernel
+def motion_of_surfaces(surfaces, system):
+    """Largest motion of a point of a surface in a step [m], by the extents that the list of near pairs has."""
+    largest = 0.0
+    for s in range(surfaces.body.shape[0]):
+        largest = max(largest, _fastest(system.motion, surfaces.body[s], surfaces.extent[s]))
+    return largest
+
+
+@kernel
+def step_bound(surfaces, system, at, closing):
     """Largest α ≤ 1 such that all gaps keep `KEPT_FRACTION` of themselves along β step, 0 ≤ β ≤ α.
 
     Parameters
     ----------
-    count, near_carrier, near_surface
-        From `near.list_near`.
-    carrier, radius, carrier_body : Array
-        Of carriers: positions [m], radii [m], and the body that carries each (−1: a node with unknowns of its own).
-    node_step : Array
-        Displacement of such nodes [m], shape (n_node, 3).
-    kind, size, rounding, place, turn
-        Of surfaces: see `near.gap_normal`.
-    surface_body : Array
-        Body of each surface, shape (n_surface,).
-    body_position, body_motion : Array
-        Of bodies and of the world: position [m], and displacement [m] and rotation vector [rad] in the step, shapes
-        (n_body + 1, 3), (n_body + 1, 6).
-    motion : float
-        By how much gaps close at most [m], see `near.largest_motion`.
+    surfaces : Surfaces
+        With the list of near pairs.
+    system : System
+        With the step: displacements of nodes, displacements and rotation vectors of bodies and of the world.
+    at : Place
+    closing : float
+        By how much gaps close at most [m].
 
     Returns
     -------
@@ -86,38 +91,38 @@ def step_bound(
     blocking : int
         Place in the list of the pair that sets the bound, −1 if none.
     """
-    alpha = 1.0
-    blocking = -1
-    for k in range(count):
-        i, s = near_carrier[k], near_surface[k]
-        x0, x1, x2 = carrier[i, 0], carrier[i, 1], carrier[i, 2]
-        gap, n0, n1, n2, _, _, _ = gap_normal(kind, size, rounding, radius[i], place, turn, s, x0, x1, x2)
+    node_step, motion, position = system.node_step, system.motion, at.place
+    alpha, blocking = 1.0, -1
+    for k in range(surfaces.near_count[0]):
+        i, s = surfaces.near_carrier[k], surfaces.near_surface[k]
+        x0, x1, x2 = at.carrier[i, 0], at.carrier[i, 1], at.carrier[i, 2]
+        gap, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, x0, x1, x2)
         kept = KEPT_FRACTION * gap
-        if gap - motion * alpha >= kept:
+        if gap - closing * alpha >= kept:
             continue
-        a, b = carrier_body[i], surface_body[s]
-        r0 = r1 = r2 = turn_a = 0.0  # turn of the carrier's body
+        a, b = surfaces.follows[i], surfaces.body[s]
+        r0 = r1 = r2 = turn_a = 0.0  # rotation of the contact point's body
         a0 = a1 = a2 = arm = 0.0  # arm on it
         if a >= 0:
-            u0, u1, u2 = body_motion[a, 0], body_motion[a, 1], body_motion[a, 2]
-            r0, r1, r2 = body_motion[a, 3], body_motion[a, 4], body_motion[a, 5]
-            a0, a1, a2 = x0 - body_position[a, 0], x1 - body_position[a, 1], x2 - body_position[a, 2]
+            u0, u1, u2 = motion[a, 0], motion[a, 1], motion[a, 2]
+            r0, r1, r2 = motion[a, 3], motion[a, 4], motion[a, 5]
+            a0, a1, a2 = x0 - position[a, 0], x1 - position[a, 1], x2 - position[a, 2]
             arm, turn_a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
         else:
             u0, u1, u2 = node_step[i, 0], node_step[i, 1], node_step[i, 2]
-        u0, u1, u2 = u0 - body_motion[b, 0], u1 - body_motion[b, 1], u2 - body_motion[b, 2]
-        f0, f1, f2 = body_motion[b, 3], body_motion[b, 4], body_motion[b, 5]
-        if kind[s] == SPHERE:
+        u0, u1, u2 = u0 - motion[b, 0], u1 - motion[b, 1], u2 - motion[b, 2]
+        f0, f1, f2 = motion[b, 3], motion[b, 4], motion[b, 5]
+        if surfaces.kind[s] == SPHERE:
             f0 = f1 = f2 = 0.0
-        z0, z1, z2 = x0 - body_position[b, 0], x1 - body_position[b, 1], x2 - body_position[b, 2]
+        z0, z1, z2 = x0 - position[b, 0], x1 - position[b, 1], x2 - position[b, 2]
         lever = turn_b = 0.0
         if f0 != 0.0 or f1 != 0.0 or f2 != 0.0:
             lever, turn_b = math.sqrt(z0 * z0 + z1 * z1 + z2 * z2), math.sqrt(f0 * f0 + f1 * f1 + f2 * f2)
         speed = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) + turn_a * arm
         if gap - (speed + turn_b * (lever + speed)) * alpha >= kept:
             continue
-        bend = turn_a * turn_a * arm + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)
-        # the carrier in a frame that moves and turns with the surface from where that is now
+        acceleration = turn_a * turn_a * arm + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)
+        # the contact point in a frame that moves and turns with the surface from where that is now
         t = 0.0
         d = gap
         b0, b1, b2 = a0, a1, a2
@@ -130,35 +135,25 @@ def step_bound(
                 w0, w1, w2 = _turned(w0, w1, w2, -t, f0, f1, f2)
                 w0, w1, w2 = w0 - (f1 * z2 - f2 * z1), w1 - (f2 * z0 - f0 * z2), w2 - (f0 * z1 - f1 * z0)
             rate = n0 * w0 + n1 * w1 + n2 * w2
-            if bend == 0.0:
+            if acceleration == 0.0:
                 if rate >= 0.0:
                     t = 1.0
                     break
                 t += (kept - d) / rate
             else:
-                # d + rate τ − ½ bend τ² = kept, the positive root without cancellation
-                root = math.sqrt(rate * rate + 2.0 * bend * (d - kept))
-                t += 2.0 * (d - kept) / (root - rate) if rate <= 0.0 else (rate + root) / bend
+                # d + rate τ − ½ acceleration τ² = kept, the positive root without cancellation
+                root = math.sqrt(rate * rate + 2.0 * acceleration * (d - kept))
+                t += 2.0 * (d - kept) / (root - rate) if rate <= 0.0 else (rate + root) / acceleration
             if t >= alpha:
                 break
             b0, b1, b2 = _turned(a0, a1, a2, t, r0, r1, r2)
-            z0 = x0 - a0 + t * u0 + b0 - body_position[b, 0]
-            z1 = x1 - a1 + t * u1 + b1 - body_position[b, 1]
-            z2 = x2 - a2 + t * u2 + b2 - body_position[b, 2]
+            z0 = x0 - a0 + t * u0 + b0 - position[b, 0]
+            z1 = x1 - a1 + t * u1 + b1 - position[b, 1]
+            z2 = x2 - a2 + t * u2 + b2 - position[b, 2]
             if turn_b > 0.0:
                 z0, z1, z2 = _turned(z0, z1, z2, -t, f0, f1, f2)
-            d, n0, n1, n2, _, _, _ = gap_normal(
-                kind,
-                size,
-                rounding,
-                radius[i],
-                place,
-                turn,
-                s,
-                z0 + body_position[b, 0],
-                z1 + body_position[b, 1],
-                z2 + body_position[b, 2],
-            )
+            y0, y1, y2 = z0 + position[b, 0], z1 + position[b, 1], z2 + position[b, 2]
+            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, y0, y1, y2)
             if d <= kept + CLOSE_ENOUGH * gap:
                 break
         if t < alpha:

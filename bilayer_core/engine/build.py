@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..forces.slip import WAY
+from ..forces.friction_limit import PATH_SIZE
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
 from ..model.records.parts import (
@@ -221,7 +221,7 @@ def slips_of(model: Model, room: int) -> Slips:
     law = model.scene.contact.friction if model.scene.contact else None
     if law is None or not law.acts:
         return Slips.absent()
-    return Slips(threshold=law.speed_threshold, way=np.zeros((room, WAY)))
+    return Slips(threshold=law.speed_threshold, way=np.zeros((room, PATH_SIZE)))
 
 
 def rod_contact_of(model: Model, rods: NearRods) -> RodContact:

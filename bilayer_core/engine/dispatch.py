@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..forces import slip_term  # noqa: F401 (declares a piece that no force lists)
+from ..forces import friction_limit, surface_pairs  # noqa: F401 (declare pieces that no force lists)
 from ..jit.piece import PIECES
 from ..model.model import Model
 from ..model.records.problem import Calls
@@ -12,7 +12,7 @@ IN_SPACE = {"assemble_in_space"}
 IN_PLANE = {"assemble_in_plane", "gradient_in_plane", "step_in_plane"}
 OF_BODIES = {"assemble_bodies", "restrict_bodies"}
 OF_BORDER = {"factor_border", "solve_bordered"}
-OF_SURFACES = {"bound_at_surfaces"}
+OF_SURFACES = {"bound_at_surfaces", "list_surface_pairs", "add_contact_to_bodies"}
 OF_RODS = {
     *("bound_between_rods", "find_rod_contacts", "list_near_rods", "near_pairs"),
     *("take_rod_contacts", "move_to_border"),

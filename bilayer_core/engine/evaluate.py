@@ -9,7 +9,6 @@ import math
 
 from ..forces.inertia import DAMPING, INERTIA
 from ..forces.rod_contact import ROD_BARRIER, ROD_FRICTION
-from ..forces.surface_term import list_pairs
 from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack, Vector, record
 from ..model.records.outcome import ENERGY, GAP, HELD_UP, PAIR, SHIFT
@@ -47,7 +46,7 @@ def _find(p, at):
     """Have lists of pairs and contacts of rods at a configuration, however far it is from the last."""
     status = READY
     if p.surfaces.exists:
-        status, _ = list_pairs(p.surfaces, at, 0.0)
+        status = call(p.calls.list_surface_pairs, (p.surfaces, at, 0.0))
     if status == READY and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, at)):
         status = NO_ROOM_FOR_RODS
     return status

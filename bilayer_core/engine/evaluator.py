@@ -54,7 +54,7 @@ class StepBound:
     held_up : float
         Fraction, at most `fraction`, at which friction holds the step up.
     slip : Array
-        Slip of each lagged contact along the step; see `forces.slip`.
+        Slip of each lagged contact along the step; see `forces.friction_limit`.
     """
 
     fraction: float

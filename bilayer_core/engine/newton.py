@@ -11,9 +11,6 @@ from __future__ import annotations
 
 import math
 
-from ..contact.near import largest_motion
-from ..contact.step_bound import step_bound
-from ..forces.surface_term import list_pairs
 from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack
 from ..kinematics.copying import copy
@@ -109,52 +106,6 @@ def bound(p, at):
     if between < fraction:
         return between, -1, status
     return fraction, pair, status
-
-
-@kernel
-def _bound_at_surfaces(surfaces, bodies, system, at):
-    if not surfaces.exists:
-        return 1.0, -1, READY
-    motion = _motion_at_surfaces(surfaces, bodies, system)
-    status, anew = list_pairs(surfaces, at, motion)
-    if status != READY:
-        return 0.0, -1, status
-    if anew:
-        motion = _motion_at_surfaces(surfaces, bodies, system)  # extents of surfaces are those of the list
-    fraction, pair = step_bound(
-        surfaces.near_count[0],
-        surfaces.near_carrier,
-        surfaces.near_surface,
-        at.carrier,
-        surfaces.radius,
-        surfaces.follows,
-        system.node_step,
-        surfaces.kind,
-        surfaces.size,
-        surfaces.rounding,
-        at.surface_place,
-        at.surface_turn,
-        surfaces.body,
-        at.place,
-        system.motion,
-        motion,
-    )
-    return fraction, pair, READY
-
-
-@kernel
-def _motion_at_surfaces(surfaces, bodies, system):
-    return largest_motion(
-        system.node_step, surfaces.node_free, system.motion, bodies.reach, surfaces.body, surfaces.extent
-    )
-
-
-@piece(float, Problem, Place)
-def bound_at_surfaces(p, at):
-    """`bound` by surfaces; the pair and the status are left in `Outcome`."""
-    counts = p.outcome.counts
-    fraction, counts[PAIR], counts[STATUS] = _bound_at_surfaces(p.surfaces, p.bodies, p.system, at)
-    return fraction
 
 
 @kernel

@@ -6,7 +6,7 @@ import math
 
 from numba import types
 
-from ..forces.surface_term import clear_contact, hand_on_contact
+from ..forces.contact_on_bodies import clear_contact, hand_on_contact
 from ..jit import call, caller, kernel, piece
 from ..kinematics.copying import copy
 from ..model.records.problem import Problem

@@ -27,7 +27,8 @@ from .load_terms import (
     start_dead_loads,
 )
 from .rod_contact import add_rod_contact, start_rod_contact
-from .surface_term import add_surface_contact, start_surface_contact
+from .surface_barrier import add_surface_barrier, start_surface_barrier
+from .surface_friction import add_surface_friction, start_surface_friction
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,8 @@ TERMS: tuple[Term, ...] = (
     Term(ELASTIC, lambda of: of["plane"], add_elasticity_in_plane, start_elasticity),
     Term(("inertia", "damping", "gravity"), lambda of: None, add_inertial_forces),
     Term(("loads",), lambda of: of["loads"], add_dead_loads, start_dead_loads),
-    Term(("barrier", "friction"), lambda of: of["surfaces"], add_surface_contact, start_surface_contact),
+    Term(("barrier",), lambda of: of["surfaces"], add_surface_barrier, start_surface_barrier),
+    Term(("friction",), lambda of: of["sliding"], add_surface_friction, start_surface_friction),
     Term(("rod barrier", "rod friction"), lambda of: of["rod_contact"], add_rod_contact, start_rod_contact),
     Term(("followers",), lambda of: of["followers"], add_follower_loads, follow=follow_with_loads),
     Term(("moments",), lambda of: of["moments"], add_body_moments, follow=follow_with_moments),

@@ -8,8 +8,8 @@ their weights w = (1 − s, s, −(1 − t), −t), the vector between the two i
 
     C = ± ½ K_c b(d) Δl,   d = D − r_p − r_segment        (Δl: the length of rod that p stands for)
 
-as for surfaces (`forces.contact`). Both rods have points, so the contact of two parallel rods is counted from either
-side, half each: K_c b per length, on any pair of meshes. With e the segment, u its direction and v = n × u,
+as for surfaces (`forces.surface_barrier`). Both rods have points, so the contact of two parallel rods is counted from
+either side, half each: K_c b per length, on any pair of meshes. With e the segment, u its direction and v = n × u,
 
     ∂D/∂x_m = w_m n                                                        (t is the minimum: its change does not count)
     ∂²D/∂x_m ∂x_l = [w_m w_l (I − n nᵀ) − a_m a_lᵀ]/D,   a_m = w_m u + (D/|e|) β_m n,   β = (0, 0, −1, 1)
@@ -23,7 +23,7 @@ segment, and a = 0 at a node. So each contact adds
 holds a pair of straight rods but friction. That is so for round rods. Faces of ribbons are flat, and the width is not
 seen here.
 
-**Friction** is lagged as in `forces.friction`: s, t, n and λ = −c b′ are those at the start of the step, and
+**Friction** is lagged as in `forces.surface_friction`: s, t, n and λ = −c b′ are those at the start of the step, and
 
     slip g = (I − n nᵀ) Σ w_m (x_m − x_m⁰),   D = μ λ h f₀(|g|/h),   force ∓ μ λ f₁ g/|g|, shared out with w_m
 
@@ -222,7 +222,7 @@ def _add_friction(rods, stage, position, gradient):
 
 @kernel
 def rod_slip_along(rods, stage, position, node_step, begin, way_out):
-    """Write the way of every lagged contact in a Newton step, see `forces.slip`: a is the direction of the slip.
+    """Write the way of every lagged contact in a Newton step (`forces.friction_limit`): a is the direction of the slip.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def rod_slip_along(rods, stage, position, node_step, begin, way_out):
     begin : int
         Row of the first contact.
     way_out : Array
-        Written: shape (≥ begin + number of contacts, `slip.WAY`).
+        Written: shape (≥ begin + number of contacts, `friction_limit.PATH_SIZE`).
 
     Returns
     -------

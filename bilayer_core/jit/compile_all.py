@@ -31,7 +31,6 @@ LONGEST = {
     "near_pairs",
     "minimise_potential",
     "make_step",
-    "add_surface_contact",
     "add_elasticity_in_space",
     "assemble_bodies",
     "adapt",

@@ -162,8 +162,8 @@ FORCES: tuple[Force, ...] = (
     ),
     Force("drag", DISSIPATIVE, "drag.py", lambda q: _unless(q.scene.fluid is not None, "no fluid")),
     Force("added mass", INERTIAL, "added_mass.py", _added_mass),
-    Force("barrier", CONSERVATIVE, "contact.py", lambda q: _unless(bool(q.pairs), "no surfaces that can meet")),
-    Force("friction", DISSIPATIVE, "friction.py", _friction),
+    Force("barrier", CONSERVATIVE, "surface_barrier.py", lambda q: _unless(bool(q.pairs), "no surfaces that can meet")),
+    Force("friction", DISSIPATIVE, "surface_friction.py", _friction),
     Force("rod barrier", CONSERVATIVE, "rod_contact.py", _rod_barrier),
     Force("rod friction", DISSIPATIVE, "rod_contact.py", _rod_friction),
 )

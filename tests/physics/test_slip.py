@@ -5,7 +5,7 @@ import pytest
 from slips import dissipation
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.forces.slip import PASSED, WAY, held_up
+from bilayer_core.forces.friction_limit import PASSED, PATH_SIZE, friction_limit
 
 THRESHOLD, STEP = 1e-4, 1e-3  # ε_v [m/s], h [s]
 ZONE = THRESHOLD * STEP  # slip within which a contact sticks [m]
@@ -41,7 +41,7 @@ def test_a_step_that_would_turn_a_contact_round_ends_where_that_rests(turning_po
     way = way_of((-turning_point * rate, side), (rate, 0.0))
     slope = -0.3 * abs(rate)  # of which friction, 2 μ λ |δu|, is a multiple
     along = potential_along(way, slope)
-    fraction = held_up(1, way, THRESHOLD, slope, 1.0)
+    fraction = friction_limit(1, way, THRESHOLD, slope, 1.0)
     assert abs(derivatives(along, fraction, 1e-7)[0]) <= 1.01 * PASSED * abs(slope)
     assert abs(fraction - turning_point) * abs(rate) < ZONE  # it sticks
     fractions = np.linspace(0.0, 1.0, 20001)
@@ -54,9 +54,9 @@ def test_a_step_is_not_held_up_by_contacts_that_slip_on_or_yield_to_it():
     on = way_of((100.0 * ZONE, 0.0), (rate, 0.0))
     weak = way_of((0.4 * rate, 0.0), (-rate, 0.0), load=1e-3)
     for way in (on, weak):
-        assert held_up(1, way, THRESHOLD, -0.3 * rate, 1.0) == 1.0
-        assert held_up(1, way, THRESHOLD, -0.3 * rate, 0.25) == 0.25
-    assert held_up(0, np.empty((0, WAY)), THRESHOLD, -1.0, 0.5) == 0.5
+        assert friction_limit(1, way, THRESHOLD, -0.3 * rate, 1.0) == 1.0
+        assert friction_limit(1, way, THRESHOLD, -0.3 * rate, 0.25) == 0.25
+    assert friction_limit(0, np.empty((0, PATH_SIZE)), THRESHOLD, -1.0, 0.5) == 0.5
 
 
 def test_sticking_and_slipping_on_the_ground_takes_few_iterations():

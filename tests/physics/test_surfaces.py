@@ -8,7 +8,11 @@ import pytest
 from bilayer_core.contact.near import gap_normal, list_near
 from bilayer_core.contact.shapes import shape_curvature, shape_distance
 from bilayer_core.contact.step_bound import KEPT_FRACTION, step_bound
+from bilayer_core.jit import kernel, record_at
 from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.records.parts import Surfaces
+from bilayer_core.model.records.problem import System
+from bilayer_core.model.records.step import Place
 from bilayer_core.model.shapes import NUMBER, Shape, axis_frame, signed_distance
 
 HALF = {
@@ -17,6 +21,30 @@ HALF = {
     "box": (0.3, 0.2, 0.15),
     "cylinder": (0.25, 0.25, 0.2),
 }
+
+surfaces_at, place_at, system_at = record_at(Surfaces), record_at(Place), record_at(System)
+
+
+def record_of(declared, **values):
+    """A record with these values; its other arrays are empty, its other numbers zero."""
+    absent = declared.absent()
+    return declared(**{name: getattr(absent, name) for name in declared.names} | values)
+
+
+@kernel
+def gap_between(surfaces, at, i, s):
+    point, place = place_at(at).carrier, place_at(at)
+    return gap_normal(surfaces_at(surfaces), place, i, s, point[i, 0], point[i, 1], point[i, 2])[0]
+
+
+@kernel
+def bound_of(surfaces, system, at, closing):
+    return step_bound(surfaces_at(surfaces), system_at(system), place_at(at), closing)
+
+
+@kernel
+def count_near(surfaces, at, margin):
+    return list_near(surfaces_at(surfaces), place_at(at), margin)
 
 
 def surface_cloud(kind, rng, count=200_000):
@@ -84,18 +112,26 @@ def test_the_gradient_of_a_signed_distance_is_a_unit_vector_and_its_derivatives_
 
 
 class Pair:
-    """A carrier and a surface in motion over a step, as arrays for the kernels and as functions of time."""
+    """A contact point and a surface in motion over a step, as records for the kernels and as functions of time."""
 
     def __init__(self, kind, rng, turning):
-        self.arrays = (
-            np.array([NUMBER[kind]]),
-            np.array([HALF[kind]]),
-            np.array([0.05 if kind == "sphere" else rng.choice([0.0, 0.03])]),
-        )
+        rounding = 0.05 if kind == "sphere" else rng.choice([0.0, 0.03])
         self.place, self.turn = rng.uniform(-0.1, 0.1, (1, 3)), rotation_matrix(rng.standard_normal(3))[None]
         self.carrier = rng.uniform(-0.8, 0.8, (1, 3))
-        self.radius = np.array([0.01])
         self.body = np.array([1 if turning else -1])
+        one = np.zeros(1, dtype=np.int64)
+        self.surfaces = record_of(
+            Surfaces,
+            kind=np.array([NUMBER[kind]]),
+            size=np.array([HALF[kind]]),
+            rounding=np.array([rounding]),
+            radius=np.array([0.01]),
+            follows=self.body,
+            body=one,
+            near_carrier=one,
+            near_surface=one,
+            near_count=np.ones(1, dtype=np.int64),
+        )
         self.position = np.concatenate([self.place, self.carrier + rng.uniform(-0.3, 0.3, (1, 3)), np.zeros((1, 3))])
         self.motion = np.zeros((3, 6))
         self.motion[0, :3] = 0.4 * rng.standard_normal(3)
@@ -105,20 +141,23 @@ class Pair:
             self.motion[:2, 3:] = rng.choice([0.1, 1.0]) * rng.standard_normal((2, 3))
         self.step = self.motion[1:2, :3].copy()
 
-    def gap(self, t):
-        place = self.place + t * self.motion[0, :3]
+    def at(self, t):
+        """Configuration at a part of the step."""
         turn = (rotation_matrix(t * self.motion[0, 3:]) @ self.turn[0])[None]
         x = self.carrier + t * self.step
         if self.body[0] == 1:
             arm = rotation_matrix(t * self.motion[1, 3:]) @ (self.carrier - self.position[1])[0]
             x = (self.position[1] + t * self.motion[1, :3] + arm)[None]
-        return gap_normal(*self.arrays, self.radius[0], place, turn, 0, *x[0])[0]
+        place = self.place + t * self.motion[0, :3]
+        return record_of(Place, carrier=x, surface_place=place, surface_turn=turn, place=self.position)
+
+    def gap(self, t):
+        at = self.at(t)
+        return gap_between(self.surfaces.address, at.address, 0, 0)
 
     def bound(self):
-        pairs = (1, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))
-        of_carrier = (self.carrier, self.radius, self.body, self.step)
-        surface = (*self.arrays, self.place, self.turn, pairs[1])
-        return step_bound(*pairs, *of_carrier, *surface, self.position, self.motion, np.inf)
+        at, system = self.at(0.0), record_of(System, node_step=self.step, motion=self.motion)
+        return bound_of(self.surfaces.address, system.address, at.address, np.inf)
 
 
 @pytest.mark.parametrize("turning", [False, True], ids=["straight", "turning"])
@@ -149,23 +188,38 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
     turn = np.array([rotation_matrix(rng.standard_normal(3)) for _ in kinds])
     radius, group = np.full(300, 0.01), np.tile([0, 1], 150)
     meets = np.array([[True, True], [True, False], [False, True], [True, True]])
-    room, out = np.zeros(1200, dtype=np.int64), np.zeros(1200, dtype=np.int64)
+    listed = {name: np.zeros(1200, dtype=np.int64) for name in ("near_carrier", "near_surface")}
+    then = {"listed_carrier": (300, 3), "listed_place": (4, 3), "listed_turn": (4, 3, 3)}
     for reach, spread in ((0.05, 1.0), (0.01, 5.0)):
         place, carrier = rng.uniform(-spread, spread, (4, 3)), rng.uniform(-spread, spread, (300, 3))
-        law = (kinds, size, rounding)
+        at = record_of(Place, carrier=carrier, surface_place=place, surface_turn=turn)
+        surfaces = record_of(
+            Surfaces,
+            d_hat=reach,
+            kind=kinds,
+            size=size,
+            rounding=rounding,
+            bound=bound,
+            radius=radius,
+            group=group,
+            meets=meets,
+            extent=np.zeros(4),
+            **listed,
+            **{name: np.zeros(shape) for name, shape in then.items()},
+        )
         gaps = {
-            (s, i): gap_normal(*law, radius[i], place, turn, s, *carrier[i])[0]
+            (s, i): gap_between(surfaces.address, at.address, i, s)
             for s in range(4)
             for i in range(300)
             if meets[s, group[i]]
         }
-        extent = np.zeros(4)
-        count = list_near(reach, 0.02, *law, bound, place, turn, radius, group, meets, carrier, room, out, extent)
-        listed = list(zip(out[:count].tolist(), room[:count].tolist(), strict=True))
-        assert listed == sorted(listed) and set(listed) <= gaps.keys()
-        assert {pair for pair, gap in gaps.items() if gap <= reach + 0.02} <= set(listed)
-        assert min(gaps, key=gaps.get) in listed
+        count = count_near(surfaces.address, at.address, 0.02)
+        pairs = list(zip(*(listed[name][:count].tolist() for name in ("near_surface", "near_carrier")), strict=True))
+        assert pairs == sorted(pairs) and set(pairs) <= gaps.keys()
+        assert {pair for pair, gap in gaps.items() if gap <= reach + 0.02} <= set(pairs)
+        assert min(gaps, key=gaps.get) in pairs
         assert count < len(gaps)
+        assert np.array_equal(surfaces.listed_carrier, carrier) and np.array_equal(surfaces.listed_turn, turn)
 
 
 @pytest.mark.parametrize("kind", ["sphere", "box", "cylinder"])

@@ -177,7 +177,7 @@ class Surfaces:
 
 @record
 class Sliding:
-    """Friction of the contacts at the start of a stage; see `forces.friction`."""
+    """Friction of the contacts at the start of a stage; see `forces.surface_friction`."""
 
     acts: bool
     threshold: float
@@ -199,7 +199,7 @@ class Sliding:
 
 @record
 class Slips:
-    """Slip of all lagged contacts along a Newton step; see `forces.slip`."""
+    """Slip of all lagged contacts along a Newton step; see `forces.friction_limit`."""
 
     threshold: float
     way: Matrix

@@ -109,7 +109,9 @@ class Calls:
 
     place_carried: Address
     place_frames: Address
+    list_surface_pairs: Address
     bound_at_surfaces: Address
+    add_contact_to_bodies: Address
     bound_between_rods: Address
     find_rod_contacts: Address
     list_near_rods: Address

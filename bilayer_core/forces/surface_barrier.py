@@ -1,0 +1,103 @@
+"""Barrier contact of contact points with surfaces.
+
+    C = K_c b(d) Δl,   force −K_c b′(d) Δl n, repulsive along the outward normal n        (paper, eq. 24; bracket's
+    sign put right)
+
+The surface of a body at X, R has the signed distance φ in its own frame. For a contact point at x with radius r,
+ρ = x − X:
+
+    p = Rᵀ ρ,   d = φ(p) − r,   n = R ∇φ,   H = R ∇²φ Rᵀ
+    ∂d/∂x = n,   ∂d/∂X = −n,   ∂d/∂φ = −ρ × n                                (chart R → exp([φ]×) R)
+
+To second order p moves with y = ρ + δ − φ × (ρ + δ) + ½ φ × (φ × ρ), δ = δx − δX, so that with w = δ − φ × ρ
+
+    d → d + n·w + ½ wᵀ H w − δ·(n × φ) + ½ ((n·φ)(ρ·φ) − (n·ρ) φ·φ)
+
+and, with g = K_c Δl b′ n and M = K_c Δl (b″ n nᵀ + b′ H), C has the gradient (g, −g, −ρ × g) and a second derivative
+whose blocks `forces.contact_on_bodies` hands to nodes and bodies.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
+from ..contact.near import gap_normal
+from ..contact.shapes import shape_curvature
+from ..jit import call, kernel, piece
+from ..jit.stack import stack_matrix, stack_vector
+from ..model.force_places import place_of
+from ..model.records.parts import Surfaces
+from ..model.records.problem import Problem
+from ..model.records.step import Place, Stage
+from .contact_on_bodies import add_force, add_second_derivative
+
+BARRIER = place_of("barrier")
+
+
+@kernel
+def _in_world(axes, s, factor, h, m_out):
+    """Upper triangle of factor R h Rᵀ, h a symmetric matrix as (h₀₀, h₀₁, h₀₂, h₁₁, h₁₂, h₂₂)."""
+    for i in range(3):
+        r0, r1, r2 = factor * axes[s, i, 0], factor * axes[s, i, 1], factor * axes[s, i, 2]
+        v0 = r0 * h[0] + r1 * h[1] + r2 * h[2]
+        v1 = r0 * h[1] + r1 * h[3] + r2 * h[4]
+        v2 = r0 * h[2] + r1 * h[4] + r2 * h[5]
+        for j in range(i, 3):
+            m_out[i, j] = v0 * axes[s, j, 0] + v1 * axes[s, j, 1] + v2 * axes[s, j, 2]
+
+
+@piece(float, Surfaces, Problem, Place, Stage, bool)
+def add_surface_barrier(surfaces, p, at, stage, with_hessian):
+    """Add the barrier between every contact point and every surface near it; returns the smallest gap [m].
+
+    The energy is infinite if a contact point is behind a surface. The gaps of the list of near pairs are written.
+    """
+    sums, min_gap = p.sums, math.inf
+    if not sums.selected[BARRIER]:
+        return min_gap
+    d_hat, size = surfaces.d_hat, surfaces.size
+    energy = 0.0
+    m = stack_matrix(3, 3)
+    g, n, arm, lever = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    arm[0] = arm[1] = arm[2] = 0.0
+    for k in range(surfaces.near_count[0]):
+        i, s = surfaces.near_carrier[k], surfaces.near_surface[k]
+        x0, x1, x2 = at.carrier[i, 0], at.carrier[i, 1], at.carrier[i, 2]
+        d, n[0], n[1], n[2], p0, p1, p2 = gap_normal(surfaces, at, i, s, x0, x1, x2)
+        surfaces.near_gap[k] = d
+        min_gap = min(min_gap, d)
+        if d >= d_hat:
+            continue
+        if d <= 0.0:
+            energy = math.inf
+            break
+        a, b = surfaces.carrier_body[i], surfaces.body[s]
+        stiffness = surfaces.stiffness * surfaces.weight[i]
+        energy += stiffness * barrier(d, d_hat)
+        slope = stiffness * barrier_gradient(d, d_hat)
+        for c in range(3):
+            g[c] = slope * n[c]
+            lever[c] = at.carrier[i, c] - at.place[b, c]
+            sums.carrier[i, c] += g[c]
+        if a >= 0:
+            for c in range(3):
+                arm[c] = at.carrier[i, c] - at.place[a, c]
+            add_force(sums.contact, a, 1.0, arm, g)
+        add_force(sums.contact, b, -1.0, lever, g)
+        if with_hessian:
+            h = shape_curvature(surfaces.kind[s], size[s, 0], size[s, 1], size[s, 2], p0, p1, p2)
+            _in_world(at.surface_turn, s, slope, h, m)
+            curvature = stiffness * barrier_hessian(d, d_hat)
+            for c in range(3):
+                for e in range(c, 3):
+                    m[c, e] += curvature * n[c] * n[e]
+            add_second_derivative(p, m, g, arm, lever, 1.0, i, a, b)
+    sums.energy[BARRIER] = energy
+    return min_gap
+
+
+@piece(int, Surfaces, Problem, Place, Stage)
+def start_surface_barrier(surfaces, p, start, stage):
+    """List the pairs that are near at the start of a stage; returns a status."""
+    return call(p.calls.list_surface_pairs, (surfaces, start, 0.0))

@@ -1,0 +1,226 @@
+"""Smoothed Coulomb friction, lagged once per step, that may differ with the direction of sliding.
+
+With normal force λ, normal n and contact points taken at the start of the step, the slip u of the contact points over
+the step of length h gives a dissipation potential (Li et al. 2020, eq. 14; paper, eqs. 25 and 26, f₁ and u_t put
+right). Let a be the forward direction in the tangent plane, s = n × a, and
+
+    ψ(u)² = (μ± u·a)² + (μ_s u·s)²,   μ± = μ₊ where u·a ≥ 0, μ₋ elsewhere,   μ = max(μ₊, μ₋, μ_s),   w = ψ/(μ h)
+
+    D = λ μ h f₀(w),   force −λ f₁(w) q/ψ,   q = μ±² (u·a) a + μ_s² (u·s) s
+
+A slip along +a meets λ μ₊, one along −a λ μ₋; with equal coefficients D = μ λ h f₀(|u_t|/h). D is convex, ψ² once
+continuously differentiable:
+
+    ∂D/∂u = λ κ q =: G,   κ = f₁/(w μ h)
+    ∂²D/∂u² = λ [κ (μ±² a aᵀ + μ_s² s sᵀ) + (f₁′ − f₁/w)/(w² (μ h)³) q qᵀ] =: F
+
+A contact point on a body moves with it: y = X + a, where the arm a from the body's position turns with the body,
+δa = δφ × a + ½ δφ × (δφ × a). So u, the motion of the contact point relative to that of the surface below it, depends
+on the motion of both (`forces.contact_on_bodies`), and the force on one side is opposite to that on the other. Between
+two bodies both points are one, on the first one's face, x − r n, and so the moments cancel as well. A node takes no
+moment: it slips with its centreline over the point of the surface below it. F is positive semidefinite.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..contact.barrier import barrier_gradient
+from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from ..contact.near import gap_normal
+from ..jit import kernel, piece
+from ..jit.stack import stack_matrix, stack_vector
+from ..kinematics.copying import copy_matrix
+from ..kinematics.turning import product_transposed
+from ..model.force_places import place_of
+from ..model.records.parts import Sliding
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Place, Stage
+from .contact_on_bodies import add_force, add_second_derivative
+
+FRICTION = place_of("friction")
+
+
+@kernel
+def _forward(sliding, start, i, n0, n1, n2):
+    """Forward direction of a contact in its tangent plane, a unit vector.
+
+    That of the rod at a node (mean of its edges), any direction for a body. A rod whose direction is along the normal
+    has no forward direction there: what rounding leaves of the projection decides.
+    """
+    x, y, z = 1.0, 0.0, 0.0
+    if i < sliding.node_axis.shape[0]:
+        e, f, axis = sliding.node_edges[i, 0], sliding.node_edges[i, 1], sliding.node_axis[i]
+        t, m = start.tangent, start.director1
+        t0, t1, t2 = t[e, 0] + t[f, 0], t[e, 1] + t[f, 1], t[e, 2] + t[f, 2]
+        m0, m1, m2 = m[e, 0] + m[f, 0], m[e, 1] + m[f, 1], m[e, 2] + m[f, 2]
+        x, y, z = t0, t1, t2
+        if axis == 1:
+            x, y, z = m0, m1, m2
+        elif axis == 2:
+            x, y, z = t1 * m2 - t2 * m1, t2 * m0 - t0 * m2, t0 * m1 - t1 * m0
+    for _ in range(2):
+        along = x * n0 + y * n1 + z * n2
+        x, y, z = x - along * n0, y - along * n1, z - along * n2
+        size = math.sqrt(x * x + y * y + z * z)
+        if size > 0.0:
+            x, y, z = x / size, y / size, z / size
+        else:
+            x, y, z = n1, n2, n0  # parallel to n only if its three components are equal
+    return x, y, z
+
+
+@kernel
+def _across(sliding, k, across_out):
+    """s = n × a"""
+    n, a = sliding.normal, sliding.axis
+    across_out[0] = n[k, 1] * a[k, 2] - n[k, 2] * a[k, 1]
+    across_out[1] = n[k, 2] * a[k, 0] - n[k, 0] * a[k, 2]
+    across_out[2] = n[k, 0] * a[k, 1] - n[k, 1] * a[k, 0]
+
+
+@kernel
+def _slip(sliding, surfaces, at, stage, k, arm_out, lever_out, slip_out):
+    """Slip of a contact since the origin of the stage [m], and its arms now on the body that the contact point is on
+    (not written for a node) and on that of the surface [m].
+    """
+    i = sliding.first[k]
+    a, b = surfaces.carrier_body[i], surfaces.body[sliding.surface[k]]
+    turn, origin_turn, position, origin = sliding.turn, sliding.origin_turn, at.place, stage.origin_place
+    for c in range(3):
+        slip_out[c] = 0.0 if a >= 0 else at.position[i, c] - stage.origin_position[i, c]
+        if a >= 0:
+            now, before = 0.0, 0.0
+            for d in range(3):
+                now += turn[a, c, d] * sliding.arm[k, d]
+                before += origin_turn[a, c, d] * sliding.arm[k, d]
+            arm_out[c] = now
+            slip_out[c] += position[a, c] - origin[a, c] + (now - before)
+        now, before = 0.0, 0.0
+        for d in range(3):
+            now += turn[b, c, d] * sliding.lever[k, d]
+            before += origin_turn[b, c, d] * sliding.lever[k, d]
+        lever_out[c] = now
+        slip_out[c] -= position[b, c] - origin[b, c] + (now - before)
+
+
+@kernel
+def _add_motion(motion, body, arm, sign, rate):
+    """Add ± the displacement of a point of a body in a step of its position and rotation vector."""
+    r0, r1, r2 = motion[body, 3], motion[body, 4], motion[body, 5]
+    rate[0] += sign * (motion[body, 0] + r1 * arm[2] - r2 * arm[1])
+    rate[1] += sign * (motion[body, 1] + r2 * arm[0] - r0 * arm[2])
+    rate[2] += sign * (motion[body, 2] + r0 * arm[1] - r1 * arm[0])
+
+
+@kernel
+def slip_paths(sliding, surfaces, at, stage, system, path_out):
+    """Write the slip paths of the lagged contacts in the present step, see `forces.friction_limit`."""
+    arm, lever, slip, rate, s = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    a, coefficient, step_length = sliding.axis, sliding.coefficient, stage.lengths[0]
+    for k in range(sliding.count[0]):
+        i = sliding.first[k]
+        body, under = surfaces.carrier_body[i], surfaces.body[sliding.surface[k]]
+        _slip(sliding, surfaces, at, stage, k, arm, lever, slip)
+        for c in range(3):
+            rate[c] = 0.0 if body >= 0 else system.node_step[i, c]
+        if body >= 0:
+            _add_motion(system.motion, body, arm, 1.0, rate)
+        _add_motion(system.motion, under, lever, -1.0, rate)
+        _across(sliding, k, s)
+        path_out[k, 0] = slip[0] * a[k, 0] + slip[1] * a[k, 1] + slip[2] * a[k, 2]
+        path_out[k, 1] = rate[0] * a[k, 0] + rate[1] * a[k, 1] + rate[2] * a[k, 2]
+        path_out[k, 2] = slip[0] * s[0] + slip[1] * s[1] + slip[2] * s[2]
+        path_out[k, 3] = rate[0] * s[0] + rate[1] * s[1] + rate[2] * s[2]
+        largest = 0.0
+        for c in range(3):
+            path_out[k, 4 + c] = coefficient[i, c] ** 2
+            largest = max(largest, coefficient[i, c])
+        path_out[k, 7] = sliding.load[k] if largest > 0.0 else 0.0
+        path_out[k, 8] = largest * step_length if largest > 0.0 else step_length
+
+
+@piece(float, Sliding, Problem, Place, Stage, bool)
+def add_surface_friction(sliding, p, at, stage, with_hessian):
+    """Add the dissipation potential of the lagged contacts; returns infinity, as it knows no gap."""
+    surfaces, sums = p.surfaces, p.sums
+    if not (sliding.acts and sums.selected[FRICTION]):
+        return math.inf
+    for b in range(at.rotation.shape[0]):
+        product_transposed(at.rotation, b, sliding.back, b, sliding.turn, b)
+    axis, coefficient, threshold = sliding.axis, sliding.coefficient, sliding.threshold
+    arm, lever, u = stack_vector(3), stack_vector(3), stack_vector(3)
+    g, q, across, hessian = stack_vector(3), stack_vector(3), stack_vector(3), stack_matrix(3, 3)
+    arm[0] = arm[1] = arm[2] = 0.0
+    energy = 0.0
+    for k in range(sliding.count[0]):
+        i, normal_force = sliding.first[k], sliding.load[k]
+        largest = max(coefficient[i, 0], coefficient[i, 1], coefficient[i, 2])
+        if largest == 0.0:
+            continue
+        a, b = surfaces.carrier_body[i], surfaces.body[sliding.surface[k]]
+        _slip(sliding, surfaces, at, stage, k, arm, lever, u)
+        _across(sliding, k, across)
+        forward = u[0] * axis[k, 0] + u[1] * axis[k, 1] + u[2] * axis[k, 2]
+        sideways = u[0] * across[0] + u[1] * across[1] + u[2] * across[2]
+        ca = (coefficient[i, 0] if forward >= 0.0 else coefficient[i, 1]) ** 2
+        cs = coefficient[i, 2] ** 2
+        scale = largest * stage.lengths[0]
+        speed = math.sqrt(ca * forward * forward + cs * sideways * sideways) / scale
+        energy += normal_force * scale * friction_potential(speed, threshold)
+        ratio = normal_force * friction_over_speed(speed, threshold) / scale
+        for c in range(3):
+            q[c] = ca * forward * axis[k, c] + cs * sideways * across[c]
+            g[c] = ratio * q[c]
+            sums.carrier[i, c] += g[c]
+        if a >= 0:
+            add_force(sums.contact, a, 1.0, arm, g)
+        add_force(sums.contact, b, -1.0, lever, g)
+        if with_hessian:
+            excess = 0.0
+            if speed > 0.0:
+                bend = friction_slope(speed, threshold) - friction_over_speed(speed, threshold)
+                excess = normal_force * bend / (speed * speed * scale**3)
+            for c in range(3):
+                for d in range(c, 3):
+                    tensor = ca * axis[k, c] * axis[k, d] + cs * across[c] * across[d]
+                    hessian[c, d] = excess * q[c] * q[d] + ratio * tensor
+            add_second_derivative(p, hessian, g, arm, lever, -1.0, i, a, b)
+    sums.energy[FRICTION] = energy
+    return math.inf
+
+
+@piece(int, Sliding, Problem, Place, Stage)
+def start_surface_friction(sliding, p, start, stage):
+    """List the contacts at the start of a stage, with their normal forces, directions and arms; returns a status.
+
+    Near pairs are those of the barrier, which starts before.
+    """
+    surfaces = p.surfaces
+    if not sliding.acts:
+        return READY
+    for b in range(start.rotation.shape[0]):
+        copy_matrix(start.rotation, b, sliding.back, b)
+        product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_turn, b)
+    n, count = stack_vector(3), 0
+    for k in range(surfaces.near_count[0]):
+        i, s = surfaces.near_carrier[k], surfaces.near_surface[k]
+        x0, x1, x2 = start.carrier[i, 0], start.carrier[i, 1], start.carrier[i, 2]
+        d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, start, i, s, x0, x1, x2)
+        if not 0.0 < d < surfaces.d_hat:
+            continue
+        a, b = surfaces.carrier_body[i], surfaces.body[s]
+        sliding.first[count], sliding.surface[count] = i, s
+        sliding.load[count] = -surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
+        below = surfaces.radius[i] if a >= 0 else surfaces.radius[i] + d
+        for c in range(3):
+            touched = start.carrier[i, c] - below * n[c]
+            sliding.normal[count, c] = n[c]
+            sliding.arm[count, c] = touched - start.place[a, c] if a >= 0 else 0.0
+            sliding.lever[count, c] = touched - start.place[b, c]
+        axis = _forward(sliding, start, i, n[0], n[1], n[2])
+        sliding.axis[count, 0], sliding.axis[count, 1], sliding.axis[count, 2] = axis
+        count += 1
+    sliding.count[0] = count
+    return READY

@@ -1,0 +1,53 @@
+"""The list of contact points near surfaces, and how far a step may go before a gap is too small.
+
+Whoever needs the list asks for it at a configuration: it is made anew only if something has moved too far since.
+"""
+
+from __future__ import annotations
+
+from ..contact.near import list_near, moved_since
+from ..contact.step_bound import motion_of_points, motion_of_surfaces, step_bound
+from ..jit import call, piece
+from ..model.records.outcome import PAIR, STATUS
+from ..model.records.parts import Surfaces
+from ..model.records.problem import Problem
+from ..model.records.status import NO_ROOM, READY
+from ..model.records.step import Place
+
+MOTION_MARGIN = 4.0
+"""Margin of a list, in units of the motion that demands it."""
+
+
+@piece(int, Surfaces, Place, float)
+def list_surface_pairs(surfaces, at, motion):
+    """Make the list of near pairs valid at a configuration and whatever can be reached from it by `motion` [m].
+
+    Returns a status.
+    """
+    if moved_since(surfaces, at) + motion <= surfaces.margin[0]:
+        return READY
+    margin = max(surfaces.d_hat, MOTION_MARGIN * motion)
+    count = list_near(surfaces, at, margin)
+    if count > surfaces.near_carrier.shape[0]:
+        surfaces.margin[0] = -1.0
+        surfaces.near_count[0] = 0
+        return NO_ROOM
+    surfaces.near_count[0] = count
+    surfaces.margin[0] = margin
+    return READY
+
+
+@piece(float, Problem, Place)
+def bound_at_surfaces(p, at):
+    """Largest fraction of the present step that keeps gaps to surfaces open; the near pair that sets it (−1: none) and
+    a status are left in `Outcome`.
+    """
+    surfaces, counts = p.surfaces, p.outcome.counts
+    of_points = motion_of_points(surfaces, p.bodies, p.system)
+    closing = of_points + motion_of_surfaces(surfaces, p.system)
+    counts[PAIR], counts[STATUS] = -1, call(p.calls.list_surface_pairs, (surfaces, at, closing))
+    if counts[STATUS] != READY:
+        return 0.0
+    closing = of_points + motion_of_surfaces(surfaces, p.system)  # extents of surfaces are those of the list
+    fraction, counts[PAIR] = step_bound(surfaces, p.system, at, closing)
+    return fraction
