@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..forces.added_mass import fluid_momentum
 from ..forces.friction_limit import PATH_SIZE
+from ..model.force_places import place_of
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
 from ..model.records.parts import (
@@ -48,14 +50,13 @@ def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
             size=layout.size,
             dimension=layout.dimension,
             edge_count=model.edge_count,
-            first_bend=0,
             bend_count=model.bend_count,
             bandwidth=b,
             axes=model.directions,
             row=layout.node,
             node_unknown=model.layout.node,
             edge_unknown=model.layout.edge,
-            **{name: getattr(model, name) for name in Strands.names[10:]},
+            **{name: getattr(model, name) for name in Strands.names[9:]},
         ),
         drives=Drives(**{name: getattr(model, name) for name in Drives.names}),
         space=_space(model, second) if plane is None else Space.absent(),
@@ -87,9 +88,9 @@ def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
         constrained=_held(model),
         attachments=_grips(model) if free else Attachments.absent(),
         flow=_flow(model) if scene.fluid is not None else Flow.absent(),
-        fluid=_fluid(model) if scene.fluid is not None else Fluid.absent(),
-        loads=_forces(model, model.dead_loads) if scene.loads else PointForces.absent(),
-        followers=_forces(model, model.follower_loads) if scene.loads else PointForces.absent(),
+        fluid=fluid_of(model) if len(model.fluid_mass) else Fluid.absent(),
+        loads=_forces(model, "loads", model.dead_loads) if scene.loads else PointForces.absent(),
+        followers=_forces(model, "followers", model.follower_loads) if scene.loads else PointForces.absent(),
         moments=_moments(model) if scene.loads else Moments.absent(),
         meets=model.meets_surfaces or model.rod_surfaces is not None,
         system=System(
@@ -278,23 +279,27 @@ def _flow(model: Model) -> Flow:
     )
 
 
-def _fluid(model: Model) -> Fluid:
-    edges, wet = model.edge_count + model.wall_count, model.node_count if len(model.fluid_mass) else 0
+def fluid_of(model: Model) -> Fluid:
+    """The fluid of a scene in which it has inertia."""
+    edges = model.edge_count + model.wall_count
     return Fluid(
         velocity=np.array(model.scene.fluid.velocity),
+        edge_node=model.edge_node,
         mass=model.fluid_mass,
         direction1=np.zeros((edges, 3)),
         direction2=np.zeros((edges, 3)),
         shape_gradient=np.zeros((model.edge_count, 4)),
-        momentum=np.zeros((wet, 3)),
-        node_velocity=np.zeros((wet, 3)),
-        still=np.zeros(model.edge_count),
+        momentum=np.zeros((model.node_count, 3)),
+        node_velocity=np.zeros((model.node_count, 3)),
+        spin=np.zeros(model.edge_count),
+        fluid_momentum=fluid_momentum.address,
     )
 
 
-def _forces(model: Model, loads: PointLoads) -> PointForces:
+def _forces(model: Model, name: str, loads: PointLoads) -> PointForces:
     before, after = columns(model.carriers.node_edges[loads.nodes.target])
     return PointForces(
+        place=place_of(name),
         node=loads.nodes.target,
         node_load=loads.nodes.load,
         node_vector=loads.nodes.vector,
@@ -305,7 +310,6 @@ def _forces(model: Model, loads: PointLoads) -> PointForces:
         on_bodies=np.zeros((len(loads.bodies.target), 3)),
         edge_before=before,
         edge_after=after,
-        direction=np.zeros((len(loads.nodes.target), 3, 3)),
     )
 
 

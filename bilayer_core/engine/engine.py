@@ -85,7 +85,7 @@ class Engine:
         )
         self.start_over(-math.inf)
         self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
-        self._work = work_of(model, self.places, self.touched, self._storage.problem.off_axis, stages)
+        self._work = work_of(model, self.places, self.touched, stages)
 
     def start_over(self, height: float) -> None:
         """Forget the extremes of the run; the mass centre is at `height` [m]."""

@@ -90,7 +90,7 @@ class Evaluator:
         self.first, self.near, self.rods = self._storage.first, self._storage.near, self._storage.rods
         self._state = initial_state(model)
         self._arrays = StateArrays(**{name: getattr(self._state, name) for name in StateArrays.names})
-        self.stage: Stage = stage_of(model, self._problem.off_axis)
+        self.stage: Stage = stage_of(model)
         self.point: Point = point_of(model)
         bodies = len(model.bodies.names)
         self._turned = np.zeros(model.edge_count)

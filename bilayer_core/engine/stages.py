@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import math
 
-from ..forces.body import moment_of_turn
-from ..forces.fluid_terms import survey
+from ..forces.added_mass import momentum_at
+from ..forces.inertia import moment_of_turn
 from ..jit import kernel, piece
 from ..jit.record import Matrix, Stack, Vector
 from ..jit.stack import stack_matrix
@@ -65,7 +65,7 @@ def start_point(bodies, fluid, strands, state, start, first):
         momentum = _tensor_times(bodies.second_moment, f, start.body_rotation, f, w0, w1, w2, scratch)
         for c in range(3):
             first.angular_momentum[f, c] = momentum[c]
-    survey(fluid, strands, start, state.velocity, first.fluid_momentum)
+    momentum_at(fluid, start, state.velocity, first.fluid_momentum)
     add_scaled(first.fluid_momentum, 1.0, state.fluid_excess)
 
 
@@ -272,7 +272,7 @@ def stand_still(bodies, fluid, strands, state, start, with_fluid, stage):
     add_scaled(stage.origin_turn, -length, state.spin)
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:
-        survey(fluid, strands, start, state.velocity, stage.origin_fluid_momentum)
+        momentum_at(fluid, start, state.velocity, stage.origin_fluid_momentum)
     _take_twist(start, stage)
 
 
@@ -348,7 +348,7 @@ def end_point(bodies, fluid, strands, state, stage, origin, turned, end, positio
             copy_matrix(rotation, b, point.rotation, b)
             continue
         copy_matrix(end.body_rotation, f, point.rotation, b)
-        # moment of inertia's potential at the end: −ax(R̃ J Rᵀ)/(γ γ′ h²), see `forces.body`
+        # moment of inertia's potential at the end: −ax(R̃ J Rᵀ)/(γ γ′ h²), see `forces.inertia`
         moment = moment_of_turn(bodies.second_moment, f, stage.predicted_body_rotation, end.body_turned)
         factor = 1.0 / length  # γ′ h times 1/(γ γ′ h²)
         for c in range(3):
@@ -365,7 +365,7 @@ def end_point(bodies, fluid, strands, state, stage, origin, turned, end, positio
     for k in range(point.turn.shape[0]):
         point.turn[k] = turned[k] + end.turn[k]
         point.spin[k] = (end.turn[k] - stage.origin_turn[k]) / length
-    survey(fluid, strands, end, point.velocity, point.fluid_momentum)
+    momentum_at(fluid, end, point.velocity, point.fluid_momentum)
 
 
 @kernel
@@ -373,7 +373,7 @@ def write_state(bodies, held, fluid, strands, state, last, end, position, rates)
     """Take the end of a step into the state; `position` and `rates` are those of prescribed bodies."""
     copy(last.velocity, state.velocity)
     _write_velocity_of_held(held, end, rates, state)
-    survey(fluid, strands, end, last.velocity, state.fluid_excess)
+    momentum_at(fluid, end, last.velocity, state.fluid_excess)
     for i in range(state.fluid_excess.shape[0]):
         for c in range(3):
             state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]

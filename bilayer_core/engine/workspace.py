@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..model.model import Model
-from ..model.records.parts import OffAxis
 from ..model.records.problem import Sums
 from ..model.records.step import Place, Point, Stage, Work
 from .allocate import FirstDerivatives, SecondDerivatives, zeros_in_one
@@ -55,12 +54,11 @@ def point_of(model: Model) -> Point:
     return Point(vectors=vectors, **parts, rotation=np.zeros((bodies, 3, 3)))
 
 
-def stage_of(model: Model, off_axis: OffAxis) -> Stage:
+def stage_of(model: Model) -> Stage:
     """Arrays of a stage."""
     nodes, edges, free, bodies = model.node_count, model.edge_count, model.free_count, len(model.bodies.names)
     world = np.zeros((bodies + 1, 3, 3))
     world[-1] = np.eye(3)
-    rest_joint = np.zeros_like(model.joint_rest)
     return Stage(
         lengths=np.zeros(2),
         origin_position=np.zeros((nodes, 3)),
@@ -75,8 +73,7 @@ def stage_of(model: Model, off_axis: OffAxis) -> Stage:
         predicted_body_rotation=np.zeros((free, 3, 3)),
         twist=np.zeros(len(model.joint_a)),
         rest_edge=np.zeros(edges),
-        rest_joint=rest_joint,
-        natural=off_axis.rest if off_axis.exists else rest_joint,
+        rest_joint=np.zeros_like(model.joint_rest),
         load_factor=np.zeros(len(model.scene.loads)),
         body_turn=np.zeros((free, 3)),
         way=np.zeros((nodes, 3)),
@@ -87,12 +84,12 @@ def stage_of(model: Model, off_axis: OffAxis) -> Stage:
     )
 
 
-def work_of(model: Model, places: list[Place], touched: Array, off_axis: OffAxis, stages: int) -> Work:
+def work_of(model: Model, places: list[Place], touched: Array, stages: int) -> Work:
     """Room for steps of so many stages."""
     edges, bodies, first = model.edge_count, len(model.bodies.names), point_of(model)
     return Work(
         places=np.array([place.address for place in places], dtype=np.int64),
-        stage=stage_of(model, off_axis),
+        stage=stage_of(model),
         first=first,
         origin=point_of(model),
         end=point_of(model),

@@ -46,50 +46,29 @@ halved.
 
 from __future__ import annotations
 
-from ..jit import entry, kernel
+import math
+
+from ..jit import call, kernel, piece
+from ..kinematics.copying import copy
+from ..model.force_places import place_of
+from ..model.records.parts import Fluid
+from ..model.records.problem import Problem
+from ..model.records.step import Place, Stage
+
+ADDED_MASS = place_of("added mass")
 
 
-@entry
-def fluid_momentum(
-    mass,
-    edge_node,
-    length,
-    tangent,
-    director1,
-    director2,
-    flow,
-    velocity,
-    spin,
-    momentum_out,
-    shape_gradient_out,
-):
-    """Momentum P of the fluid and ∂T/∂q at given velocities; return T [J].
-
-    Parameters
-    ----------
-    mass : Array
-        m₁ l̄ and m₂ l̄ [kg] and j l̄ [kg m²] of each edge, shape (n_edge, 3).
-    edge_node : Array
-        First node of each edge, shape (n_edge,).
-    length, tangent, director1, director2 : Array
-        Of edges [m, unit], shapes (≥ n_edge,), (≥ n_edge, 3).
-    flow : Array
-        U [m/s], shape (3,).
-    velocity : Array
-        Of nodes [m/s], shape (n_node, 3).
-    spin : Array
-        ω of edges [rad/s], shape (n_edge,).
-    momentum_out : Array
-        P of nodes [N s], shape (n_node, 3); written.
-    shape_gradient_out : Array
-        ∂T/∂(ε, θ) of edges [N, N m], shape (n_edge, 4); written.
-    """
+@piece(float, Fluid, Place)
+def fluid_momentum(fluid, at):
+    """Write P of nodes and ∂T/∂(ε, θ) of edges at the velocities and spins in `fluid` there; return T [J]."""
+    mass, edge_node, flow, velocity, spin = fluid.mass, fluid.edge_node, fluid.velocity, fluid.node_velocity, fluid.spin
+    length, tangent, director1, director2 = at.length, at.tangent, at.director1, at.director2
+    momentum_out, shape_gradient_out = fluid.momentum, fluid.shape_gradient
     energy = 0.0
-    momentum_out[:, :] = 0.0
+    momentum_out[:] = 0.0
+    shape_gradient_out[:] = 0.0
     for k in range(mass.shape[0]):
         energy += 0.5 * mass[k, 2] * spin[k] ** 2
-        for c in range(4):
-            shape_gradient_out[k, c] = 0.0
         for i in range(edge_node[k], edge_node[k] + 2):
             along = through = across = 0.0
             for c in range(3):
@@ -108,81 +87,72 @@ def fluid_momentum(
 
 
 @kernel
-def added_mass(
-    mass,
-    edge_node,
-    direction1,
-    direction2,
-    shape_gradient,
-    origin_momentum,
-    flow,
-    step_length,
-    momentum_length,
-    position,
-    origin,
-    turn,
-    predicted_turn,
-    node_gradient_out,
-    node_hessian_out,
-    edge_gradient_out,
-    edge_hessian_out,
-    with_hessian,
-):
-    """Add the incremental potential of the fluid's inertia and return it [J].
+def momentum_at(fluid, at, velocity, momentum_out):
+    """Write P with given velocities of nodes [m/s], shapes (n_node, 3), if the fluid has inertia."""
+    if not fluid.exists:
+        return
+    copy(velocity, fluid.node_velocity)
+    call(fluid.fluid_momentum, (fluid, at))
+    copy(fluid.momentum, momentum_out)
 
-    Parameters
-    ----------
-    mass, edge_node, flow : Array
-        As for `fluid_momentum`.
-    direction1, direction2 : Array
-        m1 and m2 of edges at z, shape (≥ n_edge, 3).
-    shape_gradient : Array
-        (∂T/∂q)_z [N, N m], shape (n_edge, 4).
-    origin_momentum : Array
-        P̄ of nodes [N s], shape (n_node, 3).
-    step_length, momentum_length : float
-        h and h′ [s].
-    position, origin : Array
-        Of nodes, now and at the origin of the stage [m], shape (n_node, 3).
-    turn, predicted_turn : Array
-        Of edges since the start of the step, and with the spin ω̄ [rad], shape (n_edge,).
-    node_gradient_out, node_hessian_out : Array
-        Shapes (n_node, 3) and (n_node, 3, 3) (upper triangle); added to.
-    edge_gradient_out, edge_hessian_out : Array
-        Shapes (≥ n_edge, 4) and (≥ n_edge, 4, 4); added to.
-    with_hessian : bool
-    """
+
+@piece(float, Fluid, Problem, Place, Stage, bool)
+def add_added_mass(fluid, p, at, stage, with_hessian):
+    """Add the potential of the fluid's inertia and its derivatives by nodes and edges, z being where it was updated."""
+    sums, h, momentum_length = p.sums, stage.lengths[0], stage.lengths[1]
+    if not sums.selected[ADDED_MASS]:
+        return math.inf
+    mass, edge_node, flow, shape_gradient = fluid.mass, fluid.edge_node, fluid.velocity, fluid.shape_gradient
+    direction1, direction2, origin_momentum = fluid.direction1, fluid.direction2, stage.origin_fluid_momentum
+    position, origin, turn, predicted_turn = at.position, stage.origin_position, at.turn, stage.predicted_turn
+    node_gradient, node_hessian = sums.node, sums.node_hessian
+    edge_gradient, edge_hessian = sums.edge, sums.edge_hessian
     energy = 0.0
     for i in range(origin_momentum.shape[0]):
         for c in range(3):
             force = origin_momentum[i, c] / momentum_length
-            node_gradient_out[i, c] -= force
+            node_gradient[i, c] -= force
             energy -= force * (position[i, c] - origin[i, c])
     for k in range(mass.shape[0]):
         first = edge_node[k]
         for i in range(first, first + 2):
             through = across = 0.0
             for c in range(3):
-                relative = (position[i, c] - origin[i, c]) / step_length - flow[c]
+                relative = (position[i, c] - origin[i, c]) / h - flow[c]
                 through += relative * direction1[k, c]
                 across += relative * direction2[k, c]
             mass1, mass2 = 0.5 * mass[k, 0], 0.5 * mass[k, 1]
-            energy += 0.5 * (mass1 * through**2 + mass2 * across**2) * step_length / momentum_length
+            energy += 0.5 * (mass1 * through**2 + mass2 * across**2) * h / momentum_length
             for m in range(3):
                 momentum = mass1 * through * direction1[k, m] + mass2 * across * direction2[k, m]
-                node_gradient_out[i, m] += momentum / momentum_length
+                node_gradient[i, m] += momentum / momentum_length
                 if with_hessian:
                     for n in range(m, 3):
-                        node_hessian_out[i, m, n] += (
+                        node_hessian[i, m, n] += (
                             mass1 * direction1[k, m] * direction1[k, n] + mass2 * direction2[k, m] * direction2[k, n]
-                        ) / (step_length * momentum_length)
+                        ) / (h * momentum_length)
         for c in range(3):
-            stretch = position[first + 1, c] - origin[first + 1, c] - position[first, c] + origin[first, c]
-            energy -= shape_gradient[k, c] * stretch
-            edge_gradient_out[k, c] -= shape_gradient[k, c]
-        inertia, ahead = mass[k, 2] / (step_length * momentum_length), turn[k] - predicted_turn[k]
+            lengthening = position[first + 1, c] - origin[first + 1, c] - position[first, c] + origin[first, c]
+            energy -= shape_gradient[k, c] * lengthening
+            edge_gradient[k, c] -= shape_gradient[k, c]
+        inertia, ahead = mass[k, 2] / (h * momentum_length), turn[k] - predicted_turn[k]
         energy += 0.5 * inertia * ahead**2 - shape_gradient[k, 3] * turn[k]
-        edge_gradient_out[k, 3] += inertia * ahead - shape_gradient[k, 3]
+        edge_gradient[k, 3] += inertia * ahead - shape_gradient[k, 3]
         if with_hessian:
-            edge_hessian_out[k, 3, 3] += inertia
-    return energy
+            edge_hessian[k, 3, 3] += inertia
+    sums.energy[ADDED_MASS] = energy
+    return math.inf
+
+
+@piece(bool, Fluid, Problem, Place, Stage)
+def update_fluid(fluid, p, at, stage):
+    """Make a configuration z: take directions and ∂T/∂q from it."""
+    velocity, position, origin, h = fluid.node_velocity, at.position, stage.origin_position, stage.lengths[0]
+    for i in range(velocity.shape[0]):
+        for c in range(3):
+            velocity[i, c] = (position[i, c] - origin[i, c]) / h
+    call(fluid.fluid_momentum, (fluid, at))
+    for k in range(fluid.direction1.shape[0]):
+        for c in range(3):
+            fluid.direction1[k, c], fluid.direction2[k, c] = at.director1[k, c], at.director2[k, c]
+    return True

@@ -3,7 +3,8 @@
     B = ½ k₁ (κ₁ − κ̄₁)² + ½ k₂ (κ₂ − κ̄₂)² + ½ k₃ (ψ − ψ̄)²        (paper, eqs. 10 to 13)
 
 At an inner node k₁ = EI₁/Δl, k₂ = EI₂/Δl, k₃ = GJ/Δl and κ₁ = χ Δl, κ₂ = ξ Δl, ψ = τ Δl with the Voronoi length Δl.
-The same element with other stiffnesses ties the frames of two bonded layers together (`coupling`).
+The elements of bonds, which come last, are the same with other stiffnesses (`bond`): they tie the frames of two bonded
+layers together.
 
 Strains. With unit tangents a, b, directors mα of either edge, and c = 1 + a·b, the curvature binormal 2 a×b/c projected
 on the mean of the directors is
@@ -45,18 +46,36 @@ with J a quarter turn, J (x, y) = (−y, x):
 The tangent comes in only where ε turns the plane: with g = ∂B/∂a, ∂²B/∂ε_a² has −(a gᵀ + g aᵀ)/l_a² beside the above.
 
 All is exact where θ = 0, that is at the configuration whose own frames are given.
+
+Stretching that bends. Where a curve is off the neutral axis of its section, a joint's natural curvature follows the
+strains of its two edges (`model.laminate`): with r = κ₁ − κ̄₁ and
+
+    κ̄₁ = κ̄₁(rest) + b_a ε_a + b_b ε_b,   ε = |e|/|ē| − 1,
+
+the energy is ½ k₁ r². Beside the derivatives through κ₁, above, there are, with t the tangent of an edge and
+P = I − t tᵀ,
+
+    ∂/∂e_i      −k₁ r b_i t_i/|ē_i|
+    ∂²/∂e_i²    k₁ b_i² t_i t_iᵀ/|ē_i|² − k₁ r b_i P_i/(|ē_i| |e_i|) − k₁ (∂κ₁/∂e_i t_iᵀ + t_i ∂κ₁/∂e_iᵀ) b_i/|ē_i|
+    ∂²/∂e_a∂e_b k₁ b_a b_b t_a t_bᵀ/(|ē_a| |ē_b|) − k₁ b_a t_a ∂κ₁/∂e_bᵀ/|ē_a| − k₁ b_b ∂κ₁/∂e_a t_bᵀ/|ē_b|
+
+and the products of t_i with ∂κ₁/∂θ.
 """
 
 from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from ..jit import kernel, piece
 from ..kinematics.vector import (
     add_column,
+    add_outer,
     add_outer_sum,
     add_row,
+    add_upper_outer,
     add_upper_outer_sum,
+    add_upper_projector,
+    add_upper_symmetric,
     angle,
     combine,
     combine3,
@@ -64,52 +83,93 @@ from ..kinematics.vector import (
     row,
     scaled,
 )
+from ..model.force_places import place_of
+from ..model.records.parts import Space
+from ..model.records.problem import Problem
+from ..model.records.step import Place, Stage
 
+BENDING, TWISTING, BOND = map(place_of, ("bending", "twisting", "bond"))
 TWO_PI = 2.0 * math.pi
 
 
 @kernel
-def bend_twist(
-    first,
-    last,
-    edge_a,
-    edge_b,
-    stiffness,
-    rest,
-    length,
-    tangent,
-    director1,
-    director2,
-    previous_twist,
-    strain_out,
-    edge_gradient_out,
-    edge_hessian_out,
-    cross_hessian_out,
-    with_hessian,
-):
-    """Add elements first … last − 1 to the edge accumulators; return the energies of κ₁ and κ₂, and of ψ [J].
+def bend_by_strains(off_axis, strands, at, stage):
+    """Write κ̄₁ κ̄₂ ψ̄ of joints at the present strains of edges [rad] into `OffAxis.rest`."""
+    joint, slope, rest = off_axis.joint, off_axis.slope, off_axis.rest
+    length, rest_length = at.length, strands.rest_length
+    for k in range(rest.shape[0]):
+        for c in range(3):
+            rest[k, c] = stage.rest_joint[k, c]
+    for i in range(joint.shape[0]):
+        k = joint[i]
+        a, b = strands.joint_a[k], strands.joint_b[k]
+        shift = 0.0
+        if slope[i, 0] != 0.0:  # a wall has none, and no rest length
+            shift += slope[i, 0] * (length[a] - rest_length[a])
+        if slope[i, 1] != 0.0:
+            shift += slope[i, 1] * (length[b] - rest_length[b])
+        rest[k, 0] += shift
 
-    Parameters
-    ----------
-    first, last : int
-    edge_a, edge_b : Array
-        The two edges of each element, shape (n,).
-    stiffness, rest : Array
-        k₁ k₂ k₃ [N m] and κ̄₁ κ̄₂ ψ̄ [rad], shape (n, 3).
-    length, tangent, director1, director2 : Array
-        Of every edge [m, unit], shapes (n_edge,), (n_edge, 3).
-    previous_twist : Array
-        Twist of each element in the configuration before [rad], from which ψ is unwrapped, shape (n,).
-    strain_out : Array
-        Written: κ₁, κ₂, ψ [rad], shape (n, 3).
-    edge_gradient_out, edge_hessian_out : Array
-        ∂/∂(e, θ) and upper triangle of ∂²/∂(e, θ)² of each edge, shapes (n_edge, 4), (n_edge, 4, 4); added to.
-    cross_hessian_out : Array
-        ∂²/∂(e, θ)_a ∂(e, θ)_b of each element, shape (n, 4, 4); added to.
-    with_hessian : bool
+
+@kernel
+def stretch_bend(off_axis, strands, at, sums, with_hessian):
+    """Add the derivatives of bending through κ̄₁, which `bend_by_strains` has left, to those of edges."""
+    joint, slope, rest = off_axis.joint, off_axis.slope, off_axis.rest
+    edge_a, edge_b, stiffness, strain = strands.joint_a, strands.joint_b, strands.joint_stiffness, at.joint_strain
+    length, tangent = at.length, at.tangent
+    director1, director2, gradient_out = at.director1, at.director2, sums.edge
+    hessian_out, cross_out = sums.edge_hessian, sums.cross_hessian
+    for i in range(joint.shape[0]):
+        k = joint[i]
+        ka, kb = edge_a[k], edge_b[k]
+        sa, sb = slope[i, 0], slope[i, 1]  # ∂κ̄₁/∂e = s t
+        k1 = stiffness[k, 0]
+        moment = k1 * (strain[k, 0] - rest[k, 0])
+        a, b = row(tangent, ka), row(tangent, kb)
+        add_row(gradient_out, ka, -moment * sa, a)
+        add_row(gradient_out, kb, -moment * sb, b)
+        if not with_hessian:
+            continue
+        m1a, m2a = row(director1, ka), row(director2, ka)
+        m1b, m2b = row(director1, kb), row(director2, kb)
+        ab = dot(a, b)
+        ic = 1.0 / (1.0 + ab)
+        kappa = strain[k, 0]
+        ua = combine3(ab, m1a, 1.0, combine(1.0, m1b, -dot(a, m1b), a), kappa, combine(1.0, b, -ab, a))
+        wb = combine3(ab, m1b, 1.0, combine(1.0, m1a, -dot(b, m1a), b), -kappa, combine(1.0, a, -ab, b))
+        da, db = scaled(-ic / length[ka], ua), scaled(ic / length[kb], wb)  # ∂κ₁/∂e
+        ta, tb = dot(b, m2a) * ic, -dot(a, m2b) * ic  # ∂κ₁/∂θ
+        add_upper_outer(hessian_out, ka, k1 * sa * sa, a)
+        add_upper_outer(hessian_out, kb, k1 * sb * sb, b)
+        add_upper_projector(hessian_out, ka, -moment * sa / length[ka], a)
+        add_upper_projector(hessian_out, kb, -moment * sb / length[kb], b)
+        add_upper_symmetric(hessian_out, ka, -k1 * sa, a, da)
+        add_upper_symmetric(hessian_out, kb, -k1 * sb, b, db)
+        add_column(hessian_out, ka, 3, -k1 * sa * ta, a)
+        add_column(hessian_out, kb, 3, -k1 * sb * tb, b)
+        add_outer(cross_out, k, -k1 * sa, a, combine(1.0, db, -sb, b))
+        add_outer(cross_out, k, -k1 * sb, da, b)
+        add_column(cross_out, k, 3, -k1 * sa * tb, a)
+        for n in range(3):
+            cross_out[k, 3, n] -= k1 * sb * ta * b[n]
+
+
+@piece(float, Space, Problem, Place, Stage, bool)
+def add_bending(_, p, at, stage, with_hessian):
+    """Add bending and twisting, and bonds as far as they are of this kind, with their derivatives by edges.
+
+    ψ is unwrapped from the twist at the start of the stage.
     """
-    energy_bend = 0.0
-    energy_twist = 0.0
+    strands, sums, off_axis, rest = p.strands, p.sums, p.off_axis, stage.rest_joint
+    edge_a, edge_b, stiffness, previous_twist = strands.joint_a, strands.joint_b, strands.joint_stiffness, stage.twist
+    length, tangent, director1, director2 = at.length, at.tangent, at.director1, at.director2
+    strain_out, gradient_out, hessian_out, cross_out = at.joint_strain, sums.edge, sums.edge_hessian, sums.cross_hessian
+    bends, bend_count = sums.selected[BENDING] or sums.selected[TWISTING], strands.bend_count
+    first, last = 0 if bends else bend_count, edge_a.shape[0] if sums.selected[BOND] else bend_count
+    if off_axis.exists and bends:
+        bend_by_strains(off_axis, strands, at, stage)
+        rest = off_axis.rest
+    bending = twisting = bond = 0.0
     for k in range(first, last):
         ka, kb = edge_a[k], edge_b[k]
         a, b = row(tangent, ka), row(tangent, kb)
@@ -131,8 +191,11 @@ def bend_twist(
         k1, k2, k3 = stiffness[k, 0], stiffness[k, 1], stiffness[k, 2]
         d1, d2, d3 = kappa1 - rest[k, 0], kappa2 - rest[k, 1], psi - rest[k, 2]
         g1, g2, g3 = k1 * d1, k2 * d2, k3 * d3
-        energy_bend += 0.5 * (g1 * d1 + g2 * d2)
-        energy_twist += 0.5 * g3 * d3
+        if k < bend_count:
+            bending += 0.5 * (g1 * d1 + g2 * d2)
+            twisting += 0.5 * g3 * d3
+        else:
+            bond += 0.5 * (g1 * d1 + g2 * d2 + g3 * d3)
 
         # of κ₁, κ₂ and ψ, components 1 and 2: u, v, h with respect to a, w, z, j to b
         u1, u2 = -(s + r11 + kappa1 * p1) * ic, -(r21 + kappa1 * p2) * ic
@@ -146,10 +209,10 @@ def bend_twist(
         fa = -g1 * h1 - g2 * h2  # ∂κ/∂θ_a = −h
         fb = -g1 * j1 - g2 * j2  # ∂κ/∂θ_b = −j
         gradient_a, gradient_b = combine(ga1, m1a, ga2, m2a), combine(gb1, m1b, gb2, m2b)
-        add_row(edge_gradient_out, ka, ila, gradient_a)
-        add_row(edge_gradient_out, kb, ilb, gradient_b)
-        edge_gradient_out[ka, 3] += fa - g3
-        edge_gradient_out[kb, 3] += fb + g3
+        add_row(gradient_out, ka, ila, gradient_a)
+        add_row(gradient_out, kb, ilb, gradient_b)
+        gradient_out[ka, 3] += fa - g3
+        gradient_out[kb, 3] += fb + g3
         if not with_hessian:
             continue
 
@@ -163,11 +226,11 @@ def bend_twist(
         s12 = p1 * x2 + p2 * x1 + k1 * u1 * u2 + k2 * v1 * v2 + k3 * h1 * h2
         s22 = own + 2.0 * p2 * x2 + k1 * u2 * u2 + k2 * v2 * v2 + k3 * h2 * h2
         rows = combine3(s11, m1a, s12, m2a, -ga1, a), combine3(s12, m1a, s22, m2a, -ga2, a)
-        add_upper_outer_sum(edge_hessian_out, ka, ila * ila, m1a, rows[0], m2a, rows[1], scaled(-1.0, a), gradient_a)
+        add_upper_outer_sum(hessian_out, ka, ila * ila, m1a, rows[0], m2a, rows[1], scaled(-1.0, a), gradient_a)
         t1 = -k1 * h1 * u1 - k2 * h2 * v1 - k3 * h1 + ic * (s * g2 - fa * p1)
         t2 = -k1 * h1 * u2 - k2 * h2 * v2 - k3 * h2 - ic * (s * g1 + fa * p2)
-        add_column(edge_hessian_out, ka, 3, ila, combine(t1, m1a, t2, m2a))
-        edge_hessian_out[ka, 3, 3] += k1 * h1 * h1 + k2 * h2 * h2 + k3 - pm
+        add_column(hessian_out, ka, 3, ila, combine(t1, m1a, t2, m2a))
+        hessian_out[ka, 3, 3] += k1 * h1 * h1 + k2 * h2 * h2 + k3 - pm
 
         # edge b with itself
         x1, x2 = -ic * (fb1 - 0.5 * (g1 - g3 * j1)), -ic * (fb2 - 0.5 * (g2 - g3 * j2))
@@ -176,11 +239,11 @@ def bend_twist(
         s12 = q1 * x2 + q2 * x1 + k1 * w1 * w2 + k2 * z1 * z2 + k3 * j1 * j2
         s22 = own + 2.0 * q2 * x2 + k1 * w2 * w2 + k2 * z2 * z2 + k3 * j2 * j2
         rows = combine3(s11, m1b, s12, m2b, -gb1, b), combine3(s12, m1b, s22, m2b, -gb2, b)
-        add_upper_outer_sum(edge_hessian_out, kb, ilb * ilb, m1b, rows[0], m2b, rows[1], scaled(-1.0, b), gradient_b)
+        add_upper_outer_sum(hessian_out, kb, ilb * ilb, m1b, rows[0], m2b, rows[1], scaled(-1.0, b), gradient_b)
         t1 = -k1 * j1 * w1 - k2 * j2 * z1 + k3 * j1 - ic * (s * g2 + fb * q1)
         t2 = -k1 * j1 * w2 - k2 * j2 * z2 + k3 * j2 + ic * (s * g1 - fb * q2)
-        add_column(edge_hessian_out, kb, 3, ilb, combine(t1, m1b, t2, m2b))
-        edge_hessian_out[kb, 3, 3] += k1 * j1 * j1 + k2 * j2 * j2 + k3 + qm
+        add_column(hessian_out, kb, 3, ilb, combine(t1, m1b, t2, m2b))
+        hessian_out[kb, 3, 3] += k1 * j1 * j1 + k2 * j2 * j2 + k3 + qm
 
         # rows of a, columns of b
         x1, x2 = -ic * (fa1 + g1 + g3 * h1), -ic * (fa2 + g2 + g3 * h2)
@@ -191,15 +254,19 @@ def bend_twist(
         s21 = x2 * q1 + p2 * y1 - fc * r21 + gc * r11 + k1 * u2 * w1 + k2 * v2 * z1 + k3 * h2 * j1
         s22 = x2 * q2 + p2 * y2 - fc * r22 + gc * r12 + k1 * u2 * w2 + k2 * v2 * z2 + k3 * h2 * j2
         rows = combine(s11, m1b, s12, m2b), combine(s21, m1b, s22, m2b)
-        add_outer_sum(cross_hessian_out, k, ila * ilb, m1a, rows[0], m2a, rows[1])
+        add_outer_sum(cross_out, k, ila * ilb, m1a, rows[0], m2a, rows[1])
         t1 = -k1 * j1 * u1 - k2 * j2 * v1 + k3 * h1 - ic * (g1 * r12 - g2 * r11 + fb * p1)
         t2 = -k1 * j1 * u2 - k2 * j2 * v2 + k3 * h2 - ic * (g1 * r22 - g2 * r21 + fb * p2)
-        add_column(cross_hessian_out, k, 3, ila, combine(t1, m1a, t2, m2a))
+        add_column(cross_out, k, 3, ila, combine(t1, m1a, t2, m2a))
         t1 = -k1 * h1 * w1 - k2 * h2 * z1 - k3 * j1 + ic * (g1 * r21 - g2 * r11 - fa * q1)
         t2 = -k1 * h1 * w2 - k2 * h2 * z2 - k3 * j2 + ic * (g1 * r22 - g2 * r12 - fa * q2)
         theta_row = combine(t1, m1b, t2, m2b)
-        cross_hessian_out[k, 3, 0] += ilb * theta_row[0]
-        cross_hessian_out[k, 3, 1] += ilb * theta_row[1]
-        cross_hessian_out[k, 3, 2] += ilb * theta_row[2]
-        cross_hessian_out[k, 3, 3] += k1 * h1 * j1 + k2 * h2 * j2 - k3
-    return energy_bend, energy_twist
+        cross_out[k, 3, 0] += ilb * theta_row[0]
+        cross_out[k, 3, 1] += ilb * theta_row[1]
+        cross_out[k, 3, 2] += ilb * theta_row[2]
+        cross_out[k, 3, 3] += k1 * h1 * j1 + k2 * h2 * j2 - k3
+    if off_axis.exists and bends:
+        stretch_bend(off_axis, strands, at, sums, with_hessian)
+    sums.energy[BENDING], sums.energy[TWISTING] = bending, twisting
+    sums.energy[BOND] += bond
+    return math.inf

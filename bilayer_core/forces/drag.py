@@ -21,77 +21,61 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from ..jit import kernel, piece
 from ..kinematics.vector import add_row, add_upper_outer_sum, combine, combine3, cross, dot, row, scaled
+from ..model.force_places import place_of
+from ..model.records.parts import Flow
+from ..model.records.problem import Problem
+from ..model.records.step import Place, Stage
+
+DRAG = place_of("drag")
 
 
 @kernel
-def node_directions(node, edge_before, edge_after, tangent, director1, direction_out):
-    """Mean directions (t, m1, m2) at nodes, made orthonormal; written, shape (n_drag, 3, 3).
-
-    `edge_before` and `edge_after` are the edges that meet at each of `node`; at an end they are the same.
-    """
-    for k in range(node.shape[0]):
-        a, b = edge_before[k], edge_after[k]
-        t = combine(1.0, row(tangent, a), 1.0, row(tangent, b))
-        t = scaled(1.0 / math.sqrt(dot(t, t)), t)
-        m = combine(1.0, row(director1, a), 1.0, row(director1, b))
-        m = combine(1.0, m, -dot(m, t), t)
-        m = scaled(1.0 / math.sqrt(dot(m, m)), m)
-        n = cross(t, m)
-        for c in range(3):
-            direction_out[k, 0, c] = t[c]
-            direction_out[k, 1, c] = m[c]
-            direction_out[k, 2, c] = n[c]
+def node_directions(before, after, at):
+    """Mean of the directions t, m1, m2 of the edges before and after a node (the same at an end), orthonormal."""
+    t = combine(1.0, row(at.tangent, before), 1.0, row(at.tangent, after))
+    t = scaled(1.0 / math.sqrt(dot(t, t)), t)
+    m = combine(1.0, row(at.director1, before), 1.0, row(at.director1, after))
+    m = combine(1.0, m, -dot(m, t), t)
+    m = scaled(1.0 / math.sqrt(dot(m, m)), m)
+    return t, m, cross(t, m)
 
 
-@kernel
-def drag(
-    node,
-    coefficient,
-    direction,
-    flow,
-    step_length,
-    position,
-    origin,
-    node_gradient_out,
-    node_hessian_out,
-    with_hessian,
-):
-    """Add the dissipation potential of drag and return it [J].
-
-    Parameters
-    ----------
-    node : Array
-        Nodes that carry drag, shape (n_drag,).
-    coefficient : Array
-        ρ_f A C along t, m1 and m2 [kg/m], shape (n_drag, 3).
-    direction : Array
-        From `node_directions`.
-    flow : Array
-        Velocity of the fluid [m/s], shape (3,).
-    step_length : float
-        [s]
-    position, origin : Array
-        Of nodes now and at the origin of the stage [m], shape (n_node, 3).
-    node_gradient_out, node_hessian_out : Array
-        Shapes (n_node, 3) and (n_node, 3, 3) (upper triangle); added to.
-    with_hessian : bool
-    """
+@piece(float, Flow, Problem, Place, Stage, bool)
+def add_drag(flow, p, at, stage, with_hessian):
+    """Add the dissipation potential of drag and its derivatives by nodes."""
+    sums, h = p.sums, stage.lengths[0]
+    if not sums.selected[DRAG]:
+        return math.inf
+    node, coefficient, direction, flow_velocity = flow.node, flow.coefficient, flow.direction, flow.velocity
+    position, origin, gradient, hessian = at.position, stage.origin_position, sums.node, sums.node_hessian
     energy = 0.0
     for k in range(node.shape[0]):
         i = node[k]
         v = (
-            (position[i, 0] - origin[i, 0]) / step_length - flow[0],
-            (position[i, 1] - origin[i, 1]) / step_length - flow[1],
-            (position[i, 2] - origin[i, 2]) / step_length - flow[2],
+            (position[i, 0] - origin[i, 0]) / h - flow_velocity[0],
+            (position[i, 1] - origin[i, 1]) / h - flow_velocity[1],
+            (position[i, 2] - origin[i, 2]) / h - flow_velocity[2],
         )
         t, m, n = row(direction[k], 0), row(direction[k], 1), row(direction[k], 2)
         vt, vm, vn = dot(v, t), dot(v, m), dot(v, n)
         ct, cm, cn = coefficient[k, 0] * abs(vt), coefficient[k, 1] * abs(vm), coefficient[k, 2] * abs(vn)
-        energy += step_length * (ct * vt * vt + cm * vm * vm + cn * vn * vn) / 6.0
-        add_row(node_gradient_out, i, 0.5, combine3(ct * vt, t, cm * vm, m, cn * vn, n))
+        energy += h * (ct * vt * vt + cm * vm * vm + cn * vn * vn) / 6.0
+        add_row(gradient, i, 0.5, combine3(ct * vt, t, cm * vm, m, cn * vn, n))
         if with_hessian:
             t_, m_, n_ = scaled(ct, t), scaled(cm, m), scaled(cn, n)
-            add_upper_outer_sum(node_hessian_out, i, 1.0 / step_length, t_, t, m_, m, n_, n)
-    return energy
+            add_upper_outer_sum(hessian, i, 1.0 / h, t_, t, m_, m, n_, n)
+    sums.energy[DRAG] = energy
+    return math.inf
+
+
+@piece(bool, Flow, Problem, Place, Stage)
+def update_directions_of_drag(flow, p, at, stage):
+    """Take the directions of drag from a configuration; whether there are any."""
+    direction = flow.direction
+    for k in range(flow.node.shape[0]):
+        t, m, n = node_directions(flow.edge_before[k], flow.edge_after[k], at)
+        for c in range(3):
+            direction[k, 0, c], direction[k, 1, c], direction[k, 2, c] = t[c], m[c], n[c]
+    return flow.node.shape[0] > 0

@@ -15,18 +15,15 @@ from ..jit import Record
 from ..jit.piece import Piece
 from ..model.model import Model
 from ..model.records.problem import ForceTable
-from .elasticity import add_elasticity_in_plane, add_elasticity_in_space, start_elasticity
-from .fluid_terms import add_drag_of_nodes, add_mass_of_fluid, follow_with_drag, follow_with_fluid
+from .added_mass import add_added_mass, update_fluid
+from .bend_twist import add_bending
+from .bond import add_bonds
+from .drag import add_drag, update_directions_of_drag
 from .inertia import add_inertial_forces
-from .load_terms import (
-    add_body_moments,
-    add_dead_loads,
-    add_follower_loads,
-    follow_with_loads,
-    follow_with_moments,
-    start_dead_loads,
-)
+from .loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
+from .planar import add_elasticity_in_plane
 from .rod_contact import add_rod_contact, start_rod_contact
+from .stretch import add_stretching
 from .surface_barrier import add_surface_barrier, start_surface_barrier
 from .surface_friction import add_surface_friction, start_surface_friction
 
@@ -58,19 +55,20 @@ class Term:
     follow: Piece | None = None
 
 
-ELASTIC = ("stretching", "bending", "twisting", "bond")
 TERMS: tuple[Term, ...] = (
-    Term(ELASTIC, lambda of: of["space"], add_elasticity_in_space, start_elasticity),
-    Term(ELASTIC, lambda of: of["plane"], add_elasticity_in_plane, start_elasticity),
+    Term(("stretching",), lambda of: of["space"], add_stretching),
+    Term(("bending", "twisting"), lambda of: of["space"], add_bending),
+    Term(("bond",), lambda of: of["space"], add_bonds),
+    Term(("stretching", "bending", "bond"), lambda of: of["plane"], add_elasticity_in_plane),
     Term(("inertia", "damping", "gravity"), lambda of: None, add_inertial_forces),
-    Term(("loads",), lambda of: of["loads"], add_dead_loads, start_dead_loads),
+    Term(("loads",), lambda of: of["loads"], add_point_forces, start_dead_loads),
     Term(("barrier",), lambda of: of["surfaces"], add_surface_barrier, start_surface_barrier),
     Term(("friction",), lambda of: of["sliding"], add_surface_friction, start_surface_friction),
     Term(("rod barrier", "rod friction"), lambda of: of["rod_contact"], add_rod_contact, start_rod_contact),
-    Term(("followers",), lambda of: of["followers"], add_follower_loads, follow=follow_with_loads),
-    Term(("moments",), lambda of: of["moments"], add_body_moments, follow=follow_with_moments),
-    Term(("drag",), lambda of: of["flow"], add_drag_of_nodes, follow=follow_with_drag),
-    Term(("added mass",), lambda of: of["fluid"], add_mass_of_fluid, follow=follow_with_fluid),
+    Term(("followers",), lambda of: of["followers"], add_point_forces, follow=update_followers),
+    Term(("moments",), lambda of: of["moments"], add_moments, follow=update_moments),
+    Term(("drag",), lambda of: of["flow"], add_drag, follow=update_directions_of_drag),
+    Term(("added mass",), lambda of: of["fluid"], add_added_mass, follow=update_fluid),
 )
 """In the order of the sum; those that follow the configuration come last."""
 

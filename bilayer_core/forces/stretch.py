@@ -9,36 +9,35 @@ With n = EA (ε − η) the axial force, t the tangent and P = I − t tᵀ:
 
 from __future__ import annotations
 
-from ..jit import kernel
+import math
+
+from ..jit import piece
 from ..kinematics.vector import add_row, add_upper_outer, add_upper_projector, row
+from ..model.force_places import place_of
+from ..model.records.parts import Space
+from ..model.records.problem import Problem
+from ..model.records.step import Place, Stage
+
+STRETCHING = place_of("stretching")
 
 
-@kernel
-def stretch(
-    axial_stiffness, rest_length, eigenstrain, length, tangent, edge_gradient_out, edge_hessian_out, with_hessian
-):
-    """Add stretching to the edge accumulators and return its energy [J].
-
-    Parameters
-    ----------
-    axial_stiffness, rest_length, eigenstrain : Array
-        EA [N], |ē| [m], η of each edge, shape (n_edge,).
-    length, tangent : Array
-        Present |e| [m] and unit tangent, shapes (≥ n_edge,), (≥ n_edge, 3).
-    edge_gradient_out : Array
-        ∂/∂(e, θ) of each edge, shape (≥ n_edge, 4); added to.
-    edge_hessian_out : Array
-        Upper triangle of ∂²/∂(e, θ)², shape (≥ n_edge, 4, 4); added to.
-    with_hessian : bool
-    """
+@piece(float, Space, Problem, Place, Stage, bool)
+def add_stretching(_, p, at, stage, with_hessian):
+    """Add the stretching of every edge and its derivatives by edge vectors."""
+    strands, sums = p.strands, p.sums
+    if not sums.selected[STRETCHING]:
+        return math.inf
+    stiffness, rest_length, eigenstrain = strands.axial_stiffness, strands.rest_length, stage.rest_edge
+    length, tangent, gradient, hessian = at.length, at.tangent, sums.edge, sums.edge_hessian
     energy = 0.0
-    for k in range(axial_stiffness.shape[0]):
+    for k in range(strands.edge_count):
         strain = length[k] / rest_length[k] - 1.0 - eigenstrain[k]
-        force = axial_stiffness[k] * strain
+        force = stiffness[k] * strain
         energy += 0.5 * force * strain * rest_length[k]
         t = row(tangent, k)
-        add_row(edge_gradient_out, k, force, t)
+        add_row(gradient, k, force, t)
         if with_hessian:
-            add_upper_outer(edge_hessian_out, k, axial_stiffness[k] / rest_length[k], t)
-            add_upper_projector(edge_hessian_out, k, force / length[k], t)
-    return energy
+            add_upper_outer(hessian, k, stiffness[k] / rest_length[k], t)
+            add_upper_projector(hessian, k, force / length[k], t)
+    sums.energy[STRETCHING] = energy
+    return math.inf

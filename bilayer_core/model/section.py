@@ -92,7 +92,7 @@ def rectangle(material: Material, width: Array, thickness: Array, stiffness: Arr
 
 @dataclass(frozen=True)
 class Bond:
-    """Stiffness of the bond between two layers, as energies per unit length (see `forces.coupling`).
+    """Stiffness of the bond between two layers, as energies per unit length (see `forces.bond`).
 
     Attributes
     ----------

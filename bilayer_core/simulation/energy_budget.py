@@ -215,10 +215,9 @@ class EnergyLedger:
         model = self._model
         if not len(model.fluid_mass):
             return None
-        momentum, shape_gradient = np.empty((model.node_count, 3)), np.empty((model.edge_count, 4))
-        relative = survey_fluid(model, at, state.velocity, state.spin, momentum, shape_gradient)
-        carried = float(momentum.sum(axis=0) @ np.array(model.scene.fluid.velocity))
-        return _Fluid(relative + carried, momentum, shape_gradient)
+        relative, fluid = survey_fluid(model, at, state.velocity, state.spin)
+        carried = float(fluid.momentum.sum(axis=0) @ fluid.velocity)
+        return _Fluid(relative + carried, fluid.momentum, fluid.shape_gradient)
 
     def _look(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
         at = self._evaluator.new()

@@ -4,19 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from evaluations import end_of_step, left_of_step
+from evaluations import end_of_step, left_of_step, undriven
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
-from bilayer_core.forces.added_mass import fluid_momentum
-from bilayer_core.forces.drag import drag, node_directions
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
-from bilayer_core.model.layout import columns
 from bilayer_core.model.section import rectangle
 from bilayer_core.model.state import initial_state
-from bilayer_core.simulation.fluid_energy import energy_of_fluid, momentum_of_fluid
+from bilayer_core.simulation.fluid_energy import energy_of_fluid, momentum_of_fluid, survey_fluid
 
 WIDTH, THICKNESS = 0.01, 2e-3
 OWN = 1000.0 * WIDTH * THICKNESS  # [kg/m]
@@ -70,11 +67,7 @@ def random_problem(seed=0):
 
 
 def shape_gradient_of(model, at, velocity):
-    gradient, ignored = np.empty((model.edge_count, 4)), np.zeros((model.node_count, 3))
-    frames = (at.length, at.tangent, at.director1, at.director2)
-    motion = (np.array(model.scene.fluid.velocity), velocity, np.zeros(model.edge_count))
-    fluid_momentum(model.fluid_mass, model.edge_node, *frames, *motion, ignored, gradient)
-    return gradient
+    return survey_fluid(model, at, velocity, np.zeros(model.edge_count))[1].shape_gradient
 
 
 def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
@@ -260,13 +253,13 @@ def test_without_added_mass_there_is_nothing_to_compute():
 
 def force_of_drag(simulator, state, at):
     """On all nodes [N], with the directions of a configuration and the velocities of a state."""
-    model, length = simulator.model, 1.0
-    direction, force = np.zeros((len(model.drag_node), 3, 3)), np.zeros((model.node_count, 3))
-    node_directions(model.drag_node, *columns(model.drag_edge), at.tangent, at.director1, direction)
-    flow, still = np.array(model.scene.fluid.velocity), np.zeros((model.node_count, 3, 3))
-    origin = state.position - length * state.velocity
-    drag(model.drag_node, model.drag_coefficient, direction, flow, length, state.position, origin, force, still, False)
-    return -force.sum(axis=0)
+    evaluator, (rest, load_factor) = Evaluator(simulator.model), undriven(simulator.model)
+    present = evaluator.new()
+    evaluator.take_state(state, present)
+    evaluator.stand_still(state, present, 1.0, rest.edge, rest.joint, load_factor)
+    evaluator.follow(at)
+    evaluator.forces(present, ("drag",))
+    return -evaluator.first.node.sum(axis=0)
 
 
 @pytest.mark.parametrize("added", [False, True], ids=["drag alone", "with added mass"])

@@ -4,15 +4,20 @@ import math
 
 import numpy as np
 import pytest
+from evaluations import undriven
 from oracles import discrete_rod
+from sample_scenes import layer, rod, scene
 
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, factor_signed, solve_band, width
-from bilayer_core.forces.bend_twist import bend_twist
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 from bilayer_core.kinematics.vector import angle
+from bilayer_core.model.build import build_model
+from bilayer_core.model.state import initial_state
+from bilayer_core.scene.loader import load_scene
 
 
 def random_frames(rng, count):
@@ -23,66 +28,45 @@ def random_frames(rng, count):
     return edges, tangents, m1, np.cross(tangents, m1)
 
 
+def bent_rod(rng, joints):
+    """An evaluator of a rod with random directions, turns and natural strains, and its configuration."""
+    model = build_model(load_scene(scene([rod([layer()], stations=joints + 2)])))
+    evaluator, (rest, load_factor), state = Evaluator(model), undriven(model), initial_state(model)
+    straight, bent = evaluator.new(), evaluator.new()
+    evaluator.take_state(state, straight)
+    bent.position[1:] = bent.position[0] + np.cumsum(random_frames(rng, model.edge_count)[0], axis=0)
+    evaluator.carry_frames(straight, rng.standard_normal(model.edge_count), bent)
+    rest_joint = rng.standard_normal(rest.joint.shape)
+    evaluator.stand_still(state, straight, 1.0, rest.edge, rest_joint, load_factor)
+    return evaluator, bent, rest_joint
+
+
 def test_bending_and_twist_strains_are_those_of_the_curvature_binormal():
-    rng = np.random.default_rng(0)
-    edges, tangents, m1, m2 = random_frames(rng, 40)
-    a, b = np.arange(0, 40, 2), np.arange(1, 40, 2)
-    strains = np.empty((20, 3))
-    stiffness, rest = np.ones((20, 3)), rng.standard_normal((20, 3))
-    energies = bend_twist(
-        0,
-        20,
-        a,
-        b,
-        stiffness,
-        rest,
-        np.linalg.norm(edges, axis=1),
-        tangents,
-        m1,
-        m2,
-        np.zeros(20),
-        strains,
-        np.zeros((40, 4)),
-        np.zeros((40, 4, 4)),
-        np.zeros((20, 4, 4)),
-        False,
-    )
+    evaluator, at, rest = bent_rod(np.random.default_rng(0), 20)
+    energies = evaluator.forces(at, ("bending", "twisting"))
+    edges, m1, m2 = np.diff(at.position, axis=0), at.director1, at.director2
     expected = np.array(
         [
             (
-                *discrete_rod.curvatures(edges[i], edges[j], (m1[i], m2[i]), (m1[j], m2[j])),
-                discrete_rod.twist(edges[i], edges[j], m1[i], m1[j]),
+                *discrete_rod.curvatures(edges[i], edges[i + 1], (m1[i], m2[i]), (m1[i + 1], m2[i + 1])),
+                discrete_rod.twist(edges[i], edges[i + 1], m1[i], m1[i + 1]),
             )
-            for i, j in zip(a, b, strict=True)
+            for i in range(20)
         ]
     )
-    assert strains == pytest.approx(expected, abs=1e-13)
-    assert energies[0] == pytest.approx(0.5 * np.square(expected - rest)[:, :2].sum())
-    assert energies[1] == pytest.approx(0.5 * np.square(expected - rest)[:, 2].sum())
+    assert at.joint_strain == pytest.approx(expected, abs=1e-13)
+    parts = 0.5 * evaluator.model.joint_stiffness * np.square(expected - rest)
+    assert energies["bending"] == pytest.approx(parts[:, :2].sum())
+    assert energies["twisting"] == pytest.approx(parts[:, 2].sum())
 
 
 def test_twist_is_unwrapped_from_its_value_before():
-    _, tangents, m1, m2 = random_frames(np.random.default_rng(1), 2)
-    strain = np.empty((1, 3))
-    args = (np.zeros((2, 4)), np.zeros((2, 4, 4)), np.zeros((1, 4, 4)), False)
+    evaluator, at, _ = bent_rod(np.random.default_rng(1), 1)
     found = []
     for before in (0.0, 4 * math.pi, -6 * math.pi):
-        bend_twist(
-            0,
-            1,
-            np.array([0]),
-            np.array([1]),
-            np.ones((1, 3)),
-            np.zeros((1, 3)),
-            np.ones(2),
-            tangents,
-            m1,
-            m2,
-            np.array([before]),
-            strain,
-            *args,
-        )
-        found.append(strain[0, 2])
+        evaluator.stage.twist[:] = before
+        evaluator.forces(at, ("twisting",))
+        found.append(at.joint_strain[0, 2])
     assert found[1] - found[0] == pytest.approx(4 * math.pi)
     assert found[2] - found[0] == pytest.approx(-6 * math.pi)
 

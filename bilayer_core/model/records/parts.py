@@ -7,7 +7,7 @@ program serves all scenes of a dimension.
 from __future__ import annotations
 
 from ...contact.broad_phase import RodSearch
-from ...jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
+from ...jit.record import Address, Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
 
 
 @record
@@ -17,8 +17,7 @@ class Strands:
     size: int  # unknowns of the matrix
     dimension: int  # of them at each node
     edge_count: int
-    first_bend: int  # elements from this one up to `bend_count` are bends and twists, the rest are bonds
-    bend_count: int
+    bend_count: int  # of joints, which come first; the others are bonds
     bandwidth: int  # half of it, without the diagonal
     axes: Matrix  # directions of a node's unknowns in the matrix, shape (dimension, 3)
     row: Indices  # first of them in the matrix, shape (n_node,)
@@ -81,11 +80,11 @@ class Plane:
 
 @record
 class OffAxis:
-    """Joints whose natural curvature depends on the strains of their edges; see `forces.stretch_bend`."""
+    """Joints whose natural curvature depends on the strains of their edges; see `forces.bend_twist`."""
 
     joint: Indices
     slope: Matrix
-    rest: Matrix
+    rest: Matrix  # of all joints at the present strains [rad]
 
 
 @record
@@ -277,22 +276,25 @@ class Flow:
 
 @record
 class Fluid:
-    """Added mass."""
+    """Added mass; see `forces.added_mass`."""
 
-    velocity: Vector
-    mass: Matrix
-    direction1: Matrix
+    velocity: Vector  # U [m/s], shape (3,)
+    edge_node: Indices  # first node of each edge, shape (n_edge,)
+    mass: Matrix  # m₁ l̄ and m₂ l̄ [kg] and j l̄ [kg m²] of each edge, shape (n_edge, 3)
+    direction1: Matrix  # m1 of edges and walls at z, shape (n_edge + n_wall, 3)
     direction2: Matrix
-    shape_gradient: Matrix
-    momentum: Matrix
-    node_velocity: Matrix  # scratch
-    still: Vector
+    node_velocity: Matrix  # at which `fluid_momentum` finds the two that follow [m/s], shape (n_node, 3)
+    spin: Vector  # likewise [rad/s], shape (n_edge,)
+    momentum: Matrix  # P of nodes [N s], shape (n_node, 3)
+    shape_gradient: Matrix  # ∂T/∂(ε, θ) of edges [N, N m], shape (n_edge, 4)
+    fluid_momentum: Address
 
 
 @record
 class PointForces:
     """Forces of fixed direction, or that turn with what they act on (then with the edges of their nodes)."""
 
+    place: int  # of their energy in `Sums`
     node: Indices
     node_load: Indices
     node_vector: Matrix
@@ -303,7 +305,6 @@ class PointForces:
     on_bodies: Matrix
     edge_before: Indices
     edge_after: Indices
-    direction: Stack
 
 
 @record

@@ -31,7 +31,7 @@ class Place:
     surface_arm: Matrix  # and of surfaces
     departure: Matrix  # of nodes from where inertia takes them, x − x̃ [m]: its digits are not those of x
     body_departure: Matrix  # of free bodies, X − X̃ [m]
-    body_turned: Matrix  # vector part of the unit quaternion from R̃ to R of free bodies; see `forces.body`
+    body_turned: Matrix  # vector part of the unit quaternion from R̃ to R of free bodies; see `forces.inertia`
 
 
 @record
@@ -54,8 +54,7 @@ class Stage:
     predicted_body_rotation: Stack  # R̃ of free bodies, shape (n_free, 3, 3)
     twist: Vector  # of joints at the start of the stage
     rest_edge: Vector  # strains without stress
-    rest_joint: Matrix
-    natural: Matrix  # of joints, with what strains off the axis add; `rest_joint` itself where none do
+    rest_joint: Matrix  # of joints; what strains off the axis add is not in it
     load_factor: Vector
     body_turn: Matrix  # rotation vector to where inertia takes free bodies
     way: Matrix  # of nodes, from the start of the stage to where inertia takes them [m]

@@ -1,4 +1,4 @@
-"""Bond between the paired edges of two layers: translation. (Rotation is `bend_twist` with other stiffnesses.)
+"""Bond between the paired edges of two layers: translation. (Rotation is among the elements of `bend_twist`.)
 
     C_T = ½ k_T l Σ_α (p·m̄_α − d_α)²,   m̄_α = ½ (m_α^t + m_α^b),   α = 1, 2, 3        (paper, eqs. 17 to 19)
 
@@ -26,7 +26,9 @@ V = Σ_{α=1,2} Q_α m_α, V′ = Q₁ m2 − Q₂ m1, Q_α = ½ k_T l (p·m̄_�
 
 from __future__ import annotations
 
-from ..jit import kernel
+import math
+
+from ..jit import kernel, piece
 from ..kinematics.vector import (
     add_column,
     add_identity,
@@ -41,6 +43,12 @@ from ..kinematics.vector import (
     row,
     scaled,
 )
+from ..model.force_places import place_of
+from ..model.records.parts import Space
+from ..model.records.problem import Problem
+from ..model.records.step import Place, Stage
+
+BOND = place_of("bond")
 
 
 @kernel
@@ -86,53 +94,19 @@ def _strain_gradients(p, length, t, m1, m2):
     )
 
 
-@kernel
-def bond_translation(
-    position,
-    edge_node,
-    edge_top,
-    edge_bottom,
-    stiffness,
-    rest_offset,
-    length,
-    tangent,
-    director1,
-    director2,
-    edge_gradient_out,
-    edge_hessian_out,
-    pair_gradient_out,
-    pair_hessian_out,
-    top_hessian_out,
-    bottom_hessian_out,
-    cross_hessian_out,
-    with_hessian,
-):
-    """Add the translation bond of every pair of edges and return its energy [J].
-
-    Parameters
-    ----------
-    position : Array
-        Node positions [m], shape (n_node, 3).
-    edge_node : Array
-        First node of each edge, shape (n_edge,).
-    edge_top, edge_bottom : Array
-        The paired edges, shape (n_pair,).
-    stiffness : Array
-        k_T l [N/m], shape (n_pair,).
-    rest_offset : Array
-        d_α [m], shape (n_pair, 3).
-    length, tangent, director1, director2 : Array
-        Of every edge [m, unit].
-    edge_gradient_out, edge_hessian_out : Array
-        As in `bend_twist`; added to.
-    pair_gradient_out, pair_hessian_out : Array
-        ∂/∂p and upper triangle of ∂²/∂p², shapes (n_pair, 3), (n_pair, 3, 3); added to.
-    top_hessian_out, bottom_hessian_out : Array
-        ∂²/∂p ∂(e, θ) of the top and the bottom edge, shape (n_pair, 3, 4); added to.
-    cross_hessian_out : Array
-        ∂²/∂(e, θ)_top ∂(e, θ)_bottom, shape (n_pair, 4, 4); added to.
-    with_hessian : bool
-    """
+@piece(float, Space, Problem, Place, Stage, bool)
+def add_bonds(space, p, at, stage, with_hessian):
+    """Add the translation of every pair of edges with its derivatives by their vector p and by edges."""
+    strands, bonds, sums = p.strands, p.bonds, p.sums
+    if not sums.selected[BOND]:
+        return math.inf
+    position, edge_node, edge_top, edge_bottom = at.position, strands.edge_node, bonds.top, bonds.bottom
+    stiffness, rest_offset = bonds.stiffness, bonds.rest
+    length, tangent, director1, director2 = at.length, at.tangent, at.director1, at.director2
+    edge_gradient_out, edge_hessian_out = sums.edge, sums.edge_hessian
+    pair_gradient_out, pair_hessian_out = sums.pair, sums.pair_hessian
+    top_hessian_out, bottom_hessian_out = space.top_hessian, space.bottom_hessian
+    cross_hessian_out = space.bond_hessian
     energy = 0.0
     for k in range(edge_top.shape[0]):
         kt, kb = edge_top[k], edge_bottom[k]
@@ -195,4 +169,5 @@ def bond_translation(
         cross_hessian_out[k, 3, 1] += theta_row[1]
         cross_hessian_out[k, 3, 2] += theta_row[2]
         cross_hessian_out[k, 3, 3] += c * (t1_theta * b1_theta + t2_theta * b2_theta)
-    return energy
+    sums.energy[BOND] += energy
+    return math.inf

@@ -1,0 +1,144 @@
+"""Forces at points and moments on bodies, as potentials of one step.
+
+A force F that keeps its direction is conservative:
+
+    V = −F·x,    ∂V/∂x = −F,    no Hessian
+
+A moment M that keeps its direction is not: no potential of a rotation has the gradient −M everywhere. Over a step it
+has one up to second order. With R̃ the rotation that inertia predicts, Q = R R̃ᵀ the small turn beyond it, and
+ax(A) = (A₃₂ − A₂₃, A₁₃ − A₃₁, A₂₁ − A₁₂):
+
+    V = −½ M·ax(Q) = −tr(A),    A = ½ [M]× Qᵀ
+    R → exp([φ]×) R:    gradient −ax(A),    Hessian tr(A) 1 − ½ (A + Aᵀ)
+
+(the same form as in `forces.inertia`). For Q = exp([δ]×) the moment that acts is −∂V/∂φ = M − ½ M×δ + O(δ²), and δ is
+the angular acceleration times the square of the step: the error is of second order. V is work, not energy.
+
+A load that turns with what it acts on ("follower") takes its direction from the configuration to which Newton moved
+last, as drag does, and is then one of these: the step ends with the direction that it has there.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import kernel, piece
+from ..jit.stack import stack_matrix
+from ..kinematics.vector import combine3
+from ..model.force_places import place_of
+from ..model.records.parts import Moments, PointForces
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Place, Stage
+from .drag import node_directions
+
+MOMENTS = place_of("moments")
+
+
+@kernel
+def point_force(index, force, position, gradient_out):
+    """Add −Σ F·x [J] of forces [N], shape (n_force, 3), on nodes or free bodies, shape (n_force,), and return it."""
+    energy = 0.0
+    for k in range(index.shape[0]):
+        i = index[k]
+        for c in range(3):
+            gradient_out[i, c] -= force[k, c]
+            energy -= force[k, c] * position[i, c]
+    return energy
+
+
+@kernel
+def in_axes_of_body(vector, k, factor, rotation, f, vector_out):
+    """Row k in the axes of free body f, times a factor."""
+    for c in range(3):
+        vector_out[k, c] = 0.0
+        for a in range(3):
+            vector_out[k, c] += factor * rotation[f, c, a] * vector[k, a]
+
+
+@piece(float, PointForces, Problem, Place, Stage, bool)
+def add_point_forces(loads, p, at, stage, with_hessian):
+    """Add the potential of forces and its gradient by nodes and free bodies."""
+    sums = p.sums
+    if sums.selected[loads.place]:
+        energy = point_force(loads.node, loads.on_nodes, at.position, sums.node)
+        sums.energy[loads.place] = energy + point_force(loads.body, loads.on_bodies, at.body_position, sums.body)
+    return math.inf
+
+
+@piece(int, PointForces, Problem, Place, Stage)
+def start_dead_loads(loads, p, start, stage):
+    """Forces of fixed direction by their factors at the stage."""
+    for k in range(loads.node.shape[0]):
+        for c in range(3):
+            loads.on_nodes[k, c] = stage.load_factor[loads.node_load[k]] * loads.node_vector[k, c]
+    for k in range(loads.body.shape[0]):
+        for c in range(3):
+            loads.on_bodies[k, c] = stage.load_factor[loads.body_load[k]] * loads.body_vector[k, c]
+    return READY
+
+
+@piece(bool, PointForces, Problem, Place, Stage)
+def update_followers(loads, p, at, stage):
+    """Followers take their directions from a configuration; whether there are any."""
+    node, body = loads.node, loads.body
+    for k in range(node.shape[0]):
+        factor, v = stage.load_factor[loads.node_load[k]], loads.node_vector
+        t, m, n = node_directions(loads.edge_before[k], loads.edge_after[k], at)
+        force = combine3(factor * v[k, 0], t, factor * v[k, 1], m, factor * v[k, 2], n)
+        for c in range(3):
+            loads.on_nodes[k, c] = force[c]
+    for k in range(body.shape[0]):
+        factor = stage.load_factor[loads.body_load[k]]
+        in_axes_of_body(loads.body_vector, k, factor, at.body_rotation, body[k], loads.on_bodies)
+    return node.shape[0] + body.shape[0] > 0
+
+
+@piece(float, Moments, Problem, Place, Stage, bool)
+def add_moments(moments, p, at, stage, with_hessian):
+    """Add −½ Σ M·ax(R R̃ᵀ) and its derivatives by the turns φ of free bodies."""
+    sums = p.sums
+    if not sums.selected[MOMENTS]:
+        return math.inf
+    body, moment, gradient, hessian = moments.body, moments.present, sums.body, sums.body_hessian
+    rotation, predicted_rotation = at.body_rotation, stage.predicted_body_rotation
+    energy = 0.0
+    for k in range(body.shape[0]):
+        b = body[k]
+        # row i of [M]× R̃ is that of the cross products of M with the columns of R̃
+        a = stack_matrix(3, 3)
+        for j in range(3):
+            a[0, j] = a[1, j] = a[2, j] = 0.0
+            for m in range(3):
+                r0, r1, r2 = predicted_rotation[b, 0, m], predicted_rotation[b, 1, m], predicted_rotation[b, 2, m]
+                half = 0.5 * rotation[b, j, m]
+                a[0, j] += half * (moment[k, 1] * r2 - moment[k, 2] * r1)
+                a[1, j] += half * (moment[k, 2] * r0 - moment[k, 0] * r2)
+                a[2, j] += half * (moment[k, 0] * r1 - moment[k, 1] * r0)
+        trace = a[0, 0] + a[1, 1] + a[2, 2]
+        energy -= trace
+        gradient[b, 3] -= a[2, 1] - a[1, 2]
+        gradient[b, 4] -= a[0, 2] - a[2, 0]
+        gradient[b, 5] -= a[1, 0] - a[0, 1]
+        if with_hessian:
+            base = 6 * b + 3
+            for i in range(3):
+                hessian[base + i, base + i] += trace
+                for j in range(3):
+                    hessian[base + i, base + j] -= 0.5 * (a[i, j] + a[j, i])
+    sums.energy[MOMENTS] = energy
+    return math.inf
+
+
+@piece(bool, Moments, Problem, Place, Stage)
+def update_moments(moments, p, at, stage):
+    """Moments by their factors, those that follow in the axes of their bodies; whether any does."""
+    body, dead = moments.body, moments.dead
+    for k in range(body.shape[0]):
+        factor = stage.load_factor[moments.load[k]]
+        if k < dead:
+            for c in range(3):
+                moments.present[k, c] = factor * moments.vector[k, c]
+        else:
+            in_axes_of_body(moments.vector, k, factor, at.body_rotation, body[k], moments.present)
+    return body.shape[0] > dead
