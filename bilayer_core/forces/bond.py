@@ -3,21 +3,16 @@
     C_T = ½ k_T l Σ_α (p·m̄_α − d_α)²,   m̄_α = ½ (m_α^t + m_α^b),   α = 1, 2, 3        (paper, eqs. 17 to 19)
 
 p joins the midpoints of the paired edges, bottom to top; m3 is the tangent; l is the rest length of the station, d_α
-the value in the
-initial shape: (c, 0, 0) for a straight bilayer, c half its thickness. k_T is an energy per unit length [N/m²],
-independent of the mesh:
-k_T = 10 EA_r/c², EA_r = EA₁EA₂/(EA₁ + EA₂). (Printed is h₁ + h₂ instead of c, which makes the curvature a third too
-small.)
+the value in the initial shape: (c, 0, 0) for a straight bilayer, c half its thickness. k_T is an energy per unit length
+[N/m²], independent of the mesh: k_T = 10 EA_r/c², EA_r = EA₁EA₂/(EA₁ + EA₂). (Printed is h₁ + h₂ instead of c, which
+makes the curvature a third too small.)
 
 Rotation: k_b l about m2 with k_b = 10 EA_r, k_τ l about the tangent with k_τ = 10 min(GJ)/c², and about m1 only what
-the shear
-of the bond supplies: k_φ = (GJ_lam − ΣGJ)/c² for ``torsion: laminate``, 0 for ``torsion: layers``. (In a twisted
-strip the two centrelines
-tilt against each other by c τ about m1: a penalty there, as printed, locks twist.)
+the shear of the bond supplies: k_φ = (GJ_lam − ΣGJ)/c² for ``torsion: laminate``, 0 for ``torsion: layers``. (In a
+twisted strip the two centrelines tilt against each other by c τ about m1: a penalty there, as printed, locks twist.)
 
 Derivatives follow from the expansions of a frame to second order (see `bend_twist`) and of the tangent; for one edge
-of length l, with
-V = Σ_{α=1,2} Q_α m_α, V′ = Q₁ m2 − Q₂ m1, Q_α = ½ k_T l (p·m̄_α − d_α), p⊥ = P p:
+of length l, with V = Σ_{α=1,2} Q_α m_α, V′ = Q₁ m2 − Q₂ m1, Q_α = ½ k_T l (p·m̄_α − d_α), p⊥ = P p:
 
     ∂/∂ε: −(p·t) V/l + Q₃ p⊥/l                      ∂/∂θ: p·V′
     ∂²/∂ε²: [(p·t)(V tᵀ + t Vᵀ) − ½ (V p⊥ᵀ + p⊥ Vᵀ) − Q₃ (t p⊥ᵀ + p⊥ tᵀ) − Q₃ (p·t) P]/l²

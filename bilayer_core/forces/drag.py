@@ -3,9 +3,8 @@
     F = −½ ρ_f Δl (w C∥ |v_t| v_t t + w C⊥ |v₁| v₁ m1 + h C⊥ |v₂| v₂ m2)        (paper, eq. 27)
 
 v is the velocity relative to the fluid, v_t, v₁, v₂ its components along the tangent, through the thickness and
-across the width; w is the
-width, h the thickness of the section, Δl the Voronoi length; the layers of a section share its drag. (The paper has
-the width for the sideways part as well, a flat ribbon's broad face.)
+across the width; w is the width, h the thickness of the section, Δl the Voronoi length; the layers of a section share
+its drag. (The paper has the width for the sideways part as well, a flat ribbon's broad face.)
 
 With the directions held fixed each component has a convex dissipation potential in the displacement u over a stage of
 length h_t, v = u/h_t − U (U the flow):

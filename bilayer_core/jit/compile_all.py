@@ -31,7 +31,7 @@ LONGEST = {
     "near_pairs",
     "minimise_potential",
     "make_step",
-    "add_elasticity_in_space",
+    "add_bending",
     "assemble_bodies",
     "adapt",
     "take_rod_contacts",

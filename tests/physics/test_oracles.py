@@ -110,7 +110,7 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     right[:25] = 0.0  # where columns of a border begin
     expected = np.linalg.solve(dense, right[:n])
     columns, scaled, corner = right.T.copy(), np.ones((6, n + b)), np.eye(6)
-    eliminate_band(band, n, width(b), 6, columns, scaled, corner)
+    eliminate_band(band, n, b, 6, columns, scaled, corner)
     assert corner == pytest.approx(np.eye(6) - right[:n].T @ expected, rel=1e-10, abs=1e-12)
     assert scaled[:, :n] == pytest.approx(columns[:, :n] / band[:n, 0], rel=1e-10, abs=1e-12)
     backward_band(band, n, width(b), columns[2])

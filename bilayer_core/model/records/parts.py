@@ -17,7 +17,7 @@ class Strands:
     size: int  # unknowns of the matrix
     dimension: int  # of them at each node
     edge_count: int
-    bend_count: int  # of joints, which come first; the others are bonds
+    bend_count: int  # the first joints bend and twist; the others, if any, are those of bonds
     bandwidth: int  # half of it, without the diagonal
     axes: Matrix  # directions of a node's unknowns in the matrix, shape (dimension, 3)
     row: Indices  # first of them in the matrix, shape (n_node,)
