@@ -37,7 +37,8 @@ class Term:
     names : tuple of str
         In the list of forces; any of them asks for the term.
     record : callable
-        Its own record, of the records of a problem by name; None if it needs none, and absent if it does not act.
+        Its own record, from the model and from the records of a problem by name; None if it needs none, and absent if it
+        does not act.
     add : Piece
         Energies and derivatives at a configuration, added to `Sums`: of the own record, Problem, Place, Stage and
         whether second derivatives are asked for. Returns the smallest gap that it knows [m], or infinity.
@@ -49,26 +50,26 @@ class Term:
     """
 
     names: tuple[str, ...]
-    record: Callable[[dict[str, Any]], Record | None]
+    record: Callable[[Model, dict[str, Any]], Record | None]
     add: Piece
     start: Piece | None = None
     follow: Piece | None = None
 
 
 TERMS: tuple[Term, ...] = (
-    Term(("stretching",), lambda of: of["space"], add_stretching),
-    Term(("bending", "twisting"), lambda of: of["space"], add_bending),
-    Term(("bond",), lambda of: of["space"], add_bonds),
-    Term(("stretching", "bending", "bond"), lambda of: of["plane"], add_elasticity_in_plane),
-    Term(("inertia", "damping", "gravity"), lambda of: None, add_inertial_forces),
-    Term(("loads",), lambda of: of["loads"], add_point_forces, start_dead_loads),
-    Term(("barrier",), lambda of: of["surfaces"], add_surface_barrier, start_surface_barrier),
-    Term(("friction",), lambda of: of["sliding"], add_surface_friction, start_surface_friction),
-    Term(("rod barrier", "rod friction"), lambda of: of["rod_contact"], add_rod_contact, start_rod_contact),
-    Term(("followers",), lambda of: of["followers"], add_point_forces, follow=update_followers),
-    Term(("moments",), lambda of: of["moments"], add_moments, follow=update_moments),
-    Term(("drag",), lambda of: of["flow"], add_drag, follow=update_directions_of_drag),
-    Term(("added mass",), lambda of: of["fluid"], add_added_mass, follow=update_fluid),
+    Term(("stretching",), lambda model, of: of["space"], add_stretching),
+    Term(("bending", "twisting"), lambda model, of: of["space"], add_bending),
+    Term(("bond",), lambda model, of: of["space"], add_bonds),
+    Term(("stretching", "bending", "bond"), lambda model, of: of["plane"], add_elasticity_in_plane),
+    Term(("inertia", "damping", "gravity"), lambda model, of: None, add_inertial_forces),
+    Term(("loads",), lambda model, of: of["loads"], add_point_forces, start_dead_loads),
+    Term(("barrier",), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),
+    Term(("friction",), lambda model, of: of["sliding"], add_surface_friction, start_surface_friction),
+    Term(("rod barrier", "rod friction"), lambda model, of: of["rod_contact"], add_rod_contact, start_rod_contact),
+    Term(("followers",), lambda model, of: of["followers"], add_point_forces, follow=update_followers),
+    Term(("moments",), lambda model, of: of["moments"], add_moments, follow=update_moments),
+    Term(("drag",), lambda model, of: of["flow"], add_drag, follow=update_directions_of_drag),
+    Term(("added mass",), lambda model, of: of["fluid"], add_added_mass, follow=update_fluid),
 )
 """In the order of the sum; those that follow the configuration come last."""
 
@@ -100,7 +101,7 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
     """
     chosen = []
     for term in TERMS:
-        own = term.record(records)
+        own = term.record(model, records)
         if set(term.names) & set(model.forces) and (own is None or own.exists):
             chosen.append((term, own))
     chosen.sort(key=lambda pair: pair[0].follow is not None)
@@ -108,10 +109,12 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
     def column(value: Callable) -> np.ndarray:
         return np.array([value(*pair) for pair in chosen], dtype=np.int64)
 
-    return ForceTable(
+    table = ForceTable(
         own=column(lambda term, own: own.address if own is not None else 0),
         add=column(lambda term, own: term.add.address),
         start=column(lambda term, own: term.start.address if term.start else 0),
         follow=column(lambda term, own: term.follow.address if term.follow else 0),
         lasting=sum(term.follow is None for term, _ in chosen),
     )
+    table.holds = [own for _, own in chosen]  # whose addresses are in it
+    return table

@@ -7,7 +7,7 @@ name (`model.force_places.place_of`). An engine refuses to be built for a scene 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -69,12 +69,15 @@ class Force:
         The file that derives it.
     skipped : callable
         Why a scene does not need it; None if it does.
+    on_nodes : bool
+        Whether it has second derivatives by positions of nodes.
     """
 
     name: str
     kind: Kind | None
     formula: str
     skipped: Callable[[Question], str | None]
+    on_nodes: bool = False
 
 
 def _unless(needed: bool, reason: str) -> str | None:
@@ -158,12 +161,18 @@ FORCES: tuple[Force, ...] = (
         "loads.py",
         lambda q: _unless(any(any(load.moment) for load in q.scene.loads), "no moment on a body"),
     ),
-    Force("drag", DISSIPATIVE, "drag.py", lambda q: _unless(q.scene.fluid is not None, "no fluid")),
-    Force("added mass", INERTIAL, "added_mass.py", _added_mass),
-    Force("barrier", CONSERVATIVE, "surface_barrier.py", lambda q: _unless(bool(q.pairs), "no surfaces that can meet")),
-    Force("friction", DISSIPATIVE, "surface_friction.py", _friction),
-    Force("rod barrier", CONSERVATIVE, "rod_contact.py", _rod_barrier),
-    Force("rod friction", DISSIPATIVE, "rod_contact.py", _rod_friction),
+    Force("drag", DISSIPATIVE, "drag.py", lambda q: _unless(q.scene.fluid is not None, "no fluid"), on_nodes=True),
+    Force("added mass", INERTIAL, "added_mass.py", _added_mass, on_nodes=True),
+    Force(
+        "barrier",
+        CONSERVATIVE,
+        "surface_barrier.py",
+        lambda q: _unless(bool(q.pairs), "no surfaces that can meet"),
+        on_nodes=True,
+    ),
+    Force("friction", DISSIPATIVE, "surface_friction.py", _friction, on_nodes=True),
+    Force("rod barrier", CONSERVATIVE, "rod_contact.py", _rod_barrier, on_nodes=True),
+    Force("rod friction", DISSIPATIVE, "rod_contact.py", _rod_friction, on_nodes=True),
 )
 """In the order in which their energies are added."""
 
@@ -179,6 +188,11 @@ def acting(scene: SceneConfig, model: str, dimension: int) -> tuple[str, ...]:
     """Names of the forces with an energy that a scene needs."""
     terms = planned(scene, model, dimension)
     return tuple(force.name for force in FORCES if force.kind is not None and terms[force.name] == "active")
+
+
+def on_nodes(forces: Iterable[str]) -> bool:
+    """Whether any of some forces has second derivatives by positions of nodes."""
+    return any(force.on_nodes for force in FORCES if force.name in set(forces))
 
 
 def kinds() -> dict[str, Kind]:
