@@ -13,7 +13,7 @@ from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Place, Stage
 from .linear.assembly import expand_gradient
-from .linear.attachments import hand_gradient_to_bodies
+from .linear.attachments import condense_gradient
 
 
 def _signature(result, *more):
@@ -96,44 +96,9 @@ def _keep_lasting(p):
     copy(p.sums.first, p.sums.lasting)
 
 
-@kernel
-def expand(p, at):
-    """First derivatives from nodes, edges, pairs and bodies to the unknowns."""
-    held, strands, sums = p.constrained, p.strands, p.sums
-    _expand_edges(p.bonds, strands, sums)
-    hand_gradient_to_bodies(
-        held.unknown,
-        held.free,
-        at.arm,
-        held.wall_free,
-        at.tangent,
-        sums.edge,
-        strands.edge_count,
-        sums.gradient,
-        sums.attached,
-        sums.body,
-    )
-
-
-@kernel
-def _expand_edges(bonds, strands, sums):
-    top = bonds.top
-    bottom = bonds.bottom
-    expand_gradient(
-        strands.edge_node,
-        strands.node_unknown,
-        strands.edge_unknown,
-        top,
-        bottom,
-        sums.edge,
-        sums.pair,
-        sums.node,
-        sums.gradient,
-    )
-
-
 @piece(int, Problem, Place)
 def expand_to_unknowns(p, at):
-    """`expand`"""
-    expand(p, at)
+    """First derivatives from nodes, edges, pairs and bodies to the unknowns."""
+    expand_gradient(p.bonds, p.strands, p.sums)
+    condense_gradient(p.constrained, p.strands, at, p.sums)
     return READY

@@ -37,8 +37,8 @@ class Term:
     names : tuple of str
         In the list of forces; any of them asks for the term.
     record : callable
-        Its own record, from the model and from the records of a problem by name; None if it needs none, and absent if it
-        does not act.
+        Its own record, from the model and from the records of a problem by name; None if it needs none, and absent if
+        it does not act.
     add : Piece
         Energies and derivatives at a configuration, added to `Sums`: of the own record, Problem, Place, Stage and
         whether second derivatives are asked for. Returns the smallest gap that it knows [m], or infinity.

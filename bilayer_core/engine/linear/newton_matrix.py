@@ -17,115 +17,18 @@ import numpy as np
 from numba import types
 
 from ...forces.rod_contact import rods_touch
-from ...jit import call, caller, kernel, piece
+from ...jit import call, caller, kernel
 from ...jit.record import Matrix, Vector
-from ...model.records.problem import BorderedSystem, Problem
+from ...model.records.problem import BorderedSystem
 from ...model.records.status import INDEFINITE, NO_ROOM_IN_BORDER, NOT_FINITE, READY
-from ...model.records.step import Place
 from ..modes import SLOWEST_GROWTH
-from .assembly import expand_bends, expand_edges, expand_pairs, hold_unknowns
-from .bordered_system import (
-    count_negative_of_border,
-    start_border,
-)
+from . import bordered_system, planar_assembly  # noqa: F401 (declare pieces)
+from .assembly import hold_unknowns
 from .contact_columns import gather_columns, scatter_columns
-from .planar_assembly import expand_in_plane, expand_pairs_in_plane, put_in_space, take_in_plane
 
 FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
 SHIFT_GROWTH = 10.0
 LARGEST_SHIFT = 1e8
-
-
-@kernel
-def _assemble_in_space(space, bonds, strands, sums, factor, band):
-    if not space.exists:
-        return
-    expand_edges(
-        strands.edge_node,
-        strands.row,
-        strands.edge_unknown,
-        strands.node_mass,
-        strands.spin_inertia,
-        factor,
-        sums.edge_hessian,
-        sums.node_hessian,
-        sums.node_hessian.shape[0] > 0,
-        band,
-    )
-    expand_bends(
-        strands.bend_count,
-        strands.edge_count,
-        strands.joint_a,
-        strands.joint_b,
-        strands.edge_node,
-        strands.row,
-        strands.edge_unknown,
-        sums.cross_hessian,
-        band,
-    )
-    _add_pairs(bonds, space, strands, sums, band)
-
-
-@kernel
-def _assemble_in_plane(plane, bonds, strands, at, sums, factor, band):
-    if not plane.exists:
-        return
-    expand_in_plane(
-        strands.axes,
-        strands.edge_node,
-        plane.joint_after,
-        strands.row,
-        strands.node_mass,
-        factor,
-        at.length,
-        plane.frame,
-        plane.polar_gradient,
-        plane.polar_hessian,
-        plane.cross_hessian,
-        sums.node_hessian,
-        band,
-    )
-    _add_pairs_in_plane(plane, bonds, strands, sums, band)
-
-
-@kernel
-def _add_pairs_in_plane(plane, bonds, strands, sums, band):
-    if not bonds.exists:
-        return
-    expand_pairs_in_plane(
-        strands.bend_count,
-        bonds.top,
-        bonds.bottom,
-        strands.edge_node,
-        strands.row,
-        plane.frame,
-        plane.pair_hessian,
-        plane.mixed_hessian,
-        plane.cross_hessian,
-        band,
-    )
-
-
-@kernel
-def _add_pairs(bonds, space, strands, sums, band):
-    if not bonds.exists:
-        return
-    expand_pairs(
-        strands.bend_count,
-        bonds.bottom,
-        strands.edge_node,
-        strands.row,
-        sums.pair_hessian,
-        space.top_hessian,
-        space.bottom_hessian,
-        sums.cross_hessian,
-        band,
-    )
-
-
-@kernel
-def _hold(held, strands, band):
-    hold_unknowns(held.row, strands.dimension, strands.bandwidth, band)
 
 
 call_factor = caller("factor_band", lambda _: types.int64(Matrix, types.int64))
@@ -150,10 +53,11 @@ def assemble(p, at, factor, simplified):
         call(p.calls.assemble_in_plane, (p, at, factor))
     if p.rod_contact.exists:
         call(p.calls.take_rod_contacts, (p, simplified))
-    start_border(p.bordered, p.bodies)
+    if p.bordered.exists:
+        p.bordered.coupled[0], p.bordered.width[0] = 0, p.bodies.freedom.shape[1]
     if p.border.exists:
         call(p.calls.assemble_bodies, (p, at))
-    _hold(p.constrained, strands, band)
+    hold_unknowns(p.constrained.row, strands.dimension, strands.bandwidth, band)
 
 
 @kernel
@@ -193,7 +97,7 @@ def factorise(p, at, stage, counts):
             if p.bordered.exists and p.bordered.coupled[0] == 1:
                 call_eliminate(p.calls.eliminate_band, (band, strands.size, p.bordered))
             if counts:
-                of_border = count_negative_of_border(p.bordered)
+                of_border = call(p.calls.count_border, (p,)) if p.bordered.exists else 0
                 p.system.negative[0] = negative + of_border
                 return READY if of_border >= 0 else NOT_FINITE, shift, simplified
             if not p.bordered.exists or call(p.calls.factor_border, (p,)):
@@ -230,31 +134,3 @@ def solve(p):
             system.step[j] = right[j]
     else:
         call(p.calls.step_in_plane, (p,))
-
-
-@piece(int, Problem, float)
-def assemble_in_space(p, factor):
-    """Second derivatives in space, with `factor` times the masses, to the band."""
-    _assemble_in_space(p.space, p.bonds, p.strands, p.sums, factor, p.system.band)
-    return READY
-
-
-@piece(int, Problem, Place, float)
-def assemble_in_plane(p, at, factor):
-    """Second derivatives in a plane, with `factor` times the masses, to the band."""
-    _assemble_in_plane(p.plane, p.bonds, p.strands, at, p.sums, factor, p.system.band)
-    return READY
-
-
-@piece(int, Problem)
-def gradient_in_plane(p):
-    """The gradient along the plane's axes, to the right-hand side."""
-    take_in_plane(p.strands.axes, p.strands.node_unknown, p.strands.row, p.sums.gradient, p.system.right)
-    return READY
-
-
-@piece(int, Problem)
-def step_in_plane(p):
-    """The step along the plane's axes as one in space."""
-    put_in_space(p.strands.axes, p.strands.node_unknown, p.strands.row, p.system.right, p.system.step)
-    return READY

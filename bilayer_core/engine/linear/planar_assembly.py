@@ -13,7 +13,20 @@ is what is solved for.
 
 from __future__ import annotations
 
-from ...jit import kernel
+from ...jit import kernel, piece
+from ...kinematics.vector import dot, row
+from ...model.records.problem import Problem
+from ...model.records.status import READY
+from ...model.records.step import Place
+
+
+@piece(int, Problem, Place, float)
+def assemble_in_plane(p, at, factor):
+    """Write second derivatives in a plane, and `factor` times the masses, into a band of zeros."""
+    _put_edges(p.plane, p.strands, at.length, p.sums.node_hessian, factor, p.system.band)
+    if p.bonds.exists:
+        _add_bonds(p.plane, p.bonds, p.strands, p.system.band)
+    return READY
 
 
 @kernel
@@ -21,13 +34,12 @@ def _node_block(axes, node_hessian, mass, i):
     """Block (pp, pq, qq) of a node by itself: its mass, and what acts on it in space, by an upper triangle."""
     if node_hessian.shape[0] == 0:
         return mass, 0.0, mass
-    h00, h01, h02 = node_hessian[i, 0, 0], node_hessian[i, 0, 1], node_hessian[i, 0, 2]
-    h11, h12, h22 = node_hessian[i, 1, 1], node_hessian[i, 1, 2], node_hessian[i, 2, 2]
-    p0, p1, p2 = axes[0, 0], axes[0, 1], axes[0, 2]
-    q0, q1, q2 = axes[1, 0], axes[1, 1], axes[1, 2]
-    v0, v1, v2 = h00 * p0 + h01 * p1 + h02 * p2, h01 * p0 + h11 * p1 + h12 * p2, h02 * p0 + h12 * p1 + h22 * p2
-    w0, w1, w2 = h00 * q0 + h01 * q1 + h02 * q2, h01 * q0 + h11 * q1 + h12 * q2, h02 * q0 + h12 * q1 + h22 * q2
-    return mass + p0 * v0 + p1 * v1 + p2 * v2, q0 * v0 + q1 * v1 + q2 * v2, mass + q0 * w0 + q1 * w1 + q2 * w2
+    p, q = row(axes, 0), row(axes, 1)
+    h0 = node_hessian[i, 0, 0], node_hessian[i, 0, 1], node_hessian[i, 0, 2]
+    h1 = h0[1], node_hessian[i, 1, 1], node_hessian[i, 1, 2]
+    h2 = h0[2], h1[2], node_hessian[i, 2, 2]
+    v, w = (dot(h0, p), dot(h1, p), dot(h2, p)), (dot(h0, q), dot(h1, q), dot(h2, q))
+    return mass + dot(p, v), dot(q, v), mass + dot(q, w)
 
 
 @kernel
@@ -49,21 +61,7 @@ def _put_block(band, row, column, pp, pq, qp, qq):
 
 
 @kernel
-def expand_in_plane(
-    axes,
-    edge_node,
-    joint_after,
-    node_unknown,
-    node_mass,
-    factor,
-    length,
-    frame,
-    polar_gradient,
-    polar_hessian,
-    cross_hessian,
-    node_hessian,
-    band_out,
-):
+def _put_edges(plane, strands, length, node_hessian, factor, band):
     """Write factor × mass, blocks of single nodes if there are any, edges and bends into a band of zeros; clamps' own
     directions have no place in it.
 
@@ -73,13 +71,13 @@ def expand_in_plane(
         (i, i)     H_a + H_b − C − Cᵀ
         (i + 1, i) −H_b + Cᵀ + C′ᵀ       with C′ of the next joint
         (i + 2, i) −C′ᵀ
-
-    `joint_after` is the joint between each edge and the next, −1 at the end of a strand, shape (n_edge,).
     """
+    axes, frame, unknown, mass = strands.axes, plane.frame, strands.row, strands.node_mass
+    polar_gradient, polar_hessian, cross_hessian = plane.polar_gradient, plane.polar_hessian, plane.cross_hessian
     before_pp = before_pq = before_qq = 0.0  # of the edge before
     pp = pq = qp = qq = 0.0  # of the joint with it
-    for k in range(edge_node.shape[0]):
-        i, joint = edge_node[k], joint_after[k]
+    for k in range(strands.edge_node.shape[0]):
+        i, joint = strands.edge_node[k], plane.joint_after[k]
         tp, tq, mp, mq = frame[k, 0], frame[k, 1], frame[k, 2], frame[k, 3]
         s = polar_hessian[k, 0]
         x = polar_hessian[k, 1] - polar_gradient[k, 1] / length[k]
@@ -95,14 +93,14 @@ def expand_in_plane(
             bp, bq, np, nq = frame[k + 1, 0], frame[k + 1, 1], frame[k + 1, 2], frame[k + 1, 3]
             next_pp, next_pq = up * bp + vp * np, up * bq + vp * nq
             next_qp, next_qq = uq * bp + vq * np, uq * bq + vq * nq
-        own_pp, own_pq, own_qq = _node_block(axes, node_hessian, factor * node_mass[i], i)
+        own_pp, own_pq, own_qq = _node_block(axes, node_hessian, factor * mass[i], i)
         own_pp += before_pp + edge_pp - 2.0 * pp
         own_pq += before_pq + edge_pq - pq - qp
         own_qq += before_qq + edge_qq - 2.0 * qq
-        d0, d1 = node_unknown[i], node_unknown[i + 1]
-        _put_own_block(band_out, d0, own_pp, own_pq, own_qq)
+        d0, d1 = unknown[i], unknown[i + 1]
+        _put_own_block(band, d0, own_pp, own_pq, own_qq)
         _put_block(
-            band_out,
+            band,
             d1,
             d0,
             pp + next_pp - edge_pp,
@@ -111,35 +109,25 @@ def expand_in_plane(
             qq + next_qq - edge_qq,
         )
         if joint >= 0:
-            _put_block(band_out, node_unknown[i + 2], d0, -next_pp, -next_qp, -next_pq, -next_qq)
+            _put_block(band, unknown[i + 2], d0, -next_pp, -next_qp, -next_pq, -next_qq)
             before_pp, before_pq, before_qq = edge_pp, edge_pq, edge_qq
         else:
-            own_pp, own_pq, own_qq = _node_block(axes, node_hessian, factor * node_mass[i + 1], i + 1)
-            _put_own_block(band_out, d1, own_pp + edge_pp, own_pq + edge_pq, own_qq + edge_qq)
+            own_pp, own_pq, own_qq = _node_block(axes, node_hessian, factor * mass[i + 1], i + 1)
+            _put_own_block(band, d1, own_pp + edge_pp, own_pq + edge_pq, own_qq + edge_qq)
             before_pp = before_pq = before_qq = 0.0
         pp, pq, qp, qq = next_pp, next_pq, next_qp, next_qq
 
 
 @kernel
-def expand_pairs_in_plane(
-    first_joint,
-    pair_top,
-    pair_bottom,
-    edge_node,
-    node_unknown,
-    frame,
-    pair_hessian,
-    mixed_hessian,
-    cross_hessian,
-    band_out,
-):
+def _add_bonds(plane, bonds, strands, band):
     """Add the blocks of bonds; the unknowns of a bond are consecutive: x_b0, x_t0 of one station and x_b1, x_t1 of the
     next (`model.layout`).
     """
-    for k in range(pair_bottom.shape[0]):
-        top, bottom = pair_top[k], pair_bottom[k]
-        start = node_unknown[edge_node[bottom]]
-        cross = cross_hessian[first_joint + k, 3]
+    frame, pair_hessian, mixed_hessian = plane.frame, plane.pair_hessian, plane.mixed_hessian
+    for k in range(bonds.bottom.shape[0]):
+        top, bottom = bonds.top[k], bonds.bottom[k]
+        start = strands.row[strands.edge_node[bottom]]
+        cross = plane.cross_hessian[strands.bend_count + k, 3]
         for m in range(2):
             for n in range(2):
                 p = 0.25 * pair_hessian[k, m + n]
@@ -150,32 +138,37 @@ def expand_pairs_in_plane(
                 c_ = cross * frame[top, 2 + n] * frame[bottom, 2 + m]
                 column, r = start + n, m - n
                 if m >= n:
-                    band_out[column, r] += p + b + b_  # b0 b0
-                    band_out[column + 2, r] += p - t - t_  # t0 t0
-                    band_out[column + 4, r] += p - b - b_  # b1 b1
-                    band_out[column + 6, r] += p + t + t_  # t1 t1
-                band_out[column, r + 2] += -p + t_ - b + c  # t0 b0
-                band_out[column, r + 4] += p + b - b_  # b1 b0
-                band_out[column + 2, r + 2] += -p + t + b_ - c_  # b1 t0
-                band_out[column, r + 6] += -p - t_ - b - c  # t1 b0
-                band_out[column + 2, r + 4] += p - t + t_  # t1 t0
-                band_out[column + 4, r + 2] += -p - t_ + b + c  # t1 b1
+                    band[column, r] += p + b + b_  # b0 b0
+                    band[column + 2, r] += p - t - t_  # t0 t0
+                    band[column + 4, r] += p - b - b_  # b1 b1
+                    band[column + 6, r] += p + t + t_  # t1 t1
+                band[column, r + 2] += -p + t_ - b + c  # t0 b0
+                band[column, r + 4] += p + b - b_  # b1 b0
+                band[column + 2, r + 2] += -p + t + b_ - c_  # b1 t0
+                band[column, r + 6] += -p - t_ - b - c  # t1 b0
+                band[column + 2, r + 4] += p - t + t_  # t1 t0
+                band[column + 4, r + 2] += -p - t_ + b + c  # t1 b1
 
 
-@kernel
-def take_in_plane(axes, space_unknown, plane_unknown, vector, out):
-    """Write the part in the plane of a vector of the unknowns in space."""
-    for i in range(space_unknown.shape[0]):
-        s, d = space_unknown[i], plane_unknown[i]
-        x0, x1, x2 = vector[s], vector[s + 1], vector[s + 2]
-        out[d] = axes[0, 0] * x0 + axes[0, 1] * x1 + axes[0, 2] * x2
-        out[d + 1] = axes[1, 0] * x0 + axes[1, 1] * x1 + axes[1, 2] * x2
+@piece(int, Problem)
+def gradient_in_plane(p):
+    """Write the gradient along the plane's axes to the right-hand side."""
+    strands = p.strands
+    axes, vector, out = strands.axes, p.sums.gradient, p.system.right
+    for i in range(strands.row.shape[0]):
+        s, d = strands.node_unknown[i], strands.row[i]
+        along = vector[s], vector[s + 1], vector[s + 2]
+        out[d], out[d + 1] = dot(row(axes, 0), along), dot(row(axes, 1), along)
+    return READY
 
 
-@kernel
-def put_in_space(axes, space_unknown, plane_unknown, vector, out):
-    """Write a vector of the unknowns in the plane as one of those in space; what is no node's is left."""
-    for i in range(space_unknown.shape[0]):
-        s, d = space_unknown[i], plane_unknown[i]
+@piece(int, Problem)
+def step_in_plane(p):
+    """Write the step along the plane's axes as one in space; what is no node's is left."""
+    strands = p.strands
+    axes, vector, out = strands.axes, p.system.right, p.system.step
+    for i in range(strands.row.shape[0]):
+        s, d = strands.node_unknown[i], strands.row[i]
         for c in range(3):
             out[s + c] = axes[0, c] * vector[d] + axes[1, c] * vector[d + 1]
+    return READY

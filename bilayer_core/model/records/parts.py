@@ -69,7 +69,7 @@ class Plane:
 
     normal: Vector
     side: Vector
-    joint_after: Indices
+    joint_after: Indices  # between each edge and the next, −1 at the end of a strand, shape (n_edge,)
     frame: Matrix
     polar_gradient: Matrix
     polar_hessian: Matrix

@@ -129,6 +129,7 @@ class Calls:
     gradient_in_plane: Address
     step_in_plane: Address
     factor_border: Address
+    count_border: Address
     minimise_potential: Address
     start_step_point: Address
     predict_stage: Address
