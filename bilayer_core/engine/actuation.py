@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from ..jit import kernel, piece
 from ..jit.record import Indices, Matrix, Stack, Vector, record
 from ..kinematics.turning import spin_of, turn_by
+from ..model.records.status import READY
+from ..model.records.step import Course
 
 
 @record
@@ -38,12 +40,12 @@ LEVEL, BEGIN, RATE, AMPLITUDE, FREQUENCY, PHASE = range(len(PARTS))
 
 
 @kernel
-def _value(piece, row, time):
+def _value(pieces, row, time):
     """`Piece.value`"""
-    s = max(time - piece[row, BEGIN], 0.0)
-    value = piece[row, LEVEL] + piece[row, RATE] * s
-    if piece[row, AMPLITUDE] != 0.0:
-        value += piece[row, AMPLITUDE] * math.sin(piece[row, FREQUENCY] * s + piece[row, PHASE])
+    s = max(time - pieces[row, BEGIN], 0.0)
+    value = pieces[row, LEVEL] + pieces[row, RATE] * s
+    if pieces[row, AMPLITUDE] != 0.0:
+        value += pieces[row, AMPLITUDE] * math.sin(pieces[row, FREQUENCY] * s + pieces[row, PHASE])
     return value
 
 
@@ -54,8 +56,8 @@ def look_back(acting, begin, course):
         course.first[0, c] = _value(acting.stimulus, c, begin)
 
 
-@kernel
-def look_ahead(acting, nodes, begin, h, course):
+@piece(int, Acting, Vector, float, float, Course)
+def drive_step(acting, nodes, begin, h, course):
     """What acts at the stages of a step of length `h` [s] that begins at `begin` [s], as the course of one step."""
     for n in range(nodes.shape[0]):
         course.elapsed[n] = nodes[n] * h
@@ -65,6 +67,7 @@ def look_ahead(acting, nodes, begin, h, course):
         for i in range(acting.load.shape[0]):
             course.load_factor[0, n, i] = _value(acting.load, i, time)
         _place(acting.paths, time, course.position[0, n], course.rotation[0, n], course.rates[0, n])
+    return READY
 
 
 @kernel

@@ -9,7 +9,7 @@ from ..kinematics.frames import edge_geometry, planar_frames, transport_director
 from ..kinematics.turning import turn_between, turn_by, turn_further, turned_by
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Place
+from ..model.records.step import Place, Stage, StateArrays
 
 
 @kernel
@@ -176,7 +176,7 @@ def copy_prescribed(bodies, source_place, source_rotation, at):
         copy_matrix(source_rotation, b, at.rotation, b)
 
 
-@kernel
+@piece(int, Problem, Place, float, Stage, Place)
 def move(p, base, alpha, stage, at):
     """Become `base` moved by α times the step in `System`."""
     bodies, strands, step, body_step = p.bodies, p.strands, p.system.step, p.system.body_step
@@ -206,6 +206,7 @@ def move(p, base, alpha, stage, at):
     call(p.calls.place_carried, (p, at))
     put_departure_of_held(p.constrained, stage, at)
     call(p.calls.place_frames, (p, base, at, at.angle))
+    return READY
 
 
 @kernel
@@ -249,7 +250,7 @@ def measure_departure(bodies, stage, at):
         turn_further(x, y, z, at.body_turned, at.body_turned, f)
 
 
-@kernel
+@piece(int, Problem, StateArrays, Place)
 def take_state(p, state, at):
     """Start from a state."""
     bodies, strands = p.bodies, p.strands
@@ -268,3 +269,4 @@ def take_state(p, state, at):
     call(p.calls.place_carried, (p, at))
     edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
     second_director(at.tangent, at.director1, at.director2)
+    return READY

@@ -176,7 +176,7 @@ class Engine:
         count_step(self._counted, gap, float(state.time[0]))
 
     def count_shape(self, state: State, end: Place, rest_edge: Array) -> None:
-        """Take the shape of a state that no loop has led to into the tally: `engine.step.count_shape` without kernels.
+        """Take the shape of a state that no loop has led to into the tally: `engine.step.count_end` without kernels.
 
         Parameters
         ----------
@@ -205,7 +205,7 @@ class Settings:
     mode : int
         From `modes`.
     length : float
-        For other modes than steps, as for `step.take_step` [s].
+        For other modes than steps, as for `step.make_step` [s].
     changes : bool
         Whether a jump ends the loop, because another integrator has to step in.
     counts : bool

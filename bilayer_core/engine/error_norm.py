@@ -25,10 +25,11 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from ..jit import kernel, piece
 from ..jit.record import Indices, Vector, record
 from ..jit.stack import stack_vector
 from ..kinematics.turning import turn_between
+from ..model.records.step import StateArrays
 
 
 @record
@@ -43,7 +44,7 @@ class Yardstick:
     reach: Vector  # of bodies [m], shape (n_body,)
 
 
-@kernel
+@piece(float, Yardstick, StateArrays, StateArrays, float)
 def deviation(yardstick, before, after, h):
     """D of a step over the length of the longest rod; times `Method.estimate` its local error.
 

@@ -11,14 +11,13 @@ from ..forces.inertia import DAMPING, INERTIA
 from ..forces.rod_contact import ROD_BARRIER, ROD_FRICTION
 from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack, Vector, record
-from ..model.records.outcome import ENERGY, GAP, HELD_UP, PAIR, SHIFT
+from ..model.records.outcome import ENERGY, GAP, HELD_UP, PAIR, SHIFT, SIMPLIFIED, STATUS
 from ..model.records.problem import Problem
 from ..model.records.status import NO_ROOM_FOR_RODS, READY
 from ..model.records.step import Place, Point, Stage, StateArrays
-from .configuration import measure_departure, move, take_state
-from .linear.newton_matrix import EXACT, assemble, factorise, solve
-from .newton import bound, correction_speed, look_ahead
-from .potential import add_forces, follow, start_stage
+from .configuration import measure_departure
+from .linear.newton_matrix import EXACT
+from .newton import correction_speed, look_ahead
 
 
 @record
@@ -82,9 +81,9 @@ def evaluate_at(task, operation, base, at, with_hessian):
     p, state, stage = task.problem, task.state, task.stage
     status, energy, gap = READY, 0.0, math.inf
     if operation == TAKE_STATE:
-        take_state(p, state, at)
+        call(p.calls.take_state, (p, state, at))
     elif operation == MOVE:
-        move(p, base, 1.0, stage, at)
+        call(p.calls.move, (p, base, 1.0, stage, at))
     elif operation == CARRY_FRAMES:
         call(p.calls.place_frames, (p, base, at, at.angle))
     elif operation == START_POINT:
@@ -98,14 +97,14 @@ def evaluate_at(task, operation, base, at, with_hessian):
     elif operation == STAND_STILL:
         call(p.calls.stand_still_stage, (p, state, at, False, stage))
     elif operation == START_STAGE:
-        status = start_stage(p, at, stage)
+        status = call(p.calls.start_stage, (p, at, stage))
     if operation == START_STAGE or operation == FOLLOW:
-        follow(p, at, stage)
+        call(p.calls.follow, (p, at, stage))
     elif operation == FORCES or operation == UNKNOWNS:
         status = _find(p, at)
         measure_departure(p.bodies, stage, at)
         if status == READY:
-            gap = add_forces(p, at, stage, with_hessian, False)
+            gap = call(p.calls.add_forces, (p, at, stage, with_hessian, False))
             for k in range(p.sums.energy.shape[0]):
                 energy += p.sums.energy[k]
             if operation == UNKNOWNS:
@@ -166,19 +165,19 @@ def solve_at(task, operation, at):
         if p.sums.selected[DAMPING]:
             factor += p.damping / stage.lengths[0]
         before = _leave_out(p.rod_contact, p.sums.selected)
-        assemble(p, at, factor, EXACT)
+        call(p.calls.assemble, (p, at, factor, EXACT))
         _put_back(p.rod_contact, before)
     elif operation == FACTORISE:
-        status, first, simplified = factorise(p, at, stage, False)
-        second = float(simplified)
+        status = call(p.calls.factorise, (p, at, stage, False))
+        first, second = p.outcome.figures[SHIFT], p.outcome.figures[SIMPLIFIED]
     elif operation == SOLVE:
-        solve(p)
+        call(p.calls.solve, (p,))
     elif operation == SPEED:
         first = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
     elif operation == BOUND:
         slope, _ = look_ahead(p.strands, p.bodies, p.sums, p.system)
-        first, pair, status = bound(p, at)
-        second = first
+        first = call(p.calls.bound, (p, at))
+        pair, status, second = p.outcome.counts[PAIR], p.outcome.counts[STATUS], first
         if p.slips.exists:
             second = call(p.calls.where_friction_holds, (p, at, stage, slope, first))
     p.outcome.figures[SHIFT], p.outcome.figures[HELD_UP], p.outcome.counts[PAIR] = first, second, pair

@@ -12,11 +12,11 @@ from ..kinematics.copying import copy
 from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, PLACE, RESIDUAL, STATUS
 from ..model.records.status import CONVERGED, JUMPED, MAX_ITERATIONS, READY, TOO_INACCURATE
 from ..model.records.step import Place, StateArrays
-from .actuation import Acting, look_ahead, look_back
-from .error_norm import Yardstick, deviation
+from .actuation import Acting, look_back
+from .error_norm import Yardstick
 from .loop import Loop
 from .modes import STEP
-from .step import count_in, count_shape, has_jumped
+from .step import has_jumped
 from .step_size import FAILURE_FACTOR, STRETCH, after_rejection, after_success, fit
 
 place_at = record_at(Place)
@@ -128,7 +128,7 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, due, most, ne
     mode : int
         From `modes`.
     length : float
-        For other modes than steps, as for `step.take_step` [s].
+        For other modes than steps, as for `step.make_step` [s].
     changes : bool
         Whether the method begins with slopes that the step before must have left: a jump ends the loop then.
     counts : bool
@@ -169,7 +169,7 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, due, most, ne
             h = fit(h, until - begin)
             time = until if h == until - begin else begin + h
             h = time - begin
-            look_ahead(adaptation.acting, method.nodes, begin, h, course)
+            call(p.calls.drive_step, (adaptation.acting, method.nodes, begin, h, course))
             span = h if mode == STEP else length
             status = call(
                 p.calls.make_step,
@@ -188,7 +188,8 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, due, most, ne
             backtracks += halvings
             error = math.inf
             if status == CONVERGED:
-                error = method.estimate * deviation(adaptation.yardstick, kept, state, h) / control.tolerance
+                defect = call(p.calls.deviation, (adaptation.yardstick, kept, state, h))
+                error = method.estimate * defect / control.tolerance
                 if error <= 1.0:
                     break
                 copy(kept.values, state.values)
@@ -210,8 +211,7 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, due, most, ne
         clock.time[0] = time
         clock.step[0] += 1.0
         if counts:
-            count_in(p.surfaces, p.strands, p.sums, state, gap, time, loop.tally)
-            count_shape(p.strands, place_at(work.places[end]), work.stage.rest_edge, state, loop.tally)
+            call(p.calls.count_end, (p, state, place_at(work.places[end]), work.stage, gap, time, loop.tally))
         if time == until or time >= due:
             return _leave(p, k + 1, CONVERGED, -1, end, gap)
     return _leave(p, most, status, pair, end, gap)

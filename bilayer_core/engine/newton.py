@@ -27,10 +27,9 @@ from ..model.records.status import (
     READY,
 )
 from ..model.records.step import Place, Stage
-from .configuration import copy_prescribed, move, put_departure_of_held
-from .linear.newton_matrix import factorise, solve
+from .configuration import copy_prescribed, put_departure_of_held
 from .modes import NEGATIVE, VALUE
-from .potential import evaluate, follow
+from .potential import evaluate
 
 ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 2006, ch. 3)
 KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
@@ -89,23 +88,24 @@ LAST_DIGITS = 4.0 * 2.0**-52
 """Relative error of a coordinate by four units of its last digit."""
 
 
-@kernel
+@piece(float, Problem, Place)
 def bound(p, at):
-    """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open, the near pair that sets it
-    (−1: none), and whether that could be found.
+    """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open; the near pair that sets it
+    (−1: none), and whether that could be found, are left in `Outcome`.
     """
     _move_held(p.constrained, p.system, at)
-    fraction, pair, status = 1.0, -1, READY
+    counts = p.outcome.counts
+    counts[PAIR], counts[STATUS] = -1, READY
+    fraction = 1.0
     if p.surfaces.exists:
         fraction = call(p.calls.bound_at_surfaces, (p, at))
-        pair, status = p.outcome.counts[PAIR], p.outcome.counts[STATUS]
-    if status != READY or not p.rod_contact.exists:
-        return fraction, pair, status
+    if counts[STATUS] != READY or not p.rod_contact.exists:
+        return fraction
     between = call(p.calls.bound_between_rods, (p, at))
-    status = p.outcome.counts[STATUS]
     if between < fraction:
-        return between, -1, status
-    return fraction, pair, status
+        counts[PAIR] = -1
+        return between
+    return fraction
 
 
 @kernel
@@ -131,21 +131,21 @@ def _move_prescribed(bodies, start, position, rotation, motion):
             motion[b, 3], motion[b, 4], motion[b, 5] = turn_between(start.rotation, b, rotation, b)
 
 
-@kernel
-def first_guess(p, start, position, rotation, stage, guess, whole):
+@piece(int, Problem, Place, Matrix, Stack, Stage, Place, bool)
+def first_guess_of(p, start, position, rotation, stage, guess, whole):
     """Set `guess` to `start` moved to where inertia takes it, or as far as no gap closes, prescribed bodies to given
     poses.
 
     Frames are carried over Newton's iterates from here: a first iterate that is off by O(h), such as one whose bodies
     have not turned, would leave a twist of O(h²) in every step.
 
-    Returns a status: `BLOCKED` with the blocking pair if prescribed motion would close a gap, or, where the `whole` way
-    is asked for, if it cannot be gone.
+    Returns a status: `BLOCKED`, with the blocking pair in `Outcome`, if prescribed motion would close a gap, or, where
+    the `whole` way is asked for, if it cannot be gone.
     """
     bodies, system = p.bodies, p.system
     free = bodies.mass.shape[0]
     _move_prescribed(bodies, start, position, rotation, system.motion)
-    fraction, pair = 1.0, -1
+    fraction, counts = 1.0, p.outcome.counts
     for attempt in range(3):
         for f in range(free):
             b = bodies.body_of_free[f]
@@ -155,13 +155,14 @@ def first_guess(p, start, position, rotation, stage, guess, whole):
         for i in range(system.node_step.shape[0]):
             for c in range(3):
                 system.node_step[i, c] = fraction * stage.way[i, c]
-        alpha, pair, status = bound(p, start)
-        if status != READY:
-            return status, -1
+        alpha = call(p.calls.bound, (p, start))
+        if counts[STATUS] != READY:
+            counts[PAIR] = -1
+            return counts[STATUS]
         if alpha >= 1.0:
             break
         if attempt == 2 or whole:
-            return BLOCKED, pair
+            return BLOCKED
         fraction *= (0.5 if attempt == 0 else 0.0) * alpha
     for i in range(system.node_step.shape[0]):
         for c in range(3):
@@ -198,7 +199,8 @@ def first_guess(p, start, position, rotation, stage, guess, whole):
     call(p.calls.place_frames, (p, start, guess, guess.turn))
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]
-    return READY, -1
+    counts[PAIR] = -1
+    return READY
 
 
 FACTORISE, FOLLOW, SEARCH = 0, 1, 2
@@ -206,8 +208,8 @@ FACTORISE, FOLLOW, SEARCH = 0, 1, 2
 of the line search."""
 
 
-@kernel
-def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
+@piece(int, Problem, Place, Place, Stage, float, int, int)
+def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     """Move `at` to the minimum of the potential, or only do there what is `wanted` (`modes`); `trial` is scratch.
 
     All evaluations are at one place, because the compiler would make as many copies of them as there are places. Where
@@ -220,15 +222,11 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
     Returns
     -------
     status : int
-    swapped : bool
-        Whether the minimum is `trial` and not `at`.
-    iterations, factorisations, backtracks : int
-    residual : float
-        Speed of the last correction [m/s].
-    gap : float
-        Smallest gap to a surface or another rod [m].
+        In `Outcome`: whether the minimum is `trial` and not `at`, numbers of iterations, factorisations and backtracks,
+        the speed of the last correction [m/s], and the smallest gap to a surface or another rod [m].
     """
-    follow(p, at, stage)
+    counts, figures = p.outcome.counts, p.outcome.figures
+    call(p.calls.follow, (p, at, stage))
     swapped, fresh, bounded, short, task = False, True, False, False, FACTORISE
     settled = False  # whether what is left to do is the last correction
     found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
@@ -237,7 +235,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
     energy = alpha = slope = noise = 0.0
     while True:
         if task == SEARCH:
-            move(p, at, alpha, stage, trial)
+            call(p.calls.move, (p, at, alpha, stage, trial))
             if settled:
                 copy(at.joint_strain, trial.joint_strain)  # twists, by which turns are counted, are near enough
                 swapped, status = not swapped, CONVERGED
@@ -269,7 +267,7 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
             iterations += not fresh
             fresh, previous = False, residual
             at, trial, swapped = trial, at, not swapped
-            if follow(p, at, stage):
+            if call(p.calls.follow, (p, at, stage)):
                 curved, task = False, FOLLOW
             if short or halvings > 0:
                 task = FACTORISE
@@ -282,14 +280,14 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
                     status = NOT_FINITE
                     break
                 factorisations += 1
-                status, _, _ = factorise(p, at, stage, wanted == NEGATIVE)
+                status = call(p.calls.factorise, (p, at, stage, wanted == NEGATIVE))
                 if wanted == NEGATIVE and status == READY:
                     status = CONVERGED
                 if status != READY:
                     break
                 iterations += 1
                 fresh = True
-        solve(p)
+        call(p.calls.solve, (p,))
         residual = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
         if not math.isfinite(residual):
             status = NOT_FINITE
@@ -302,14 +300,17 @@ def minimise(p, at, trial, stage, tolerance, max_iterations, wanted):
             task = FACTORISE
             continue
         slope, noise = look_ahead(p.strands, p.bodies, p.sums, p.system)
-        alpha, _, status = bound(p, at)
+        alpha = call(p.calls.bound, (p, at))
+        status = counts[STATUS]
         if status != READY:
             break
         bounded, halvings, task = alpha < 1.0, 0, SEARCH
         if fresh and not settled and p.slips.exists:
             alpha = call(p.calls.where_friction_holds, (p, at, stage, slope, alpha))
         short = alpha < 1.0
-    return status, swapped, iterations, factorisations, backtracks, residual, gap
+    counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
+    counts[BACKTRACKS], figures[RESIDUAL], figures[GAP] = backtracks, residual, gap
+    return status
 
 
 @kernel
@@ -333,22 +334,3 @@ def look_ahead(strands, bodies, sums, system):
         for c in range(3):
             system.node_step[i, c] = system.step[strands.node_unknown[i] + c]
     return slope, ROUNDING * noise
-
-
-@piece(int, Problem, Place, Matrix, Stack, Stage, Place, bool)
-def first_guess_of(p, start, position, rotation, stage, guess, whole):
-    """`first_guess`; the pair is left in `Outcome`."""
-    status, p.outcome.counts[PAIR] = first_guess(p, start, position, rotation, stage, guess, whole)
-    return status
-
-
-@piece(int, Problem, Place, Place, Stage, float, int, int)
-def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
-    """`minimise`; all but the status is left in `Outcome`."""
-    counts, figures = p.outcome.counts, p.outcome.figures
-    status, swapped, iterations, factorisations, backtracks, residual, gap = minimise(
-        p, at, trial, stage, tolerance, max_iterations, wanted
-    )
-    counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
-    counts[BACKTRACKS], figures[RESIDUAL], figures[GAP] = backtracks, residual, gap
-    return status

@@ -27,7 +27,7 @@ call_start = caller("the start of a force", lambda _: _signature(types.int64))
 call_follow = caller("a force that follows", lambda _: _signature(types.boolean))
 
 
-@kernel
+@piece(int, Problem, Place, Stage)
 def start_stage(p, start, stage):
     """Freeze what a stage depends on: near pairs, friction's contacts, loads. Returns whether it can go on."""
     forces = p.forces
@@ -39,7 +39,7 @@ def start_stage(p, start, stage):
     return READY
 
 
-@kernel
+@piece(bool, Problem, Place, Stage)
 def follow(p, at, stage):
     """Let forces take from a configuration what they hold fixed between moves; whether any does."""
     forces, moved = p.forces, False
@@ -56,7 +56,7 @@ def evaluate(p, at, stage, with_hessian, again):
     `again` the configuration is that of the last evaluation, and only what `follow` has changed since is found anew,
     without second derivatives and the gap.
     """
-    gap = add_forces(p, at, stage, with_hessian, again)
+    gap = call(p.calls.add_forces, (p, at, stage, with_hessian, again))
     call(p.calls.expand_to_unknowns, (p, at))
     energy = 0.0
     for k in range(p.sums.energy.shape[0]):
@@ -64,7 +64,7 @@ def evaluate(p, at, stage, with_hessian, again):
     return energy, gap
 
 
-@kernel
+@piece(float, Problem, Place, Stage, bool, bool)
 def add_forces(p, at, stage, with_hessian, again):
     """Energies and first derivatives by nodes, edges, pairs and bodies, second ones on request; parameters as for
     `evaluate`. Returns the smallest gap [m].

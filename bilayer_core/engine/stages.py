@@ -30,7 +30,7 @@ from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn
 from ..kinematics.vector import row
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Place, Point, Stage, StateArrays
+from ..model.records.step import Method, Place, Point, Stage, StateArrays, Work
 from .configuration import clear_departure
 
 SPIN_ITERATIONS = 50
@@ -48,9 +48,10 @@ def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
     )
 
 
-@kernel
-def start_point(bodies, fluid, strands, state, start, first):
+@piece(int, Problem, StateArrays, Place, Point)
+def start_step_point(p, state, start, first):
     """The start of a step."""
+    bodies = p.bodies
     first.displacement[:] = 0.0
     first.body_displacement[:] = 0.0
     copy(state.body_rotation, first.rotation)
@@ -65,43 +66,43 @@ def start_point(bodies, fluid, strands, state, start, first):
         momentum = _tensor_times(bodies.second_moment, f, start.body_rotation, f, w0, w1, w2, scratch)
         for c in range(3):
             first.angular_momentum[f, c] = momentum[c]
-    momentum_at(fluid, start, state.velocity, first.fluid_momentum)
+    momentum_at(p.fluid, start, state.velocity, first.fluid_momentum)
     add_scaled(first.fluid_momentum, 1.0, state.fluid_excess)
+    return READY
 
 
-@kernel
-def copy_point(source, target):
-    """All parts of a point."""
-    copy(source.vectors, target.vectors)
-    copy(source.rotation, target.rotation)
+@piece(int, Work, Method, int)
+def place_origin(work, method, n):
+    """Put the origin of stage n, or a step's end beyond its last stage, to where earlier stages have it.
 
-
-@kernel
-def gain(origin, end, gained, turned, n):
-    """Write what stage n has gained over its origin: vectors, and rotation vectors of bodies."""
-    for i in range(origin.vectors.shape[0]):
-        gained[n, i] = end.vectors[i] - origin.vectors[i]
-    for b in range(origin.rotation.shape[0]):
-        turned[n, b, 0], turned[n, b, 1], turned[n, b, 2] = turn_between(origin.rotation, b, end.rotation, b)
-
-
-@kernel
-def add_stage(total, weight, gained, turned, scratch):
-    """Add a part of what a stage has gained; rotations likewise on their group. `scratch` has room for all
-    rotations.
+    First note what the stage before has gained over its own origin: vectors, and rotation vectors of bodies. Rotations
+    advance on their group.
     """
-    add_scaled(total.vectors, weight, gained)
-    copy(total.rotation, scratch)
-    for b in range(total.rotation.shape[0]):
-        turn_by(weight * turned[b, 0], weight * turned[b, 1], weight * turned[b, 2], scratch, b, total.rotation, b)
+    origin, end, gained, turned = work.origin, work.end, work.gained, work.gained_turn
+    if n > 0:
+        for i in range(origin.vectors.shape[0]):
+            gained[n - 1, i] = end.vectors[i] - origin.vectors[i]
+        for b in range(origin.rotation.shape[0]):
+            x, y, z = turn_between(origin.rotation, b, end.rotation, b)
+            turned[n - 1, b, 0], turned[n - 1, b, 1], turned[n - 1, b, 2] = x, y, z
+    copy(work.first.vectors, origin.vectors)
+    copy(work.first.rotation, origin.rotation)
+    for j in range(n):
+        weight = method.couplings[n, j]
+        for i in range(origin.vectors.shape[0]):
+            origin.vectors[i] += weight * gained[j, i]
+        copy(origin.rotation, work.rotation)
+        for b in range(origin.rotation.shape[0]):
+            x, y, z = weight * turned[j, b, 0], weight * turned[j, b, 1], weight * turned[j, b, 2]
+            turn_by(x, y, z, work.rotation, b, origin.rotation, b)
+    return READY
 
 
-@kernel
-def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
-    """Move an origin by what the slopes at the start of a step of length h add to it.
-
-    `along`, `bend` and `momenta` are the weights of q̇ h, q̈ h² and ṗ h.
-    """
+@piece(int, Problem, StateArrays, Work, Method, int, float)
+def move_along(p, state, work, method, n, h):
+    """Move the origin of stage n by what the slopes at the start of a step of length h add to it."""
+    bodies, point, first, scratch = p.bodies, work.origin, work.first, work.rotation
+    along, bend, momenta = method.along[n], method.bend, method.momenta[n]  # weights of q̇ h, q̈ h² and ṗ h
     add_scaled(point.displacement, along * h, state.velocity)
     add_scaled(point.body_displacement, along * h, state.body_velocity)
     add_scaled(point.turn, along * h, state.spin)
@@ -134,6 +135,7 @@ def move_along(bodies, point, state, first, h, along, bend, momenta, scratch):
             y += bend * h * h * rate[1]
             z += bend * h * h * rate[2]
         turn_by(x, y, z, scratch, b, point.rotation, b)
+    return READY
 
 
 @kernel
@@ -154,17 +156,16 @@ def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned
     return x, y, z
 
 
-@kernel
-def predict(bodies, held, state, origin, previous, start, turned, position, rotation, rates, stage):
+@piece(int, Problem, StateArrays, Point, Point, Place, Vector, Matrix, Stack, Matrix, Stage)
+def predict_stage(p, state, origin, previous, start, turned, position, rotation, rates, stage):
     """Frozen data of a stage from its origin; puts the origin of what bodies hold to where it has their velocity.
 
     `previous` is the end of the stage before, or the start of the step, and `start` its configuration; `position`,
     `rotation` and `rates` are those of prescribed bodies at the time of the stage, among those of all. `turned` is the
     turn of edges from the start of the step, where positions are those of `state`, to `start`.
     """
-    length = stage.lengths[0]
-    count = origin.rotation.shape[0]
-    for b in range(count):
+    bodies, length = p.bodies, stage.lengths[0]
+    for b in range(origin.rotation.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
             w0, w1, w2 = rates[b, 3], rates[b, 4], rates[b, 5]
@@ -199,7 +200,7 @@ def predict(bodies, held, state, origin, previous, start, turned, position, rota
             stage.origin_position[i, c] = state.position[i, c] + moved
             stage.predicted_position[i, c] = stage.origin_position[i, c] + ahead
             stage.way[i, c] = (moved - previous.displacement[i, c]) + ahead
-    _put_origin_of_held(bodies, held, origin, state, stage)
+    _put_origin_of_held(p.constrained, origin, state, stage)
     for k in range(origin.turn.shape[0]):
         stage.origin_turn[k] = origin.turn[k] - turned[k]
         stage.predicted_turn[k] = stage.origin_turn[k] + length * origin.spin[k]
@@ -207,14 +208,16 @@ def predict(bodies, held, state, origin, previous, start, turned, position, rota
         for c in range(3):
             stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
     _take_twist(start, stage)
+    return READY
 
 
-@kernel
-def aim(bodies, state, end, previous, start, turned, position, rotation, stage):
+@piece(int, Problem, StateArrays, Point, Point, Place, Vector, Matrix, Stack, Stage)
+def predict_end(p, state, end, previous, start, turned, position, rotation, stage):
     """Predict just the end of a step, which lies beyond its last stage; prescribed bodies are put there.
 
-    Parameters as for `predict`.
+    Parameters as for `predict_stage`.
     """
+    bodies = p.bodies
     for i in range(end.displacement.shape[0]):
         for c in range(3):
             stage.predicted_position[i, c] = state.position[i, c] + end.displacement[i, c]
@@ -233,6 +236,7 @@ def aim(bodies, state, end, previous, start, turned, position, rotation, stage):
         x, y, z = turn_between(start.body_rotation, f, stage.predicted_body_rotation, f)
         stage.body_turn[f, 0], stage.body_turn[f, 1], stage.body_turn[f, 2] = x, y, z
     _take_twist(start, stage)
+    return READY
 
 
 @kernel
@@ -241,14 +245,14 @@ def _take_twist(start, stage):
         stage.twist[k] = start.joint_strain[k, 2]
 
 
-@kernel
-def stand_still(bodies, fluid, strands, state, start, with_fluid, stage):
+@piece(int, Problem, StateArrays, Place, bool, Stage)
+def stand_still_stage(p, state, start, with_fluid, stage):
     """Frozen data of a stage in which inertia wants everything to stay where it is.
 
     Forces see velocities as displacements from an origin. `with_fluid` says whether inertia of the fluid wants the
     fluid's momentum at `start` with these velocities to stay, too, instead of asking for nothing.
     """
-    length = stage.lengths[0]
+    bodies, length = p.bodies, stage.lengths[0]
     for b in range(state.body_position.shape[0]):
         w0, w1, w2 = row(state.body_angular_velocity, b)
         for c in range(3):
@@ -272,14 +276,15 @@ def stand_still(bodies, fluid, strands, state, start, with_fluid, stage):
     add_scaled(stage.origin_turn, -length, state.spin)
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:
-        momentum_at(fluid, start, state.velocity, stage.origin_fluid_momentum)
+        momentum_at(p.fluid, start, state.velocity, stage.origin_fluid_momentum)
     _take_twist(start, stage)
+    return READY
 
 
-@kernel
-def distance(bodies, strands, start, end):
+@piece(float, Problem, Place, Place)
+def distance(p, start, end):
     """Largest displacement of a material point from one configuration to another [m]."""
-    largest = 0.0
+    bodies, strands, largest = p.bodies, p.strands, 0.0
     for i in range(start.position.shape[0]):
         square = 0.0
         for c in range(3):
@@ -308,7 +313,7 @@ def _set_back(rotation, b, length, w0, w1, w2, out, c):
 
 
 @kernel
-def _put_origin_of_held(bodies, held, origin, state, stage):
+def _put_origin_of_held(held, origin, state, stage):
     length = stage.lengths[0]
     for k in range(held.node.shape[0]):
         b, i, f = held.body[k], held.node[k], held.free[k]
@@ -333,13 +338,13 @@ def _put_origin_of_held(bodies, held, origin, state, stage):
         stage.held_lag[k, 2] = length * (origin.body_velocity[f, 2] + (w0 * u1 - w1 * u0) - v2)
 
 
-@kernel
-def end_point(bodies, fluid, strands, state, stage, origin, turned, end, position, rotation, point):
-    """The end of a stage that was solved; parameters as for `predict`.
+@piece(int, Problem, StateArrays, Stage, Point, Vector, Place, Matrix, Stack, Point)
+def end_stage(p, state, stage, origin, turned, end, position, rotation, point):
+    """The end of a stage that was solved; parameters as for `predict_stage`.
 
     Velocities and displacements are those of inertia's motion and what the end departs from it.
     """
-    length = stage.lengths[0]
+    bodies, length = p.bodies, stage.lengths[0]
     for b in range(position.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
@@ -365,15 +370,17 @@ def end_point(bodies, fluid, strands, state, stage, origin, turned, end, positio
     for k in range(point.turn.shape[0]):
         point.turn[k] = turned[k] + end.turn[k]
         point.spin[k] = (end.turn[k] - stage.origin_turn[k]) / length
-    momentum_at(fluid, end, point.velocity, point.fluid_momentum)
+    momentum_at(p.fluid, end, point.velocity, point.fluid_momentum)
+    return READY
 
 
-@kernel
-def write_state(bodies, held, fluid, strands, state, last, end, position, rates):
+@piece(int, Problem, StateArrays, Point, Place, Matrix, Matrix)
+def write_end(p, state, last, end, position, rates):
     """Take the end of a step into the state; `position` and `rates` are those of prescribed bodies."""
+    bodies, held = p.bodies, p.constrained
     copy(last.velocity, state.velocity)
     _write_velocity_of_held(held, end, rates, state)
-    momentum_at(fluid, end, last.velocity, state.fluid_excess)
+    momentum_at(p.fluid, end, last.velocity, state.fluid_excess)
     for i in range(state.fluid_excess.shape[0]):
         for c in range(3):
             state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]
@@ -385,7 +392,7 @@ def write_state(bodies, held, fluid, strands, state, last, end, position, rates)
             state.position[i, c], state.position_low[i, c] = end.position[i, c], 0.0
     _move_positions(state.body_position, state.body_position_low, last.body_displacement)
     copy(last.rotation, state.body_rotation)
-    _write_frames(bodies, strands, end, state)
+    _write_frames(bodies, p.strands, end, state)
     tensor = stack_matrix(3, 3)
     for b in range(rates.shape[0]):
         f = bodies.free_index[b]
@@ -399,17 +406,20 @@ def write_state(bodies, held, fluid, strands, state, last, end, position, rates)
         spin = solve_three(tensor, momentum[0], momentum[1], momentum[2])
         for c in range(3):
             state.body_velocity[b, c], state.body_angular_velocity[b, c] = last.body_velocity[f, c], spin[c]
+    return READY
 
 
-@kernel
-def write_shape(bodies, strands, at, state):
+@piece(int, Problem, Place, StateArrays)
+def write_shape(p, at, state):
     """Take positions, frames, and the poses of free bodies into the state."""
+    bodies = p.bodies
     copy(at.position, state.position)
     state.position_low[:] = 0.0
     state.body_position_low[:] = 0.0
     for f in range(bodies.mass.shape[0]):
         copy_row(at.body_position, f, state.body_position, bodies.body_of_free[f])
-    _write_frames(bodies, strands, at, state)
+    _write_frames(bodies, p.strands, at, state)
+    return READY
 
 
 @kernel
@@ -468,7 +478,7 @@ def _keep(rate, end, origin, length, carry):
         a[i] = ((b[i] - c[i]) / length - carry * a[i]) / (1.0 - carry)
 
 
-@kernel
+@piece(int, StateArrays, Point, Point, float, float)
 def keep_slopes(state, origin, end, momentum_length, carry):
     """Write the slopes of momenta at the end of the last stage of a step into the state."""
     _keep(state.acceleration, end.velocity, origin.velocity, momentum_length, carry)
@@ -477,38 +487,4 @@ def keep_slopes(state, origin, end, momentum_length, carry):
     _keep(state.body_moment, end.angular_momentum, origin.angular_momentum, momentum_length, carry)
     _keep(state.fluid_force, end.fluid_momentum, origin.fluid_momentum, momentum_length, carry)
     state.kept[0] = 1.0
-
-
-@piece(int, Problem, StateArrays, Place, Point)
-def start_step_point(p, state, start, first):
-    """`start_point`"""
-    start_point(p.bodies, p.fluid, p.strands, state, start, first)
-    return READY
-
-
-@piece(int, Problem, StateArrays, Point, Point, Place, Vector, Matrix, Stack, Matrix, Stage)
-def predict_stage(p, state, origin, previous, start, turned, position, rotation, rates, stage):
-    """`predict`"""
-    predict(p.bodies, p.constrained, state, origin, previous, start, turned, position, rotation, rates, stage)
-    return READY
-
-
-@piece(int, Problem, StateArrays, Place, bool, Stage)
-def stand_still_stage(p, state, start, with_fluid, stage):
-    """`stand_still`"""
-    stand_still(p.bodies, p.fluid, p.strands, state, start, with_fluid, stage)
-    return READY
-
-
-@piece(int, Problem, StateArrays, Stage, Point, Vector, Place, Matrix, Stack, Point)
-def end_stage(p, state, stage, origin, turned, reached, position, rotation, end):
-    """`end_point`"""
-    end_point(p.bodies, p.fluid, p.strands, state, stage, origin, turned, reached, position, rotation, end)
-    return READY
-
-
-@piece(int, Problem, StateArrays, Point, Place, Matrix, Matrix)
-def write_end(p, state, last, at, position, rates):
-    """`write_state`"""
-    write_state(p.bodies, p.constrained, p.fluid, p.strands, state, last, at, position, rates)
     return READY

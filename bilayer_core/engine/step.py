@@ -22,23 +22,11 @@ from ..model.records.outcome import (
 )
 from ..model.records.problem import Problem
 from ..model.records.status import BEYOND, BLOCKED, CONVERGED, JUMPED, MAX_ITERATIONS, READY
-from ..model.records.step import Course, Method, Place, StateArrays, Work
+from ..model.records.step import Course, Method, Place, Stage, StateArrays, Tally, Work
 from ..scene.transduction import grown, lagged
-from .configuration import take_state
 from .loop import Counted, Loop
 from .modes import COUNT, LOOK, MINIMUM, MOMENT, NEGATIVE, SETTLE, STEP, VALUE, WITHOUT_INERTIA
-from .potential import start_stage
-from .stages import (
-    add_stage,
-    aim,
-    copy_point,
-    distance,
-    gain,
-    keep_slopes,
-    move_along,
-    write_shape,
-    write_twist,
-)
+from .stages import write_twist
 
 place_at = record_at(Place)
 
@@ -67,24 +55,6 @@ def _compare_touched(sums, touched):
 
 
 @kernel
-def _take_slopes(keeps, bodies, origin, state, first, h, method, n, scratch):
-    """Move the origin of stage n by what the slopes at the start of a step add to it."""
-    if not keeps:
-        return
-    if method.history:
-        move_along(bodies, origin, state, first, h, method.along[n], method.bend, method.momenta[n], scratch)
-
-
-@kernel
-def _keep_slopes(keeps, sums, state, origin, last, momentum_length, carry, touched):
-    """Leave slopes for the step after, and whether it can take them: not if something touches anew."""
-    if not keeps:
-        return
-    keep_slopes(state, origin, last, momentum_length, carry)
-    state.kept[0] = _compare_touched(sums, touched)
-
-
-@kernel
 def has_jumped(keeps, drives, state, first, range_of_channel, h):
     """Whether a stimulus has jumped that some layer follows at once, or a step before did not leave its slopes."""
     if not keeps:
@@ -106,10 +76,10 @@ NO_JUMP = 1e-9
 """Part of a channel's range below which a change at once is rounding."""
 
 
-@kernel
-def _drive(drives, state, course, k, n, work, stage):
+@piece(int, Problem, StateArrays, Course, int, int, Work)
+def drive_stage(p, state, course, k, n, work):
     """What acts from outside at stage n of step k."""
-    transduction, strain = work.transduction, work.strain
+    drives, stage, transduction, strain = p.drives, work.stage, work.transduction, work.strain
     for i in range(drives.law_channel.shape[0]):
         channel = drives.law_channel[i]
         first, last = course.first[k, channel], course.stimulus[k, n, channel]
@@ -119,6 +89,7 @@ def _drive(drives, state, course, k, n, work, stage):
     grow(drives, strain, stage.rest_edge, stage.rest_joint)
     for i in range(stage.load_factor.shape[0]):
         stage.load_factor[i] = course.load_factor[k, n, i]
+    return READY
 
 
 @kernel
@@ -129,8 +100,8 @@ def _total(energy):
     return total
 
 
-@kernel
-def take_step(p, state, method, keeps, mode, course, k, work, before, h, tolerance, max_iterations):
+@piece(int, Problem, StateArrays, Method, bool, int, Course, int, Work, Vector, float, float, int)
+def make_step(p, state, method, keeps, mode, course, k, work, before, h, tolerance, max_iterations):
     """Advance a state by a step of length h [s]; it changes only if every stage converged and its end can be reached.
 
     Everything happens in passes through one loop, because the compiler would make a copy of all that is called in two
@@ -165,17 +136,13 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
     Returns
     -------
     status : int
-    pair : int
-        Blocking pair, −1 if none.
-    end : int
-        Place in `work.places` of the last configuration.
-    iterations, factorisations, backtracks : int
-    residual, gap : float
+        In `Outcome`: the blocking pair, −1 if none, the place in `work.places` of the last configuration, numbers of
+        iterations, factorisations and backtracks, the residual and the gap.
     """
     first, origin, end, stage = work.first, work.origin, work.end, work.stage
-    bodies, strands, counts = p.bodies, p.strands, p.outcome.counts
+    counts, figures = p.outcome.counts, p.outcome.figures
     s, e, t = 0, 1, 2
-    take_state(p, state, place_at(work.places[s]))
+    call(p.calls.take_state, (p, state, place_at(work.places[s])))
     points, stages = method.couplings.shape
     passes = 1
     if mode == STEP:
@@ -186,7 +153,8 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
     else:
         stage.lengths[:] = MOMENT if mode == LOOK else h if mode == SETTLE else WITHOUT_INERTIA
     iterations = factorisations = backtracks = 0
-    worst, gap = 0.0, math.inf
+    worst, residual, gap = 0.0, 0.0, math.inf
+    status, pair = READY, -1
     previous = first
     place = min(k, course.position.shape[0] - 1)
     for n in range(passes):
@@ -199,14 +167,16 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
             call(p.calls.stand_still_stage, (p, state, start, mode == SETTLE or mode == COUNT, stage))
             position, rotation = state.body_position, state.body_rotation
         else:
-            copy_point(first, origin)
-            for j in range(min(n, stages)):
-                add_stage(origin, method.couplings[n, j], work.gained[j], work.gained_turn[j], work.rotation)
-            _drive(p.drives, state, course, k, n, work, stage)
+            call(p.calls.place_origin, (work, method, n))
+            call(p.calls.drive_stage, (p, state, course, k, n, work))
             if beyond:
-                aim(bodies, state, origin, previous, start, work.turned, position, rotation, stage)
+                call(
+                    p.calls.predict_end,
+                    (p, state, origin, previous, start, work.turned, position, rotation, stage),
+                )
             else:
-                _take_slopes(keeps, bodies, origin, state, first, h, method, n, work.rotation)
+                if keeps and method.history:
+                    call(p.calls.move_along, (p, state, work, method, n, h))
                 rates = course.rates[place, n]
                 call(
                     p.calls.predict_stage,
@@ -214,15 +184,15 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
                 )
         status = READY
         if not beyond:
-            status = start_stage(p, start, stage)
+            status = call(p.calls.start_stage, (p, start, stage))
         if status == READY and (not stays or mode == SETTLE):
             guess = place_at(work.places[e])
             status = call(p.calls.first_guess_of, (p, start, position, rotation, stage, guess, beyond))
-            pair = p.outcome.counts[PAIR]
             if status != READY:
+                pair, residual = counts[PAIR], math.inf
                 if beyond and status == BLOCKED:
                     status, pair = BEYOND, -1
-                return status, pair, e, iterations, factorisations, backtracks, math.inf, gap
+                break
         elif status == READY:
             e = s
         residual = 0.0
@@ -235,18 +205,18 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
             iterations += counts[ITERATIONS]
             factorisations += counts[FACTORISATIONS]
             backtracks += counts[BACKTRACKS]
-            residual, gap = p.outcome.figures[RESIDUAL], p.outcome.figures[GAP]
+            residual, gap = figures[RESIDUAL], figures[GAP]
         if mode == SETTLE and (status == CONVERGED or status == MAX_ITERATIONS):
-            work.moved[0] = distance(bodies, strands, start, place_at(work.places[e]))
-            write_shape(bodies, strands, place_at(work.places[e]), state)
+            work.moved[0] = call(p.calls.distance, (p, start, place_at(work.places[e])))
+            call(p.calls.write_shape, (p, place_at(work.places[e]), state))
         if stays and mode == STEP and (status != CONVERGED or not math.isfinite(_total(p.sums.energy))):
             copy(before, state.values)
             status, residual = BEYOND if status == CONVERGED else status, math.inf
         if mode != STEP or not (beyond or status == CONVERGED):
-            return status, -1, e, iterations, factorisations, backtracks, residual, gap
+            break
         if stays:
             write_twist(place_at(work.places[e]), state)
-            break
+            continue
         worst = max(worst, residual)
         last = origin
         if not beyond:
@@ -260,27 +230,20 @@ def take_step(p, state, method, keeps, mode, course, k, work, before, h, toleran
             call(p.calls.write_end, (p, state, last, place_at(work.places[e]), position, rates))
             for i in range(state.transduction.shape[0]):
                 state.transduction[i] = work.transduction[i]
-            _keep_slopes(keeps, p.sums, state, origin, last, stage.lengths[1], method.carry, work.touched)
+            if keeps:  # for the step after, which can take them if nothing touches anew
+                call(p.calls.keep_slopes, (state, origin, last, stage.lengths[1], method.carry))
+                state.kept[0] = _compare_touched(p.sums, work.touched)
         if n + 1 < passes:
             if not beyond:
-                gain(origin, end, work.gained, work.gained_turn, n)
                 previous = end
             copy(last.turn, work.turned)
             s, e = e, s
             place_at(work.places[s]).turn[:] = 0.0
         if beyond:
             stage.lengths[:] = MOMENT
-    return CONVERGED, -1, e, iterations, factorisations, backtracks, worst, gap
-
-
-@piece(int, Problem, StateArrays, Method, bool, int, Course, int, Work, Vector, float, float, int)
-def make_step(p, state, method, keeps, mode, course, k, work, before, h, tolerance, max_iterations):
-    """`take_step`; all but the status is left in `Outcome`."""
-    counts, figures = p.outcome.counts, p.outcome.figures
-    status, pair, end, iterations, factorisations, backtracks, residual, gap = take_step(
-        p, state, method, keeps, mode, course, k, work, before, h, tolerance, max_iterations
-    )
-    counts[PAIR], counts[PLACE], counts[ITERATIONS] = pair, end, iterations
+    else:
+        status, residual = CONVERGED, worst
+    counts[PAIR], counts[PLACE], counts[ITERATIONS] = pair, e, iterations
     counts[FACTORISATIONS], counts[BACKTRACKS] = factorisations, backtracks
     figures[RESIDUAL], figures[GAP] = residual, gap
     return status
@@ -305,10 +268,11 @@ def count_in(surfaces, strands, sums, state, gap, time, tally):
     _count_contacts(surfaces, nodes, time, tally)
 
 
-@kernel
-def count_shape(strands, place, rest_edge, state, tally):
-    """Take the shape at the end of a step into the extremes of a run; `rest_edge` holds rest strains of edges."""
-    figures, voronoi = tally.figures, tally.voronoi_length
+@piece(int, Problem, StateArrays, Place, Stage, float, float, Tally)
+def count_end(p, state, place, stage, gap, time, tally):
+    """Take the end of a step, and its shape, into the extremes of a run."""
+    count_in(p.surfaces, p.strands, p.sums, state, gap, time, tally)
+    strands, rest_edge, figures, voronoi = p.strands, stage.rest_edge, tally.figures, tally.voronoi_length
     sharpest = 0.0
     for j in range(voronoi.shape[0]):
         sharpest = max(sharpest, abs(place.joint_strain[j, 0]) / voronoi[j])
@@ -318,6 +282,7 @@ def count_shape(strands, place, rest_edge, state, tally):
     figures[3], figures[4] = max(figures[3], sharpest), max(figures[4], largest)
     for b in range(tally.body_top.shape[0]):
         tally.body_top[b] = max(tally.body_top[b], state.body_position[b, 2])
+    return READY
 
 
 @kernel
@@ -338,7 +303,7 @@ def _count_contacts(surfaces, nodes, time, tally):
 @piece(int, Loop, bool, int, bool, bool, float, float, int)
 def take_steps(loop, keeps, mode, changes, counts, h, tolerance, max_iterations):
     """Advance a state by the steps of a course, as far as each succeeds, or do once what another mode says; parameters
-    beside those of `take_step`:
+    beside those of `make_step`:
 
     Parameters
     ----------
@@ -379,8 +344,8 @@ def take_steps(loop, keeps, mode, changes, counts, h, tolerance, max_iterations)
         done, place, last = done + 1, end, residual
         worst = max(worst, residual)
         if counts:
-            count_in(p.surfaces, p.strands, p.sums, state, gap, course.time[k], loop.tally)
-            count_shape(p.strands, place_at(work.places[end]), work.stage.rest_edge, state, loop.tally)
+            at = place_at(work.places[end])
+            call(p.calls.count_end, (p, state, at, work.stage, gap, course.time[k], loop.tally))
     found[STATUS], found[PAIR], found[PLACE], found[DONE] = status, pair, end, done
     found[ITERATIONS], found[FACTORISATIONS], found[BACKTRACKS] = iterations, factorisations, backtracks
     figures[RESIDUAL], figures[LARGEST_RESIDUAL], figures[GAP] = residual, worst, gap

@@ -24,8 +24,9 @@ COMPLETE = "complete"
 MOST_PROCESSES = 2
 _log = logging.getLogger(__name__)
 PACKAGES = Path(__file__).resolve().parents[2]
-WORKER = "bilayer_core.jit.worker"
-ENGINE = "bilayer_core.engine"
+PACKAGE = "bilayer_core"
+WORKER = f"{PACKAGE}.jit.worker"
+ENGINE = f"{PACKAGE}.engine"
 """Module that imports all that declare pieces."""
 LONGEST = {
     "near_pairs",
@@ -78,7 +79,8 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     if folder is None:
         return
     import_module(ENGINE)
-    names = sorted(PIECES, key=lambda name: name not in LONGEST)
+    own = [name for name, piece in PIECES.items() if piece.function.__module__.startswith(f"{PACKAGE}.")]
+    names = sorted(own, key=lambda name: name not in LONGEST)
     left: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in names:
         left.put(name)

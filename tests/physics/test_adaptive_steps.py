@@ -42,7 +42,7 @@ def falling(obstacles=(GROUND,), **solver):
 
 def deviation_between(simulator, before, after, h):
     """That of a step of length `h`, from its ends."""
-    ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.fields}) for state in (before, after))
+    ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.names}) for state in (before, after))
     return deviation(yardstick_of(simulator.model), *ends, h)
 
 

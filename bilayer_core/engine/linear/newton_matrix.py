@@ -17,10 +17,12 @@ import numpy as np
 from numba import types
 
 from ...forces.rod_contact import rods_touch
-from ...jit import call, caller, kernel
+from ...jit import call, caller, piece
 from ...jit.record import Matrix, Vector
-from ...model.records.problem import BorderedSystem
+from ...model.records.outcome import SHIFT, SIMPLIFIED
+from ...model.records.problem import BorderedSystem, Problem
 from ...model.records.status import INDEFINITE, NO_ROOM_IN_BORDER, NOT_FINITE, READY
+from ...model.records.step import Place, Stage
 from ..modes import SLOWEST_GROWTH
 from . import bordered_system, planar_assembly  # noqa: F401 (declare pieces)
 from .assembly import hold_unknowns
@@ -40,7 +42,7 @@ EXACT = np.int64(0)
 all that takes it once more.)"""
 
 
-@kernel
+@piece(int, Problem, Place, float, int)
 def assemble(p, at, factor, simplified):
     """The matrix of the last evaluation, that of `at`, with `factor` times the masses [1/s²]: the band, and the border
     and corner of free bodies. Nodes that bodies hold are rows of the identity.
@@ -58,9 +60,10 @@ def assemble(p, at, factor, simplified):
     if p.border.exists:
         call(p.calls.assemble_bodies, (p, at))
     hold_unknowns(p.constrained.row, strands.dimension, strands.bandwidth, band)
+    return READY
 
 
-@kernel
+@piece(int, Problem, Place, Stage, bool)
 def factorise(p, at, stage, counts):
     """Assemble and factorise the matrix of the last evaluation, that of `at`.
 
@@ -72,23 +75,23 @@ def factorise(p, at, stage, counts):
     Returns
     -------
     status : int
-    shift : float
-        Multiple of the inertial part that was added.
-    simplified : int
-        How far contacts of rods were simplified; see `take_contacts`.
+        In `Outcome`: the multiple of the masses that was added, and how far contacts of rods were simplified (see
+        `engine.linear.contact_columns`).
     """
+    figures = p.outcome.figures
     strands, band = p.strands, p.system.band
     factor = 1.0 / (stage.lengths[0] * stage.lengths[1]) + p.damping / stage.lengths[0]
     shift, simplified = 0.0, EXACT
     if counts:
         factor = SLOWEST_GROWTH * SLOWEST_GROWTH
     while True:
-        assemble(p, at, factor * (1.0 + shift), simplified)
+        call(p.calls.assemble, (p, at, factor * (1.0 + shift), simplified))
+        figures[SHIFT], figures[SIMPLIFIED] = shift, simplified
         of_bodies = factor if counts else shift * factor
         if p.border.exists:
             call(p.calls.restrict_bodies, (p, of_bodies))
         if p.contact_columns.exists and not call(p.calls.move_to_border, (p,)):
-            return NO_ROOM_IN_BORDER, shift, simplified
+            return NO_ROOM_IN_BORDER
         if counts:
             negative = call_factor(p.calls.count_band, (band, strands.size))
         else:
@@ -99,18 +102,19 @@ def factorise(p, at, stage, counts):
             if counts:
                 of_border = call(p.calls.count_border, (p,)) if p.bordered.exists else 0
                 p.system.negative[0] = negative + of_border
-                return READY if of_border >= 0 else NOT_FINITE, shift, simplified
+                return READY if of_border >= 0 else NOT_FINITE
             if not p.bordered.exists or call(p.calls.factor_border, (p,)):
-                return READY, shift, simplified
+                return READY
         if simplified < 2 and rods_touch(p.rod_contact):
             simplified += 1
             continue
         shift = max(FIRST_SHIFT, shift * SHIFT_GROWTH)
         if shift > LARGEST_SHIFT:
-            return INDEFINITE, shift, simplified
+            figures[SHIFT] = shift
+            return INDEFINITE
 
 
-@kernel
+@piece(int, Problem)
 def solve(p):
     """Minus the inverse of the factorised matrix times the present gradient, to `step` and `body_step`."""
     size, system, right = p.strands.size, p.system, p.system.right
@@ -134,3 +138,4 @@ def solve(p):
             system.step[j] = right[j]
     else:
         call(p.calls.step_in_plane, (p,))
+    return READY

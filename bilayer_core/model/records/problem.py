@@ -107,6 +107,8 @@ class ForceTable:
 class Calls:
     """Addresses of the pieces of the engine; see `engine.dispatch`."""
 
+    take_state: Address
+    move: Address
     place_carried: Address
     place_frames: Address
     list_surface_pairs: Address
@@ -118,7 +120,14 @@ class Calls:
     near_pairs: Address
     where_friction_holds: Address
     first_guess_of: Address
+    start_stage: Address
+    follow: Address
+    add_forces: Address
     expand_to_unknowns: Address
+    assemble: Address
+    factorise: Address
+    solve: Address
+    bound: Address
     assemble_in_space: Address
     assemble_in_plane: Address
     take_rod_contacts: Address
@@ -132,11 +141,21 @@ class Calls:
     count_border: Address
     minimise_potential: Address
     start_step_point: Address
+    place_origin: Address
+    move_along: Address
+    drive_stage: Address
     predict_stage: Address
+    predict_end: Address
     stand_still_stage: Address
     end_stage: Address
     write_end: Address
+    write_shape: Address
+    distance: Address
+    keep_slopes: Address
     make_step: Address
+    drive_step: Address
+    deviation: Address
+    count_end: Address
     factor_band: int  # those of the scene's half-bandwidth
     count_band: int
     forward_band: int
