@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..model.force_list import on_nodes
 from ..model.model import Model
 from ..model.records.parts import RodContactList
 from ..model.records.step import Place
@@ -75,8 +76,6 @@ class SecondDerivatives:
 
     def __init__(self, model: Model):
         edges, pairs, joints = model.edge_count + model.wall_count, len(model.pair_top), len(model.joint_a)
-        on_nodes = model.meets_surfaces or model.rod_surfaces is not None
-        on_nodes = on_nodes or len(model.drag_node) > 0 or len(model.fluid_mass) > 0
         if model.plane is None:
             shapes = {
                 "edge_hessian": (edges, 4, 4),
@@ -95,7 +94,7 @@ class SecondDerivatives:
                 "mixed_hessian": (pairs, 4),
             }
             self.frame, self.polar_gradient = np.zeros((edges, 4)), np.zeros((edges, 2))
-        shapes["node_hessian"] = (model.node_count if on_nodes else 0, 3, 3)
+        shapes["node_hessian"] = (model.node_count if on_nodes(model.forces) else 0, 3, 3)
         shapes["body_hessian"] = (6 * model.free_count, 6 * model.free_count)
         self.flat, parts = zeros_in_one(shapes)
         vars(self).update(parts)

@@ -51,9 +51,16 @@ class Storage:
         self.rods = NearRods(model) if model.rod_surfaces is not None else None
         self.energy = np.zeros(len(NAMES))
         self._columns, self._width = model.bodies.freedom.shape[1], np.zeros(1, dtype=np.int64)
-        self._groups, self._calls = lasting_groups(model, self._second), calls_of(model)
+        self._groups = lasting_groups(model, self._second)
         self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
-        self.problem = self._make()
+        self._problem: Problem | None = None
+
+    @property
+    def problem(self) -> Problem:
+        """Its records; the pieces that it calls are compiled, or read from the cache, when first asked for."""
+        if self._problem is None:
+            self._problem = self._make()
+        return self._problem
 
     def _make(self) -> Problem:
         model, near, rods = self._model, self.near, self.rods
@@ -70,7 +77,7 @@ class Storage:
             contact_columns=contact_columns_of(model, of_rods) if rods else ContactColumns.absent(),
             sums=sums_of(self.first, self._second, self.energy, 2 * capacity),
         )
-        return Problem(**records, calls=self._calls, outcome=self.outcome, forces=force_table(model, records))
+        return Problem(**records, calls=calls_of(model), outcome=self.outcome, forces=force_table(model, records))
 
     def grow(self, status: int) -> bool:
         """Have the capacity that a kernel lacked; false if that is not what it lacked.
@@ -85,7 +92,7 @@ class Storage:
             self._columns = 2 * int(self._width[0])
         else:
             return False
-        before, self.problem = self.problem, self._make()
+        before, self._problem = self.problem, self._make()
         self.problem.sums.selected[:] = before.sums.selected
         if before.sliding.exists:
             for name in Sliding.names:
