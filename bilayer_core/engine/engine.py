@@ -187,7 +187,11 @@ class Engine:
             Rest strains of edges there, shape (n_edge,).
         """
         model = self._model
-        curvature = np.abs(end.joint_strain[: model.bend_count, 0]) / model.voronoi_length
+        a, b = model.joint_a[: model.bend_count], model.joint_b[: model.bend_count]
+        tangents, directors = end.tangent, end.director1
+        bend = np.einsum("ki,ki->k", tangents[b], directors[a]) - np.einsum("ki,ki->k", tangents[a], directors[b])
+        bend /= 1.0 + np.einsum("ki,ki->k", tangents[a], tangents[b])
+        curvature = np.abs(bend) / model.voronoi_length
         strain = np.abs(end.length[: model.edge_count] / model.rest_length - 1.0 - rest_edge)
         self.figures[3:] = np.maximum(self.figures[3:], [curvature.max(initial=0.0), strain.max(initial=0.0)])
         np.maximum(self.body_top, state.body_position[: len(self.body_top), 2], out=self.body_top)

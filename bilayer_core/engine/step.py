@@ -275,7 +275,12 @@ def count_end(p, state, place, stage, gap, time, tally):
     strands, rest_edge, figures, voronoi = p.strands, stage.rest_edge, tally.figures, tally.voronoi_length
     sharpest = 0.0
     for j in range(voronoi.shape[0]):
-        sharpest = max(sharpest, abs(place.joint_strain[j, 0]) / voronoi[j])
+        a, b = strands.joint_a[j], strands.joint_b[j]
+        bend, cosine = 0.0, 1.0
+        for c in range(3):  # κ₁ of `forces.bend_twist`; that in `joint_strain` is from before Newton's last correction
+            bend += place.tangent[b, c] * place.director1[a, c] - place.tangent[a, c] * place.director1[b, c]
+            cosine += place.tangent[a, c] * place.tangent[b, c]
+        sharpest = max(sharpest, abs(bend) / (cosine * voronoi[j]))
     largest = 0.0
     for e in range(strands.edge_count):
         largest = max(largest, abs(place.length[e] / strands.rest_length[e] - 1.0 - rest_edge[e]))

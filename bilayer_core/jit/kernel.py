@@ -20,14 +20,16 @@ OPTIONS = dict(nogil=True, error_model="numpy", **unofficial.OPTIONS)
 def kernel(function):
     """Compile `function` for kernels that call it: nopython, GIL released, NaN-preserving fast arithmetic.
 
-    The interpreter can call it, too, but then it is compiled by every process that does.
+    It becomes part of each piece that calls it: left to itself, LLVM's engine would take one copy of a function for all
+    pieces of a process, that which it met first, and last digits would depend on what a process has compiled or loaded
+    before. The interpreter can call it, too, but then it is compiled by every process that does.
     """
-    return numba.njit(**OPTIONS, fastmath=FASTMATH)(function)
+    return numba.njit(**OPTIONS, fastmath=FASTMATH, forceinline=True)(function)
 
 
 def exact_kernel(function):
     """`kernel` without reordered arithmetic."""
-    return numba.njit(**OPTIONS, fastmath=EXACT)(function)
+    return numba.njit(**OPTIONS, fastmath=EXACT, forceinline=True)(function)
 
 
 def entry(function):
