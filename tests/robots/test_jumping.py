@@ -133,11 +133,12 @@ def test_the_energy_of_the_jump_is_found_again():
 
 def test_two_rods_in_short_steps_lose_little_of_the_jump_to_the_integrator():
     bonded = load_scene("jumping", [TWO_RODS, "solver.dimension=3"])
-    budgets = []
-    for budget, supplied in budgets_of_the_jump(bonded, {"dt": 5e-4}, {"dt": 2.5e-4}):
+    *budgets, of_longer_steps = budgets_of_the_jump(bonded, {"dt": 5e-4}, {"dt": 2.5e-4}, {"dt": 1e-3})
+    lost = abs(of_longer_steps[0]["lost"]["numerical"])
+    for budget, supplied in budgets:
         assert supplied > 0.03
         assert abs(budget["residual"]) < 1e-4 * supplied
         assert abs(budget["lost"]["numerical"]) < 0.02 * supplied
         assert budget["lost"]["rod friction"] > budget["lost"]["friction"] > 0.0
-        budgets.append(budget)
-    assert abs(budgets[1]["lost"]["numerical"]) < abs(budgets[0]["lost"]["numerical"])
+        # its ends slap the ground a little differently with each step: what is lost falls until it is of that size
+        assert abs(budget["lost"]["numerical"]) < 0.5 * lost
