@@ -24,6 +24,10 @@ class PenetrationError(SceneError):
     """A scene starts with a node behind a surface, or nearer to it than can be resolved."""
 
 
+class ForceError(BilayerError):
+    """A scene needs a force that is planned and that no term of the engine computes."""
+
+
 class SimulationError(BilayerError):
     """The simulation could not go on; the last accepted state is kept.
 

@@ -39,7 +39,7 @@ class Storage:
 
     Raises
     ------
-    NotImplementedError
+    ForceError
         If the scene needs a force that nothing computes.
     """
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import ForceError
 from ..jit import Record
 from ..jit.piece import Piece
 from ..model.model import Model
@@ -79,12 +80,12 @@ def require_computed(forces: Iterable[str]) -> None:
 
     Raises
     ------
-    NotImplementedError
+    ForceError
     """
     computed = {name for term in TERMS for name in term.names}
     missing = [name for name in forces if name not in computed]
     if missing:
-        raise NotImplementedError(
+        raise ForceError(
             f"force {missing[0]!r}: is in the list, bilayer_core/model/force_list.py, and the scene needs it, but no "
             "term of bilayer_core/forces/register.py computes it"
         )

@@ -25,7 +25,7 @@ from typing import Any, dataclass_transform
 
 import numpy as np
 from llvmlite import ir
-from numba.core import types
+from numba import types
 from numba.extending import intrinsic, models, register_model
 
 from .unofficial import add_attributes, add_field

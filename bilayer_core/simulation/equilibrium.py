@@ -10,6 +10,7 @@ Forces that turn with what they act on, and moments on bodies, are taken at q_k 
 from __future__ import annotations
 
 import math
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,12 +80,11 @@ def solve_static(stepper: Stepper, state: State, tolerance: float | None = None)
     """
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f"tolerance: {tolerance} is not allowed; it must be a positive number of metres")
-    before = state.copy()
-    try:
-        return _Search(stepper, state, tolerance).run()
-    except BaseException:
-        state.take(before)
-        raise
+    with ExitStack() as undo:
+        undo.callback(state.take, state.copy())
+        report = _Search(stepper, state, tolerance).run()
+        undo.pop_all()
+    return report
 
 
 class _Search:

@@ -8,6 +8,7 @@ from sample_scenes import everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.errors import ForceError
 from bilayer_core.model import force_list
 from bilayer_core.model.build import build_model
 from bilayer_core.model.force_list import FORCES, Force, Kind, markdown_table
@@ -21,7 +22,7 @@ def test_a_force_that_is_only_in_the_list_is_refused_when_a_scene_needs_it(monke
     Simulator(description)
     monkeypatch.setattr(force_list, "FORCES", (*FORCES, SPRING))
     for build in (Simulator, lambda config: Evaluator(build_model(config))):
-        with pytest.raises(NotImplementedError, match="force 'spring': is in the list.*no term.*computes it"):
+        with pytest.raises(ForceError, match="force 'spring': is in the list.*no term.*computes it"):
             build(description)
     unneeded = replace(SPRING, skipped=lambda _: "no spring")
     monkeypatch.setattr(force_list, "FORCES", (*FORCES, unneeded))
