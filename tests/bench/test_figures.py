@@ -95,7 +95,7 @@ def test_the_slope_of_times_that_grow_with_a_power_is_the_power():
     assert scaling.slopes(records, 200) == {("m", 3): pytest.approx(1.3)}
 
 
-def test_the_independent_rod_swings_with_the_frequency_of_a_cantilever_about_its_equilibrium():
+def test_the_independent_rod_swings_with_a_cantilevers_frequency():
     length, axial, bending, mass, gravity = 0.1, 20.0, 6.6667e-6, 0.02, 9.81e-3
     rod = SplineRod(length, axial, bending, mass, 6, gravity=gravity)
     frequency = FIRST_MODE**2 * math.sqrt(bending / (mass * length**4))

@@ -150,7 +150,7 @@ def test_momentum_of_rods_and_fluid_together_is_conserved(integrator):
     assert np.ptp(simulator.positions[:, 2]) > 5e-3  # it bends
 
 
-def test_a_strip_that_is_twisted_up_turns_back_and_forth_with_the_fluids_moment_of_inertia():
+def test_a_twisted_strip_swings_back_with_the_fluids_moment_of_inertia():
     """Torsional vibration of a strip clamped at one end: ω = π/2 √(GJ/(I + j))/L."""
     section = rectangle(load_scene(scene([rod(WHOLE)])).materials["gel"], WIDTH, THICKNESS)
     periods = []

@@ -95,7 +95,7 @@ def flyer():
     [(driven(gravity=[0, 0, -9.81]), 4.0), (flyer(), 2.0)],  # what a turning body holds goes along arcs
     ids=["clamped", "flying"],
 )
-def test_the_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_falls_at_the_integrators_order(
+def test_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_has_the_order(
     description, quadrature, integrator
 ):
     budgets = [run(description, 0.15, dt, integrator=integrator).budget() for dt in (1e-3, 2.5e-4)]
@@ -130,7 +130,7 @@ def test_the_first_cycle_of_the_inchworm_closes():
     assert lost[0] / lost[1] > 1.8
 
 
-def test_the_inertia_of_a_flowing_fluid_takes_part_in_the_budget_of_a_strip_on_a_moving_clamp():
+def test_the_inertia_of_a_flowing_fluid_takes_part_in_the_budget():
     fluid = {"drag_along": 0.3, "drag_across": 1.2, "added_mass": True, "velocity": [0.1, 0, 0.2]}
     towed = driven(fluid=fluid, bodies=[moving("wall", (0, 0, 0), (0, 3e-3, 0.01), 0.1)])
     budgets = [run(towed, 0.1, dt).budget() for dt in (5e-4, 2.5e-4)]

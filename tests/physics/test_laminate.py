@@ -36,7 +36,7 @@ def test_every_node_has_timoshenkos_curvature(m, n):
 
 
 @pytest.mark.parametrize("height", [-1e-3, 0.3e-3])
-def test_wherever_the_curve_lies_every_node_has_the_same_curvature_and_the_faces_the_same_place(height, monkeypatch):
+def test_curvature_and_faces_do_not_depend_on_where_the_curve_lies(height, monkeypatch):
     content = strip(2.0, 0.5, 0.05)
     on_axis = settled(content)
     monkeypatch.setattr(laminate, "_axis", lambda _: height)
@@ -85,7 +85,7 @@ def test_a_strip_under_its_weight_agrees_with_the_planar_beam_of_appendix_a():
     assert differences[1] < 0.5 * differences[0] < 1e-5
 
 
-def test_a_layer_that_covers_a_part_bends_that_part_alone_by_its_whole_length_as_two_rods_come_to_do():
+def test_a_layer_on_a_part_bends_that_part_alone_as_two_rods_come_to_do():
     part = [0.03, 0.05]
 
     def strip_of(stations):
@@ -143,7 +143,7 @@ def test_a_curved_strip_starts_without_stress_and_changes_its_curvature_as_two_r
     assert one[20] * along == pytest.approx(two[20] * bottom, rel=2e-3)
 
 
-def test_natural_curvature_and_twist_are_the_means_of_the_layers_weighted_with_their_stiffness():
+def test_natural_curvature_and_twist_are_means_weighted_with_stiffness():
     layers = [layer("bottom", natural_curvature=12.0, natural_twist=6.0), layer("top", material="stiff")]
     content = scene(
         [rod(layers, torsion="layers", clamp_start="wall")],
@@ -206,7 +206,7 @@ def test_contact_counts_from_the_outer_face():
     assert faces[1] == pytest.approx(np.where(np.arange(21) < 4, 0.0, 3e-3))
 
 
-def test_the_leanest_model_is_the_laminate_unless_the_scene_asks_for_what_only_two_rods_have():
+def test_the_leanest_model_is_the_laminate_unless_a_scene_needs_two_rods():
     plain = scene([rod([layer("bottom"), layer("top")])])
     assert leanest_model(load_scene(plain))[0] == "laminate"
     soft = leanest_model(load_scene(plain | {"coupling": {"bending": 3.0}}))

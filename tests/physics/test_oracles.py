@@ -148,7 +148,7 @@ def test_barrier_derivatives_agree_with_differences_and_vanish_at_its_distance()
         assert law(d_hat, d_hat) == 0.0
 
 
-def test_friction_reaches_coulombs_value_at_the_threshold_and_is_the_slope_of_its_potential():
+def test_friction_reaches_coulombs_value_and_is_the_derivative_of_its_potential():
     threshold = 1e-4
     for v in (1e-7, 3e-5, 9.99e-5, 1.01e-4, 1.0):
         h = 1e-4 * v

@@ -45,7 +45,7 @@ def test_a_disturbed_column_above_eulers_load_buckles_to_a_stable_shape_of_the_e
     assert abs(tip[2]) == pytest.approx(0.593 * LENGTH, abs=2e-3 * LENGTH)
 
 
-def test_the_equilibrium_is_that_to_which_time_would_lead_with_lags_settled_and_nothing_moves_there():
+def test_the_equilibrium_is_where_time_would_lead_and_nothing_moves_there():
     surroundings = {"bodies": [fixed()], "gravity": [0, 0, -9.81], "solver": LONG_STEPS}
     description = bilayer(clamp_start="wall") | surroundings
     found = Simulator(load_scene(description))

@@ -90,7 +90,7 @@ def test_a_signed_distance_is_that_of_the_nearest_point_of_the_surface(kind):
 
 
 @pytest.mark.parametrize("kind", HALF)
-def test_the_gradient_of_a_signed_distance_is_a_unit_vector_and_its_derivatives_are_its_slopes(kind):
+def test_a_signed_distance_has_a_unit_gradient_and_matching_second_derivatives(kind):
     rng = np.random.default_rng(2)
     number, half, h, found = NUMBER[kind], HALF[kind], 1e-6, 0
     for point in rng.uniform(-0.7, 0.7, (150, 3)):
@@ -244,7 +244,7 @@ def test_inertia_of_solid_shapes_is_that_of_their_points(kind):
         (Shape("cylinder", np.array([0.2, 0.2, 0.3]), 0.2, axis_frame(np.array([0, 1.0, 0])), 12), 2, None),
     ],
 )
-def test_points_of_a_shape_lie_a_rounding_below_its_surface_and_share_the_length_of_its_edges(shape, count, length):
+def test_points_of_a_shape_lie_below_its_surface_and_share_its_edges_lengths(shape, count, length):
     points, radius, weight = shape.points()
     assert len(points) == count
     assert signed_distance(shape, points) == pytest.approx(np.full(count, -radius), abs=1e-12)

@@ -136,7 +136,7 @@ def sliding(coefficient=0.3):
     return scene([strip], gravity=[0, 0, -9.81], obstacles=[GROUND], contact=contact(coefficient=coefficient))
 
 
-def test_friction_takes_weight_times_coefficient_times_distance_and_all_of_a_sliding_strips_energy():
+def test_friction_takes_coulombs_work_and_all_of_a_sliding_strips_energy():
     simulator = run(sliding(), 0.12, 2e-4, (0.3, 0, 0))
     taken, mass = simulator.budget()["lost"]["friction"], simulator.model.node_mass.sum()
     distance = simulator.positions[0, 0]
@@ -161,7 +161,7 @@ def test_friction_between_rods_takes_weight_times_coefficient_times_distance():
     assert simulator.budget()["lost"]["rod friction"] == pytest.approx(0.3 * weight * distance, rel=3e-3)
 
 
-def test_a_spinning_ball_put_on_the_ground_loses_five_sevenths_of_its_energy_before_it_rolls():
+def test_a_spinning_ball_loses_five_sevenths_of_its_energy_before_it_rolls():
     away = rod([layer()], length=0.02, stations=3, start=(0, 5, 5), clamp_start="wall")
     skidding = scene(
         [away],

@@ -49,7 +49,7 @@ def test_without_saturation_the_strain_is_linear_about_the_reference():
 
 
 @pytest.mark.parametrize("gain", [0.5, -0.5])
-def test_a_saturated_strain_has_the_gain_as_its_slope_at_the_reference_and_tends_to_its_limit(gain):
+def test_a_saturated_strain_has_its_gain_at_the_reference_and_tends_to_its_limit(gain):
     def strain(stimulus):
         return free_strain(np.array([stimulus]), np.array([gain]), np.array([0.3]), np.array([0.1]))[0]
 

@@ -32,7 +32,7 @@ def _printed_by(program):
     return json.loads(found.stdout)
 
 
-def test_a_run_with_compiled_kernels_compiles_nothing_and_loads_no_piece_that_it_does_not_need():
+def test_a_warm_run_compiles_nothing_and_loads_only_the_pieces_it_needs():
     _printed_by(PROGRAM)  # compiles what is not in the cache
     compiled, loaded = _printed_by(PROGRAM)
     assert not compiled

@@ -109,7 +109,7 @@ def test_bonded_layers_bend_by_their_natural_curvatures_weighted_with_their_stif
     assert "w²κ/H up to 0.5 (below 0.5 or above 3)\n" in told(layers, width=0.00999) + "\n"
 
 
-def test_a_layer_whose_own_natural_curvature_is_sharp_is_told_although_the_other_holds_it_straight():
+def test_a_layers_own_sharp_natural_curvature_is_told_though_the_other_holds_it():
     layers = [layer("bottom", thickness=1e-3), layer("top", thickness=1e-3, natural_curvature=201.0)]
     assert "curvature × thickness up to 0.2 (at most 0.2): it is no thin rod" in told(layers)
 
@@ -138,6 +138,6 @@ def test_the_natural_curvature_of_a_layer_that_has_the_paths_changes_nothing():
     assert EdgeFigures(config, config.rods[0]).natural_change() == pytest.approx(0.0, abs=1e-12)
 
 
-def test_without_contact_nothing_is_said_of_distances_and_without_eigenstrain_nothing_of_curvature():
+def test_what_a_scene_lacks_is_not_judged_for_validity():
     told = [str(figure) for figure in validity_figures(load_scene(scene([rod([layer()])])))]
     assert len(told) == 1 and "length/width" in told[0]

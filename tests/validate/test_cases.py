@@ -36,7 +36,7 @@ def test_the_curvature_of_the_printed_formula_would_fail():
 
 
 @pytest.mark.parametrize(("multiple", "passes"), [(10.0, True), (1000.0, False)])
-def test_curvature_that_varies_is_not_locked_but_would_be_with_bonds_a_hundred_times_stiffer(multiple, passes):
+def test_varying_curvature_locks_only_with_bonds_a_hundred_times_stiffer(multiple, passes):
     layers, strain = torsion.wave_strip(20)
     config = scene(
         [rod(layers, stations=21, clamp_start="wall")],
