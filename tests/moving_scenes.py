@@ -3,7 +3,10 @@
 import math
 
 import numpy as np
-from sample_scenes import fixed, layer, rod, scene
+from sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.integrators.register import INTEGRATORS
 
 SOFT = {"gel": {"youngs_modulus": 1e4, "poisson_ratio": 0.5, "density": 1000.0}}
 EXACT = {"newton_tolerance": 1e-10}
@@ -65,6 +68,31 @@ PROBLEMS = {
     "jet": (jet(), 0.06),
     "spinning body": (spinner(), 0.06),
 }
+
+
+ADAPTIVE = [name for name, method in INTEGRATORS.items() if method.estimate is not None]
+"""Names of the integrators that have an estimate of their error."""
+
+
+def simulate(description, duration=None, **settings):
+    """A simulator, after `duration` [s]."""
+    simulator = Simulator(load_scene(description), **settings)
+    if duration:
+        simulator.run(duration)
+    return simulator
+
+
+def falling(obstacles=(GROUND,), **solver):
+    """A ball 28 mm above the ground, with a distant strip because a scene must have one."""
+    strip = rod([layer()], start=(1, 0, 1), length=0.05, stations=3, clamp_start="wall")
+    return scene(
+        [strip],
+        gravity=[0, 0, -9.81],
+        bodies=[fixed("wall", (1, 0, 1)), ball((0, 0, 0.05))],
+        obstacles=list(obstacles),
+        contact=contact(barrier_distance=1e-3),
+        solver={"newton_tolerance": 1e-9, **solver},
+    )
 
 
 def part(simulator, name):
