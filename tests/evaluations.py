@@ -8,7 +8,7 @@ from bilayer_core.model.build import build_model
 from bilayer_core.model.rest_strains import RestStrains
 from bilayer_core.model.state import initial_state
 from bilayer_core.scene.loader import load_scene
-from bilayer_core.simulation.stage_inputs import Surroundings
+from bilayer_core.simulation.surroundings import Surroundings
 
 GRADIENT_LIMIT = 1e-7  # of the largest entry
 HESSIAN_LIMIT = 1e-6

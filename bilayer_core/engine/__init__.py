@@ -1,3 +1,3 @@
 """The compiled engine: Newton's method on the incremental potential, steps, evaluations."""
 
-from . import adaptive, evaluator  # noqa: F401 (import all that declares pieces)
+from . import engine, evaluator  # noqa: F401 (import all that declares pieces)

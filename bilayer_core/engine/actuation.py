@@ -1,4 +1,8 @@
-"""What acts from outside until the next corner or jump, evaluated by loops whose steps find their own lengths."""
+"""What acts from outside over time: stimuli, loads and prescribed paths, evaluated at the stages of steps.
+
+Each schedule is given as its next pieces (`scene.piece.Piece`), as far as a horizon. Two times that differ by less than
+`same` [s] count as one. Where a schedule jumps, a step that ends there has its value from before, to its end.
+"""
 
 from __future__ import annotations
 
@@ -8,83 +12,166 @@ from ..jit import kernel, piece
 from ..jit.record import Indices, Matrix, Stack, Vector, record
 from ..kinematics.turning import spin_of, turn_by
 from ..model.records.status import READY
-from ..model.records.step import Course
+from ..model.records.step import StageInputs
+from ..scene.piece import ROUNDING, Piece
 
 
 @record
 class Paths:
-    """Prescribed bodies that move, each between two of its keyframes; see `model.model.between_keyframes`."""
+    """Keyframes of prescribed bodies that move; cubic smoothsteps lead from one to the next."""
 
     body: Indices  # shape (n_moving,)
-    begin: Vector  # time of the keyframe before [s]
-    duration: Vector  # until that after it [s]
-    displacement: Matrix  # at the keyframe before [m], shape (n_moving, 3)
-    way: Matrix  # to the next [m]
-    turn: Matrix  # rotation vector at the keyframe before [rad], shape (n_moving, 3)
-    turn_way: Matrix  # to the next [rad]
+    first: Indices  # of the keyframes of each, last the number of all, shape (n_moving + 1,)
+    time: Vector  # of keyframes [s], shape (n_keyframe,)
+    displacement: Matrix  # [m], shape (n_keyframe, 3)
+    rotation_vector: Matrix  # [rad], shape (n_keyframe, 3)
     position: Matrix  # of all bodies at time 0 [m], shape (n_body, 3)
     rotation: Stack  # shape (n_body, 3, 3)
 
 
 @record
-class Acting:
-    """Pieces of schedules (`scene.piece.Piece`), a row of `PARTS` each, and of paths."""
+class Actuation:
+    """Schedules as far as `horizon`, one row of `PARTS` for each piece."""
 
-    stimulus: Matrix  # shape (n_channel, len(PARTS))
-    load: Matrix  # shape (n_load, len(PARTS))
+    stimulus: Stack  # shape (n_channel, n_piece, len(PARTS))
+    load: Stack  # shape (n_load, n_piece, len(PARTS))
+    ranges: Vector  # of channels, in their units, shape (n_channel,)
+    horizon: Vector  # the first end of all last pieces [s], shape (1,)
     paths: Paths
 
 
-PARTS = ("level", "begin", "rate", "amplitude", "frequency", "phase")
-LEVEL, BEGIN, RATE, AMPLITUDE, FREQUENCY, PHASE = range(len(PARTS))
+PARTS = Piece._fields
+UNTIL, LEVEL, BEGIN, RATE, AMPLITUDE, FREQUENCY, PHASE = range(len(PARTS))
+AT_ONCE = 1e-2
+"""Part of a step below which the lag of a layer makes no difference to a jump of its stimulus."""
+NO_JUMP = 1e-9
+"""Part of a channel's range below which a change at once is rounding."""
 
 
 @kernel
-def _value(pieces, row, time):
+def _value(pieces, row, k, time):
     """`Piece.value`"""
-    s = max(time - pieces[row, BEGIN], 0.0)
-    value = pieces[row, LEVEL] + pieces[row, RATE] * s
-    if pieces[row, AMPLITUDE] != 0.0:
-        value += pieces[row, AMPLITUDE] * math.sin(pieces[row, FREQUENCY] * s + pieces[row, PHASE])
+    s = max(time - pieces[row, k, BEGIN], 0.0)
+    value = pieces[row, k, LEVEL] + pieces[row, k, RATE] * s
+    if pieces[row, k, AMPLITUDE] != 0.0:
+        value += pieces[row, k, AMPLITUDE] * math.sin(pieces[row, k, FREQUENCY] * s + pieces[row, k, PHASE])
     return value
 
 
 @kernel
-def look_back(acting, begin, course):
-    """What acts at the start of a step."""
-    for c in range(acting.stimulus.shape[0]):
-        course.first[0, c] = _value(acting.stimulus, c, begin)
+def _piece_until(pieces, row, time):
+    """The first piece that ends at `time` or later."""
+    k = 0
+    while k + 1 < pieces.shape[1] and pieces[row, k, UNTIL] < time:
+        k += 1
+    return k
 
 
-@piece(int, Acting, Vector, float, float, Course)
-def drive_step(acting, nodes, begin, h, course):
-    """What acts at the stages of a step of length `h` [s] that begins at `begin` [s], as the course of one step."""
+@kernel
+def _any_jumps(pieces, time, same):
+    """Whether a schedule jumps at a time; see `Piece.jump_to`."""
+    for row in range(pieces.shape[0]):
+        k = _piece_until(pieces, row, time - same)
+        end = pieces[row, k, UNTIL]
+        if end > time + same or k + 1 == pieces.shape[1]:
+            continue
+        before, after = _value(pieces, row, k, end), _value(pieces, row, k + 1, end)
+        largest = max(abs(pieces[row, k, LEVEL]), abs(pieces[row, k, AMPLITUDE]), abs(before), abs(after))
+        if abs(after - before) > ROUNDING * largest:
+            return True
+    return False
+
+
+@piece(int, Actuation, float, float)
+def jumps_at(actuation, time, same):
+    """1 if a stimulus jumps at a time [s], plus 2 if a load does."""
+    return int(_any_jumps(actuation.stimulus, time, same)) + 2 * int(_any_jumps(actuation.load, time, same))
+
+
+@piece(float, Actuation, float, float)
+def corner_after(actuation, time, same):
+    """The first time after `time` at which a schedule or a path has a corner or jumps [s]; infinity without one."""
+    first, paths = math.inf, actuation.paths
+    for row in range(actuation.stimulus.shape[0]):
+        k = _piece_until(actuation.stimulus, row, time + same)
+        first = min(first, actuation.stimulus[row, k, UNTIL])
+    for row in range(actuation.load.shape[0]):
+        k = _piece_until(actuation.load, row, time + same)
+        first = min(first, actuation.load[row, k, UNTIL])
+    if paths.exists:
+        for k in range(paths.time.shape[0]):
+            if paths.time[k] > time + same:
+                first = min(first, paths.time[k])
+    return first
+
+
+@kernel
+def look_back(actuation, begin, same, inputs):
+    """Stimuli at the start of a step, after any jump there."""
+    for c in range(actuation.stimulus.shape[0]):
+        inputs.first[c] = _value(actuation.stimulus, c, _piece_until(actuation.stimulus, c, begin + same), begin)
+
+
+@piece(int, Actuation, Vector, float, float, float, StageInputs)
+def drive_step(actuation, nodes, begin, h, same, inputs):
+    """What acts at the stages of a step of length `h` [s] that begins at `begin` [s]."""
     for n in range(nodes.shape[0]):
-        course.elapsed[n] = nodes[n] * h
+        inputs.elapsed[n] = nodes[n] * h
         time = begin + nodes[n] * h
-        for c in range(acting.stimulus.shape[0]):
-            course.stimulus[0, n, c] = _value(acting.stimulus, c, time)
-        for i in range(acting.load.shape[0]):
-            course.load_factor[0, n, i] = _value(acting.load, i, time)
-        _place(acting.paths, time, course.position[0, n], course.rotation[0, n], course.rates[0, n])
+        for c in range(actuation.stimulus.shape[0]):
+            k = _piece_until(actuation.stimulus, c, time - same)
+            inputs.stimulus[n, c] = _value(actuation.stimulus, c, k, time)
+        for i in range(actuation.load.shape[0]):
+            k = _piece_until(actuation.load, i, time - same)
+            inputs.load_factor[n, i] = _value(actuation.load, i, k, time)
+        _follow_paths(actuation.paths, time, inputs.position[n], inputs.rotation[n], inputs.rates[n])
     return READY
 
 
 @kernel
-def _place(paths, time, position, rotation, rates):
+def _keyframe_before(paths, first, last, time):
+    """The last of the keyframes from `first` to `last` − 1 that is not later than a time; first − 1 without one."""
+    low, high = first, last
+    while low < high:
+        middle = (low + high) // 2
+        if paths.time[middle] <= time:
+            low = middle + 1
+        else:
+            high = middle
+    return low - 1
+
+
+@kernel
+def _follow_paths(paths, time, position, rotation, rates):
     """Put bodies where their paths lead."""
     if not paths.exists:
         return
     for k in range(paths.body.shape[0]):
-        b = paths.body[k]
-        s = (time - paths.begin[k]) / paths.duration[k]
-        part, rate = s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / paths.duration[k]
+        b, first, last = paths.body[k], paths.first[k], paths.first[k + 1]
+        before = _keyframe_before(paths, first, last, time)
+        a, z = max(before, first), min(before + 1, last - 1)
+        part = rate = 0.0
+        if z > a:
+            duration = paths.time[z] - paths.time[a]
+            s = (time - paths.time[a]) / duration
+            part, rate = s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / duration
+        shift, turn = paths.displacement, paths.rotation_vector
         for c in range(3):
-            position[b, c] = paths.position[b, c] + paths.displacement[k, c] + part * paths.way[k, c]
-            rates[b, c] = rate * paths.way[k, c]
-        v0 = paths.turn[k, 0] + part * paths.turn_way[k, 0]
-        v1 = paths.turn[k, 1] + part * paths.turn_way[k, 1]
-        v2 = paths.turn[k, 2] + part * paths.turn_way[k, 2]
+            position[b, c] = paths.position[b, c] + shift[a, c] + part * (shift[z, c] - shift[a, c])
+            rates[b, c] = rate * (shift[z, c] - shift[a, c])
+        w0, w1, w2 = turn[z, 0] - turn[a, 0], turn[z, 1] - turn[a, 1], turn[z, 2] - turn[a, 2]
+        v0, v1, v2 = turn[a, 0] + part * w0, turn[a, 1] + part * w1, turn[a, 2] + part * w2
         turn_by(v0, v1, v2, paths.rotation, b, rotation, b)
-        u0, u1, u2 = rate * paths.turn_way[k, 0], rate * paths.turn_way[k, 1], rate * paths.turn_way[k, 2]
-        rates[b, 3], rates[b, 4], rates[b, 5] = spin_of(v0, v1, v2, u0, u1, u2)
+        rates[b, 3], rates[b, 4], rates[b, 5] = spin_of(v0, v1, v2, rate * w0, rate * w1, rate * w2)
+
+
+@kernel
+def stimulus_has_jumped(drives, state, first, ranges, h):
+    """Whether a stimulus has jumped that some layer follows at once in a step of length `h` [s]."""
+    for k in range(drives.law_channel.shape[0]):
+        channel = drives.law_channel[k]
+        change = first[channel] - state.transduction[k]
+        lag = drives.law_rising[k] if change > 0.0 else drives.law_falling[k]
+        if abs(change) > NO_JUMP * ranges[channel] and lag < AT_ONCE * h:
+            return True
+    return False

@@ -1,36 +1,28 @@
-"""Compiled steps for the stepper: what they take, and what they leave."""
+"""Steps of a model: the arrays that they compute into, and what they leave."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..integrators.method import Method
+from ..integrators.sdirk2 import METHOD as SELF_STARTING
 from ..model.carriers import carrier_names
 from ..model.force_list import Kind, kinds
 from ..model.force_places import NAMES
-from ..model.model import Model
-from ..model.records.outcome import (
-    BACKTRACKS,
-    FACTORISATIONS,
-    GAP,
-    ITERATIONS,
-    LARGEST_RESIDUAL,
-    PAIR,
-    PLACE,
-    RESIDUAL,
-    STATUS,
-)
-from ..model.records.status import CONVERGED, TOO_INACCURATE
-from ..model.records.step import Course, Method, Place, StateArrays, Tally
+from ..model.model import Model, scheduled_motion
+from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, PLACE, RESIDUAL, STATUS
+from ..model.records.step import RunExtrema, StageInputs, StateArrays
 from ..model.rest_strains import RestStrains
 from ..model.state import State
+from .actuation import Actuation
 from .allocate import configuration
-from .loop import Counted, Loop
-from .modes import STEP
-from .newton_report import FAILURES, NewtonReport, NewtonStatus
-from .step import count_step, take_steps
+from .error_norm import ErrorNorm
+from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
+from .report import FAILURES, IntegrationReport
+from .run_extrema import count_shape
+from .step import make_step
 from .storage import Storage
 from .workspace import work_of
 
@@ -40,93 +32,143 @@ Array = np.ndarray
 class Engine:
     """Compiled steps of a model, and the arrays that they compute into.
 
+    Parameters
+    ----------
+    model : Model
+    method : Method
+    control : StepControl
+    newton_tolerance : float
+        Speed of a material point below which Newton's correction is the last [m/s].
+    max_iterations : int
+        Of Newton's method.
+
     Attributes
     ----------
-    places : list of Place
-        Configurations that steps use.
+    actuation : Actuation or None
+        What acts from outside; to be set before the first step.
     end : Place
-        That of them which was evaluated last.
+        The configuration that was evaluated last.
     first : FirstDerivatives
         There.
     gap : float
         The smallest to a surface or another rod there [m], infinite without contact; between rods those below the
         barrier distance count.
+    stimulus : Array
+        Value of each channel at the end of the last step, shape (n_channel,).
     touched : Array
         Carriers that something pushed at the end of the last step, bool, shape (n_carrier,).
-    ranges : Array
-        Of channels, in their units, shape (n_channel,).
-    figures, nodes, most_nodes, first_contact, body_top : Array
-        Extremes of the run; see `model.records.step.Tally`.
+    extrema : RunExtrema
+        Of the run.
     """
 
-    def __init__(self, model: Model, keeps_slopes: bool, stages: int):
-        self._model, self._storage = model, Storage(model)
-        self.first, self.gap, self.outcome = self._storage.first, math.inf, self._storage.outcome
-        self.keeps = keeps_slopes
-        self.places = [configuration(model) for _ in range(3)]
-        self.end = self.places[1]
+    def __init__(
+        self, model: Model, method: Method, control: StepControl, newton_tolerance: float, max_iterations: int
+    ):
+        self._model, self._storage, self._control = model, Storage(model), control
+        self._newton = newton_tolerance, max_iterations
+        self.first, self.gap = self._storage.first, math.inf
+        self._outcome = self._storage.outcome
+        methods = (method, SELF_STARTING) if method.history else (method, method)
+        self._methods = [used.arrays() for used in methods]
+        self._configurations = [configuration(model) for _ in range(3)]
+        self.end = self._configurations[1]
+        self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
+        stages = max(len(used.nodes) for used in methods)
+        self._work = work_of(model, self._configurations, self.touched, stages)
+        self._inputs = inputs_of(model, max(len(used.points) for used in methods))
+        self.stimulus = self._inputs.applied
+        self.actuation: Actuation | None = None
+        self._error_norm, self._counts = error_norm_of(model), empty_counts()
         self._state: State | None = None
-        self._loop: Loop | None = None
-        self._counted: Counted | None = None
-        self.ranges = np.array([c.maximum - c.minimum for c in model.scene.stimuli.values()], dtype=float)
-        self.figures = np.zeros(5)
-        self.body_top = np.zeros(len(model.bodies.names))
-        self.nodes, self.most_nodes = np.zeros((2, len(model.surfaces.names)), dtype=np.int64)
-        self.first_contact = np.zeros(len(model.surfaces.names))
-        self.tally = Tally(
+        self._integration: Integration | None = None
+        surfaces = len(model.surfaces.names)
+        self.extrema = RunExtrema(
             mass_moment=model.mass_moment,
             mass=float(model.node_mass.sum()),
             voronoi_length=model.voronoi_length,
-            figures=self.figures,
-            body_top=self.body_top,
-            nodes=self.nodes,
-            most_nodes=self.most_nodes,
-            first_contact=self.first_contact,
+            figures=np.zeros(5),
+            body_top=np.zeros(len(model.bodies.names)),
+            nodes=np.zeros(surfaces, dtype=np.int64),
+            most_nodes=np.zeros(surfaces, dtype=np.int64),
+            first_contact=np.zeros(surfaces),
         )
         self.start_over(-math.inf)
-        self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
-        self._work = work_of(model, self.places, self.touched, stages)
 
     def start_over(self, height: float) -> None:
-        """Forget the extremes of the run; the mass centre is at `height` [m]."""
-        self.figures[:] = height, math.inf, 0.0, 0.0, 0.0
-        self.body_top[:] = -math.inf
-        self.nodes[:], self.most_nodes[:], self.first_contact[:] = 0, 0, math.nan
+        """Forget the extrema of the run; the mass centre is at `height` [m]."""
+        extrema = self.extrema
+        extrema.figures[:] = height, math.inf, 0.0, 0.0, 0.0
+        extrema.body_top[:] = -math.inf
+        extrema.nodes[:], extrema.most_nodes[:], extrema.first_contact[:] = 0, 0, math.nan
 
-    def _arrays_of(self, state: State) -> StateArrays:
-        if state is not self._state:
-            self._state, self._counted = state, None
-            self._state_arrays = StateArrays(**{name: getattr(state, name) for name in StateArrays.names})
-        return self._state_arrays
-
-    def loop_of(self, state: State, method: Method, course: Course) -> Loop:
-        """What compiled steps take, with the present rooms; the same object as long as all parts are."""
-        parts = {"problem": self._storage.problem, "state": self._arrays_of(state), "method": method, "course": course}
-        if self._loop is None or any(getattr(self._loop, name) is not part for name, part in parts.items()):
-            self._loop = Loop(
-                **parts, work=self._work, before=np.zeros_like(state.values), tally=self.tally, ranges=self.ranges
-            )
-        return self._loop
-
-    def march(self, state: State, method: Method, course: Course, h: float, settings: Settings) -> MarchReport:
-        """Make the steps of a course, each of length `h` [s], as far as they succeed; `state` is that after them."""
-        loop = self.loop_of(state, method, course)
-        flags = self.keeps, settings.mode, settings.changes, settings.counts
-        done = take_steps(
-            loop, *flags, h if settings.mode == STEP else settings.length, settings.tolerance, settings.max_iterations
+    def integrate(self, state: State, until: float, due: float, most: int) -> IntegrationReport:
+        """Make at most so many steps, by `integrate.integrate`. One that fails leaves `state` as it is."""
+        counts, outcome = self._counts, self._outcome
+        clear(counts)
+        done = integrate(self._parts_for(state), until, due, most, *self._newton)
+        status, pair = int(outcome.counts[STATUS]), int(outcome.counts[PAIR])
+        if done > 0 or status in FAILURES:
+            self._take_end()
+        iterations, factorisations, backtracks, rejected, inaccurate, restarts = counts.numbers.tolist()
+        shortest, longest, length = counts.lengths.tolist()
+        residual, largest_residual = counts.residuals.tolist()
+        error = 0.0
+        if status in FAILURES:
+            length, residual, error, iterations = counts.failure.tolist()
+        return IntegrationReport(
+            *(done, status, pair, int(iterations), factorisations, backtracks, residual, largest_residual),
+            *(shortest, longest, length, rejected, inaccurate, restarts, error),
         )
-        counts, figures = self.outcome.counts.tolist(), self.outcome.figures.tolist()
-        status, pair, place, gap = counts[STATUS], counts[PAIR], counts[PLACE], figures[GAP]
-        if done > 0 or status == CONVERGED or status in FAILURES:
-            self.take_over(place, gap)
-        how = FAILURES.get(status, NewtonStatus.CONVERGED)
-        work = counts[ITERATIONS], counts[FACTORISATIONS], figures[RESIDUAL], counts[BACKTRACKS]
-        newton = NewtonReport(how, *work)
-        return MarchReport(done, status, place, pair, newton, figures[LARGEST_RESIDUAL], h, h, h)
 
-    def take_over(self, place: int, gap: float) -> None:
-        """Note which configuration was evaluated last, and the smallest gap there [m]."""
-        self.end, self.gap = self.places[place], gap
+    def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
+        """What another mode of a step than steps does (`engine.modes`), with what acts set before."""
+        while True:
+            run = self._parts_for(state)
+            parts = run.problem, run.state, run.state, run.method, run.method.history, mode, run.inputs, run.work
+            status = make_step(*parts, length, tolerance, self._newton[1])
+            if not self.reserve(status):
+                break
+        counts, figures = self._outcome.counts.tolist(), self._outcome.figures
+        self._take_end()
+        numbers = counts[ITERATIONS], counts[FACTORISATIONS], counts[BACKTRACKS]
+        return IntegrationReport(1, status, counts[PAIR], *numbers, float(figures[RESIDUAL]))
+
+    def _parts_for(self, state: State) -> Integration:
+        """What compiled steps take; the same object as long as all parts are."""
+        problem, parts = self._storage.problem, self._integration
+        known = parts is not None and parts.problem is problem and parts.actuation is self.actuation
+        if not known or state is not self._state:
+            methods, kept = self._methods, state.copy()
+            arrays, kept_arrays = (
+                StateArrays(**{name: getattr(of, name) for name in StateArrays.names}) for of in (state, kept)
+            )
+            self._state = state
+            self._integration = parts = Integration(
+                problem=problem,
+                state=arrays,
+                clock=Clock(**{name: getattr(state, name) for name in Clock.names}),
+                method=methods[0],
+                starter=methods[1],
+                inputs=self._inputs,
+                actuation=self.actuation,
+                control=self._control,
+                error_norm=self._error_norm,
+                work=self._work,
+                kept=kept_arrays,
+                kept_touched=self.touched.copy(),
+                extrema=self.extrema,
+                counts=self._counts,
+            )
+        return parts
+
+    def _take_end(self) -> None:
+        """Note which configuration was evaluated last, and the smallest gap there."""
+        self.end = self._configurations[self._outcome.counts[PLACE]]
+        self.gap = float(self._outcome.figures[GAP])
+
+    def reserve(self, status: int) -> bool:
+        """Have the capacity that a step lacked; false if that is not what it lacked."""
+        return self._storage.grow(status)
 
     @property
     def energies(self) -> dict[str, float]:
@@ -160,136 +202,43 @@ class Engine:
         return int(self._storage.problem.system.negative[0])
 
     def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
-        """What acts on the state that is looked at next, by settings that say so."""
+        """What acts on the state in modes other than steps."""
         stage = self._work.stage
         stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
 
-    def make_room(self, status: int) -> bool:
-        """Have the room that a loop lacked; false if that is not what it lacked: something has jumped."""
-        return self._storage.grow(status)
-
-    def count_in(self, state: State, gap: float) -> None:
-        """Take the end of a step that no loop has made into the tally."""
-        p, arrays = self._storage.problem, self._arrays_of(state)
-        if self._counted is None or self._counted.sums is not p.sums:
-            self._counted = Counted(surfaces=p.surfaces, strands=p.strands, sums=p.sums, state=arrays, tally=self.tally)
-        count_step(self._counted, gap, float(state.time[0]))
-
-    def count_shape(self, state: State, end: Place, rest_edge: Array) -> None:
-        """Take the shape of a state that no loop has led to into the tally: `engine.step.count_end` without kernels.
-
-        Parameters
-        ----------
-        state : State
-        end : Place
-            That of the state.
-        rest_edge : Array
-            Rest strains of edges there, shape (n_edge,).
-        """
-        model = self._model
-        a, b = model.joint_a[: model.bend_count], model.joint_b[: model.bend_count]
-        tangents, directors = end.tangent, end.director1
-        bend = np.einsum("ki,ki->k", tangents[b], directors[a]) - np.einsum("ki,ki->k", tangents[a], directors[b])
-        bend /= 1.0 + np.einsum("ki,ki->k", tangents[a], tangents[b])
-        curvature = np.abs(bend) / model.voronoi_length
-        strain = np.abs(end.length[: model.edge_count] / model.rest_length - 1.0 - rest_edge)
-        self.figures[3:] = np.maximum(self.figures[3:], [curvature.max(initial=0.0), strain.max(initial=0.0)])
-        np.maximum(self.body_top, state.body_position[: len(self.body_top), 2], out=self.body_top)
+    def count_shape(self, state: State) -> None:
+        """Take the shape of a state that was evaluated, and to which no step has led, into the extrema."""
+        run = self._parts_for(state)
+        count_shape(run.problem, run.state, self.end, self._work.stage, self.extrema)
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How a loop goes about its steps.
-
-    Attributes
-    ----------
-    tolerance : float
-        Of Newton [m/s].
-    max_iterations : int
-    mode : int
-        From `modes`.
-    length : float
-        For other modes than steps, as for `step.make_step` [s].
-    changes : bool
-        Whether a jump ends the loop, because another integrator has to step in.
-    counts : bool
-        Whether steps are taken into the tally.
-    """
-
-    tolerance: float
-    max_iterations: int
-    mode: int
-    length: float
-    changes: bool
-    counts: bool
+def inputs_of(model: Model, points: int) -> StageInputs:
+    """Arrays for what acts at so many points of a step, with prescribed bodies where their paths begin."""
+    channels, bodies = len(model.scene.stimuli), len(model.bodies.names)
+    inputs = StageInputs(
+        applied=np.zeros(channels),
+        elapsed=np.zeros(points),
+        first=np.zeros(channels),
+        stimulus=np.zeros((points, channels)),
+        load_factor=np.zeros((points, len(model.scene.loads))),
+        position=np.zeros((points, bodies, 3)),
+        rotation=np.zeros((points, bodies, 3, 3)),
+        rates=np.zeros((points, bodies, 6)),
+    )
+    for b in np.flatnonzero(model.bodies.free_index[:-1] < 0):
+        inputs.position[:, b], inputs.rotation[:, b], _ = scheduled_motion(model.bodies, b, 0.0)
+    return inputs
 
 
-@dataclass(frozen=True)
-class MarchReport:
-    """How a loop ended.
-
-    Attributes
-    ----------
-    done : int
-        Number of steps made.
-    status : int
-        Why it ended, in the loop's own numbers.
-    place : int
-        Which configuration is the last.
-    pair : int
-        Blocking pair, −1 if none.
-    newton : NewtonReport
-        Iterations of all attempts; the rest is that of the last one.
-    largest_residual : float
-        Of the steps made [m/s].
-    shortest, longest : float
-        Lengths of the steps made [s].
-    length : float
-        That of the last step, or of the attempt that failed [s].
-    rejected, inaccurate : int
-        Attempts that were made again, shorter, and those of them whose error was too large.
-    error : float
-        That of the attempt that failed, in tolerances.
-    """
-
-    done: int
-    status: int
-    place: int
-    pair: int
-    newton: NewtonReport
-    largest_residual: float
-    shortest: float
-    longest: float
-    length: float
-    rejected: int = 0
-    inaccurate: int = 0
-    error: float = 0.0
-
-    def followed_by(self, more: MarchReport) -> MarchReport:
-        """Both together; it ends as `more` does."""
-        newton = replace(
-            more.newton,
-            iterations=self.newton.iterations + more.newton.iterations,
-            factorisations=self.newton.factorisations + more.newton.factorisations,
-            backtracks=self.newton.backtracks + more.newton.backtracks,
-        )
-        return replace(
-            more,
-            done=self.done + more.done,
-            newton=newton,
-            largest_residual=max(self.largest_residual, more.largest_residual),
-            shortest=min(self.shortest, more.shortest),
-            longest=max(self.longest, more.longest),
-            rejected=self.rejected + more.rejected,
-            inaccurate=self.inaccurate + more.inaccurate,
-        )
-
-    @property
-    def failed(self) -> bool:
-        """Whether the step after those made failed; otherwise, if it was not made, it is not one for the loop."""
-        return self.status in FAILURES or self.status == TOO_INACCURATE
-
-    @property
-    def finished(self) -> bool:
-        """Whether all steps were made."""
-        return self.status == CONVERGED
+def error_norm_of(model: Model) -> ErrorNorm:
+    """What the defect of a model's steps is measured on."""
+    ends = [strand.first_node for strand in model.strands] + [model.node_count]
+    shares = np.array(model.carriers.weight[: model.node_count])
+    return ErrorNorm(
+        length=float(max(rod.path.length for rod in model.scene.rods)),
+        first_node=np.array(ends, dtype=np.int64),
+        weight=shares / np.repeat(np.add.reduceat(shares, ends[:-1]), np.diff(ends)),
+        half_width=model.half_width if model.plane is None else np.zeros(0),
+        body_of_free=model.bodies.body_of_free,
+        reach=model.bodies.reach,
+    )

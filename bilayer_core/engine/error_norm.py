@@ -33,8 +33,8 @@ from ..model.records.step import StateArrays
 
 
 @record
-class Yardstick:
-    """What deviations are measured on, and with."""
+class ErrorNorm:
+    """What the defect of a step is measured on, and with."""
 
     length: float  # of the longest rod [m]
     first_node: Indices  # of each strand, last the number of nodes, shape (n_strand + 1,)
@@ -44,28 +44,28 @@ class Yardstick:
     reach: Vector  # of bodies [m], shape (n_body,)
 
 
-@piece(float, Yardstick, StateArrays, StateArrays, float)
-def deviation(yardstick, before, after, h):
+@piece(float, ErrorNorm, StateArrays, StateArrays, float)
+def step_defect(norm, before, after, h):
     """D of a step over the length of the longest rod; times `Method.estimate` its local error.
 
     Parameters
     ----------
-    yardstick : Yardstick
+    norm : ErrorNorm
     before, after : StateArrays
         The ends of the step.
     h : float
         Its length [s].
     """
-    first, largest = yardstick.first_node, 0.0
+    first, largest = norm.first_node, 0.0
     for s in range(first.shape[0] - 1):
-        square = _of_nodes(yardstick.weight, before, after, 0.5 * h, first[s], first[s + 1])
-        square += _of_edges(yardstick.half_width, yardstick.weight, before, after, 0.5 * h, first[s], first[s + 1], s)
+        square = _of_nodes(norm.weight, before, after, 0.5 * h, first[s], first[s + 1])
+        square += _of_edges(norm.half_width, norm.weight, before, after, 0.5 * h, first[s], first[s + 1], s)
         largest = max(largest, square)
     largest = math.sqrt(largest)
-    for f in range(yardstick.body_of_free.shape[0]):
-        b = yardstick.body_of_free[f]
-        largest = max(largest, _of_body(yardstick.reach[b], before, after, 0.5 * h, b))
-    return largest / yardstick.length
+    for f in range(norm.body_of_free.shape[0]):
+        b = norm.body_of_free[f]
+        largest = max(largest, _of_body(norm.reach[b], before, after, 0.5 * h, b))
+    return largest / norm.length
 
 
 @kernel
@@ -107,8 +107,8 @@ def _of_edges(half_width, weight, before, after, half, first, last, strand):
         x, y, z = after.director1[edge, 0], after.director1[edge, 1], after.director1[edge, 2]
         sine = (d[1] * z - d[2] * y) * u[0] + (d[2] * x - d[0] * z) * u[1] + (d[0] * y - d[1] * x) * u[2]
         turn = math.atan2(sine, d[0] * x + d[1] * y + d[2] * z)
-        deviation = half_width[edge] * (turn - half * (before.spin[edge] + after.spin[edge]))
-        total += 0.5 * (weight[i] + weight[i + 1]) * deviation**2
+        defect = half_width[edge] * (turn - half * (before.spin[edge] + after.spin[edge]))
+        total += 0.5 * (weight[i] + weight[i + 1]) * defect**2
     return total
 
 

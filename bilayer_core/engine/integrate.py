@@ -1,4 +1,10 @@
-"""Steps as long as their error allows, many in one compiled function."""
+"""Time integration: fixed or adaptive steps, many in one compiled function.
+
+An adaptive step is made again, shorter, where its error exceeds the tolerance or Newton's method fails. It ends exactly
+at corners and jumps of what acts from outside, and at output times; after a jump steps begin again with the first
+step's length. A fixed step is made in as few equal parts as Newton's method needs. All that this remembers is in the
+state.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +16,17 @@ from ..jit import call, kernel, piece, record_at
 from ..jit.record import Flags, Indices, Vector, record
 from ..kinematics.copying import copy
 from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, PLACE, RESIDUAL, STATUS
-from ..model.records.status import CONVERGED, JUMPED, MAX_ITERATIONS, READY, TOO_INACCURATE
-from ..model.records.step import Place, StateArrays
-from .actuation import Acting, look_back
-from .error_norm import Yardstick
-from .loop import Loop
+from ..model.records.problem import Problem
+from ..model.records.status import CONVERGED, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
+from ..model.records.step import Method, Place, RunExtrema, StageInputs, StateArrays, Work
+from .actuation import Actuation, look_back, stimulus_has_jumped
+from .error_norm import ErrorNorm
 from .modes import STEP
-from .step import has_jumped
-from .step_size import FAILURE_FACTOR, STRETCH, after_rejection, after_success, fit
+from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, after_rejection, after_success, fit, next_end
 
 place_at = record_at(Place)
 TIME_ROUNDING = 1e-9
-"""Part of a step by which one that ended where it had to was as long as planned."""
+"""Part of a step, or of an output period, by which two times are the same."""
 
 
 @record
@@ -35,43 +40,52 @@ class Clock:
 
 
 @record
-class Control:
+class StepControl:
     """What decides on lengths of steps."""
 
+    dt: float  # length of fixed steps; 0 for adaptive ones [s]
     order: int  # of the integrator
-    tolerance: float  # largest local error of a step
+    tolerance: float  # largest local error of an adaptive step
     first: float  # length of the first step, and of the first after a jump [s]
     shortest: float  # [s]
     longest: float  # [s]
+    output_rate: float  # adaptive steps end at multiples of its period [1/s]
+    same: float  # two times that differ by less are the same [s]
 
 
 @record
 class Counts:
     """What came of steps, added up until they are cleared."""
 
-    numbers: Indices  # iterations, factorisations, backtracks, attempts refused, and those refused for their error
+    numbers: Indices  # iterations, factorisations, backtracks, attempts refused, those for their error, restarts
     lengths: Vector  # shortest, longest, and last step [s]
     residuals: Vector  # of the last step, and the largest [m/s]
     failure: Vector  # length [s], residual [m/s], error, in tolerances, and iterations of the last attempt
 
 
 @record
-class Adaptation:
-    """All that adaptive steps read and write."""
+class Integration:
+    """All that steps read and write."""
 
-    loop: Loop
+    problem: Problem
+    state: StateArrays
     clock: Clock
-    acting: Acting
-    control: Control
-    yardstick: Yardstick
-    kept: StateArrays
+    method: Method
+    starter: Method  # stands in for a method with history where that cannot start: there it has none of its own
+    inputs: StageInputs
+    actuation: Actuation
+    control: StepControl
+    error_norm: ErrorNorm
+    work: Work
+    kept: StateArrays  # at the start of the step
     kept_touched: Flags
+    extrema: RunExtrema
     counts: Counts
 
 
-def room_for_counts() -> Counts:
+def empty_counts() -> Counts:
     """Counts of no steps."""
-    return Counts(numbers=np.zeros(5, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
+    return Counts(numbers=np.zeros(6, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
 
 
 def clear(counts: Counts) -> None:
@@ -82,9 +96,49 @@ def clear(counts: Counts) -> None:
 
 
 @kernel
+def _end_of_fixed(control, clock):
+    """End of the present fixed step, of which parts may be done: on the grid of multiples of dt if its start is."""
+    begin, end = clock.time[0], (clock.step[0] + 1.0) * control.dt
+    on_grid = end - control.dt <= begin + control.same and begin < end - control.same
+    return end if on_grid else begin + control.dt
+
+
+@kernel
+def _end_of_adaptive(run, until):
+    """The next time at which a step has to end: an output time, a corner, or `until`."""
+    control, begin = run.control, run.clock.time[0]
+    output = next_end(begin + control.same, control.output_rate)
+    end = output if output < until - TIME_ROUNDING / control.output_rate else until
+    corner = call(run.problem.calls.corner_after, (run.actuation, begin, control.same))
+    return corner if corner < end - control.same else end
+
+
+@kernel
+def _begin_again_after_jump(run):
+    """Where something jumps, start with the first step's length, and without a history that a load's jump ends."""
+    control, clock = run.control, run.clock
+    jumped = call(run.problem.calls.jumps_at, (run.actuation, clock.time[0], control.same))
+    if jumped > 0:
+        clock.next_step[0], clock.last_error[0] = min(clock.next_step[0], control.first), 0.0
+    if jumped > 1 and run.method.history:
+        run.state.kept[0] = 0.0
+
+
+@kernel
+def _has_to_start(run, h):
+    """Whether the method needs stage derivatives of the step before, and there are none that hold."""
+    if not run.method.history:
+        return False
+    no_history, drives = run.state.kept[0] == 0.0, run.problem.drives
+    return no_history or stimulus_has_jumped(drives, run.state, run.inputs.first, run.actuation.ranges, h)
+
+
+@kernel
 def _plan(control, clock, h, planned, error, iterations, shortened):
     """Write the length of the next step; one cut short by what it had to end at says little."""
-    following = after_success(control.order, h, error, clock.last_error[0], iterations, shortened)
+    following = 2.0 * h
+    if control.dt == 0.0:
+        following = after_success(control.order, h, error, clock.last_error[0], iterations, shortened)
     following = min(following, control.longest)
     if h < (1.0 - TIME_ROUNDING) * planned and not shortened:
         clock.next_step[0] = max(following, min(planned, control.longest))
@@ -93,51 +147,27 @@ def _plan(control, clock, h, planned, error, iterations, shortened):
 
 
 @kernel
-def _count(counts, h, iterations, factorisations, backtracks, rejected, inaccurate, residual):
-    """Take in a step, with all its attempts."""
-    numbers, lengths, residuals = counts.numbers, counts.lengths, counts.residuals
-    numbers[0] += iterations
-    numbers[1] += factorisations
-    numbers[2] += backtracks
-    numbers[3] += rejected
-    numbers[4] += inaccurate
-    lengths[0], lengths[1], lengths[2] = min(lengths[0], h), max(lengths[1], h), h
-    residuals[0], residuals[1] = residual, max(residuals[1], residual)
-
-
-@kernel
-def _leave(p, done, status, pair, end, gap):
+def _leave(run, done, status, pair, end, gap):
     """Note how steps ended."""
-    p.outcome.counts[STATUS], p.outcome.counts[PAIR], p.outcome.counts[PLACE] = status, pair, end
-    p.outcome.figures[GAP] = gap
+    outcome = run.problem.outcome
+    outcome.counts[STATUS], outcome.counts[PAIR], outcome.counts[PLACE] = status, pair, end
+    outcome.figures[GAP] = gap
     return done
 
 
-@piece(int, Adaptation, bool, int, float, bool, bool, float, float, int, float, int)
-def adapt(adaptation, keeps, mode, length, changes, counts, until, due, most, newton_tolerance, max_iterations):
-    """Advance a state to `until` [s], by at most so many steps, as far as each succeeds, or do once what another mode
-    says.
-
-    Each is made again, shorter, where its error exceeds the tolerance or Newton fails.
+@piece(int, Integration, float, float, int, float, int)
+def integrate(run, until, due, most, newton_tolerance, max_iterations):
+    """Advance a state in time, by at most so many steps, as far as each succeeds, and take them into the extrema.
 
     Parameters
     ----------
-    adaptation : Adaptation
-    keeps : bool
-        Whether the integrator of the run keeps slopes.
-    mode : int
-        From `modes`.
-    length : float
-        For other modes than steps, as for `step.make_step` [s].
-    changes : bool
-        Whether the method begins with slopes that the step before must have left: a jump ends the loop then.
-    counts : bool
-        Whether to take the steps into the tally.
+    run : Integration
     until : float
-        Where the last step ends exactly, later than now and before any corner [s].
+        Where the last adaptive step ends exactly, later than now [s]; fixed ones end within half a step of it.
     due : float
         The first step that ends there or later is the last one, and as long as it would have been [s].
     most : int
+        A part of a fixed step counts as one.
     newton_tolerance : float
         [m/s]
     max_iterations : int
@@ -147,71 +177,79 @@ def adapt(adaptation, keeps, mode, length, changes, counts, until, due, most, ne
     done : int
         Number of steps made; what they took is in `Counts`.
         In `Outcome`: why there are no more, the blocking pair of the last attempt, its configuration, and the gap.
+        `INPUTS_END`: the actuation is to be continued from the present time.
     """
-    loop, clock, control, counted = adaptation.loop, adaptation.clock, adaptation.control, adaptation.counts
-    p, state, course, work, method = loop.problem, loop.state, loop.course, loop.work, loop.method
-    kept, kept_touched = adaptation.kept, adaptation.kept_touched
-    found, figures = p.outcome.counts, p.outcome.figures
+    p, state, work, clock, control, counts = run.problem, run.state, run.work, run.clock, run.control, run.counts
+    kept, inputs, numbers, lengths = run.kept, run.inputs, run.counts.numbers, run.counts.lengths
+    found, figures, fixed = p.outcome.counts, p.outcome.figures, run.control.dt > 0.0
     status, pair, end, gap = READY, -1, 1, math.inf
     for k in range(most):
         begin = clock.time[0]
-        planned = clock.next_step[0] if clock.next_step[0] > 0.0 else control.first
-        look_back(adaptation.acting, begin, course)
-        if changes and has_jumped(keeps, p.drives, state, course.first[0], loop.ranges, planned):
-            return _leave(p, k, JUMPED, -1, end, gap)
+        goal = _end_of_fixed(control, clock) if fixed else _end_of_adaptive(run, until)
+        if run.actuation.horizon[0] < goal - control.same or run.actuation.horizon[0] <= begin + control.same:
+            return _leave(run, k, INPUTS_END, -1, end, gap)
+        _begin_again_after_jump(run)
+        planned = min(clock.next_step[0], control.longest) if clock.next_step[0] > 0.0 else control.first
+        look_back(run.actuation, begin, control.same, inputs)
+        method = run.method
+        starts = _has_to_start(run, planned)
+        if starts:
+            method = run.starter
         copy(state.values, kept.values)
-        copy(work.touched, kept_touched)
+        copy(work.touched, run.kept_touched)
         h, time, error = planned, begin, math.inf
-        rejected = inaccurate = iterations = factorisations = backtracks = 0
+        rejected = iterations = 0
         residual = 0.0
-        last_iterations = 0
         while True:
-            h = fit(h, until - begin)
-            time = until if h == until - begin else begin + h
+            h = fit(h, goal - begin)
+            time = goal if h == goal - begin else begin + h
             h = time - begin
-            call(p.calls.drive_step, (adaptation.acting, method.nodes, begin, h, course))
-            span = h if mode == STEP else length
+            call(p.calls.drive_step, (run.actuation, method.nodes, begin, h, control.same, inputs))
             status = call(
                 p.calls.make_step,
-                (p, state, method, keeps, mode, course, 0, work, loop.before, span, newton_tolerance, max_iterations),
+                (p, state, kept, method, run.method.history, STEP, inputs, work, h, newton_tolerance, max_iterations),
             )
-            pair, end, last_iterations = found[PAIR], found[PLACE], found[ITERATIONS]
-            factors, halvings = found[FACTORISATIONS], found[BACKTRACKS]
+            pair, end, iterations = found[PAIR], found[PLACE], found[ITERATIONS]
             residual, gap = figures[RESIDUAL], figures[GAP]
-            if mode != STEP:
-                _count(counted, span, last_iterations, factors, halvings, 0, 0, residual)
-                return _leave(p, k, status, pair, end, gap)
             if status != CONVERGED and status < MAX_ITERATIONS:
-                return _leave(p, k, status, pair, end, gap)
-            iterations += last_iterations
-            factorisations += factors
-            backtracks += halvings
+                return _leave(run, k, status, pair, end, gap)
+            numbers[0] += iterations
+            numbers[1] += found[FACTORISATIONS]
+            numbers[2] += found[BACKTRACKS]
             error = math.inf
             if status == CONVERGED:
-                defect = call(p.calls.deviation, (adaptation.yardstick, kept, state, h))
-                error = method.estimate * defect / control.tolerance
+                error = 0.0
+                if not fixed:
+                    defect = call(p.calls.step_defect, (run.error_norm, kept, state, h))
+                    error = method.estimate * defect / control.tolerance
                 if error <= 1.0:
                     break
                 copy(kept.values, state.values)
-                copy(kept_touched, work.touched)
+                copy(run.kept_touched, work.touched)
                 status = TOO_INACCURATE
-            if h <= STRETCH * control.shortest:
-                counted.failure[0], counted.failure[1], counted.failure[2] = h, residual, error
-                counted.failure[3] = last_iterations
-                return _leave(p, k, status, pair, end, gap)
+            if h <= GROWTH_LIMIT * control.shortest:
+                counts.failure[0], counts.failure[1], counts.failure[2] = h, residual, error
+                counts.failure[3] = iterations
+                return _leave(run, k, status, pair, end, gap)
             rejected += 1
+            numbers[3] += 1
             if status == TOO_INACCURATE:
-                inaccurate += 1
+                numbers[4] += 1
                 h = after_rejection(control.order, h, error)
             else:
                 h = FAILURE_FACTOR * h
             h = max(h, control.shortest)
-        _count(counted, h, iterations, factorisations, backtracks, rejected, inaccurate, residual)
-        _plan(control, clock, h, planned, error, last_iterations / method.couplings.shape[1], rejected > 0)
+        numbers[5] += starts
+        lengths[0], lengths[1], lengths[2] = min(lengths[0], h), max(lengths[1], h), h
+        counts.residuals[0], counts.residuals[1] = residual, max(counts.residuals[1], residual)
+        _plan(control, clock, h, planned, error, iterations / method.couplings.shape[1], rejected > 0)
+        for c in range(inputs.applied.shape[0]):
+            inputs.applied[c] = inputs.stimulus[method.nodes.shape[0] - 1, c]
         clock.time[0] = time
-        clock.step[0] += 1.0
-        if counts:
-            call(p.calls.count_end, (p, state, place_at(work.places[end]), work.stage, gap, time, loop.tally))
-        if time == until or time >= due:
-            return _leave(p, k + 1, CONVERGED, -1, end, gap)
-    return _leave(p, most, status, pair, end, gap)
+        whole = not fixed or time == goal
+        clock.step[0] += whole
+        call(p.calls.count_end, (p, state, place_at(work.places[end]), work.stage, gap, time, run.extrema))
+        last = time == until or fixed and whole and time > until - 0.5 * control.dt
+        if last or time >= due:
+            return _leave(run, k + 1, CONVERGED, -1, end, gap)
+    return _leave(run, most, status, pair, end, gap)

@@ -6,15 +6,15 @@ from __future__ import annotations
 
 STEP = 0
 """Advance in time."""
-LOOK = 1
+EVALUATE_STATE = 1
 """Evaluate the potential at the state as it stands, without second derivatives."""
 SETTLE = 2
 """One round of statics: minimise the potential with inertia that wants everything to stay where it is."""
 COUNT = 3
 """Count the directions in which the state is unstable."""
 
-MOMENT = 1e-6
-"""Time over which a look sees a velocity as a displacement [s]; rounding makes 1e-10 m/s of it."""
+EVALUATION_TIME = 1e-6
+"""Time over which an evaluation sees a velocity as a displacement [s]; rounding makes 1e-10 m/s of it."""
 WITHOUT_INERTIA = 1e9
 """Length of a step in which neither inertia nor dissipation counts [s]."""
 SLOWEST_GROWTH = 0.1

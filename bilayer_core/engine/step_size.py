@@ -12,7 +12,10 @@ many iterations, or where the step had to be shortened first.
 
 from __future__ import annotations
 
-from ..jit import kernel
+import math
+import sys
+
+from ..jit.kernel import exact_kernel, kernel
 
 SAFETY = 0.9
 PROPORTIONAL, INTEGRAL = 0.6, 0.2
@@ -22,8 +25,13 @@ LEAST_ERROR = 1e-4
 FAILURE_FACTOR = 0.5
 MANY_ITERATIONS = 15
 """Newton iterations of a stage that are no reason to lengthen steps; with twice as many they are halved."""
-STRETCH = 1.05
+GROWTH_LIMIT = 1.05
 """By which a step is lengthened to end where it must; the safety above covers it."""
+
+PERIOD_ROUNDING = 1e-9
+"""Part of a period by which a time may be off and still ends it."""
+NUMBER_ROUNDING = 4.0 * sys.float_info.epsilon
+"""By which part of itself a product of time and rate may be off; more than the above after ten million periods."""
 
 
 @kernel
@@ -60,6 +68,19 @@ def after_rejection(order, h, error):
 @kernel
 def fit(h, left):
     """A length near `h` with which steps end after exactly `left` [s], without a short one at last."""
-    if left <= STRETCH * h:
+    if left <= GROWTH_LIMIT * h:
         return left
     return 0.5 * left if left < 2.0 * h else h
+
+
+@exact_kernel
+def completed(time, rate):
+    """Periods of `rate` [1/s] from time 0 to `time` [s]; one that ends now is complete."""
+    periods = time * rate
+    return math.floor(periods + PERIOD_ROUNDING + NUMBER_ROUNDING * abs(periods))
+
+
+@exact_kernel
+def next_end(time, rate):
+    """When the period ends that has not ended at `time` [s]."""
+    return (completed(time, rate) + 1) / rate

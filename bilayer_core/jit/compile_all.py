@@ -108,7 +108,7 @@ def _feed(left: queue.SimpleQueue, done: queue.SimpleQueue, printed: list[str]) 
     """Have one process compile what is left, name by name."""
     path = os.pathsep.join([str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])])
     process = subprocess.Popen(
-        [sys.executable, "-m", WORKER],
+        [sys.executable, "-P", "-m", WORKER],  # -P: not what has the package's name in the present folder
         env=os.environ | {"PYTHONPATH": path},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

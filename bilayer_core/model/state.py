@@ -28,9 +28,8 @@ class State:
     """
 
     time: Array  # simulated time [s], shape (1,); with fixed steps their number times dt, so that it does not drift
-    step: Array  # steps done, shape (1,)
-    halvings: Array  # present refinement of a fixed step: dt/2^halvings, shape (1,)
-    next_step: Array  # length of the next adaptive step [s], 0 at the start, shape (1,)
+    step: Array  # steps done, without parts of fixed ones, shape (1,)
+    next_step: Array  # length of the next step [s], or of the next part of a fixed one; 0 at the start, shape (1,)
     last_error: Array  # error of the last adaptive step as a part of the tolerance, 0 if there is none, shape (1,)
     position: Array  # of nodes [m], shape (n_node, 3)
     position_low: Array  # what rounding cut off `position` [m], shape (n_node, 3); see `kinematics.compensated`
@@ -147,7 +146,6 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
     return State(
         time=np.zeros(1),
         step=np.zeros(1),
-        halvings=np.zeros(1),
         next_step=np.zeros(1),
         last_error=np.zeros(1),
         position=model.start_position.copy(),

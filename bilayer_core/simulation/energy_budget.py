@@ -38,7 +38,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..engine.evaluator import Evaluator
-from ..engine.modes import MOMENT
+from ..engine.modes import EVALUATION_TIME
 from ..kinematics.rotation import rotation_matrix
 from ..model.force_list import Kind, kinds
 from ..model.model import Model
@@ -87,10 +87,7 @@ class _Instant:
 
 
 class EnergyLedger:
-    """Sums works since `begin`, from `record` after every accepted part of a step.
-
-    `mark` and `roll_back` serve a step that is not accepted after all, or after some of its parts were.
-    """
+    """Sums works since `begin`, from `record` after every accepted step or part of one."""
 
     def __init__(self, model: Model):
         self._model = model
@@ -108,16 +105,6 @@ class EnergyLedger:
         self._work: dict[str, float] = defaultdict(float)  # of each force [J]
         self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
         self._stimulus = 0.0
-        self.mark()
-
-    def mark(self) -> None:
-        """Remember all sums."""
-        self._marked = (self._last, self._work.copy(), self._imposed.copy(), self._stimulus)
-
-    def roll_back(self) -> None:
-        """Go back to the sums that were marked last."""
-        self._last, work, imposed, self._stimulus = self._marked
-        self._work, self._imposed = work.copy(), imposed.copy()
 
     def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
         """Add the works of a step of length `h` [s] that has just been accepted."""
@@ -228,7 +215,7 @@ class EnergyLedger:
         model, evaluator = self._model, self._evaluator
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
-        evaluator.stand_still(state, at, MOMENT, rest.edge, rest.joint, load_factor)
+        evaluator.stand_still(state, at, EVALUATION_TIME, rest.edge, rest.joint, load_factor)
         evaluator.start_stage(at)
         energy, gradient, power = {}, {}, {}
         for name in self._watched:

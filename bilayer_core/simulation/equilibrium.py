@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..engine.modes import COUNT, SETTLE
-from ..engine.newton_report import NewtonStatus
+from ..engine.report import FAILURES
 from ..errors import InputError, SimulationError
+from ..model.records.status import MAX_ITERATIONS
 from ..model.state import State
 from .stepper import Stepper
 
@@ -109,16 +110,16 @@ class _Search:
         first_position, start = state.position.copy(), state.copy()
         length, moved, settled = FIRST, math.inf, 0
         while self.rounds < MAX_ROUNDS:
-            attempt = self.stepper.do_once(state, SETTLE, length, self.tolerance / length).newton
+            attempt = engine.do_once(state, SETTLE, length, self.tolerance / length)
             self.rounds += 1
             self.iterations += attempt.iterations
             self.factorisations += attempt.factorisations
-            lost = not attempt.converged and attempt.status is not NewtonStatus.MAX_ITERATIONS
+            lost = not attempt.converged and attempt.status != MAX_ITERATIONS
             if lost or (not attempt.converged and engine.moved < WORTH_KEEPING * self.size):
                 state.take(start)
                 length *= SHRINKAGE
                 if length < SHORTEST:
-                    raise self._failure(attempt.status.value, moved)
+                    raise self._failure(FAILURES[attempt.status], moved)
                 continue
             moved = engine.moved
             if np.abs(state.position - first_position).max() > OUT_OF_SIGHT * self.size:
@@ -134,9 +135,10 @@ class _Search:
         raise self._failure("the shape does not come to rest", moved)
 
     def _report(self, residual: float) -> StaticReport:
-        counted = self.stepper.do_once(self.state, COUNT).newton
+        counted = self.stepper.engine.do_once(self.state, COUNT)
         if not counted.converged:
-            raise SimulationError(f"the stability of the equilibrium cannot be told: {counted.status.value}", self.time)
+            reason = FAILURES[counted.status]
+            raise SimulationError(f"the stability of the equilibrium cannot be told: {reason}", self.time)
         self.stepper.restart(self.state)
         unstable = self.stepper.engine.unstable
         return StaticReport(unstable == 0, unstable, residual, self.rounds, self.iterations, self.factorisations)

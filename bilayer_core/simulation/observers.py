@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Protocol
 
+from ..engine import step_size
+from ..engine.step_size import PERIOD_ROUNDING
 from .frame import Description, Frame
 
-TIME_ROUNDING = 1e-9
-"""Part of a period by which a time may be off and is still the time at which something is due."""
-_NUMBER_ROUNDING = 4.0 * sys.float_info.epsilon
-"""By which part of itself a product of time and rate may be off; more than the above after ten million periods."""
-
-
-def completed(time: float, rate: float) -> int:
-    """Periods of `rate` [1/s] from time 0 to `time` [s]."""
-    periods = time * rate
-    return math.floor(periods + TIME_ROUNDING + _NUMBER_ROUNDING * abs(periods))
-
-
-def next_end(time: float, rate: float) -> float:
-    """When the period ends that has not ended at `time` [s]."""
-    return (completed(time, rate) + 1) / rate
+completed = step_size.completed.py_func
+"""Periods of a rate [1/s] that are over at a time [s]: the same function decides where steps end."""
 
 
 class Observed(Protocol):
@@ -34,13 +22,10 @@ class Observed(Protocol):
     ----------
     time : float
         Simulated [s].
-    dt : float
-        Length of a fixed step [s].
     description : Description
     """
 
     time: float
-    dt: float
     description: Description
 
     def frame(self) -> Frame:
@@ -83,12 +68,7 @@ class Schedule:
     def next_due(self) -> float:
         """The earliest time of a step's end at which an observer is to look [s]; infinite without any."""
         due = zip(self._count, self._observers, strict=True)
-        return min(((count + 1 - TIME_ROUNDING) / of.rate for count, of in due), default=math.inf)
-
-    def steps_until_due(self, most: float) -> int:
-        """Fixed steps until the next observer is due, at most `most`."""
-        due, dt = self.next_due(), self._simulator.dt
-        return int(most) if math.isinf(due) else int(min(most, max(1.0, math.ceil((due - self._simulator.time) / dt))))
+        return min(((count + 1 - PERIOD_ROUNDING) / of.rate for count, of in due), default=math.inf)
 
     def observe_due(self) -> None:
         done = [completed(self._simulator.time, of.rate) for of in self._observers]

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..engine.report import IntegrationReport
 from ..errors import InputError, SimulationError
 from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
@@ -18,11 +19,10 @@ from ..model.state import State, initial_state, refuse_out_of_plane
 from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observation as observe
-from .adaptive_stepper import AdaptiveStepper
 from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
 from .frame import Description, Frame
-from .observers import TIME_ROUNDING, Observer, Schedule, next_end
+from .observers import Observer, Schedule
 from .result import BodyView, RunResult, Termination
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
@@ -77,13 +77,7 @@ class Simulator:
         self.model = build_model(scene, self.plan.model, self.plan.dimension)
         self._keeps_history = method.history is not None
         self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
-        solver = scene.solver
-        newton = self.steps.newton_tolerance, solver.max_newton_iterations
-        if self.tolerance is None:
-            self._stepper = Stepper(self.model, method, self.dt, *newton, self.steps.max_halvings)
-        else:
-            lengths = self.steps.shortest, self.steps.longest
-            self._stepper = AdaptiveStepper(self.model, method, self.dt, *newton, self.tolerance, *lengths)
+        self._stepper = Stepper(self.model, method, self.steps, scene.solver.max_newton_iterations)
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = self._initial_state()
@@ -239,9 +233,9 @@ class Simulator:
             ensure_compiled()
             begin = clock.thread_time()
             self._compile_time = 0.0
-            self._stepper.rest(self._state)
+            self._stepper.evaluate(self._state)
             self._stepper.compile(self._state)
-            self._stepper.rest(self._state)
+            self._stepper.evaluate(self._state)
             self.statistics.take_shape(self._stepper, self._state)
             self._begin_budget()
             self._compile_time = clock.thread_time() - begin
@@ -259,53 +253,30 @@ class Simulator:
         Raises
         ------
         SimulationError
-            If it cannot be made; the state is that of the last step.
+            If it cannot be made; the state is that of the last step, or of the last part of it.
         """
         self.compile()
-        begin, wall = clock.thread_time(), clock.perf_counter()
-        until = self._stop_before(until)
-        found = self._stepper.march(self._state, 1, until)
-        if found is not None:
-            self.statistics.update_with(found, self._stepper)
-            report = StepReport.of(found, self.time)
-        else:
-            report = self._advance(until)
-        self.cpu_time += clock.thread_time() - begin
-        self.wall_time += clock.perf_counter() - wall
-        return report
+        begin, before, found = self.time, self._state.step[0], None
+        while self._state.step[0] == before:
+            more = self._integrate(1, until if self.steps.adaptive else math.inf, math.inf)
+            found = more if found is None else found.followed_by(more)
+        return StepReport.of(found, self.time, self.time - begin)
 
-    def _advance(self, until: float) -> StepReport:
-        """A step that is none for a compiled loop, or cannot be made."""
+    def _integrate(self, most: int, until: float, due: float) -> IntegrationReport:
+        """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that
+        has reached `due` [s].
+        """
+        state, before = self._state, float(self._state.step[0])
+        begin, wall = clock.thread_time(), clock.perf_counter()
         try:
-            report = self._stepper.advance(self._state, until)
+            found = self._stepper.integrate(state, most, until, due)
         except SimulationError:
-            self._stepper.rest(self._state)
             self.termination = Termination.FAILED.value
             raise
-        self.statistics.update(report, self._stepper, self._state)
-        return report
-
-    def _stop_before(self, end: float) -> float:
-        """The scene's next output time, or `end` [s]: where adaptive steps end whether or not anybody observes, so that
-        a run does not depend on who does.
-        """
-        rate = self.scene.output.rate
-        due = next_end(self.time + TIME_ROUNDING * self.dt, rate)  # no step can be as short as that
-        return due if due < end - TIME_ROUNDING / rate else end
-
-    def _march(self, steps: int, until: float, due: float) -> int:
-        """Advance by at most so many steps, adaptive ones to `until` [s] at the latest, and by none after one that has
-        reached `due` [s]; returns how many.
-        """
-        begin, wall = clock.thread_time(), clock.perf_counter()
-        found = self._stepper.march(self._state, steps, until, due)
-        if found is not None:
-            self.statistics.update_with(found, self._stepper)
-        else:
-            self._advance(until)
+        self.statistics.update(found, int(state.step[0] - before), self._stepper)
         self.cpu_time += clock.thread_time() - begin
         self.wall_time += clock.perf_counter() - wall
-        return 1 if found is None else found.done
+        return found
 
     def run(
         self,
@@ -344,27 +315,26 @@ class Simulator:
         left = self.scene.duration - self.time if duration is None else duration
         if not (math.isfinite(left) and left >= 0.0):
             raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
-        adaptive = self.tolerance is not None
-        steps = math.inf if adaptive else int(round(left / self.dt))
-        if left > 0.0 and steps == 0:
+        steps, fixed = int(round(left / self.dt)), not self.steps.adaptive
+        if fixed and left > 0.0 and steps == 0:
             raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
         self.compile()
-        begin, cpu, wall, done = self.time, self.cpu_time, clock.perf_counter(), 0
-        end = begin + left if adaptive else math.inf
+        begin, cpu, wall, before = self.time, self.cpu_time, clock.perf_counter(), self._state.step[0]
+        end = begin + (steps * self.dt if fixed else left)
+        last = end - 0.5 * self.dt if fixed else end
         termination = Termination.INTERRUPTED
         most = STEPS_AT_ONCE if each_step is None else 1
         schedule = Schedule(observers, self)
         try:
             schedule.start()
-            while done < steps and self.time < end:
-                at_once = most if adaptive else schedule.steps_until_due(min(steps - done, most))
-                done += self._march(at_once, self._stop_before(end), schedule.next_due())
+            while self.time < last:
+                self._integrate(most, end, schedule.next_due())
                 schedule.observe_due()
                 if each_step is not None:
                     each_step(self.time)
                 if progress is not None:
                     progress(self.time)
-                if stop is not None and done < steps and self.time < end and stop():
+                if stop is not None and self.time < last and stop():
                     break
             else:
                 termination = Termination.COMPLETED
@@ -374,6 +344,7 @@ class Simulator:
         finally:
             self.termination = termination.value
             schedule.finish(termination is Termination.COMPLETED, termination.value)
+        done = int(self._state.step[0] - before)
         return RunResult(
             termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
         )
@@ -401,7 +372,7 @@ class Simulator:
         try:
             return solve_static(self._stepper, self._state, tolerance)
         finally:
-            self._stepper.rest(self._state)
+            self._stepper.evaluate(self._state)
             self.statistics.take_shape(self._stepper, self._state)
             self._begin_budget()
             self.cpu_time += clock.thread_time() - begin
@@ -428,7 +399,7 @@ class Simulator:
         refuse_out_of_plane(self.model, loaded)
         self._state.set_flat(snapshot)
         self.compile()
-        self._stepper.rest(self._state)
+        self._stepper.evaluate(self._state)
         self._start_over()
         self.statistics.take_shape(self._stepper, self._state)
         self._begin_budget()

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..engine.engine import MarchReport
+from ..engine.report import IntegrationReport
 from ..model.model import Model
 from ..model.state import State
-from .stepper import Stepper, StepReport
+from .stepper import Stepper
 
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:
@@ -32,7 +32,7 @@ class BodyContact:
 
 @dataclass
 class RunStatistics:
-    """Counts, extremes and first contacts of a run, from `update` after every step.
+    """Counts, extrema and first contacts of a run, from `update` after every few steps.
 
     Times in s, lengths in m, forces in N, residuals in m/s, curvatures in 1/m. `max_strain` is the largest magnitude of
     the strain of an edge without its eigenstrain, `body_tops` the greatest height of each body; these two and
@@ -57,50 +57,34 @@ class RunStatistics:
     body_tops: dict[str, float] = field(default_factory=dict)
     bodies: dict[str, BodyContact] = field(default_factory=dict)
 
-    def update(self, report: StepReport, stepper: Stepper, state: State) -> None:
-        """Take in one step."""
-        self.steps += 1
-        self.substeps += report.substeps
-        self.rejected += report.rejected
-        self.inaccurate += report.inaccurate
-        self.shortest, self.longest = min(self.shortest, report.length), max(self.longest, report.length)
-        self.iterations += report.iterations
-        self.factorisations += report.factorisations
-        self.last_residual = report.residual
-        self.largest_residual = max(self.largest_residual, report.residual)
-        stepper.engine.count_in(state, stepper.engine.gap)
-        self.take_shape(stepper, state)
-
     def take_shape(self, stepper: Stepper, state: State) -> None:
-        """Take in the shape of a state that no compiled loop has led to, evaluated in `stepper`."""
-        rest = stepper.surroundings.rest_strains_of(state.transduction)
-        stepper.engine.count_shape(state, stepper.end, rest.edge)
-        self._take_extremes(stepper)
+        """Take in the shape of a state to which no step has led, evaluated in `stepper`."""
+        stepper.engine.count_shape(state)
+        self._take_extrema(stepper)
 
-    def update_with(self, report: MarchReport, stepper: Stepper) -> None:
-        """Take in the steps that a compiled loop made."""
-        newton = report.newton
-        self.steps += report.done
+    def update(self, report: IntegrationReport, whole: int, stepper: Stepper) -> None:
+        """Take in some steps, of which so many are no parts of one."""
+        self.steps += whole
         self.substeps += report.done
         self.rejected += report.rejected
         self.inaccurate += report.inaccurate
         self.shortest, self.longest = min(self.shortest, report.shortest), max(self.longest, report.longest)
-        self.iterations += newton.iterations
-        self.factorisations += newton.factorisations
-        self.last_residual = newton.residual if report.finished else report.largest_residual
+        self.iterations += report.iterations
+        self.factorisations += report.factorisations
+        self.last_residual = report.largest_residual if report.failed else report.residual
         self.largest_residual = max(self.largest_residual, report.largest_residual)
-        self._take_extremes(stepper)
+        self._take_extrema(stepper)
 
-    def _take_extremes(self, stepper: Stepper) -> None:
-        engine, model = stepper.engine, stepper.model
-        self.com_max_height, self.min_gap, self.max_contact_force, *shape = engine.figures.tolist()
+    def _take_extrema(self, stepper: Stepper) -> None:
+        extrema, model = stepper.engine.extrema, stepper.model
+        self.com_max_height, self.min_gap, self.max_contact_force, *shape = extrema.figures.tolist()
         self.max_curvature, self.max_strain = shape
-        self.body_tops = dict(zip(model.bodies.names, engine.body_top.tolist(), strict=True))
+        self.body_tops = dict(zip(model.bodies.names, extrema.body_top.tolist(), strict=True))
         if not model.meets_surfaces:
             return
         for surface, body in enumerate(model.surfaces.body):
             if body < len(model.bodies.names):
-                first = float(engine.first_contact[surface])
+                first = float(extrema.first_contact[surface])
                 self.bodies[model.bodies.names[body]] = BodyContact(
-                    None if math.isnan(first) else first, int(engine.most_nodes[surface]), int(engine.nodes[surface])
+                    None if math.isnan(first) else first, int(extrema.most_nodes[surface]), int(extrema.nodes[surface])
                 )

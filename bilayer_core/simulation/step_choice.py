@@ -23,10 +23,8 @@ class Steps:
         over a run. None: steps are fixed.
     longest : float
         Length of the longest adaptive step [s].
-    max_halvings : int
-        Of a fixed step that fails.
     shortest : float
-        Length of the shortest adaptive step [s].
+        Length of the shortest adaptive step, or part of a fixed one [s].
     newton_tolerance : float
         Speed of a material point below which Newton's correction is the last [m/s].
     reason : str
@@ -35,7 +33,6 @@ class Steps:
     dt: float
     tolerance: float | None
     longest: float
-    max_halvings: int
     shortest: float
     newton_tolerance: float
     reason: str
@@ -92,10 +89,11 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
         length = max(rod.path.length for rod in scene.rods)
         newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / longest
     dt, halvings = dt or DEFAULT_DT, solver.max_halvings
-    shortest = min(dt, longest) / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings)
-    if halvings is None:
-        halvings, shortest = DEFAULT_HALVINGS, min(shortest, SHORTEST_PART * _time_of_sound(scene))
-    return Steps(dt, tolerance, longest, halvings, shortest, newton, reason)
+    first = dt if tolerance is None else min(dt, longest)
+    shortest = first / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings)
+    if halvings is None and tolerance is not None:
+        shortest = min(shortest, SHORTEST_PART * _time_of_sound(scene))
+    return Steps(dt, tolerance, longest, shortest, newton, reason)
 
 
 def _time_of_sound(scene: SceneConfig) -> float:

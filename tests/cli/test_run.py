@@ -62,9 +62,7 @@ def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
     ("asked", "tolerance"),
     [(["--dt", "2 ms"], None), (["--tolerance", "1e-3"], 1e-3), (["--dt", "2 ms", "--tolerance", "1e-3"], 1e-3)],
 )
-def test_dt_alone_asks_for_fixed_steps_and_a_tolerance_for_adaptive_ones(
-    here, capsys, asked, tolerance
-):
+def test_dt_alone_asks_for_fixed_steps_and_a_tolerance_for_adaptive_ones(here, capsys, asked, tolerance):
     of_scene = ["--set", "solver={dt: 2 ms, tolerance: 1e-2}", "--duration", "0.02"]
     assert main(["run", "cantilever", *of_scene, *asked, "--summary", "run.json"]) == 0
     summary = json.loads((here / "run.json").read_text())

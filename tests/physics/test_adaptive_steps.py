@@ -8,18 +8,18 @@ from moving_scenes import ADAPTIVE, EXACT, PROBLEMS, cantilever, driven, falling
 from sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.engine.adaptive import yardstick_of
-from bilayer_core.engine.error_norm import deviation
+from bilayer_core.engine.engine import error_norm_of
+from bilayer_core.engine.error_norm import step_defect
 from bilayer_core.engine.step_size import LARGEST_GROWTH, after_rejection, after_success, fit
 from bilayer_core.errors import InputError, SceneError, SimulationError
 from bilayer_core.integrators.register import INTEGRATORS
 from bilayer_core.model.records.step import StateArrays
 
 
-def deviation_between(simulator, before, after, h):
+def defect_between(simulator, before, after, h):
     """That of a step of length `h`, from its ends."""
     ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.names}) for state in (before, after))
-    return deviation(yardstick_of(simulator.model), *ends, h)
+    return step_defect(error_norm_of(simulator.model), *ends, h)
 
 
 # the error
@@ -36,13 +36,13 @@ def test_the_estimate_is_the_local_error_of_a_step(problem, integrator):
     before = start._state.copy()
     start.step()
     exact.run(h)
-    found = INTEGRATORS[integrator].estimate * deviation_between(start, before, start._state, h)
+    found = INTEGRATORS[integrator].estimate * defect_between(start, before, start._state, h)
     # with the same velocities at both ends, D is the difference of the two ends
     apart = exact._state.copy()
     apart.velocity[:], apart.spin[:] = 0.0, 0.0
     other = start._state.copy()
     other.velocity[:], other.spin[:] = 0.0, 0.0
-    assert found == pytest.approx(deviation_between(start, apart, other, h), rel=0.2)
+    assert found == pytest.approx(defect_between(start, apart, other, h), rel=0.2)
 
 
 @pytest.mark.parametrize("integrator", ADAPTIVE)
@@ -68,7 +68,7 @@ def test_the_estimate_does_not_depend_on_the_mesh():
         simulator = simulate({**cantilever(), "rods": [strip]}, 0.02, dt=5e-4, integrator="sdirk2")
         before = simulator._state.copy()
         simulator.step()
-        found.append(deviation_between(simulator, before, simulator._state, 5e-4))
+        found.append(defect_between(simulator, before, simulator._state, 5e-4))
     assert found[1] == pytest.approx(found[0], rel=0.1)
 
 

@@ -1,5 +1,7 @@
 """Where adaptive steps end, and what acts during them."""
 
+import math
+
 import numpy as np
 import pytest
 from moving_scenes import ADAPTIVE, cantilever, driven, falling, part, simulate
@@ -146,10 +148,10 @@ def test_stages_see_the_schedule(wave):
     schedule = simulator.scene.stimuli["heat"].schedule
     while simulator.time < 0.1:
         report = simulator.step(until=0.1)
-        stages = simulator._stepper._rooms[simulator._stepper.method]
+        stages = simulator._stepper.engine._inputs
         begin = report.time - report.length
-        assert stages.first[0, 0] == pytest.approx(schedule.value(begin + 1e-12), abs=1e-8)
-        for node, value in zip(INTEGRATORS["sdirk2"].nodes, stages.stimulus[0, :, 0], strict=True):
+        assert stages.first[0] == pytest.approx(schedule.value(begin + 1e-12), abs=1e-8)
+        for node, value in zip(INTEGRATORS["sdirk2"].nodes, stages.stimulus[:2, 0], strict=True):
             time = begin + node * report.length
             assert value == pytest.approx(schedule.value_before(time, node * report.length), abs=1e-8)
 
@@ -182,19 +184,28 @@ def test_after_a_jump_of_a_load_a_method_that_starts_itself_makes_one_step():
     used = []
     while simulator.time < 0.05:
         begin = simulator.time
-        simulator.step(until=0.05)
-        used.append((begin, simulator._stepper.used.name))
-    assert [begin for begin, name in used if name == "sdirk2"] == pytest.approx([0.0, 0.02, 0.03])
+        found = simulator._integrate(1, 0.05, math.inf)
+        assert found.done == 1
+        used.append((begin, found.restarts))
+    assert [begin for begin, restarts in used if restarts] == pytest.approx([0.0, 0.02, 0.03])
 
 
-def test_steps_made_one_by_one_and_many_at_once_are_the_same():
-    description = driven(added_mass=True)
-    description["stimuli"]["heat"]["schedule"] = WAVES["square"]
-    for integrator in ADAPTIVE:
-        runs = [Simulator(load_scene(description), tolerance=1e-4, integrator=integrator) for _ in range(2)]
-        runs[0].run(0.05)
-        while runs[1].time < 0.05:
-            runs[1].step(until=0.05)
-        np.testing.assert_array_equal(runs[0].save_state(), runs[1].save_state())
-        first, second = (vars(run.statistics) for run in runs)
-        assert first == second
+STEPS = {f"adaptive {name}": {"tolerance": 1e-4, "integrator": name} for name in ADAPTIVE}
+STEPS |= {f"fixed {name}": {"dt": 1e-3, "integrator": name} for name in INTEGRATORS}
+
+
+@pytest.mark.parametrize("steps", STEPS)
+@pytest.mark.parametrize("kind", ["driven", "touching"])
+def test_steps_made_one_by_one_and_many_at_once_are_the_same(kind, steps):
+    description = driven(added_mass=True) if kind == "driven" else everything()
+    if kind == "driven":
+        description["stimuli"]["heat"]["schedule"] = WAVES["square"]
+    else:
+        description["solver"] = {}
+    runs = [Simulator(load_scene(description), **STEPS[steps]) for _ in range(2)]
+    runs[0].run(0.04)
+    while runs[1].time < 0.04 - 1e-9:
+        runs[1].step(until=0.04)
+    np.testing.assert_array_equal(runs[0].save_state(), runs[1].save_state())
+    first, second = (vars(run.statistics) for run in runs)
+    assert first == second

@@ -1,7 +1,6 @@
 """The energy budget of whole runs: that it closes, and what the integrator loses."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,11 +8,8 @@ from budgets import EXACT, SOFT, clamped, driven, moving, run, throw
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.engine.modes import STEP
-from bilayer_core.engine.newton_report import NewtonStatus
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.register import INTEGRATORS
-from bilayer_core.model.records.status import MAX_ITERATIONS
 
 # what the integrator loses
 
@@ -95,9 +91,7 @@ def flyer():
     [(driven(gravity=[0, 0, -9.81]), 4.0), (flyer(), 2.0)],  # what a turning body holds goes along arcs
     ids=["clamped", "flying"],
 )
-def test_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_has_the_order(
-    description, quadrature, integrator
-):
+def test_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_has_the_order(description, quadrature, integrator):
     budgets = [run(description, 0.15, dt, integrator=integrator).budget() for dt in (1e-3, 2.5e-4)]
     residual = [abs(budget["residual"]) for budget in budgets]
     numerical = [budget["lost"]["numerical"] for budget in budgets]
@@ -167,31 +161,30 @@ def test_parts_of_halved_steps_enter_the_budget():
     assert abs(simulator.budget()["relative_residual"]) < 0.02
 
 
-def test_accepted_parts_of_a_step_that_fails_leave_the_budget(monkeypatch):
+def test_accepted_parts_of_a_step_that_fails_stay_in_state_and_budget():
     simulator = run(driven(solver={"max_halvings": 1}), 0.05, 1e-3)
-    before, engine, attempts = simulator.budget(), simulator._stepper.engine, []
-    march = engine.march
+    engine, state = simulator._stepper.engine, simulator._state
+    integrate, newton, parts = engine.integrate, engine._newton, []
 
-    def accepts_the_second(state, method, course, h, settings):
-        kept = state.copy()
-        found = march(state, method, course, h, settings)
-        if settings.mode != STEP:
-            return found
-        attempts.append(None)
-        assert found.newton.converged
-        if len(attempts) == 2:
-            return found
-        state.take(kept)
-        return replace(
-            found, done=0, status=MAX_ITERATIONS, newton=replace(found.newton, status=NewtonStatus.MAX_ITERATIONS)
-        )
+    def fails_after_the_first_part(*arguments):
+        if parts:
+            engine._newton = 1e-30, 1
+        found = integrate(*arguments)
+        parts.append((simulator.time, simulator.save_state(), found))
+        return found
 
-    monkeypatch.setattr(engine, "march", accepts_the_second)
-    with pytest.raises(SimulationError):
+    state.next_step[0] = 0.5e-3  # as after a step that failed
+    engine.integrate = fails_after_the_first_part
+    record, budgets = simulator._ledger.record, []
+    simulator._ledger.record = lambda *arguments: (record(*arguments), budgets.append(simulator.budget()))
+    with pytest.raises(SimulationError, match=r"stopped at t = 0\.0505 s"):
         simulator.step()
-    assert len(attempts) == 3
-    assert simulator.budget() == before
-    monkeypatch.undo()
+    assert [found.done for _, _, found in parts] == [1, 0] and len(budgets) == 1
+    np.testing.assert_array_equal(simulator.save_state(), parts[0][1])
+    assert simulator.budget() == budgets[0]
+    del engine.integrate, simulator._ledger.record
+    engine._newton = newton
     simulator.step()
-    assert simulator.budget()["supplied"]["stimulus"] > before["supplied"]["stimulus"]
+    assert simulator.time == pytest.approx(0.051, abs=1e-15)
+    assert simulator.budget()["supplied"]["stimulus"] > budgets[0]["supplied"]["stimulus"]
     assert abs(simulator.budget()["relative_residual"]) < 1e-4

@@ -11,7 +11,7 @@ from bilayer_core.beam2d.scene import beam_of, set_stimuli
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.model.build import build_model
 from bilayer_core.model.plan import leanest_model, make_plan
-from bilayer_core.simulation.stage_inputs import Surroundings
+from bilayer_core.simulation.surroundings import Surroundings
 from bilayer_core.validate.bending import PAIRS, THICKNESS, strip
 from bilayer_core.validate.references import timoshenko
 

@@ -1,6 +1,7 @@
 """Compiled code follows the sources, wherever they are edited."""
 
 import os
+import queue
 import shutil
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import time
 import numba
 import pytest
 
-from bilayer_core.jit import cache
+from bilayer_core.jit import cache, compile_all
 
 PROGRAM = """
 import numpy as np
@@ -97,3 +98,14 @@ def test_numbas_own_setting_is_restored():
     with cache.cached():
         assert str(cache.cache_folder()) == numba.config.CACHE_DIR
     assert before == numba.config.CACHE_DIR
+
+
+def test_workers_compile_this_package_and_not_one_of_its_name_where_they_start(tmp_path, monkeypatch):
+    decoy = tmp_path / "bilayer_core" / "__init__.py"
+    decoy.parent.mkdir()
+    decoy.write_text("raise ImportError('not this one')")
+    monkeypatch.chdir(tmp_path)
+    left, done, printed = queue.SimpleQueue(), queue.SimpleQueue(), []
+    left.put("place_carried")
+    compile_all._feed(left, done, printed)
+    assert not printed and done.get(timeout=1.0) is not None

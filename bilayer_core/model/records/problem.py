@@ -153,8 +153,11 @@ class Calls:
     distance: Address
     keep_slopes: Address
     make_step: Address
+    jumps_at: Address
+    corner_after: Address
     drive_step: Address
-    deviation: Address
+    step_defect: Address
+    count_shape: Address
     count_end: Address
     factor_band: int  # those of the scene's half-bandwidth
     count_band: int

@@ -9,8 +9,8 @@ NO_ROOM_FOR_RODS = 2
 """Likewise of rods with rods, or more contacts."""
 NO_ROOM_IN_BORDER = 3
 """Contacts of rods have more columns than the border has room for."""
-JUMPED = 4
-"""Something has jumped: another integrator has to make this step."""
+INPUTS_END = 4
+"""What acts from outside is not known as far as the step reaches."""
 CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND = 5, 10, 11, 12, 13, 14, 15
 """How a step ended; from `MAX_ITERATIONS` on it failed."""
 TOO_INACCURATE = 20

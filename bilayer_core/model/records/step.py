@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...jit.record import DeepTensor, Flags, Indices, Matrix, Stack, Tensor, Vector, record
+from ...jit.record import Flags, Indices, Matrix, Stack, Tensor, Vector, record
 
 
 @record
@@ -101,23 +101,22 @@ class Method:
 
 
 @record
-class Course:
-    """What acts from outside over some steps, at each of their points: the ends of stages, and of the step."""
+class StageInputs:
+    """What acts from outside during a step, at each of its points: the ends of stages, and of the step."""
 
-    time: Vector  # at the end of each step [s], shape (n_step,)
-    elapsed: Vector  # from the start of a step to each point [s], shape (n_point,)
-    first: Matrix  # stimuli at the start of each step, shape (n_step, n_channel)
-    jumps: Flags  # whether a load jumps there, shape (n_step,)
-    stimulus: Stack  # shape (n_step, n_point, n_channel)
-    load_factor: Stack  # shape (n_step, n_point, n_load)
-    position: Tensor  # of all bodies; those of prescribed ones count, shape (n_step or 1, n_point, n_body, 3)
-    rotation: DeepTensor  # shape (n_step or 1, n_point, n_body, 3, 3)
-    rates: Tensor  # shape (n_step or 1, n_point, n_body, 6)
+    applied: Vector  # stimuli at the end of the last step, shape (n_channel,)
+    elapsed: Vector  # from the start of the step to each point [s], shape (n_point,)
+    first: Vector  # stimuli at the start of the step, shape (n_channel,)
+    stimulus: Matrix  # shape (n_point, n_channel)
+    load_factor: Matrix  # shape (n_point, n_load)
+    position: Stack  # of all bodies; those of prescribed ones count [m], shape (n_point, n_body, 3)
+    rotation: Tensor  # shape (n_point, n_body, 3, 3)
+    rates: Stack  # [m/s, rad/s], shape (n_point, n_body, 6)
 
 
 @record
-class Tally:
-    """Extremes over a run; see `simulation.statistics`."""
+class RunExtrema:
+    """Extrema over a run; see `simulation.statistics`."""
 
     mass_moment: Vector  # of edges along m1 [kg m], shape (n_edge,) or (0,)
     mass: float  # of all rods [kg]

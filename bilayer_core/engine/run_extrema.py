@@ -1,0 +1,63 @@
+"""Extrema over a run: heights, gaps, contact forces, curvature, strain, and what touches what."""
+
+from __future__ import annotations
+
+import math
+
+from ..jit import call, kernel, piece
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Place, RunExtrema, Stage, StateArrays
+
+
+@piece(int, Problem, StateArrays, Place, Stage, RunExtrema)
+def count_shape(p, state, at, stage, extrema):
+    """Take the shape of a state, which is `at`, into the extrema: curvature, strain, and heights of bodies."""
+    strands, rest_edge, figures, voronoi = p.strands, stage.rest_edge, extrema.figures, extrema.voronoi_length
+    sharpest = 0.0
+    for j in range(voronoi.shape[0]):
+        a, b = strands.joint_a[j], strands.joint_b[j]
+        bend, cosine = 0.0, 1.0
+        for c in range(3):  # κ₁ of `forces.bend_twist`; that in `joint_strain` is from before Newton's last correction
+            bend += at.tangent[b, c] * at.director1[a, c] - at.tangent[a, c] * at.director1[b, c]
+            cosine += at.tangent[a, c] * at.tangent[b, c]
+        sharpest = max(sharpest, abs(bend) / (cosine * voronoi[j]))
+    largest = 0.0
+    for e in range(strands.edge_count):
+        largest = max(largest, abs(at.length[e] / strands.rest_length[e] - 1.0 - rest_edge[e]))
+    figures[3], figures[4] = max(figures[3], sharpest), max(figures[4], largest)
+    for b in range(extrema.body_top.shape[0]):
+        extrema.body_top[b] = max(extrema.body_top[b], state.body_position[b, 2])
+    return READY
+
+
+@piece(int, Problem, StateArrays, Place, Stage, float, float, RunExtrema)
+def count_end(p, state, at, stage, gap, time, extrema):
+    """Take the end of a step into the extrema: the smallest gap there [m] and the time [s] are given."""
+    strands, figures, nodes = p.strands, extrema.figures, p.strands.node_mass.shape[0]
+    height = largest = 0.0
+    for i in range(nodes):
+        height += strands.node_mass[i] * state.position[i, 2]
+        force = p.sums.carrier[i, 0] ** 2 + p.sums.carrier[i, 1] ** 2 + p.sums.carrier[i, 2] ** 2
+        largest = max(largest, force)
+    for k in range(extrema.mass_moment.shape[0]):
+        height += extrema.mass_moment[k] * state.director1[k, 2]
+    figures[0], figures[1] = max(figures[0], height / extrema.mass), min(figures[1], gap)
+    figures[2] = max(figures[2], math.sqrt(largest))
+    _count_contacts(p.surfaces, nodes, time, extrema)
+    return call(p.calls.count_shape, (p, state, at, stage, extrema))
+
+
+@kernel
+def _count_contacts(surfaces, nodes, time, extrema):
+    if not surfaces.exists:
+        return
+    count = extrema.nodes
+    count[:] = 0
+    for c in range(surfaces.near_count[0]):
+        if surfaces.near_gap[c] < surfaces.d_hat and surfaces.near_carrier[c] < nodes:
+            count[surfaces.near_surface[c]] += 1
+    for s in range(count.shape[0]):
+        extrema.most_nodes[s] = max(extrema.most_nodes[s], count[s])
+        if count[s] > 0 and math.isnan(extrema.first_contact[s]):
+            extrema.first_contact[s] = time

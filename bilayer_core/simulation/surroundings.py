@@ -1,0 +1,133 @@
+"""What acts on a robot from outside: stimuli, what its layers make of them, loads, and bodies on prescribed paths."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..engine.actuation import Actuation, Paths
+from ..model.model import Model
+from ..model.rest_strains import RestStrains
+from ..model.state import State
+from ..scene.body import Prescribed
+from ..scene.piece import Piece, Pieces
+from ..scene.transduction import free_strain
+
+Array = np.ndarray
+PIECES_AT_ONCE = 8
+"""Of each schedule, that steps are given at least."""
+
+
+class Surroundings:
+    """Evaluates what acts on a model.
+
+    Parameters
+    ----------
+    model : Model
+    ahead : float
+        Time by which `actuation` reaches beyond the present, both ways, at least [s].
+
+    Attributes
+    ----------
+    actuation : Actuation
+        The same for steps, as far as `cover` has made it.
+    """
+
+    def __init__(self, model: Model, ahead: float = 0.0):
+        self.model, self._ahead = model, ahead
+        scene = model.scene
+        self._channels = [channel.schedule for channel in scene.stimuli.values()]
+        self._loads = [load.factor for load in scene.loads]
+        self._ranges = np.array([c.maximum - c.minimum for c in scene.stimuli.values()], dtype=float)
+        self._paths = paths_of(model)
+        self._begin, self._override = 0.0, np.full(len(self._channels), math.nan)
+        self.actuation = self._pieces_about(0.0)
+
+    def stimulus_at(self, state: State, time: float) -> Array:
+        """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's."""
+        scheduled = [schedule.value(time) for schedule in self._channels]
+        return np.where(np.isnan(state.override), np.array(scheduled, dtype=float), state.override)
+
+    def rest_strains_of(self, transduction: Array) -> RestStrains:
+        """Strains without stress from the filtered stimuli."""
+        model = self.model
+        strain = free_strain(transduction, model.law_gain, model.law_reference, model.law_saturation)
+        eigenstrain = np.bincount(model.driven_edge, model.driven_weight * strain[model.driven_law], model.edge_count)
+        joint = model.joint_rest
+        if len(model.driven_joint):
+            bent = model.driven_joint_weight * strain[model.driven_joint_law]
+            joint = joint.copy()
+            joint[:, 0] += np.bincount(model.driven_joint, bent, len(joint))
+            joint.flags.writeable = False
+        return RestStrains(model.rest_strain + eigenstrain, joint)
+
+    def load_factor(self, time: float, ended: float = 0.0) -> Array:
+        """Factor of each load at `time`, shape (n_load,): at the end of a step of length `ended` [s] that from before
+        a jump there.
+        """
+        values = [load.value_before(time, ended) if ended else load.value(time) for load in self._loads]
+        return np.array(values, dtype=float)
+
+    def cover(self, time: float, override: Array) -> None:
+        """Have `actuation` hold what acts from `time` [s] on, and a little before, where something may jump.
+
+        Parameters
+        ----------
+        time : float
+        override : Array
+            Values of channels set from outside, NaN where the schedule acts (`State.override`).
+        """
+        known = self._begin <= time and time + self._ahead < self.actuation.horizon[0]
+        if not (known and np.array_equal(override, self._override, equal_nan=True)):
+            self._begin, self._override = time, override.copy()
+            self.actuation = self._pieces_about(time)
+
+    def _pieces_about(self, time: float) -> Actuation:
+        channels = zip(self._channels, self._override.tolist(), strict=True)
+        fixed = [schedule if math.isnan(value) else value for schedule, value in channels]
+        rows = [_next_pieces(of, time - self._ahead, time + self._ahead) for of in [*fixed, *self._loads]]
+        size = max((len(row) for row in rows), default=1)
+        table = np.array([row + [row[-1]] * (size - len(row)) for row in rows]).reshape(-1, size, len(Piece._fields))
+        count = len(fixed)
+        return Actuation(
+            stimulus=np.ascontiguousarray(table[:count]),
+            load=np.ascontiguousarray(table[count:]),
+            ranges=self._ranges,
+            horizon=np.array([min((row[-1].until for row in rows), default=math.inf)]),
+            paths=self._paths,
+        )
+
+
+def _next_pieces(schedule: Pieces | float, begin: float, end: float) -> list[Piece]:
+    """The pieces of a schedule, or of a value set from outside, from the one that ends at `begin` or later to one that
+    does not end before `end`.
+    """
+    if not isinstance(schedule, Pieces):
+        return [Piece(math.inf, schedule)]
+    pieces = [schedule.piece(begin)]
+    while math.isfinite(pieces[-1].until) and (len(pieces) < PIECES_AT_ONCE or pieces[-1].until <= end):
+        pieces.append(schedule.piece(pieces[-1].until))
+    return pieces
+
+
+def paths_of(model: Model) -> Paths:
+    """The keyframes of prescribed bodies that move; absent if none does."""
+    bodies = model.bodies
+    motions = [body.motion for body in model.scene.bodies]
+    moving = [b for b, motion in enumerate(motions) if isinstance(motion, Prescribed) and motion.moves]
+    if not moving:
+        return Paths.absent()
+
+    def keyframes(values: tuple[Array, ...]) -> Array:
+        return np.concatenate([values[b] if len(values[b]) else np.zeros((len(bodies.times[b]), 3)) for b in moving])
+
+    return Paths(
+        body=np.array(moving, dtype=np.int64),
+        first=np.cumsum([0, *(len(bodies.times[b]) for b in moving)]),
+        time=np.concatenate([bodies.times[b] for b in moving]),
+        displacement=keyframes(bodies.displacements),
+        rotation_vector=keyframes(bodies.rotations),
+        position=bodies.start_position,
+        rotation=bodies.start_rotation,
+    )
