@@ -149,8 +149,8 @@ class Problem:
 
     def gradient(self):
         """That of the last evaluation, by the vector."""
-        first = self.evaluator.first
-        return self.scale * (np.concatenate([first.unknowns, first.body.ravel()]) @ self.basis)
+        first = self.evaluator.sums
+        return self.scale * (np.concatenate([first.gradient, first.body.ravel()]) @ self.basis)
 
     def value(self, vector, forces=None):
         """Energy of some forces, or all, at a vector from `at`, and its gradient."""
@@ -237,5 +237,5 @@ def left_of_step(evaluator, end):
     """What Newton's method would still change at the end of a step: of unknowns and of free bodies."""
     evaluator.evaluate(end, second=True)
     evaluator.factorise(end)
-    first = evaluator.first
-    return evaluator.newton_step(first.unknowns.copy(), first.body.copy())
+    first = evaluator.sums
+    return evaluator.newton_step(first.gradient.copy(), first.body.copy())

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from ..contact.broad_phase import RodSearch
 from ..forces.added_mass import fluid_momentum
-from ..forces.friction_limit import PATH_SIZE
 from ..model.force_places import place_of
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
@@ -25,24 +25,22 @@ from ..model.records.parts import (
     Plane,
     PointForces,
     RodContact,
+    RodContactList,
     Sliding,
     Slips,
-    Space,
     Strands,
     Surfaces,
 )
-from ..model.records.problem import Border, BorderedSystem, System
-from .allocate import NearRods, NearSurfaces, SecondDerivatives, body_masses
+from ..model.records.problem import Border, System
 
 Array = np.ndarray
 NONE = np.zeros(0, dtype=np.int64)
 
 
-def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
-    """The groups of a problem that stay as they are."""
+def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
+    """The groups of a problem that stay as they are, but for that of its dimension; `sizes` as in `model.sizes`."""
     layout, scene = model.solved_layout, model.scene
-    bodies, free, plane = model.bodies, len(model.bodies.mass), model.plane
-    b = layout.half_bandwidth
+    bodies, free = model.bodies, model.free_count
     return dict(
         gravity=np.array(scene.gravity, dtype=float),
         damping=float(scene.damping.mass),
@@ -51,7 +49,7 @@ def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
             dimension=layout.dimension,
             edge_count=model.edge_count,
             bend_count=model.bend_count,
-            bandwidth=b,
+            bandwidth=layout.half_bandwidth,
             axes=model.directions,
             row=layout.node,
             node_unknown=model.layout.node,
@@ -59,9 +57,7 @@ def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
             **{name: getattr(model, name) for name in Strands.names[9:]},
         ),
         drives=Drives(**{name: getattr(model, name) for name in Drives.names}),
-        space=_space(model, second) if plane is None else Space.absent(),
-        plane=_plane(model, second) if plane is not None else Plane.absent(),
-        off_axis=OffAxis.absent() if len(model.pair_top) else _off_axis(model),
+        off_axis=OffAxis.absent() if len(model.pair_top) else _off_axis(model, sizes),
         bonds=(
             Bonds(top=model.pair_top, bottom=model.pair_bottom, stiffness=model.pair_stiffness, rest=model.pair_rest)
             if len(model.pair_top)
@@ -73,71 +69,34 @@ def lasting_groups(model: Model, second: SecondDerivatives) -> dict[str, Any]:
             prescribed=np.flatnonzero(bodies.free_index[:-1] < 0),
             mass=bodies.mass,
             second_moment=bodies.second_moment,
-            inertia=body_masses(model),
+            inertia=_inertia_of_bodies(model),
             freedom=bodies.freedom,
             reach=bodies.reach,
             turns=np.array(
                 [f >= 0 or len(r) > 0 for f, r in zip(bodies.free_index, bodies.rotations, strict=False)], dtype=bool
             ),
         ),
-        border=(
-            Border(border=np.zeros((layout.size + b, 6 * free)), corner=np.zeros((6 * free, 6 * free)))
-            if free
-            else Border.absent()
-        ),
+        border=Border.zeros(sizes) if free else Border.absent(),
         constrained=_held(model),
         attachments=_grips(model) if free else Attachments.absent(),
-        flow=_flow(model) if scene.fluid is not None else Flow.absent(),
-        fluid=fluid_of(model) if len(model.fluid_mass) else Fluid.absent(),
+        flow=_flow(model, sizes) if scene.fluid is not None else Flow.absent(),
+        fluid=fluid_of(model, sizes) if len(model.fluid_mass) else Fluid.absent(),
         loads=_forces(model, "loads", model.dead_loads) if scene.loads else PointForces.absent(),
         followers=_forces(model, "followers", model.follower_loads) if scene.loads else PointForces.absent(),
         moments=_moments(model) if scene.loads else Moments.absent(),
         meets=model.meets_surfaces or model.rod_surfaces is not None,
-        system=System(
-            band=np.zeros((layout.size + b, b + 1)),
-            right=np.zeros(layout.size + b),
-            step=np.zeros(model.layout.size),
-            body_step=np.zeros((free, 6)),
-            node_step=np.zeros((model.node_count, 3)),
-            motion=np.zeros((len(bodies.names) + 1, 6)),
-            negative=np.zeros(1, dtype=np.int64),
-        ),
+        system=System.zeros(sizes),
     )
 
 
-def _space(model: Model, second: SecondDerivatives) -> Space:
-    return Space(
-        top_hessian=second.top_hessian,
-        bottom_hessian=second.bottom_hessian,
-        bond_hessian=second.cross_hessian[model.bend_count :],
-    )
+def plane_of(model: Model, sizes: dict[str, int], hessians: dict[str, Array]) -> Plane:
+    """What dimension 2 has, with its second derivatives."""
+    plane = model.plane
+    return Plane.zeros(sizes, normal=plane.normal, side=plane.side, joint_after=plane.joint_after, **hessians)
 
 
-def _plane(model: Model, second: SecondDerivatives) -> Plane:
-    names = ("cross_hessian", "pair_hessian", "frame", "polar_gradient", "polar_hessian", "mixed_hessian")
-    return Plane(
-        normal=model.plane.normal,
-        side=model.plane.side,
-        joint_after=model.plane.joint_after,
-        **{name: getattr(second, name) for name in names},
-    )
-
-
-def _off_axis(model: Model) -> OffAxis:
-    return OffAxis(joint=model.coupled_joint, slope=model.strain_slope, rest=np.zeros_like(model.joint_rest))
-
-
-def wide_of(model: Model, columns: int, width: Array) -> BorderedSystem:
-    """A border with room for so many columns."""
-    rows = model.solved_layout.size + model.solved_layout.half_bandwidth
-    return BorderedSystem(
-        border=np.zeros((columns, rows)),
-        scaled=np.zeros((columns, rows)),
-        schur=np.zeros((columns, columns)),
-        load=np.zeros(columns),
-        width=width,
-        coupled=np.zeros(1, dtype=np.int64),
-    )
+def _off_axis(model: Model, sizes: dict[str, int]) -> OffAxis:
+    return OffAxis.zeros(sizes, joint=model.coupled_joint, slope=model.strain_slope)
 
 
 def _grips(model: Model) -> Attachments:
@@ -166,9 +125,11 @@ def _held(model: Model) -> Constrained:
     )
 
 
-def surfaces_of(model: Model, near: NearSurfaces) -> Surfaces:
+def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
+    """With an empty list of near pairs."""
     carriers, surfaces, contact = model.carriers, model.surfaces, model.scene.contact
-    return Surfaces(
+    return Surfaces.zeros(
+        sizes,
         d_hat=contact.barrier_distance,
         stiffness=contact.stiffness,
         radius=carriers.radius,
@@ -176,7 +137,7 @@ def surfaces_of(model: Model, near: NearSurfaces) -> Surfaces:
         carrier_body=carriers.body,
         free_index=model.bodies.free_index if model.free_count else NONE,
         follows=carriers.follows,
-        node_free=near.node_free,
+        node_free=carriers.follows[: model.node_count] < 0,
         group=carriers.group,
         point_position=carriers.position,
         point_body=carriers.body[model.node_count :],
@@ -188,117 +149,96 @@ def surfaces_of(model: Model, near: NearSurfaces) -> Surfaces:
         position=surfaces.position,
         turn=surfaces.turn,
         meets=surfaces.meets,
-        near_carrier=near.carrier,
-        near_surface=near.surface,
-        near_gap=near.gap,
-        near_count=near.counted,
-        margin=near.margin,
-        extent=near.extent,
-        listed_carrier=near.listed_carrier,
-        listed_place=near.listed_place,
-        listed_turn=near.listed_turn,
+        margin=np.full(1, -1.0),  # no list yet
     )
 
 
-def sliding_of(model: Model, room: int) -> Sliding:
-    carriers, bodies, law = model.carriers, len(model.bodies.names) + 1, model.scene.contact.friction
-    return Sliding(
+def sliding_of(model: Model, sizes: dict[str, int]) -> Sliding:
+    """Without contacts."""
+    carriers, law = model.carriers, model.scene.contact.friction
+    return Sliding.zeros(
+        sizes,
         acts=law is not None and law.acts,
         threshold=law.speed_threshold if law is not None else 0.0,
         coefficient=carriers.friction,
         node_edges=carriers.node_edges,
         node_axis=carriers.node_axis,
-        count=np.zeros(1, dtype=np.int64),
-        first=np.zeros(room, dtype=np.int64),
-        surface=np.zeros(room, dtype=np.int64),
-        load=np.zeros(room),
-        **{name: np.zeros((room, 3)) for name in ("normal", "axis", "arm", "lever")},
-        **{name: np.zeros((bodies, 3, 3)) for name in ("back", "turn", "origin_turn")},
     )
 
 
-def slips_of(model: Model, room: int) -> Slips:
+def slips_of(model: Model, sizes: dict[str, int]) -> Slips:
     """Absent if nothing slides against friction."""
     law = model.scene.contact.friction if model.scene.contact else None
     if law is None or not law.acts:
         return Slips.absent()
-    return Slips(threshold=law.speed_threshold, way=np.zeros((room, PATH_SIZE)))
+    return Slips.zeros(sizes, threshold=law.speed_threshold)
 
 
-def rod_contact_of(model: Model, rods: NearRods) -> RodContact:
-    contact = model.scene.contact
+def rod_contact_of(
+    model: Model,
+    sizes: dict[str, int],
+    search: RodSearch,
+    now: RodContactList,
+    old: RodContactList,
+    **motion: Array,
+) -> RodContact:
+    """With contacts of now, and `old` ones of the start of a stage; `motion` is that of the list of near rods."""
+    contact, surfaces = model.scene.contact, model.rod_surfaces
     law = contact.friction
-    return RodContact(
+    return RodContact.zeros(
+        sizes,
         d_hat=contact.barrier_distance,
         stiffness=contact.stiffness,
         slides=law is not None and law.acts and law.coefficient > 0.0,
         coefficient=law.coefficient if law is not None else 0.0,
         threshold=law.speed_threshold if law is not None else 1.0,
-        unit=rods.unit,
-        point_weight=model.rod_surfaces.point_weight,
-        search=rods.pairs.search,
-        last=rods.last,
-        ways=rods.ways,
-        no_step=rods.no_step,
-        gap=np.zeros(1),
-        contacts=rods.contacts.record,
-        sliding=rods.sliding.record,
+        unit=contact.barrier_distance + 2.0 * float(surfaces.edge_radius.max()),
+        point_weight=surfaces.point_weight,
+        search=search,
+        contacts=now,
+        sliding=old,
+        **motion,
     )
 
 
-def contact_columns_of(model: Model, capacity: int) -> ContactColumns:
-    """With room for so many contacts of barrier and friction together."""
-    nodes, strands, d = model.node_count, len(model.strands), model.solved_layout.dimension
-    attached = np.full(nodes, -1)
+def contact_columns_of(model: Model, sizes: dict[str, int], capacity: int) -> ContactColumns:
+    """With capacity for so many contacts of barrier and friction together."""
+    attached = np.full(model.node_count, -1)
     attached[model.attached_node] = np.arange(len(model.attached_node))
-    return ContactColumns(
-        counts=np.zeros(2, dtype=np.int64),
-        node=np.zeros((capacity, 2), dtype=np.int64),
-        weight=np.zeros((capacity, 4)),
-        matrix=np.zeros((capacity, d, d)),
-        stiffness=np.zeros(capacity),
-        foot_gradient=np.zeros((capacity, 4, d)),
-        strand=np.repeat(np.arange(strands), [s.node_count for s in model.strands]),
+    return ContactColumns.zeros(
+        sizes | {"contact": capacity},
+        strand=np.repeat(np.arange(len(model.strands)), [s.node_count for s in model.strands]),
         attached=attached,
-        mark=np.zeros((nodes, 3), dtype=np.int64),
-        met=np.zeros((strands, strands), dtype=np.int64),
-        row=np.zeros(nodes, dtype=np.int64),
-        column=np.zeros(model.solved_layout.size, dtype=np.int64),
     )
 
 
-def _flow(model: Model) -> Flow:
+def _flow(model: Model, sizes: dict[str, int]) -> Flow:
     before, after = columns(model.drag_edge)
-    return Flow(
+    return Flow.zeros(
+        sizes,
         velocity=np.array(model.scene.fluid.velocity),
         node=model.drag_node,
         edge_before=before,
         edge_after=after,
         coefficient=model.drag_coefficient,
-        direction=np.zeros((len(model.drag_node), 3, 3)),
     )
 
 
-def fluid_of(model: Model) -> Fluid:
+def fluid_of(model: Model, sizes: dict[str, int]) -> Fluid:
     """The fluid of a scene in which it has inertia."""
-    edges = model.edge_count + model.wall_count
-    return Fluid(
+    return Fluid.zeros(
+        sizes,
         velocity=np.array(model.scene.fluid.velocity),
         edge_node=model.edge_node,
         mass=model.fluid_mass,
-        direction1=np.zeros((edges, 3)),
-        direction2=np.zeros((edges, 3)),
-        shape_gradient=np.zeros((model.edge_count, 4)),
-        momentum=np.zeros((model.node_count, 3)),
-        node_velocity=np.zeros((model.node_count, 3)),
-        spin=np.zeros(model.edge_count),
         fluid_momentum=fluid_momentum.address,
     )
 
 
 def _forces(model: Model, name: str, loads: PointLoads) -> PointForces:
     before, after = columns(model.carriers.node_edges[loads.nodes.target])
-    return PointForces(
+    return PointForces.zeros(
+        {"loaded node": len(loads.nodes.target), "loaded body": len(loads.bodies.target)},
         place=place_of(name),
         node=loads.nodes.target,
         node_load=loads.nodes.load,
@@ -306,8 +246,6 @@ def _forces(model: Model, name: str, loads: PointLoads) -> PointForces:
         body=loads.bodies.target,
         body_load=loads.bodies.load,
         body_vector=loads.bodies.vector,
-        on_nodes=np.zeros((len(loads.nodes.target), 3)),
-        on_bodies=np.zeros((len(loads.bodies.target), 3)),
         edge_before=before,
         edge_after=after,
     )
@@ -316,10 +254,16 @@ def _forces(model: Model, name: str, loads: PointLoads) -> PointForces:
 def _moments(model: Model) -> Moments:
     dead, following = model.dead_loads.moments, model.follower_loads.moments
     body = np.concatenate([dead.target, following.target])
-    return Moments(
+    return Moments.zeros(
+        {"moment": len(body)},
         dead=len(dead.target),
         body=body,
         load=np.concatenate([dead.load, following.load]),
         vector=np.concatenate([dead.vector, following.vector]),
-        present=np.zeros((len(body), 3)),
     )
+
+
+def _inertia_of_bodies(model: Model) -> Array:
+    """Factor of the shift for each unknown of free bodies, m and tr(J), shape (6 n_free,)."""
+    pairs = zip(model.bodies.mass, model.bodies.second_moment, strict=True)
+    return np.concatenate([np.zeros(0), *(np.repeat([m, np.trace(j)], 3) for m, j in pairs)])

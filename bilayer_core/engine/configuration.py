@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ..jit import call, kernel, piece
-from ..jit.record import Vector
 from ..kinematics.copying import copy, copy_matrix, copy_row
 from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
 from ..kinematics.turning import turn_between, turn_by, turn_further, turned_by
@@ -160,10 +159,10 @@ def place_carried(p, at):
     return READY
 
 
-@piece(int, Problem, Place, Place, Vector)
-def place_frames(p, base, at, angle):
-    """`carry_frames`"""
-    carry_frames(p.space, p.plane, p.strands, base, at, angle)
+@piece(int, Problem, Place, Place)
+def place_frames(p, base, at):
+    """`carry_frames`, by the angles of `at`."""
+    carry_frames(p.space, p.plane, p.strands, base, at, at.angle)
     return READY
 
 
@@ -205,7 +204,7 @@ def move(p, base, alpha, stage, at):
         turn_further(v0, v1, v2, base.body_turned, at.body_turned, b)
     call(p.calls.place_carried, (p, at))
     put_departure_of_held(p.constrained, stage, at)
-    call(p.calls.place_frames, (p, base, at, at.angle))
+    call(p.calls.place_frames, (p, base, at))
     return READY
 
 

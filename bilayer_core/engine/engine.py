@@ -13,18 +13,18 @@ from ..model.force_list import Kind, kinds
 from ..model.force_places import NAMES
 from ..model.model import Model, scheduled_motion
 from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, PLACE, RESIDUAL, STATUS
+from ..model.records.problem import Sums
 from ..model.records.step import RunExtrema, StageInputs, StateArrays
 from ..model.rest_strains import RestStrains
+from ..model.sizes import sizes_of
 from ..model.state import State
 from .actuation import Actuation
-from .allocate import configuration
 from .error_norm import ErrorNorm
 from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
 from .report import FAILURES, IntegrationReport
 from .run_extrema import count_shape
 from .step import make_step
-from .storage import Storage
-from .workspace import work_of
+from .storage import Storage, new_configuration, new_work
 
 Array = np.ndarray
 
@@ -48,8 +48,6 @@ class Engine:
         What acts from outside; to be set before the first step.
     end : Place
         The configuration that was evaluated last.
-    first : FirstDerivatives
-        There.
     gap : float
         The smallest to a surface or another rod there [m], infinite without contact; between rods those below the
         barrier distance count.
@@ -66,31 +64,24 @@ class Engine:
     ):
         self._model, self._storage, self._control = model, Storage(model), control
         self._newton = newton_tolerance, max_iterations
-        self.first, self.gap = self._storage.first, math.inf
-        self._outcome = self._storage.outcome
+        self._outcome, self.gap = self._storage.outcome, math.inf
         methods = (method, SELF_STARTING) if method.history else (method, method)
         self._methods = [used.arrays() for used in methods]
-        self._configurations = [configuration(model) for _ in range(3)]
+        self._configurations = [new_configuration(model) for _ in range(3)]
         self.end = self._configurations[1]
-        self.touched = np.zeros(len(model.carriers.weight), dtype=bool)
-        stages = max(len(used.nodes) for used in methods)
-        self._work = work_of(model, self._configurations, self.touched, stages)
-        self._inputs = inputs_of(model, max(len(used.points) for used in methods))
+        self._work = new_work(model, self._configurations, max(len(used.nodes) for used in methods))
+        self.touched = self._work.touched
+        self._inputs = new_inputs(model, max(len(used.points) for used in methods))
         self.stimulus = self._inputs.applied
         self.actuation: Actuation | None = None
         self._error_norm, self._counts = error_norm_of(model), empty_counts()
         self._state: State | None = None
         self._integration: Integration | None = None
-        surfaces = len(model.surfaces.names)
-        self.extrema = RunExtrema(
+        self.extrema = RunExtrema.zeros(
+            sizes_of(model),
             mass_moment=model.mass_moment,
             mass=float(model.node_mass.sum()),
             voronoi_length=model.voronoi_length,
-            figures=np.zeros(5),
-            body_top=np.zeros(len(model.bodies.names)),
-            nodes=np.zeros(surfaces, dtype=np.int64),
-            most_nodes=np.zeros(surfaces, dtype=np.int64),
-            first_contact=np.zeros(surfaces),
         )
         self.start_over(-math.inf)
 
@@ -171,25 +162,30 @@ class Engine:
         return self._storage.grow(status)
 
     @property
+    def sums(self) -> Sums:
+        """What forces added at the configuration evaluated last."""
+        return self._storage.problem.sums
+
+    @property
     def energies(self) -> dict[str, float]:
         """Of the conservative forces at the configuration evaluated last [J]; what others lose or supply is no
         energy.
         """
-        kind, values = kinds(), dict(zip(NAMES, self._storage.energy.tolist(), strict=True))
+        kind, values = kinds(), dict(zip(NAMES, self.sums.energy.tolist(), strict=True))
         return {name: values[name] for name in self._model.forces if kind[name] is Kind.CONSERVATIVE}
 
     @property
     def touching(self) -> Array:
         """Which carriers something pushed at the last evaluation, shape (n_carrier,)."""
-        return np.any(self.first.carrier != 0.0, axis=1)
+        return np.any(self.sums.carrier != 0.0, axis=1)
 
     def who_blocks(self, pair: int) -> str:
         """What a message says of the near pair that blocks prescribed motion."""
         if pair < 0:
             return "a rod would reach another"
-        near = self._storage.near
-        surface = self._model.surfaces.names[near.surface[pair]]
-        return f"{carrier_names(self._model)[near.carrier[pair]]} would reach the surface of {surface}"
+        near = self._storage.problem.surfaces
+        surface = self._model.surfaces.names[near.near_surface[pair]]
+        return f"{carrier_names(self._model)[near.near_carrier[pair]]} would reach the surface of {surface}"
 
     @property
     def moved(self) -> float:
@@ -212,19 +208,9 @@ class Engine:
         count_shape(run.problem, run.state, self.end, self._work.stage, self.extrema)
 
 
-def inputs_of(model: Model, points: int) -> StageInputs:
-    """Arrays for what acts at so many points of a step, with prescribed bodies where their paths begin."""
-    channels, bodies = len(model.scene.stimuli), len(model.bodies.names)
-    inputs = StageInputs(
-        applied=np.zeros(channels),
-        elapsed=np.zeros(points),
-        first=np.zeros(channels),
-        stimulus=np.zeros((points, channels)),
-        load_factor=np.zeros((points, len(model.scene.loads))),
-        position=np.zeros((points, bodies, 3)),
-        rotation=np.zeros((points, bodies, 3, 3)),
-        rates=np.zeros((points, bodies, 6)),
-    )
+def new_inputs(model: Model, ends: int) -> StageInputs:
+    """Arrays for what acts at so many ends of stages, with prescribed bodies where their paths begin."""
+    inputs = StageInputs.zeros(sizes_of(model) | {"stage end": ends})
     for b in np.flatnonzero(model.bodies.free_index[:-1] < 0):
         inputs.position[:, b], inputs.rotation[:, b], _ = scheduled_motion(model.bodies, b, 0.0)
     return inputs

@@ -3,40 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..model.force_places import NAMES
 from ..model.model import Model
-from ..model.records.outcome import ENERGY, GAP, HELD_UP, PAIR, SHIFT
-from ..model.records.problem import Problem
+from ..model.records.outcome import ENERGY, FRACTION, GAP, HELD_UP, PAIR, SHIFT, SIMPLIFIED
+from ..model.records.problem import Problem, Sums
 from ..model.records.status import READY
 from ..model.records.step import Place, Point, Stage, StateArrays
 from ..model.state import State, initial_state
-from .allocate import configuration
-from .evaluate import (
-    ASSEMBLE,
-    BOUND,
-    CARRY_FRAMES,
-    FACTORISE,
-    FOLLOW,
-    FORCES,
-    MOVE,
-    PREDICT,
-    SOLVE,
-    SPEED,
-    STAND_STILL,
-    START_POINT,
-    START_STAGE,
-    TAKE_STATE,
-    UNKNOWNS,
-    Evaluation,
-    evaluate_at,
-    solve_at,
-)
-from .storage import Storage
-from .workspace import point_of, stage_of
+from .configuration import move, place_frames, take_state
+from .engine import new_inputs
+from .evaluate import bound_step, evaluate_at, speed_of_step
+from .linear.newton_matrix import EXACT, assemble, factorise, solve
+from .potential import follow, start_stage
+from .stages import predict_stage, stand_still_stage, start_step_point
+from .storage import Storage, new_configuration, new_work
 
 Array = np.ndarray
 
@@ -74,12 +59,6 @@ class Evaluator:
     stage : Stage
     point : Point
         Start of a step, or origin of a stage: it may be changed between `start_point` and `predict`.
-    first : FirstDerivatives
-        Of the last evaluation.
-    near : NearSurfaces or None
-        Pairs of carriers and surfaces near each other; None where nothing can meet a surface.
-    rods : NearRods or None
-        Likewise of rods.
     """
 
     def __init__(self, model: Model):
@@ -87,64 +66,36 @@ class Evaluator:
         # a stiffness of its own, whose columns are set to zero where bending or twisting is left out
         self._stiffness = model.joint_stiffness.copy()
         self._storage = Storage(replace(model, joint_stiffness=self._stiffness.view()))
-        self.first, self.near, self.rods = self._storage.first, self._storage.near, self._storage.rods
         self._state = initial_state(model)
         self._arrays = StateArrays(**{name: getattr(self._state, name) for name in StateArrays.names})
-        self.stage: Stage = stage_of(model)
-        self.point: Point = point_of(model)
-        bodies = len(model.bodies.names)
-        self._turned = np.zeros(model.edge_count)
-        self._poses = np.zeros((bodies, 3)), np.zeros((bodies, 3, 3)), np.zeros((bodies, 6))
-        self._take_problem()
+        self._work, self._inputs = new_work(model, [], 1), new_inputs(model, 1)
+        self.stage: Stage = self._work.stage
+        self.point: Point = self._work.origin
 
     @property
-    def _problem(self) -> Problem:
+    def problem(self) -> Problem:
+        """Its records; others after capacity has grown."""
         return self._storage.problem
 
-    def _take_problem(self) -> None:
-        """Have the present problem evaluated."""
-        position, rotation, rates = self._poses
-        self._call = Evaluation(
-            problem=self._problem,
-            state=self._arrays,
-            stage=self.stage,
-            point=self.point,
-            turned=self._turned,
-            position=position,
-            rotation=rotation,
-            rates=rates,
-        )
+    @property
+    def sums(self) -> Sums:
+        """What forces added in the last evaluation."""
+        return self.problem.sums
 
     def _grow(self, status: int) -> None:
         if not self._storage.grow(status):
             raise ArithmeticError(f"the evaluation ended with status {status}")
-        self._take_problem()
-
-    def _do(self, operation: int, at: Place, base: Place | None = None, second: bool = False) -> tuple[float, float]:
-        while True:
-            status = evaluate_at(self._call, operation, base or at, at, second)
-            if status == READY:
-                figures = self._storage.outcome.figures
-                return float(figures[ENERGY]), float(figures[GAP])
-            self._grow(status)
-
-    def _solve(self, operation: int, at: Place) -> tuple[float, float, int]:
-        status, found = solve_at(self._call, operation, at), self._storage.outcome
-        if status != READY:
-            self._grow(status)
-            raise LookupError("there was too little room: evaluate with second derivatives again")
-        return float(found.figures[SHIFT]), float(found.figures[HELD_UP]), int(found.counts[PAIR])
 
     # configurations
 
     def new(self) -> Place:
         """A configuration, of which only what does not move is in place."""
-        return configuration(self.model)
+        return new_configuration(self.model)
 
     def take_state(self, state: State, at: Place) -> None:
         """Make a configuration that of a state."""
         self._take(state)
-        self._do(TAKE_STATE, at)
+        take_state(self.problem, self._arrays, at)
 
     def _take(self, state: State) -> None:
         for name in StateArrays.names:
@@ -158,23 +109,23 @@ class Evaluator:
         (n_free, 6), both in space.
         """
         self._put(step, body_step)
-        self._do(MOVE, at, base)
+        move(self.problem, base, 1.0, self.stage, at)
 
     def _put(self, step: Array, body_step: Array) -> None:
-        system = self._problem.system
+        system = self.problem.system
         system.step[:], system.body_step[:] = step, body_step
 
     def carry_frames(self, base: Place, angle: Array, at: Place) -> None:
         """Have frames of `base`, carried to the positions of `at` and turned by `angle` [rad], shape (n_edge,)."""
         at.angle[:] = angle
-        self._do(CARRY_FRAMES, at, base)
+        place_frames(self.problem, base, at)
 
     # stages
 
     def start_point(self, state: State, at: Place) -> Point:
         """Positions and momenta at the start of a step from a state, whose configuration is `at`."""
         self._take(state)
-        self._do(START_POINT, at)
+        start_step_point(self.problem, self._arrays, at, self.point)
         return self.point
 
     def predict(
@@ -203,10 +154,10 @@ class Evaluator:
         """
         self.set_drive(rest_edge, rest_joint, load_factor)
         self.stage.lengths[:] = lengths
-        self._turned[:] = turned
-        position, rotation, rates = self._poses
-        position[:], rotation[:], rates[:] = at.place[:-1], at.rotation[:-1], 0.0
-        self._do(PREDICT, at)
+        self._work.turned[:] = turned
+        inputs = self._inputs
+        inputs.position[0], inputs.rotation[0], inputs.rates[0] = at.place[:-1], at.rotation[:-1], 0.0
+        predict_stage(self.problem, self._arrays, self._work, inputs, 0, self.point, at)
 
     def stand_still(
         self, state: State, at: Place, length: float, rest_edge: Array, rest_joint: Array, load_factor: Array
@@ -218,7 +169,7 @@ class Evaluator:
         self._take(state)
         self.set_drive(rest_edge, rest_joint, load_factor)
         self.stage.lengths[:] = length
-        self._do(STAND_STILL, at)
+        stand_still_stage(self.problem, self._arrays, at, False, self.stage)
 
     def set_drive(self, rest_edge: Array, rest_joint: Array, load_factor: Array) -> None:
         """Strains without stress, and factors of loads."""
@@ -227,11 +178,13 @@ class Evaluator:
 
     def start_stage(self, at: Place) -> None:
         """Freeze contacts for friction, and have everything follow the configuration that follows one."""
-        self._do(START_STAGE, at)
+        while (status := start_stage(self.problem, at, self.stage)) != READY:
+            self._grow(status)
+        self.follow(at)
 
     def follow(self, at: Place) -> None:
         """Let directions of drag and of followers, and the momentum of the fluid, be those of a configuration."""
-        self._do(FOLLOW, at)
+        follow(self.problem, at, self.stage)
 
     # forces
 
@@ -247,7 +200,7 @@ class Evaluator:
         for name in forces:
             if name not in self.model.forces:
                 raise LookupError(f"force {name!r}: does not act in the scene, but: {', '.join(self.model.forces)}")
-        self._problem.sums.selected[:] = [name in forces for name in NAMES]
+        self.sums.selected[:] = [name in forces for name in NAMES]
         bends = slice(self.model.bend_count)
         self._stiffness[bends] = self.model.joint_stiffness[bends]
         if "bending" not in forces:
@@ -256,36 +209,45 @@ class Evaluator:
             self._stiffness[bends, 2] = 0.0
 
     def forces(self, at: Place, forces: Iterable[str] | None = None) -> dict[str, float]:
-        """Energies [J] of all forces or of some by name; `first` holds their derivatives by nodes, edges, pairs, and
+        """Energies [J] of all forces or of some by name; `sums` holds their derivatives by nodes, edges, pairs, and
         free bodies, of which nothing has been handed on to the unknowns.
         """
-        self.select(forces)
-        self._do(FORCES, at)
-        return self._energies()
+        return self._evaluate(at, forces, second=False, expands=False)
 
     def evaluate(self, at: Place, forces: Iterable[str] | None = None, second: bool = False) -> dict[str, float]:
         """Energies [J] of all forces or of some by name; their derivatives by the unknowns and by free bodies are in
-        `first`, with `second` those for `assemble` as well.
+        `sums`, with `second` those for `assemble` as well.
         """
-        self.select(forces)
-        self.total, self.gap = self._do(UNKNOWNS, at, second=second)
-        return self._energies()
+        return self._evaluate(at, forces, second=second, expands=True)
 
-    def _energies(self) -> dict[str, float]:
-        selected, energy = self._problem.sums.selected, self._storage.energy
-        return {name: float(energy[k]) for k, name in enumerate(NAMES) if selected[k]}
+    def _evaluate(self, at: Place, forces: Iterable[str] | None, *, second: bool, expands: bool) -> dict[str, float]:
+        self.select(forces)
+        while (status := evaluate_at(self.problem, at, self.stage, second, expands)) != READY:
+            self._grow(status)
+        figures, sums = self._storage.outcome.figures, self.sums
+        self.total, self.gap = float(figures[ENERGY]), float(figures[GAP])
+        return {name: float(sums.energy[k]) for k, name in enumerate(NAMES) if sums.selected[k]}
 
     # the matrix
 
     def assemble(self, at: Place) -> tuple[Array, Array, Array]:
-        """The matrix of the last evaluation with second derivatives, that of `at`: A as a band
+        """The matrix of the selected forces in the last evaluation with second derivatives, that of `at`: A as a band
         (`engine.linear.band`), U and D of free bodies, shapes (size + half-bandwidth, half-bandwidth + 1),
         (size, 6 n_free), (6 n_free, 6 n_free).
 
         What contacts of rods couple between two edges is in none of them, see `newton_step`.
         """
-        self._solve(ASSEMBLE, at)
-        problem, size = self._problem, self.model.solved_layout.size
+        problem, size, (length, momentum_length) = self.problem, self.model.solved_layout.size, self.stage.lengths
+        selected = {name for k, name in enumerate(NAMES) if self.sums.selected[k]}
+        factor = "inertia" in selected and 1.0 / (length * momentum_length)
+        factor += "damping" in selected and problem.damping / length
+        with ExitStack() as undo:
+            rods = problem.rod_contact
+            for name, contacts in (("rod barrier", rods.contacts), ("rod friction", rods.sliding)):
+                if rods.exists and name not in selected:
+                    undo.callback(contacts.count.__setitem__, 0, contacts.count[0])
+                    contacts.count[0] = 0
+            assemble(problem, at, factor, EXACT)
         if not problem.border.exists:
             return problem.system.band, np.zeros((size, 0)), np.zeros((0, 0))
         return problem.system.band, problem.border.border[:size], problem.border.corner
@@ -300,42 +262,36 @@ class Evaluator:
         simplified : int
             How far contacts of rods had to be simplified.
         """
-        while True:
-            try:
-                shift, simplified, _ = self._solve(FACTORISE, at)
-            except LookupError:
-                self.evaluate(at, second=True)
-                continue
-            return shift, int(simplified)
+        while (status := factorise(self.problem, at, self.stage, False)) != READY:
+            self._grow(status)
+            self.evaluate(at, second=True)
+        figures = self._storage.outcome.figures
+        return float(figures[SHIFT]), int(figures[SIMPLIFIED])
 
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
         """Minus the inverse of the factorised matrix times a gradient: of unknowns, shape (size,), and of free bodies,
         shape (n_free, 6), both in space.
         """
-        problem = self._problem
-        self.first.unknowns[:], self.first.body[:] = gradient, body_gradient
-        self._solve(SOLVE, self._any())
+        problem = self.problem
+        self.sums.gradient[:], self.sums.body[:] = gradient, body_gradient
+        solve(problem)
         return problem.system.step.copy(), problem.system.body_step.copy()
 
     def speed(self, step: Array, body_step: Array) -> float:
         """Largest displacement of a material point in a step over the length of the stage [m/s]."""
         self._put(step, body_step)
-        return self._solve(SPEED, self._any())[0]
+        return speed_of_step(self.problem, self.stage)
 
     def bound(self, at: Place, step: Array, body_step: Array) -> StepBound:
         """How far a step may go from the configuration of the last evaluation."""
         self._put(step, body_step)
-        fraction, held_up, pair = self._solve(BOUND, at)
-        problem, count = self._problem, 0
-        if problem.sliding.exists:
-            count += int(problem.sliding.count[0])
-        if self.rods is not None:
-            count += self.rods.sliding.count
+        status = bound_step(self.problem, at, self.stage)
+        if status != READY:
+            self._grow(status)
+            raise LookupError("there was too little capacity: evaluate with second derivatives again")
+        problem, outcome = self.problem, self._storage.outcome
+        count = int(problem.sliding.count[0]) if problem.sliding.exists else 0
+        count += int(problem.rod_contact.sliding.count[0]) if problem.rod_contact.exists else 0
         slip = problem.slips.way[:count].copy() if problem.slips.exists else np.zeros((0, 0))
-        return StepBound(fraction, pair, held_up, slip)
-
-    def _any(self) -> Place:
-        """A configuration where none is looked at."""
-        if not hasattr(self, "_place"):
-            self._place = self.new()
-        return self._place
+        figures = outcome.figures
+        return StepBound(float(figures[FRACTION]), int(outcome.counts[PAIR]), float(figures[HELD_UP]), slip)

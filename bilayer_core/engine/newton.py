@@ -196,7 +196,8 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
         )
     call(p.calls.place_carried, (p, guess))
     put_departure_of_held(p.constrained, stage, guess)
-    call(p.calls.place_frames, (p, start, guess, guess.turn))
+    copy(guess.turn, guess.angle)
+    call(p.calls.place_frames, (p, start, guess))
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]
     counts[PAIR] = -1

@@ -22,7 +22,6 @@ import math
 from ..forces.added_mass import momentum_at
 from ..forces.inertia import moment_of_turn
 from ..jit import kernel, piece
-from ..jit.record import Matrix, Stack, Vector
 from ..jit.stack import stack_matrix
 from ..kinematics.compensated import add_exactly
 from ..kinematics.copying import add_scaled, copy, copy_matrix, copy_row
@@ -30,7 +29,7 @@ from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn
 from ..kinematics.vector import row
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Method, Place, Point, Stage, StateArrays, Work
+from ..model.records.step import Method, Place, Point, Stage, StageInputs, StateArrays, Work
 from .configuration import clear_departure
 
 SPIN_ITERATIONS = 50
@@ -156,15 +155,16 @@ def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned
     return x, y, z
 
 
-@piece(int, Problem, StateArrays, Point, Point, Place, Vector, Matrix, Stack, Matrix, Stage)
-def predict_stage(p, state, origin, previous, start, turned, position, rotation, rates, stage):
-    """Frozen data of a stage from its origin; puts the origin of what bodies hold to where it has their velocity.
+@piece(int, Problem, StateArrays, Work, StageInputs, int, Point, Place)
+def predict_stage(p, state, work, inputs, n, previous, start):
+    """Frozen data of stage n from its origin; puts the origin of what bodies hold to where it has their velocity.
 
-    `previous` is the end of the stage before, or the start of the step, and `start` its configuration; `position`,
-    `rotation` and `rates` are those of prescribed bodies at the time of the stage, among those of all. `turned` is the
-    turn of edges from the start of the step, where positions are those of `state`, to `start`.
+    `previous` is the end of the stage before, or the start of the step, and `start` its configuration. The turn of
+    edges in `work` is that from the start of the step, where positions are those of `state`, to `start`.
     """
-    bodies, length = p.bodies, stage.lengths[0]
+    origin, stage, bodies = work.origin, work.stage, p.bodies
+    position, rotation, rates = inputs.position[n], inputs.rotation[n], inputs.rates[n]
+    length = stage.lengths[0]
     for b in range(origin.rotation.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
@@ -202,7 +202,7 @@ def predict_stage(p, state, origin, previous, start, turned, position, rotation,
             stage.way[i, c] = (moved - previous.displacement[i, c]) + ahead
     _put_origin_of_held(p.constrained, origin, state, stage)
     for k in range(origin.turn.shape[0]):
-        stage.origin_turn[k] = origin.turn[k] - turned[k]
+        stage.origin_turn[k] = origin.turn[k] - work.turned[k]
         stage.predicted_turn[k] = stage.origin_turn[k] + length * origin.spin[k]
     for i in range(origin.fluid_momentum.shape[0]):
         for c in range(3):
@@ -211,23 +211,23 @@ def predict_stage(p, state, origin, previous, start, turned, position, rotation,
     return READY
 
 
-@piece(int, Problem, StateArrays, Point, Point, Place, Vector, Matrix, Stack, Stage)
-def predict_end(p, state, end, previous, start, turned, position, rotation, stage):
+@piece(int, Problem, StateArrays, Work, StageInputs, int, Point, Place)
+def predict_end(p, state, work, inputs, n, previous, start):
     """Predict just the end of a step, which lies beyond its last stage; prescribed bodies are put there.
 
     Parameters as for `predict_stage`.
     """
-    bodies = p.bodies
+    end, stage, bodies = work.origin, work.stage, p.bodies
     for i in range(end.displacement.shape[0]):
         for c in range(3):
             stage.predicted_position[i, c] = state.position[i, c] + end.displacement[i, c]
             stage.way[i, c] = end.displacement[i, c] - previous.displacement[i, c]
-    for k in range(turned.shape[0]):
-        stage.predicted_turn[k] = end.turn[k] - turned[k]
-    for b in range(position.shape[0]):
+    for k in range(end.turn.shape[0]):
+        stage.predicted_turn[k] = end.turn[k] - work.turned[k]
+    for b in range(end.rotation.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
-            copy_matrix(rotation, b, end.rotation, b)
+            copy_matrix(inputs.rotation[n], b, end.rotation, b)
             continue
         for c in range(3):
             stage.predicted_body_position[f, c] = state.body_position[b, c] + end.body_displacement[b, c]
@@ -338,14 +338,15 @@ def _put_origin_of_held(held, origin, state, stage):
         stage.held_lag[k, 2] = length * (origin.body_velocity[f, 2] + (w0 * u1 - w1 * u0) - v2)
 
 
-@piece(int, Problem, StateArrays, Stage, Point, Vector, Place, Matrix, Stack, Point)
-def end_stage(p, state, stage, origin, turned, end, position, rotation, point):
-    """The end of a stage that was solved; parameters as for `predict_stage`.
+@piece(int, Problem, StateArrays, Work, StageInputs, int, Place)
+def end_stage(p, state, work, inputs, n, end):
+    """The end of stage n, which was solved with the configuration `end`.
 
     Velocities and displacements are those of inertia's motion and what the end departs from it.
     """
-    bodies, length = p.bodies, stage.lengths[0]
-    for b in range(position.shape[0]):
+    origin, point, stage, bodies = work.origin, work.end, work.stage, p.bodies
+    position, rotation, length = inputs.position[n], inputs.rotation[n], stage.lengths[0]
+    for b in range(point.rotation.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
             for c in range(3):
@@ -368,16 +369,16 @@ def end_stage(p, state, stage, origin, turned, end, position, rotation, point):
             point.velocity[i, c] = velocity + departure / length
             point.displacement[i, c] = origin.displacement[i, c] + (length * velocity + departure)
     for k in range(point.turn.shape[0]):
-        point.turn[k] = turned[k] + end.turn[k]
+        point.turn[k] = work.turned[k] + end.turn[k]
         point.spin[k] = (end.turn[k] - stage.origin_turn[k]) / length
     momentum_at(p.fluid, end, point.velocity, point.fluid_momentum)
     return READY
 
 
-@piece(int, Problem, StateArrays, Point, Place, Matrix, Matrix)
-def write_end(p, state, last, end, position, rates):
-    """Take the end of a step into the state; `position` and `rates` are those of prescribed bodies."""
-    bodies, held = p.bodies, p.constrained
+@piece(int, Problem, StateArrays, Point, Place, StageInputs, int)
+def write_end(p, state, last, end, inputs, n):
+    """Take the end of a step, its point n, into the state."""
+    bodies, held, position, rates = p.bodies, p.constrained, inputs.position[n], inputs.rates[n]
     copy(last.velocity, state.velocity)
     _write_velocity_of_held(held, end, rates, state)
     momentum_at(p.fluid, end, last.velocity, state.fluid_excess)

@@ -140,18 +140,11 @@ def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, m
             call(p.calls.place_origin, (work, method, n))
             call(p.calls.drive_stage, (p, state, inputs, n, work))
             if beyond:
-                call(
-                    p.calls.predict_end,
-                    (p, state, origin, previous, start, work.turned, position, rotation, stage),
-                )
+                call(p.calls.predict_end, (p, state, work, inputs, n, previous, start))
             else:
                 if keeps and method.history:
                     call(p.calls.move_along, (p, state, work, method, n, h))
-                rates = inputs.rates[n]
-                call(
-                    p.calls.predict_stage,
-                    (p, state, origin, previous, start, work.turned, position, rotation, rates, stage),
-                )
+                call(p.calls.predict_stage, (p, state, work, inputs, n, previous, start))
         status = READY
         if not beyond:
             status = call(p.calls.start_stage, (p, start, stage))
@@ -191,11 +184,9 @@ def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, m
         last = origin
         if not beyond:
             last = end
-            reached = place_at(work.places[e])
-            call(p.calls.end_stage, (p, state, stage, origin, work.turned, reached, position, rotation, end))
+            call(p.calls.end_stage, (p, state, work, inputs, n, place_at(work.places[e])))
         if n + 1 == points:
-            rates = inputs.rates[n]
-            call(p.calls.write_end, (p, state, last, place_at(work.places[e]), position, rates))
+            call(p.calls.write_end, (p, state, last, place_at(work.places[e]), inputs, n))
             for i in range(state.transduction.shape[0]):
                 state.transduction[i] = work.transduction[i]
             if keeps:  # for the step after, which can take them if nothing touches anew

@@ -1,22 +1,44 @@
-"""The arrays of a problem, and more of them where something grows in number."""
+"""The arrays of a problem, with capacity for what varies in number, and those of configurations and steps."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from ..forces.friction_limit import PATH_SIZE
 from ..forces.register import force_table, require_computed
-from ..model.force_places import NAMES
+from ..jit import shapes_of, zeros_in_one
 from ..model.model import Model
 from ..model.records.outcome import COUNTS, FIGURES
-from ..model.records.parts import ContactColumns, RodContact, Sliding, Surfaces
-from ..model.records.problem import BorderedSystem, Outcome, Problem
+from ..model.records.parts import ContactColumns, Plane, RodContact, RodContactList, Sliding, Slips, Space, Surfaces
+from ..model.records.problem import BorderedSystem, Outcome, Problem, Sums
 from ..model.records.status import NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
-from .allocate import FirstDerivatives, NearRods, NearSurfaces, SecondDerivatives
-from .build import contact_columns_of, lasting_groups, rod_contact_of, sliding_of, slips_of, surfaces_of, wide_of
+from ..model.records.step import Place, Point, Stage, Work
+from ..model.rod_surfaces import NearPairs
+from ..model.sizes import sizes_of
+from .build import contact_columns_of, lasting_groups, plane_of, rod_contact_of, sliding_of, slips_of, surfaces_of
 from .dispatch import calls_of
-from .workspace import sums_of
 
 Array = np.ndarray
+PAIRS_PER_POINT = 8
+"""Of rods near each other: for how many there is capacity at first."""
+FIRST = ("node", "edge", "pair", "body")
+"""Parts of `Sums.first`."""
+SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
+"""Parts of `Sums.second`, with those of the dimension."""
+IN_SPACE = ("top_hessian", "bottom_hessian")
+IN_PLANE = ("polar_hessian", "cross_hessian", "pair_hessian", "mixed_hessian")
+
+
+@dataclass
+class Capacity:
+    """For how much of what varies in number there is room."""
+
+    near: int  # pairs of carriers and surfaces
+    contacts: int  # of rods
+    sliding: int  # of them, at the start of a stage
+    columns: int  # of the border
 
 
 class Storage:
@@ -26,16 +48,8 @@ class Storage:
     ----------
     problem : Problem
         Another object after `grow`.
-    first : FirstDerivatives
-        Of the last evaluation.
     outcome : Outcome
         What pieces leave beside the number that they return.
-    energy : Array
-        Of forces [J], in the order of `model.force_places`.
-    near : NearSurfaces or None
-        Pairs of carriers and surfaces near each other; None where nothing can meet a surface.
-    rods : NearRods or None
-        Likewise of rods.
 
     Raises
     ------
@@ -45,15 +59,35 @@ class Storage:
 
     def __init__(self, model: Model):
         require_computed(model.forces)
-        self._model = model
-        self.first, self._second = FirstDerivatives(model), SecondDerivatives(model)
-        self.near = NearSurfaces(model) if model.meets_surfaces else None
-        self.rods = NearRods(model) if model.rod_surfaces is not None else None
-        self.energy = np.zeros(len(NAMES))
-        self._columns, self._width = model.bodies.freedom.shape[1], np.zeros(1, dtype=np.int64)
-        self._groups = lasting_groups(model, self._second)
+        self._model, self._sizes = model, sizes_of(model)
+        points = len(model.rod_surfaces.point_edge) if model.rod_surfaces is not None else 0
+        near = self._sizes["carrier"] if model.meets_surfaces and self._sizes["surface"] else 0
+        self._capacity = Capacity(near, points, points, model.bodies.freedom.shape[1])
+        self._pairs: NearPairs | None = None
+        if points:
+            geometry = model.rod_surfaces, model.edge_node, model.start_position
+            self._pairs = NearPairs(*geometry, PAIRS_PER_POINT * points)
         self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
+        self._width = np.zeros(1, dtype=np.int64)
+        self._sums, of_dimension = self._lasting_sums()
+        self._groups = lasting_groups(model, self._sizes) | of_dimension
         self._problem: Problem | None = None
+
+    def _lasting_sums(self) -> tuple[dict[str, Array], dict[str, Space | Plane]]:
+        """The parts of `Sums` that have no capacity, and the record of the dimension, whose hessians are among them."""
+        model, sizes = self._model, self._sizes
+        declared, names = (Space, IN_SPACE) if model.plane is None else (Plane, IN_PLANE)
+        own = shapes_of(declared, sizes, names)
+        first, sums = zeros_in_one(shapes_of(Sums, sizes, FIRST))
+        second, parts = zeros_in_one(shapes_of(Sums, sizes, SECOND) | {("own", name): own[name] for name in names})
+        sums |= {name: parts[name] for name in SECOND}
+        sums |= {"first": first, "second": second, "lasting": np.zeros_like(first)}
+        sums["selected"] = np.ones(sizes["force"], dtype=bool)
+        of_dimension = {name: parts["own", name] for name in names}
+        if model.plane is None:
+            bonds = sums["cross_hessian"][model.bend_count :]
+            return sums, {"space": Space(**of_dimension, bond_hessian=bonds), "plane": Plane.absent()}
+        return sums, {"space": Space.absent(), "plane": plane_of(model, self._sizes, of_dimension)}
 
     @property
     def problem(self) -> Problem:
@@ -63,40 +97,112 @@ class Storage:
         return self._problem
 
     def _make(self) -> Problem:
-        model, near, rods = self._model, self.near, self.rods
-        capacity = near.capacity if near else 0
-        of_rods = rods.contacts.capacity + rods.sliding.capacity if rods else 0
+        model, capacity, before = self._model, self._capacity, self._problem
+        surfaces, rods = model.meets_surfaces, self._pairs is not None
+        sizes = self._sizes | {
+            "near": capacity.near,
+            "link": 2 * capacity.near,
+            "column": capacity.columns,
+            "slip": capacity.near + capacity.sliding,
+            "path": PATH_SIZE,
+        }
         border = rods or model.free_count
+        same = before is not None and surfaces and len(before.surfaces.near_carrier) == capacity.near
         records = dict(
             **self._groups,
-            bordered=wide_of(model, self._columns, self._width) if border else BorderedSystem.absent(),
-            surfaces=surfaces_of(model, near) if near else Surfaces.absent(),
-            sliding=sliding_of(model, capacity) if near else Sliding.absent(),
-            rod_contact=rod_contact_of(model, rods) if rods else RodContact.absent(),
-            slips=slips_of(model, capacity + (rods.sliding.capacity if rods else 0)),
-            contact_columns=contact_columns_of(model, of_rods) if rods else ContactColumns.absent(),
-            sums=sums_of(self.first, self._second, self.energy, 2 * capacity),
+            bordered=BorderedSystem.zeros(sizes, width=self._width) if border else BorderedSystem.absent(),
+            surfaces=Surfaces.absent() if not surfaces else before.surfaces if same else surfaces_of(model, sizes),
+            sliding=self._sliding(before, sizes) if surfaces else Sliding.absent(),
+            rod_contact=self._rod_contact(before) if rods else RodContact.absent(),
+            slips=slips_of(model, sizes) if surfaces or rods else Slips.absent(),
+            contact_columns=ContactColumns.absent(),
+            sums=Sums.zeros(sizes, **self._sums),
         )
+        if rods:
+            records["contact_columns"] = contact_columns_of(model, sizes, capacity.contacts + capacity.sliding)
+        self._sums = {name: getattr(records["sums"], name) for name in Sums.names if "link" not in name}
         return Problem(**records, calls=calls_of(model), outcome=self.outcome, forces=force_table(model, records))
+
+    def _sliding(self, before: Problem | None, sizes: dict[str, int]) -> Sliding:
+        sliding = sliding_of(self._model, sizes)
+        if before is not None:
+            _take_over(before.sliding, sliding, int(before.sliding.count[0]))
+        return sliding
+
+    def _rod_contact(self, before: Problem | None) -> RodContact:
+        capacity, of_stage = self._capacity, RodContactList.zeros({"contact": self._capacity.sliding})
+        if before is not None:
+            _take_over(before.rod_contact.sliding, of_stage, int(before.rod_contact.sliding.count[0]))
+        now = RodContactList.zeros({"contact": capacity.contacts})
+        ways = np.array([0.0, -1.0, 0.0, -np.inf]) if before is None else before.rod_contact.ways
+        last = np.zeros((self._sizes["node"], 3)) if before is None else before.rod_contact.last
+        return rod_contact_of(self._model, self._sizes, self._pairs.search, now, of_stage, ways=ways, last=last)
 
     def grow(self, status: int) -> bool:
         """Have the capacity that a kernel lacked; false if that is not what it lacked.
 
         Contacts of friction, and which forces are selected, stay.
         """
+        capacity, before = self._capacity, self.problem
         if status == NO_ROOM:
-            self.near.grow()
+            capacity.near = 2 * max(1, capacity.near)
         elif status == NO_ROOM_FOR_RODS:
-            self.rods.grow()
+            found = int(before.rod_contact.contacts.count[0])
+            if self._pairs.count > self._pairs.capacity:
+                self._pairs.reserve(2 * self._pairs.count)
+            if found > capacity.contacts:
+                capacity.contacts = 2 * found
+            capacity.sliding = max(capacity.sliding, capacity.contacts)
         elif status == NO_ROOM_IN_BORDER:
-            self._columns = 2 * int(self._width[0])
+            capacity.columns = 2 * int(self._width[0])
         else:
             return False
-        before, self._problem = self.problem, self._make()
-        self.problem.sums.selected[:] = before.sums.selected
-        if before.sliding.exists:
-            for name in Sliding.names:
-                old, new = getattr(before.sliding, name), getattr(self.problem.sliding, name)
-                if isinstance(new, np.ndarray) and new.flags.writeable:
-                    new[: len(old)] = old
+        self._problem = self._make()
         return True
+
+
+def _take_over(old: Sliding | RodContactList, new: Sliding | RodContactList, count: int) -> None:
+    """Copy what is in use: `count` contacts, and what has no capacity."""
+    for name in old.shapes:
+        source, target = getattr(old, name), getattr(new, name)
+        used = slice(None) if source.shape == target.shape else slice(count)
+        target[used] = source[used]
+
+
+def new_configuration(model: Model) -> Place:
+    """Arrays of a configuration, of which everything that does not move is in place."""
+    sizes, surfaces = sizes_of(model), model.surfaces
+    carrier, edges = np.zeros((sizes["carrier"], 3)), sizes["edge+wall"]
+    at = Place.zeros(
+        sizes,
+        carrier=carrier,
+        position=carrier[: model.node_count],
+        point=carrier[model.node_count :],
+        length=np.ones(edges),
+        rotation=np.tile(np.eye(3), (sizes["body+world"], 1, 1)),
+    )
+    if not (surfaces.body < sizes["body"]).any():
+        at.surface_place[:], at.surface_arm[:], at.surface_turn[:] = surfaces.position, surfaces.position, surfaces.turn
+    return at
+
+
+def new_point(sizes: dict[str, int]) -> Point:
+    """Arrays of a point."""
+    vectors, parts = zeros_in_one(shapes_of(Point, sizes, [name for name in Point.shapes if name != "rotation"]))
+    return Point.zeros(sizes, vectors=vectors, **parts)
+
+
+def new_work(model: Model, configurations: list[Place], stages: int) -> Work:
+    """Room for steps of so many stages."""
+    sizes = sizes_of(model)
+    first = new_point(sizes)
+    stage = Stage.zeros(sizes)
+    stage.origin_rotation[-1] = np.eye(3)
+    return Work.zeros(
+        sizes | {"stage": stages, "point vector": first.vectors.size},
+        places=np.array([at.address for at in configurations], dtype=np.int64),
+        stage=stage,
+        first=first,
+        origin=new_point(sizes),
+        end=new_point(sizes),
+    )

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from .kernel import entry, kernel
 from .piece import addresses, call, caller, piece
-from .record import Address, Record, record, record_at
+from .record import Address, Record, record, record_at, shapes_of, zeros_in_one
 
-__all__ = ["Address", "Record", "addresses", "call", "caller", "entry", "kernel", "piece", "record", "record_at"]
+__all__ = ["Address", "Record", "record", "record_at", "shapes_of", "zeros_in_one"]
+__all__ += ["addresses", "call", "caller", "entry", "kernel", "piece"]

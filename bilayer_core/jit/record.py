@@ -8,7 +8,9 @@ A record is declared with the type of each field, so every kernel that takes one
 
         node: Indices  # nodes that it acts on, shape (n_drag,)
         coefficient: Matrix  # along t, m1, m2 [kg/m], shape (n_drag, 3)
+        velocity: Matrix = ("node", 3)  # of the water at nodes [m/s]
 
+A shape after an array's type, of numbers and of names of sizes, makes `Record.zeros` allocate the array.
 In memory every field begins at a multiple of eight bytes: a number takes one word, an array the words of numba's own
 descriptor of it, a record one for its address. The first word says whether the record `exists`: what a scene lacks is
 there with arrays of length zero (`Record.absent`). A record holds what its fields refer to, so its address is good as
@@ -21,6 +23,7 @@ Numba's `structref` counts references at every access.)
 from __future__ import annotations
 
 import typing
+from collections.abc import Iterable, Mapping
 from typing import Any, dataclass_transform
 
 import numpy as np
@@ -86,6 +89,7 @@ class Record:
     """
 
     names: tuple[str, ...] = ()
+    shapes: typing.ClassVar[dict[str, tuple[int | str, ...]]] = {}
 
     def __init__(self, **values: Any):
         kind = type(self).numba_type()
@@ -118,6 +122,22 @@ class Record:
         return empty
 
     @classmethod
+    def zeros(cls, sizes: Mapping[str, int], **values: Any) -> typing.Self:
+        """A record with the given values, and with arrays of zeros in all fields that declare a shape beside.
+
+        Parameters
+        ----------
+        sizes : mapping of str to int
+            What the names in shapes stand for.
+        **values
+        """
+        kinds = cls.numba_type().fields
+        missing = [name for name in cls.shapes if name not in values]
+        for name, shape in shapes_of(cls, sizes, missing).items():
+            values[name] = np.zeros(shape, DTYPES[kinds[name].dtype])
+        return cls(**values)
+
+    @classmethod
     def numba_type(cls) -> RecordType:
         """Its type in kernels."""
         if "_numba_type" not in cls.__dict__:
@@ -140,8 +160,25 @@ def record(declared: type) -> type:
 
     Fields are arrays of the types above, numbers, or other records.
     """
+    names = tuple(declared.__annotations__)
     body = {"__module__": declared.__module__, "__doc__": declared.__doc__, "__annotations__": declared.__annotations__}
-    return type(declared.__name__, (Record,), body | {"names": tuple(declared.__annotations__)})
+    shapes = {name: vars(declared)[name] for name in names if name in vars(declared)}
+    return type(declared.__name__, (Record,), body | {"names": names, "shapes": shapes})
+
+
+def shapes_of(declared: type[Record], sizes: Mapping[str, int], names: Iterable[str]) -> dict[str, tuple[int, ...]]:
+    """The declared shapes of some fields, in numbers."""
+    return {
+        name: tuple(sizes[part] if isinstance(part, str) else part for part in declared.shapes[name]) for name in names
+    }
+
+
+def zeros_in_one(shapes: Mapping[str, tuple[int, ...]]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """A flat array of zeros, and consecutive views of it with the given shapes: one loop clears them all."""
+    ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes.values())])
+    flat = np.zeros(ends[-1])
+    parts = zip(shapes.items(), ends[:-1], ends[1:], strict=True)
+    return flat, {name: flat[begin:end].reshape(shape) for (name, shape), begin, end in parts}
 
 
 def type_in_kernels(declared: Any) -> types.Type:

@@ -196,7 +196,7 @@ class EnergyLedger:
     def _force(self, name: str, at: Place) -> tuple[float, Gradient]:
         """Energy [J] and derivatives of one force at a configuration."""
         energy = self._evaluator.forces(at, (name,))[name]
-        return energy, Gradient.copy_of(self._evaluator.first, self._model)
+        return energy, Gradient.copy_of(self._evaluator.sums, self._model)
 
     def _look_at_fluid(self, at: Place, state: State) -> _Fluid | None:
         model = self._model

@@ -9,6 +9,7 @@ from ..forces.added_mass import fluid_momentum
 from ..model.model import Model
 from ..model.records.parts import Fluid
 from ..model.records.step import Place
+from ..model.sizes import sizes_of
 
 Array = np.ndarray
 
@@ -27,6 +28,6 @@ def energy_of_fluid(model: Model, at: Place, velocity: Array, spin: Array) -> fl
 
 def survey_fluid(model: Model, at: Place, velocity: Array, spin: Array) -> tuple[float, Fluid]:
     """T [J], and the fluid with P and ∂T/∂q; see `forces.added_mass.fluid_momentum`."""
-    fluid = fluid_of(model)
+    fluid = fluid_of(model, sizes_of(model))
     fluid.node_velocity[:], fluid.spin[:] = velocity, spin
     return fluid_momentum(fluid, at), fluid

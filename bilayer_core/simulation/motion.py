@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..engine.allocate import FirstDerivatives
 from ..kinematics.rotation import rotation_vector
 from ..model.model import Model
+from ..model.records.problem import Sums
 from ..model.records.step import Place
 from ..model.state import State
 
@@ -18,7 +18,7 @@ PARTS = ("node", "edge", "pair", "body", "contact")
 
 @dataclass(frozen=True)
 class Gradient:
-    """First derivatives of one force: shapes as in `FirstDerivatives`.
+    """First derivatives of one force: shapes as in `model.records.problem.Sums`.
 
     Of `contact`, rows of free bodies are zero, because theirs are in `body`.
     """
@@ -30,7 +30,7 @@ class Gradient:
     contact: Array
 
     @classmethod
-    def copy_of(cls, first: FirstDerivatives, model: Model) -> Gradient:
+    def copy_of(cls, first: Sums, model: Model) -> Gradient:
         """The present ones."""
         found = cls(*(getattr(first, part).copy() for part in PARTS))
         found.contact[model.bodies.body_of_free] = 0.0
@@ -40,7 +40,7 @@ class Gradient:
 @dataclass(frozen=True)
 class Motion:
     """Displacement [m, rad] or velocity [m/s, rad/s] of everything that a force may differentiate by: shapes as in
-    `FirstDerivatives`.
+    `model.records.problem.Sums`.
     """
 
     node: Array

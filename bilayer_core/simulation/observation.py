@@ -108,12 +108,12 @@ def _points(model: Model, state: State) -> tuple[Array, Array]:
 def contact_forces(stepper: Stepper) -> Array:
     """Barrier and friction force on nodes and contact points [N], shape (n_node + n_point, 3)."""
     model = stepper.model
-    return -stepper.engine.first.carrier[: model.node_count + model.point_count]
+    return -stepper.engine.sums.carrier[: model.node_count + model.point_count]
 
 
 def body_wrenches(stepper: Stepper) -> Array:
     """Contact force [N] and moment about its position [N m] on every body, shape (n_body, 6)."""
-    return -stepper.engine.first.contact[:-1]
+    return -stepper.engine.sums.contact[:-1]
 
 
 def node_strain(model: Model, stepper: Stepper) -> Array:

@@ -8,9 +8,9 @@ from contextlib import ExitStack
 from typing import Protocol
 
 from ..engine import step_size
-from ..engine.step_size import PERIOD_ROUNDING
 from .frame import Description, Frame
 
+TIME_ROUNDING = step_size.PERIOD_ROUNDING
 completed = step_size.completed.py_func
 """Periods of a rate [1/s] that are over at a time [s]: the same function decides where steps end."""
 
@@ -68,7 +68,7 @@ class Schedule:
     def next_due(self) -> float:
         """The earliest time of a step's end at which an observer is to look [s]; infinite without any."""
         due = zip(self._count, self._observers, strict=True)
-        return min(((count + 1 - PERIOD_ROUNDING) / of.rate for count, of in due), default=math.inf)
+        return min(((count + 1 - TIME_ROUNDING) / of.rate for count, of in due), default=math.inf)
 
     def observe_due(self) -> None:
         done = [completed(self._simulator.time, of.rate) for of in self._observers]

@@ -40,7 +40,7 @@ evaluator.start_stage(at)
 
 def energy(step):
     evaluator.move(at, step, np.zeros((0, 6)), moved)
-    return evaluator.evaluate(moved, ["springs"])["springs"], evaluator.first.unknowns.copy()
+    return evaluator.evaluate(moved, ["springs"])["springs"], evaluator.sums.gradient.copy()
 
 
 unknowns = [model.layout.node[node] + axis for node in (0, 5) for axis in (0, 2)]

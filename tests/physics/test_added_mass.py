@@ -259,7 +259,7 @@ def force_of_drag(simulator, state, at):
     evaluator.stand_still(state, present, 1.0, rest.edge, rest.joint, load_factor)
     evaluator.follow(at)
     evaluator.forces(present, ("drag",))
-    return -evaluator.first.node.sum(axis=0)
+    return -evaluator.sums.node.sum(axis=0)
 
 
 @pytest.mark.parametrize("added", [False, True], ids=["drag alone", "with added mass"])

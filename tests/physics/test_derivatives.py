@@ -182,8 +182,9 @@ def test_derivatives_of_contact_agree_with_differences_at_every_feature_of_a_sha
     for forces in (("barrier",), ("friction",), without_elasticity):
         check(problem, forces)
     assert all(problem.terms[term] > 0.0 for term in ("barrier", "friction"))
-    near = problem.evaluator.near
-    touching = near.gap[: near.count] < 1e-3
-    nodes = near.carrier[: near.count] < problem.model.node_count
+    near = problem.evaluator.problem.surfaces
+    count = near.near_count[0]
+    touching = near.near_gap[:count] < 1e-3
+    nodes = near.near_carrier[:count] < problem.model.node_count
     assert touching[nodes].any() and np.count_nonzero(touching[~nodes]) >= 2  # strip, ball and box
     assert (problem.coupling > 0.0) == (owner == "free")

@@ -73,7 +73,7 @@ def test_elastic_forces_and_moments_sum_to_zero(torsion, forces):
     evaluator, start = at_rest(model_of(bilayer(torsion=torsion)), LONG)
     shape, model = deformed(evaluator, start), evaluator.model
     evaluator.evaluate(shape, None if forces == "all" else (forces,))
-    gradient = evaluator.first.unknowns
+    gradient = evaluator.sums.gradient
     forces = gradient[model.layout.node[:, None] + np.arange(3)]
     about_tangent = gradient[model.layout.edge]
     moment = np.cross(shape.position, forces).sum(axis=0) + about_tangent @ shape.tangent[: model.edge_count]

@@ -51,7 +51,8 @@ def test_the_newton_matrix_of_rods_that_touch_is_the_derivative_of_the_gradient(
     terms = evaluator.evaluate(problem.at, second=True)
     assert evaluator.factorise(problem.at) == (0.0, 0)
     assert all(terms[term] > 0.0 for term in ("rod barrier", "rod friction"))
-    touching = evaluator.rods.contacts.record.node[: evaluator.rods.contacts.count]
+    contacts = evaluator.problem.rod_contact.contacts
+    touching = contacts.node[: contacts.count[0]]
     assert np.isin(touching, problem.model.attached_node).any()
     loads = []
     for _ in range(3):

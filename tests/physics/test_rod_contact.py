@@ -84,7 +84,7 @@ class Rods:
         """Energy and gradient."""
         self.at.position[:] = position
         energy = self.evaluator.forces(self.at, (force,))[force]
-        return energy, self.evaluator.first.node.copy()
+        return energy, self.evaluator.sums.node.copy()
 
     def bound(self, position, node_step):
         """How far a step of nodes may go."""
@@ -97,12 +97,12 @@ class Rods:
     @property
     def contacts(self):
         """Those found last."""
-        return self.evaluator.rods.contacts.record
+        return self.evaluator.problem.rod_contact.contacts
 
     @property
     def lagged(self):
         """Those of friction."""
-        return self.evaluator.rods.sliding.record
+        return self.evaluator.problem.rod_contact.sliding
 
 
 def dense(contacts, nodes):
@@ -256,15 +256,15 @@ def test_the_newton_matrix_with_rod_contact_is_the_derivative_of_the_gradient(hu
 
     def gradient(vector):
         problem.value(vector / scale)
-        body = evaluator.first.body.copy()  # in the chart of rotations at the moved place; wanted is that at `at`
+        body = evaluator.sums.body.copy()  # in the chart of rotations at the moved place; wanted is that at `at`
         body[:, 3:] -= 0.5 * np.cross(vector[size:].reshape(-1, 6)[:, 3:], body[:, 3:])
-        return np.concatenate([evaluator.first.unknowns, body.ravel()])
+        return np.concatenate([evaluator.sums.gradient, body.ravel()])
 
     terms = evaluator.evaluate(problem.at, second=True)
     assert evaluator.factorise(problem.at) == (0.0, 0)
     assert terms["rod barrier"] > 0.0 and terms["rod friction"] > 0.0
-    contacts = evaluator.rods.contacts
-    touching = contacts.record.node[: contacts.count]
+    contacts = evaluator.problem.rod_contact.contacts
+    touching = contacts.node[: contacts.count[0]]
     assert np.isin(touching, model.attached_node).any()
     loads = []
     for _ in range(3):
@@ -373,7 +373,7 @@ def test_contacts_and_the_bound_of_a_step_do_not_depend_on_the_way_that_led_ther
         if move % 20 == 0:  # straight on for a while, then elsewhere
             drift = size * rng.standard_normal(nodes)
         step = drift + 0.1 * size * rng.standard_normal(nodes) + np.array([1e-2, 0.0, 0.0])
-        fresh, base = Rods(model), rods.evaluator.rods.pairs.search.base.copy()
+        fresh, base = Rods(model), rods.evaluator.problem.rod_contact.search.base.copy()
         assert rods.evaluate(position)[0] == fresh.evaluate(position)[0]
         count = fresh.contacts.count[0]
         assert rods.contacts.count[0] == count
@@ -383,7 +383,7 @@ def test_contacts_and_the_bound_of_a_step_do_not_depend_on_the_way_that_led_ther
         fraction = fresh.bound(position, step).fraction
         assert rods.bound(position, step).fraction == fraction
         assert rods.evaluator.gap == fresh.evaluator.gap
-        made += not np.array_equal(base, rods.evaluator.rods.pairs.search.base)
+        made += not np.array_equal(base, rods.evaluator.problem.rod_contact.search.base)
         touching += count > 0
         bounded += fraction < 1.0
         position = position + 0.8 * fraction * step

@@ -97,7 +97,7 @@ def one_percent_more(evaluator, force):
     def wrong(at, forces):
         energies = right(at, forces)
         for part in PARTS if forces == (force,) else ():
-            array = getattr(evaluator.first, part)
+            array = getattr(evaluator.sums, part)
             array *= 1.01
         return energies
 

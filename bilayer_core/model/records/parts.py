@@ -58,8 +58,8 @@ class Drives:
 class Space:
     """What dimension 3 has: second derivatives of bonds. Absent in a plane."""
 
-    top_hessian: Stack
-    bottom_hessian: Stack
+    top_hessian: Stack = ("pair", 3, 4)
+    bottom_hessian: Stack = ("pair", 3, 4)
     bond_hessian: Stack  # the part of cross_hessian that belongs to bonds
 
 
@@ -70,12 +70,12 @@ class Plane:
     normal: Vector
     side: Vector
     joint_after: Indices  # between each edge and the next, −1 at the end of a strand, shape (n_edge,)
-    frame: Matrix
-    polar_gradient: Matrix
-    polar_hessian: Matrix
-    cross_hessian: Matrix
-    pair_hessian: Matrix
-    mixed_hessian: Matrix
+    frame: Matrix = ("edge+wall", 4)
+    polar_gradient: Matrix = ("edge+wall", 2)
+    polar_hessian: Matrix = ("edge+wall", 3)
+    cross_hessian: Matrix = ("joint", 4)
+    pair_hessian: Matrix = ("pair", 3)
+    mixed_hessian: Matrix = ("pair", 4)
 
 
 @record
@@ -84,7 +84,7 @@ class OffAxis:
 
     joint: Indices
     slope: Matrix
-    rest: Matrix  # of all joints at the present strains [rad]
+    rest: Matrix = ("joint", 3)  # of all joints at the present strains [rad]
 
 
 @record
@@ -142,7 +142,7 @@ class Attachments:
 
 @record
 class Surfaces:
-    """Carriers, surfaces, and the list of near pairs with what it was made for; see `allocate.NearSurfaces`."""
+    """Carriers, surfaces, and the list of near pairs with what it was made for; see `contact.near`."""
 
     d_hat: float
     stiffness: float
@@ -163,15 +163,15 @@ class Surfaces:
     position: Matrix
     turn: Stack
     meets: FlagTable
-    near_carrier: Indices
-    near_surface: Indices
-    near_gap: Vector
-    near_count: Indices  # shape (1,)
+    near_carrier: Indices = ("near",)
+    near_surface: Indices = ("near",)
+    near_gap: Vector = ("near",)
+    near_count: Indices = (1,)
     margin: Vector  # shape (1,)
-    extent: Vector
-    listed_carrier: Matrix
-    listed_place: Matrix
-    listed_turn: Stack
+    extent: Vector = ("surface",)
+    listed_carrier: Matrix = ("carrier", 3)
+    listed_place: Matrix = ("surface", 3)
+    listed_turn: Stack = ("surface", 3, 3)
 
 
 @record
@@ -183,17 +183,17 @@ class Sliding:
     coefficient: Matrix
     node_edges: IndexTable
     node_axis: Indices
-    count: Indices  # shape (1,)
-    first: Indices
-    surface: Indices
-    load: Vector
-    normal: Matrix
-    axis: Matrix
-    arm: Matrix
-    lever: Matrix
-    back: Stack
-    turn: Stack
-    origin_turn: Stack
+    count: Indices = (1,)
+    first: Indices = ("near",)
+    surface: Indices = ("near",)
+    load: Vector = ("near",)
+    normal: Matrix = ("near", 3)
+    axis: Matrix = ("near", 3)
+    arm: Matrix = ("near", 3)
+    lever: Matrix = ("near", 3)
+    back: Stack = ("body+world", 3, 3)
+    turn: Stack = ("body+world", 3, 3)
+    origin_turn: Stack = ("body+world", 3, 3)
 
 
 @record
@@ -201,32 +201,32 @@ class Slips:
     """Slip of all lagged contacts along a Newton step; see `forces.friction_limit`."""
 
     threshold: float
-    way: Matrix
+    way: Matrix = ("slip", "path")
 
 
 @record
 class RodContactList:
     """Contacts of rods; see `forces.rod_contact`."""
 
-    count: Indices  # shape (1,)
-    point: Indices
-    multiplicity: Indices  # +1 or −1
-    inner: Flags  # whether t moves with the shape, or is that of a node
-    gap: Vector  # d [m]
-    distance: Vector  # D [m]
-    node: IndexTable  # i and j, shape (·, 2)
-    weight: Matrix  # w_m, shape (·, 4)
-    normal: Matrix  # n
-    normal_force: Vector  # λ [N]; those of friction alone
-    matrix: Stack  # M [N/m]
-    tangential_stiffness: Vector  # κ [N/m]
-    segment_direction: Matrix  # u
-    foot_gradient: Stack  # a_m, shape (·, 4, 3)
+    count: Indices = (1,)
+    point: Indices = ("contact",)
+    multiplicity: Indices = ("contact",)  # +1 or −1
+    inner: Flags = ("contact",)  # whether t moves with the shape, or is that of a node
+    gap: Vector = ("contact",)  # d [m]
+    distance: Vector = ("contact",)  # D [m]
+    node: IndexTable = ("contact", 2)  # i and j
+    weight: Matrix = ("contact", 4)  # w_m
+    normal: Matrix = ("contact", 3)  # n
+    normal_force: Vector = ("contact",)  # λ [N]; those of friction alone
+    matrix: Stack = ("contact", 3, 3)  # M [N/m]
+    tangential_stiffness: Vector = ("contact",)  # κ [N/m]
+    segment_direction: Matrix = ("contact", 3)  # u
+    foot_gradient: Stack = ("contact", 4, 3)  # a_m
 
 
 @record
 class RodContact:
-    """Rods that can meet: the search for near pairs, and contacts; see `allocate.NearRods`."""
+    """Rods that can meet: the search for near pairs, and contacts; see `contact.rod_list`."""
 
     d_hat: float
     stiffness: float
@@ -236,10 +236,10 @@ class RodContact:
     unit: float  # barrier distance and thickest layer together
     point_weight: Vector
     search: RodSearch
-    last: Matrix  # where nodes were last, their mean taken off [m], shape (n_node, 3)
+    last: Matrix = ("node", 3)  # where nodes were last, their mean taken off [m]
     ways: Vector  # of the list; see `contact.rod_list`, shape (4,)
-    no_step: Matrix  # zeros, shape (n_node, 3)
-    gap: Vector  # the smallest below the barrier distance, shape (1,)
+    no_step: Matrix = ("node", 3)  # zeros
+    gap: Vector = (1,)  # the smallest below the barrier distance
     contacts: RodContactList  # present ones
     sliding: RodContactList  # of the start of the stage
 
@@ -248,18 +248,18 @@ class RodContact:
 class ContactColumns:
     """Contacts of rods in the Newton matrix, and their columns in the border; see `engine.linear.contact_columns`."""
 
-    counts: Indices  # of contacts and of nodes, shape (2,)
-    node: IndexTable  # of contacts of barrier and friction in one list
-    weight: Matrix
-    matrix: Stack  # M along the unknowns of nodes
-    stiffness: Vector  # κ, 0 where the nearest point is a node
-    foot_gradient: Stack  # a_m along the unknowns of nodes
+    counts: Indices = (2,)  # of contacts and of nodes
+    node: IndexTable = ("contact", 2)  # of contacts of barrier and friction in one list
+    weight: Matrix = ("contact", 4)
+    matrix: Stack = ("contact", "dimension", "dimension")  # M along the unknowns of nodes
+    stiffness: Vector = ("contact",)  # κ, 0 where the nearest point is a node
+    foot_gradient: Stack = ("contact", 4, "dimension")  # a_m along the unknowns of nodes
     strand: Indices  # of each node
     attached: Indices  # place of each node among those that bodies hold, which are in the border already, or −1
-    mark: IndexTable  # scratch, shape (n_node, 3)
-    met: IndexTable  # scratch, shape (n_strand, n_strand)
-    row: Indices  # in the band, of each node that has columns, ascending
-    column: Indices  # of each unknown among the contact columns, −1 without one
+    mark: IndexTable = ("node", 3)  # scratch
+    met: IndexTable = ("strand", "strand")  # scratch
+    row: Indices = ("node",)  # in the band, of each node that has columns, ascending
+    column: Indices = ("matrix unknown",)  # of each unknown among the contact columns, −1 without one
 
 
 @record
@@ -271,7 +271,7 @@ class Flow:
     edge_before: Indices
     edge_after: Indices
     coefficient: Matrix
-    direction: Stack
+    direction: Stack = ("dragged", 3, 3)
 
 
 @record
@@ -281,12 +281,12 @@ class Fluid:
     velocity: Vector  # U [m/s], shape (3,)
     edge_node: Indices  # first node of each edge, shape (n_edge,)
     mass: Matrix  # m₁ l̄ and m₂ l̄ [kg] and j l̄ [kg m²] of each edge, shape (n_edge, 3)
-    direction1: Matrix  # m1 of edges and walls at z, shape (n_edge + n_wall, 3)
-    direction2: Matrix
-    node_velocity: Matrix  # at which `fluid_momentum` finds the two that follow [m/s], shape (n_node, 3)
-    spin: Vector  # likewise [rad/s], shape (n_edge,)
-    momentum: Matrix  # P of nodes [N s], shape (n_node, 3)
-    shape_gradient: Matrix  # ∂T/∂(ε, θ) of edges [N, N m], shape (n_edge, 4)
+    direction1: Matrix = ("edge+wall", 3)  # m1 of edges and walls at z
+    direction2: Matrix = ("edge+wall", 3)
+    node_velocity: Matrix = ("node", 3)  # at which `fluid_momentum` finds the two that follow [m/s]
+    spin: Vector = ("edge",)  # likewise [rad/s]
+    momentum: Matrix = ("node", 3)  # P of nodes [N s]
+    shape_gradient: Matrix = ("edge", 4)  # ∂T/∂(ε, θ) of edges [N, N m]
     fluid_momentum: Address
 
 
@@ -301,8 +301,8 @@ class PointForces:
     body: Indices
     body_load: Indices
     body_vector: Matrix
-    on_nodes: Matrix  # the present ones
-    on_bodies: Matrix
+    on_nodes: Matrix = ("loaded node", 3)  # the present ones
+    on_bodies: Matrix = ("loaded body", 3)
     edge_before: Indices
     edge_after: Indices
 
@@ -315,4 +315,4 @@ class Moments:
     body: Indices
     load: Indices
     vector: Matrix
-    present: Matrix
+    present: Matrix = ("moment", 3)

@@ -27,66 +27,66 @@ from .parts import (
 
 @record
 class Sums:
-    """First and second derivatives to which forces add; see `allocate`."""
+    """First and second derivatives to which forces add, and what becomes of them for the unknowns."""
 
-    lasting: Vector  # the part of `first` that stays as it is when other parts follow the configuration
-    energy: Vector  # of each force, in the order of `model.force_places` [J]
-    selected: Flags  # whether a force is computed, bool, in that order; in steps all are
+    energy: Vector = ("force",)  # of each, in the order of `model.force_places` [J]
+    selected: Flags = ("force",)  # whether a force is computed, in that order; in steps all are
     first: Vector  # node, edge, pair and body in one piece, for clearing
-    node: Matrix
-    edge: Matrix
-    pair: Matrix
-    body: Matrix
-    carrier: Matrix
-    contact: Matrix
-    gradient: Vector
-    attached: Matrix
+    lasting: Vector  # the part of it that stays as it is when other parts follow the configuration
+    node: Matrix = ("node", 3)  # ∂/∂x of nodes [N]
+    edge: Matrix = ("edge+wall", 4)  # ∂/∂(e, θ) of edges and walls
+    pair: Matrix = ("pair", 3)  # ∂/∂p of paired edges
+    body: Matrix = ("free", 6)  # ∂/∂(X, φ) of free bodies
+    carrier: Matrix = ("carrier", 3)  # ∂/∂x of carriers by contact alone [N], of which nodes take theirs
+    contact: Matrix = ("body+world", 6)  # ∂/∂(X, φ) of all bodies by contact alone, of which free ones take theirs
+    gradient: Vector = ("unknown",)  # of the unknowns, zero where nodes are held
+    attached: Matrix = ("attached", 3)  # of held nodes before that
     second: Vector  # all second derivatives but links in one piece
-    edge_hessian: Stack
-    cross_hessian: Stack
-    pair_hessian: Stack
-    node_hessian: Stack
-    body_hessian: Matrix
-    links: Indices  # number of links, shape (1,)
-    link_node: Indices
-    link_body: Indices
-    link_hessian: Stack
+    edge_hessian: Stack = ("edge with hessian", 4, 4)
+    cross_hessian: Stack = ("joint in space", 4, 4)
+    pair_hessian: Stack = ("pair in space", 3, 3)
+    node_hessian: Stack = ("node with hessian", 3, 3)
+    body_hessian: Matrix = ("body unknown", "body unknown")
+    links: Indices = (1,)  # number of links
+    link_node: Indices = ("link",)
+    link_body: Indices = ("link",)
+    link_hessian: Stack = ("link", 3, 6)
 
 
 @record
 class System:
-    """The Newton matrix, its factors, and steps; see `matrix`."""
+    """The Newton matrix, its factors, and steps; see `engine.linear.newton_matrix`."""
 
-    band: Matrix
-    right: Vector
-    step: Vector
-    body_step: Matrix
-    node_step: Matrix
-    motion: Matrix
-    negative: Indices  # number of negative eigenvalues, where they were counted, shape (1,)
+    band: Matrix = ("row", "band")
+    right: Vector = ("row",)
+    step: Vector = ("unknown",)
+    body_step: Matrix = ("free", 6)
+    node_step: Matrix = ("node", 3)
+    motion: Matrix = ("body+world", 6)
+    negative: Indices = (1,)  # number of negative eigenvalues, where they were counted
 
 
 @record
 class Border:
     """Rows and columns of free bodies in the Newton matrix."""
 
-    border: Matrix
-    corner: Matrix
+    border: Matrix = ("row", "body unknown")
+    corner: Matrix = ("body unknown", "body unknown")
 
 
 @record
 class BorderedSystem:
     """The border as it is eliminated: of bodies their freedom, then the columns of contacts of rods.
 
-    Rooms for columns are larger than what is in use; see `matrix`.
+    There is capacity for more columns than are in use.
     """
 
-    border: Matrix  # U by columns, then L⁻¹ U, shape (room, size + half-bandwidth)
-    scaled: Matrix  # D⁻¹ L⁻¹ U likewise
-    schur: Matrix
-    load: Vector
+    border: Matrix = ("column", "row")  # U by columns, then L⁻¹ U
+    scaled: Matrix = ("column", "row")  # D⁻¹ L⁻¹ U likewise
+    schur: Matrix = ("column", "column")
+    load: Vector = ("column",)
     width: Indices  # columns in use, shape (1,)
-    coupled: Indices  # whether the border is not zero, shape (1,)
+    coupled: Indices = (1,)  # whether the border is not zero
 
 
 @record

@@ -7,31 +7,34 @@ from ...jit.record import Flags, Indices, Matrix, Stack, Tensor, Vector, record
 
 @record
 class Place:
-    """A configuration: positions, frames and bodies at one point of a Newton iteration."""
+    """A configuration: positions, frames and bodies at one point of a Newton iteration.
 
-    carrier: Matrix  # all carriers [m], shape (n_carrier, 3); the first are the nodes, the others points of bodies
-    position: Matrix  # of nodes [m], shape (n_node, 3)
-    point: Matrix  # of the other carriers [m]
-    length: Vector  # of edges and walls [m], shape (n_edge + n_wall,)
-    tangent: Matrix  # of edges and walls, unit, shape (n_edge + n_wall, 3)
-    director1: Matrix  # likewise
-    director2: Matrix
-    turn: Vector  # of edges about their tangents since the start of the step [rad], shape (n_edge,)
-    angle: Vector  # of edges in the last move [rad], shape (n_edge,)
-    joint_strain: Matrix  # κ₁ κ₂ ψ of joints, ψ unwrapped [rad], shape (n_joint, 3)
-    body_position: Matrix  # of free bodies [m], shape (n_free, 3)
-    body_rotation: Stack  # shape (n_free, 3, 3)
-    place: Matrix  # of all bodies and last of the world [m], shape (n_body + 1, 3)
-    rotation: Stack  # shape (n_body + 1, 3, 3)
-    surface_place: Matrix  # of surfaces [m], shape (n_surface, 3)
-    surface_turn: Stack  # their axes, shape (n_surface, 3, 3)
-    arm: Matrix  # from the position of its body to each attached node [m], shape (n_attached, 3)
-    held: Matrix  # of attached nodes [m], shape (n_attached, 3)
-    point_arm: Matrix  # like `arm`, of points
-    surface_arm: Matrix  # and of surfaces
-    departure: Matrix  # of nodes from where inertia takes them, x − x̃ [m]: its digits are not those of x
-    body_departure: Matrix  # of free bodies, X − X̃ [m]
-    body_turned: Matrix  # vector part of the unit quaternion from R̃ to R of free bodies; see `forces.inertia`
+    Sizes in shapes are those of `model.sizes`.
+    """
+
+    carrier: Matrix = ("carrier", 3)  # all carriers [m]: the first are the nodes, the others points of bodies
+    position: Matrix = ("node", 3)  # of nodes [m]
+    point: Matrix = ("point", 3)  # of the other carriers [m]
+    length: Vector = ("edge+wall",)  # of edges and walls [m]
+    tangent: Matrix = ("edge+wall", 3)  # of edges and walls, unit
+    director1: Matrix = ("edge+wall", 3)  # likewise
+    director2: Matrix = ("edge+wall", 3)
+    turn: Vector = ("edge",)  # of edges about their tangents since the start of the step [rad]
+    angle: Vector = ("edge",)  # of edges in the last move [rad]
+    joint_strain: Matrix = ("joint", 3)  # κ₁ κ₂ ψ of joints, ψ unwrapped [rad]
+    body_position: Matrix = ("free", 3)  # of free bodies [m]
+    body_rotation: Stack = ("free", 3, 3)  # of free bodies
+    place: Matrix = ("body+world", 3)  # of all bodies and last of the world [m]
+    rotation: Stack = ("body+world", 3, 3)  # likewise
+    surface_place: Matrix = ("surface", 3)  # of surfaces [m]
+    surface_turn: Stack = ("surface", 3, 3)  # their axes
+    arm: Matrix = ("attached", 3)  # from the position of its body to each attached node [m]
+    held: Matrix = ("attached", 3)  # of attached nodes [m]
+    point_arm: Matrix = ("point", 3)  # like `arm`, of points
+    surface_arm: Matrix = ("surface", 3)  # and of surfaces
+    departure: Matrix = ("node", 3)  # of nodes from where inertia takes them, x − x̃ [m]: its digits are not those of x
+    body_departure: Matrix = ("free", 3)  # of free bodies, X − X̃ [m]
+    body_turned: Matrix = ("free", 3)  # vector part of their unit quaternion from R̃ to R; see `forces.inertia`
 
 
 @record
@@ -41,27 +44,31 @@ class Stage:
     The velocity of whatever is at q is (q − origin)/(γ h).
     """
 
-    lengths: Vector  # γ h and γ′ h [s], where p = p̄ + γ′ h × force for momenta, shape (2,)
-    origin_position: Matrix  # of nodes [m], shape (n_node, 3)
-    origin_turn: Vector  # of edges, counted from the start of the stage [rad], shape (n_edge,)
-    origin_body_position: Matrix  # of free bodies [m], shape (n_free, 3)
-    origin_place: Matrix  # of all bodies and last of the world [m], shape (n_body + 1, 3)
-    origin_rotation: Stack  # likewise; R̄ is no rotation but the matrix with dR/dt = (R − R̄)/(γ h)
-    origin_fluid_momentum: Matrix  # P̄ of the fluid at nodes [N s], shape (n_node, 3); (0, 3) without added mass
-    predicted_position: Matrix  # x̃ of nodes [m], shape (n_node, 3)
-    predicted_turn: Vector  # of edges that inertia prefers, counted from the start of the stage [rad], shape (n_edge,)
-    predicted_body_position: Matrix  # X̃ of free bodies [m], shape (n_free, 3)
-    predicted_body_rotation: Stack  # R̃ of free bodies, shape (n_free, 3, 3)
-    twist: Vector  # of joints at the start of the stage
-    rest_edge: Vector  # strains without stress
-    rest_joint: Matrix  # of joints; what strains off the axis add is not in it
-    load_factor: Vector
-    body_turn: Matrix  # rotation vector to where inertia takes free bodies
-    way: Matrix  # of nodes, from the start of the stage to where inertia takes them [m]
-    body_way: Matrix  # likewise of free bodies
-    body_spin: Matrix  # with which they turn there [rad/s]
-    held_arm: Matrix  # of what free bodies hold, R̃ r [m], shape (n_attached, 3)
-    held_lag: Matrix  # of these, by which bodies without forces would take them farther than its own inertia [m]
+    lengths: Vector = (2,)  # γ h and γ′ h [s], where p = p̄ + γ′ h × force for momenta
+    origin_position: Matrix = ("node", 3)  # of nodes [m]
+    origin_turn: Vector = ("edge",)  # of edges, counted from the start of the stage [rad]
+    origin_body_position: Matrix = ("free", 3)  # of free bodies [m]
+    origin_place: Matrix = ("body+world", 3)  # of all bodies and last of the world [m]
+    origin_rotation: Stack = (
+        "body+world",
+        3,
+        3,
+    )  # likewise; R̄ is no rotation: (R − R̄)/(γ h) is dR/dt
+    origin_fluid_momentum: Matrix = ("wet", 3)  # P̄ of the fluid at nodes [N s]; none without added mass
+    predicted_position: Matrix = ("node", 3)  # x̃ of nodes [m]
+    predicted_turn: Vector = ("edge",)  # of edges that inertia prefers, counted from the start of the stage [rad]
+    predicted_body_position: Matrix = ("free", 3)  # X̃ of free bodies [m]
+    predicted_body_rotation: Stack = ("free", 3, 3)  # R̃ of free bodies
+    twist: Vector = ("joint",)  # of joints at the start of the stage
+    rest_edge: Vector = ("edge",)  # strains without stress
+    rest_joint: Matrix = ("joint", 3)  # of joints; what strains off the axis add is not in it
+    load_factor: Vector = ("load",)
+    body_turn: Matrix = ("free", 3)  # rotation vector to where inertia takes free bodies
+    way: Matrix = ("node", 3)  # of nodes, from the start of the stage to where inertia takes them [m]
+    body_way: Matrix = ("free", 3)  # likewise of free bodies
+    body_spin: Matrix = ("free", 3)  # with which they turn there [rad/s]
+    held_arm: Matrix = ("attached", 3)  # of what free bodies hold, R̃ r [m]
+    held_lag: Matrix = ("attached", 3)  # by which bodies without forces would take these farther than inertia [m]
 
 
 @record
@@ -73,15 +80,15 @@ class Point:
     """
 
     vectors: Vector  # all but rotations, in one piece, of which the following are views
-    displacement: Matrix  # of nodes [m]
-    body_displacement: Matrix  # of all bodies [m]
-    turn: Vector  # of edges about their tangents since the start of the step [rad]
-    velocity: Matrix  # of nodes [m/s]
-    spin: Vector  # of edges [rad/s]
-    body_velocity: Matrix  # of free bodies [m/s]
-    angular_momentum: Matrix  # of free bodies about their mass centres [N m s]
-    fluid_momentum: Matrix  # of the fluid at nodes [N s]
-    rotation: Stack  # of all bodies, shape (n_body, 3, 3)
+    displacement: Matrix = ("node", 3)  # of nodes [m]
+    body_displacement: Matrix = ("body", 3)  # of all bodies [m]
+    turn: Vector = ("edge",)  # of edges about their tangents since the start of the step [rad]
+    velocity: Matrix = ("node", 3)  # of nodes [m/s]
+    spin: Vector = ("edge",)  # of edges [rad/s]
+    body_velocity: Matrix = ("free", 3)  # of free bodies [m/s]
+    angular_momentum: Matrix = ("free", 3)  # of free bodies about their mass centres [N m s]
+    fluid_momentum: Matrix = ("wet", 3)  # of the fluid at nodes [N s]
+    rotation: Stack = ("body", 3, 3)  # of all bodies
 
 
 @record
@@ -104,14 +111,14 @@ class Method:
 class StageInputs:
     """What acts from outside during a step, at each of its points: the ends of stages, and of the step."""
 
-    applied: Vector  # stimuli at the end of the last step, shape (n_channel,)
-    elapsed: Vector  # from the start of the step to each point [s], shape (n_point,)
-    first: Vector  # stimuli at the start of the step, shape (n_channel,)
-    stimulus: Matrix  # shape (n_point, n_channel)
-    load_factor: Matrix  # shape (n_point, n_load)
-    position: Stack  # of all bodies; those of prescribed ones count [m], shape (n_point, n_body, 3)
-    rotation: Tensor  # shape (n_point, n_body, 3, 3)
-    rates: Stack  # [m/s, rad/s], shape (n_point, n_body, 6)
+    applied: Vector = ("channel",)  # stimuli at the end of the last step
+    elapsed: Vector = ("stage end",)  # from the start of the step to each point [s]
+    first: Vector = ("channel",)  # stimuli at the start of the step
+    stimulus: Matrix = ("stage end", "channel")
+    load_factor: Matrix = ("stage end", "load")
+    position: Stack = ("stage end", "body", 3)  # of all bodies; those of prescribed ones count [m]
+    rotation: Tensor = ("stage end", "body", 3, 3)
+    rates: Stack = ("stage end", "body", 6)  # [m/s, rad/s]
 
 
 @record
@@ -121,11 +128,11 @@ class RunExtrema:
     mass_moment: Vector  # of edges along m1 [kg m], shape (n_edge,) or (0,)
     mass: float  # of all rods [kg]
     voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
-    figures: Vector  # highest mass centre [m], smallest gap [m], largest contact force [N], curvature [1/m], strain
-    body_top: Vector  # greatest height of each body's position [m], shape (n_body,)
-    nodes: Indices  # that touch each surface now, shape (n_surface,)
-    most_nodes: Indices
-    first_contact: Vector  # [s], NaN before, shape (n_surface,)
+    figures: Vector = (5,)  # highest mass centre, smallest gap [m], largest contact force [N], curvature [1/m], strain
+    body_top: Vector = ("body",)  # greatest height of each body's position [m]
+    nodes: Indices = ("surface",)  # that touch each surface now
+    most_nodes: Indices = ("surface",)
+    first_contact: Vector = ("surface",)  # [s], NaN before
 
 
 @record
@@ -137,14 +144,14 @@ class Work:
     first: Point
     origin: Point  # of the stage at hand, or the end of a step beyond its last stage
     end: Point
-    gained: Matrix  # by each stage over its origin, in the vectors of points, shape (n_stage, n_vectors)
-    gained_turn: Stack  # likewise rotation vectors of bodies, shape (n_stage, n_body, 3)
-    moved: Vector  # largest displacement in a round of statics [m], shape (1,)
-    turned: Vector  # of edges, from the start of the step to that of the stage [rad]
-    rotation: Stack  # scratch
-    transduction: Vector  # at a stage, shape (n_law,)
-    strain: Vector  # of laws at a stage, shape (n_law,)
-    touched: Flags  # carriers that something pushed at the end of the last step, shape (n_carrier,)
+    gained: Matrix = ("stage", "point vector")  # by each stage over its origin, in the vectors of points
+    gained_turn: Stack = ("stage", "body", 3)  # likewise rotation vectors of bodies
+    moved: Vector = (1,)  # largest displacement in a round of statics [m]
+    turned: Vector = ("edge",)  # of edges, from the start of the step to that of the stage [rad]
+    rotation: Stack = ("body", 3, 3)  # scratch
+    transduction: Vector = ("law",)  # at a stage
+    strain: Vector = ("law",)  # of laws at a stage
+    touched: Flags = ("carrier",)  # carriers that something pushed at the end of the last step
 
 
 @record
