@@ -71,6 +71,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             second_moment=bodies.second_moment,
             inertia=_inertia_of_bodies(model),
             freedom=bodies.freedom,
+            freedom_first=6 * (np.argmax(bodies.freedom != 0.0, axis=0) // 6) if free else NONE,
             reach=bodies.reach,
             turns=np.array(
                 [f >= 0 or len(r) > 0 for f, r in zip(bodies.free_index, bodies.rotations, strict=False)], dtype=bool

@@ -52,13 +52,14 @@ def restrict_bodies(p, shift):
     schur, corner, rows, columns = p.bordered.schur, p.border.corner, p.border.border, p.bordered.border
     m, n = freedom.shape
     for a in range(n):
+        first = p.bodies.freedom_first[a]
         for b in range(n):
-            total = 0.0
-            for i in range(m):
+            other, total = p.bodies.freedom_first[b], 0.0
+            for i in range(first, first + 6):
                 if freedom[i, a] == 0.0:
                     continue
                 total += shift * inertia[i] * freedom[i, a] * freedom[i, b]
-                for j in range(m):
+                for j in range(other, other + 6):
                     total += freedom[i, a] * corner[i, j] * freedom[j, b]
             schur[a, b] = total
     if p.bordered.coupled[0] == 0:
@@ -70,11 +71,15 @@ def restrict_bodies(p, shift):
     for a in range(n):
         for row in range(columns.shape[1]):
             columns[a, row] = 0.0
+    for row in range(p.strands.size):  # few of which are not zero
+        present = 0.0
         for i in range(m):
-            part = freedom[i, a]
-            if part != 0.0:
-                for row in range(p.strands.size):
-                    columns[a, row] += part * rows[row, i]
+            present += abs(rows[row, i])
+        if present != 0.0:
+            for a in range(n):
+                first = p.bodies.freedom_first[a]
+                for i in range(first, first + 6):
+                    columns[a, row] += freedom[i, a] * rows[row, i]
     return READY
 
 

@@ -108,6 +108,7 @@ class Bodies:
     second_moment: Stack
     inertia: Vector  # factor of the shift for each unknown of free bodies: m and tr(J), shape (6 n_free,)
     freedom: Matrix
+    freedom_first: Indices  # the first unknown of the body that each of its columns moves, shape (n_freedom,)
     reach: Vector
     turns: Flags  # whether a body can turn, bool
 
