@@ -34,7 +34,7 @@ class Control(Protocol):
     def next_stop(self, time: float) -> float:
         """Where adaptive steps from `time` [s] on end at the latest [s]."""
 
-    def reach(self, time: float) -> None:
+    def advance_to(self, time: float) -> None:
         """A step has ended at `time` [s]."""
 
     def repeat(self, time: float) -> None:
@@ -69,7 +69,7 @@ class Asynchronous:
         """Never."""
         return math.inf
 
-    def reach(self, time: float) -> None:
+    def advance_to(self, time: float) -> None:
         """Every time is like any other."""
 
     def repeat(self, time: float) -> None:
@@ -127,7 +127,7 @@ class Lockstep:
         """The next tick."""
         return self._ticks.next_end(time)
 
-    def reach(self, time: float) -> None:
+    def advance_to(self, time: float) -> None:
         """Open a tick if the step has reached one."""
         count = self._ticks.complete(time)
         if count > self._count:

@@ -217,7 +217,7 @@ class SimulationWorker:
         frame_is_due = self._frames.complete(now) > self._frames.complete(start)
         if frame_is_due:
             self._hand_out()
-        self._control.reach(now)
+        self._control.advance_to(now)
         if self._single_steps and (frame_is_due or self._is_over()):
             self._single_steps.popleft().set_result(f"paused at t = {now:.6g} s")
 

@@ -87,7 +87,7 @@ class Problem:
         evaluator.take_state(state, bent)
         bent.position[free] += noise * draw(len(free))
         still = np.zeros(model.edge_count)
-        evaluator.carry_frames(rest, turns * rng.standard_normal(model.edge_count) if in_space else still, bent)
+        evaluator.transport_frames(rest, turns * rng.standard_normal(model.edge_count) if in_space else still, bent)
         state.position[:] = bent.position
         state.director1[:] = bent.director1[: model.edge_count]
         state.velocity[free] = 0.05 * draw(len(free))
@@ -116,7 +116,7 @@ class Problem:
         step = np.zeros(len(self.scale))
         step[self.free] = 3 * origin_noise * rng.standard_normal(len(self.free))
         self.move(start, 0.5 * step, self.at)
-        evaluator.follow(self.at)
+        evaluator.update_lagged(self.at)
         self.move(start, step, self.at)
 
     def _number(self):
@@ -217,7 +217,7 @@ def end_of_step(simulator, before):
     -------
     evaluator : Evaluator
         What follows the configuration is that of the end.
-    start, end : Place
+    start, end : Configuration
     """
     model, state, h = simulator.model, simulator._state, simulator.dt
     evaluator, surroundings = Evaluator(model), Surroundings(model)
@@ -228,8 +228,8 @@ def end_of_step(simulator, before):
     evaluator.predict(start, (h, h), strains.edge, strains.joint, load_factor)
     evaluator.start_stage(start)
     evaluator.take_state(state, end)
-    end.turn[:] = h * state.spin
-    evaluator.follow(end)
+    end.total_angle[:] = h * state.spin
+    evaluator.update_lagged(end)
     return evaluator, start, end
 
 

@@ -48,7 +48,7 @@ class Track:
             self.points[name].append(body.position)
 
     def at(self, point: str, time: float) -> Array:
-        """Place of a point at the end of the step nearest to `time` [m], shape (3,)."""
+        """Configuration of a point at the end of the step nearest to `time` [m], shape (3,)."""
         return self.points[point][int(np.abs(np.array(self.times) - time).argmin())]
 
 

@@ -38,13 +38,13 @@ class RodSearch:
     point_edge: Indices
     point_fraction: Vector
     point_arc: Vector
-    rod_meets: FlagTable
+    rod_can_collide: FlagTable
     rod_joined: FlagTable
     rod_exclusion: Vector
     box: Matrix  # scratch: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last
     sweep: Matrix  # of edges: middle, its motion, half of the length and, where ends move differently, the difference
     met: IndexTable  # scratch: edges
-    count: Indices  # of pairs, more than are written if there is no room for them, shape (1,)
+    count: Indices  # of pairs, more than are written if there is no capacity for them, shape (1,)
     point: Indices  # the pairs
     edge: Indices
     before: Flags  # whether the point also sees the segment before, and
@@ -86,10 +86,10 @@ GROUP = 4
 
 
 @kernel
-def _come_near(box, a, b, reach):
+def _come_near(box, a, b, distance):
     """Whether two boxes of the tree are nearer than `reach` along each axis."""
     for c in range(3):
-        if box[b, c] >= box[a, 3 + c] + reach or box[b, 3 + c] <= box[a, c] - reach:
+        if box[b, c] >= box[a, 3 + c] + distance or box[b, 3 + c] <= box[a, c] - distance:
             return False
     return True
 
@@ -134,11 +134,11 @@ def _run_about(search, first, last, near):
         if (k > first and edge_first[k]) or not _goes_on(search, k, d0, d1, d2, share):
             return 0, 0
     begin, end = first, last + 1
-    reach = edge_arc[first, 0] - RUN * exclusion
-    while not edge_first[begin] and edge_arc[begin, 0] > reach and _goes_on(search, begin - 1, d0, d1, d2, share):
+    distance = edge_arc[first, 0] - RUN * exclusion
+    while not edge_first[begin] and edge_arc[begin, 0] > distance and _goes_on(search, begin - 1, d0, d1, d2, share):
         begin -= 1
-    reach = edge_arc[last, 1] + RUN * exclusion
-    while end < edge_first.shape[0] and not edge_first[end] and edge_arc[end, 0] < reach:
+    distance = edge_arc[last, 1] + RUN * exclusion
+    while end < edge_first.shape[0] and not edge_first[end] and edge_arc[end, 0] < distance:
         if not _goes_on(search, end, d0, d1, d2, share):
             break
         end += 1
@@ -146,7 +146,7 @@ def _run_about(search, first, last, near):
 
 
 @kernel
-def _meet(box, leaves, own, reach, begin, end, met_out):
+def _near_leaves(box, leaves, own, distance, begin, end, met_out):
     """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending, but for
     those from `begin` to `end`, in the first row of `met_out`; return how many there are.
     """
@@ -154,12 +154,12 @@ def _meet(box, leaves, own, reach, begin, end, met_out):
     b, below = 1, leaves  # a node, and how many leaves are below it
     while b > 0:
         from_leaf = b * below - leaves
-        meets = (from_leaf < begin or from_leaf + below > end) and _come_near(box, own, b, reach)
-        if meets and b < leaves:
+        can_collide = (from_leaf < begin or from_leaf + below > end) and _come_near(box, own, b, distance)
+        if can_collide and b < leaves:
             b *= 2
             below >>= 1
             continue
-        if meets:
+        if can_collide:
             met_out[0, count] = from_leaf
             count += 1
         while b & 1:
@@ -170,11 +170,11 @@ def _meet(box, leaves, own, reach, begin, end, met_out):
 
 
 @piece(int, RodSearch, float, float)
-def near_pairs(search, touch, reach):
+def near_pairs(search, touch, distance):
     """List points and segments that may come to a gap below `reach` in a straight motion of nodes, ordered by point,
     then by segment; return how many there are.
 
-    If there are more than there is room for, the rest is counted but not written.
+    If there are more than there is capacity for, the rest is counted but not written.
 
     Parameters
     ----------
@@ -210,21 +210,21 @@ def near_pairs(search, touch, reach):
             box[b, c] = min(box[2 * b, c], box[2 * b + 1, c])
             box[b, 3 + c] = max(box[2 * b, 3 + c], box[2 * b + 1, 3 + c])
     found = 0
-    room = search.point.shape[0]
+    capacity = search.point.shape[0]
     group = min(GROUP, leaves)
     meetings = 0
     for a in range(edges):
         if a % group == 0:
-            last, near_by = min(a + group, edges) - 1, 2.0 * edge_radius[a] + reach
+            last, near_by = min(a + group, edges) - 1, 2.0 * edge_radius[a] + distance
             begin, end = _run_about(search, a, last, near_by)
-            meetings = _meet(box, leaves, (leaves + a) // group, reach, begin, end, met)
+            meetings = _near_leaves(box, leaves, (leaves + a) // group, distance, begin, end, met)
         if first_point[a] == first_point[a + 1]:
             continue
         count = 0
         own, i = edge_rod[a], edge_node[a]
         for m in range(meetings):
             k = met[0, m]
-            if not search.rod_meets[own, edge_rod[k]]:
+            if not search.rod_can_collide[own, edge_rod[k]]:
                 continue
             if own == edge_rod[k]:
                 along = max(edge_arc[k, 0] - edge_arc[a, 0], edge_arc[a, 1] - edge_arc[k, 1])
@@ -234,10 +234,10 @@ def near_pairs(search, touch, reach):
             for c in range(3):
                 away += (sweep[a, c] - sweep[k, c]) ** 2
                 moved += (sweep[a, 3 + c] - sweep[k, 3 + c]) ** 2
-            near_enough = sweep[a, 6] + sweep[k, 6] + reach
+            near_enough = sweep[a, 6] + sweep[k, 6] + distance
             if away >= near_enough * near_enough and away >= (near_enough + math.sqrt(moved)) ** 2:
                 continue
-            if _come_near(box, leaves + a, leaves + k, reach):
+            if _come_near(box, leaves + a, leaves + k, distance):
                 met[1, count] = k
                 count += 1
         if count == 0:
@@ -255,14 +255,14 @@ def near_pairs(search, touch, reach):
                     right += (way - tip[j + 1, c] + position[j + 1, c]) ** 2
                 moved = math.sqrt(max(left, right))
                 square = _square_distance(position, i, s, j)
-                if square >= (radii + reach + moved) ** 2:
+                if square >= (radii + distance + moved) ** 2:
                     continue
                 away = math.sqrt(square)  # and no less than half of what is left of this and of that at the end
-                if away + math.sqrt(_square_distance(tip, i, s, j)) >= 2.0 * (radii + reach) + moved:
+                if away + math.sqrt(_square_distance(tip, i, s, j)) >= 2.0 * (radii + distance) + moved:
                     continue
                 if not _sees(search, a, p, k, touch):
                     continue
-                if found < room:
+                if found < capacity:
                     search.point[found], search.edge[found] = p, k
                     search.until[found] = away - radii - touch
                     before = not edge_first[k] and _sees(search, a, p, k - 1, touch)

@@ -5,7 +5,7 @@ until contact points and surfaces together have moved by more than m (a Verlet l
 surface is that of its fastest point: |δX| + |δφ| times its extent, the radius of a ball about its position that holds
 it; a gap can shrink by no more than that. A plane's extent is the largest distance of a contact point.
 
-`surfaces` is a record `Surfaces`, `at` a configuration, `Place` (`model.records`).
+`surfaces` is a record `Surfaces`, `at` a configuration, `Configuration` (`model.records`).
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def gap_normal(surfaces, at, i, s, x0, x1, x2):
     p0, p1, p2 : float
         x in the surface's frame [m]; above a plane, its height alone.
     """
-    kind, size, position, axes = surfaces.kind[s], surfaces.size, at.surface_place, at.surface_turn
+    kind, size, position, axes = surfaces.kind[s], surfaces.size, at.surface_position, at.surface_rotation
     inward = surfaces.rounding[s]
     z0, z1, z2 = x0 - position[s, 0], x1 - position[s, 1], x2 - position[s, 2]
     p2 = axes[s, 0, 2] * z0 + axes[s, 1, 2] * z1 + axes[s, 2, 2] * z2
@@ -68,8 +68,8 @@ def list_near(surfaces, at, margin):
     -------
     count : int
     """
-    bound, radius, group, can_collide = surfaces.bound, surfaces.radius, surfaces.group, surfaces.meets
-    point, position, extent = at.carrier, at.surface_place, surfaces.extent
+    bound, radius, group, can_collide = surfaces.bound, surfaces.radius, surfaces.group, surfaces.can_collide
+    point, position, extent = at.contact_point, at.surface_position, surfaces.extent
     count, smallest = 0, math.inf
     for s in range(position.shape[0]):
         plane = surfaces.kind[s] == PLANE
@@ -88,27 +88,27 @@ def list_near(surfaces, at, margin):
             gap = gap_normal(surfaces, at, i, s, point[i, 0], point[i, 1], point[i, 2])[0]
             smallest = min(smallest, gap)
             if gap <= limit:
-                if count < surfaces.near_carrier.shape[0]:
-                    surfaces.near_carrier[count] = i
+                if count < surfaces.near_contact_point.shape[0]:
+                    surfaces.near_contact_point[count] = i
                     surfaces.near_surface[count] = s
                 count += 1
     for i in range(point.shape[0]):
         for c in range(3):
-            surfaces.listed_carrier[i, c] = point[i, c]
+            surfaces.listed_contact_point[i, c] = point[i, c]
     for s in range(position.shape[0]):
         for c in range(3):
-            surfaces.listed_place[s, c] = position[s, c]
+            surfaces.listed_surface_position[s, c] = position[s, c]
             for k in range(3):
-                surfaces.listed_turn[s, c, k] = at.surface_turn[s, c, k]
+                surfaces.listed_surface_rotation[s, c, k] = at.surface_rotation[s, c, k]
     return count
 
 
 @kernel
 def moved_since(surfaces, at):
     """Largest motion of a contact point plus that of a surface's point since the list was made [m]."""
-    point, listed_point = at.carrier, surfaces.listed_carrier
-    position, listed_position = at.surface_place, surfaces.listed_place
-    axes, listed_axes = at.surface_turn, surfaces.listed_turn
+    point, listed_point = at.contact_point, surfaces.listed_contact_point
+    position, listed_position = at.surface_position, surfaces.listed_surface_position
+    axes, listed_axes = at.surface_rotation, surfaces.listed_surface_rotation
     largest = 0.0
     for i in range(point.shape[0]):
         square = 0.0

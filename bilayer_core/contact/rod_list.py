@@ -23,7 +23,7 @@ AHEAD, MOST_AHEAD = 1.0, 32.0
 """How far a motion is prolonged, in the same units, and in lengths of its own at most."""
 LARGEST_MOVE = 8.0
 """In the same units; longer steps are cut short."""
-MADE, ROOM, PATH, FIRST = 0, 1, 2, 3
+MADE, LEFT, PATH, FIRST = 0, 1, 2, 3
 """Places in `RodContact.ways`: margin of the list [m] (0: there is none), how far nodes may go on in any direction for
 it to serve, its path [m], and that before which none of its pairs comes to the barrier distance."""
 
@@ -106,16 +106,16 @@ def list_serves(rods, position, step, fraction, move):
             last[i, 0], last[i, 1], last[i, 2] = x0, x1, x2
             square = max(square, d0 * d0 + d1 * d1 + d2 * d2)
         gone = math.sqrt(square)
-        ways[ROOM] -= gone
+        ways[LEFT] -= gone
         ways[PATH] += 2.0 * gone
-    if move <= ways[ROOM]:
+    if move <= ways[LEFT]:
         return True
     if ways[MADE] <= 0.0:
         return False
-    ways[ROOM] = 0.5 * ways[MADE] - _stray(rods.search, position, step, 0.0)
-    if ways[ROOM] < 0.0:
+    ways[LEFT] = 0.5 * ways[MADE] - _stray(rods.search, position, step, 0.0)
+    if ways[LEFT] < 0.0:
         return False
-    return move <= ways[ROOM] or _stray(rods.search, position, step, fraction) <= 0.5 * ways[MADE]
+    return move <= ways[LEFT] or _stray(rods.search, position, step, fraction) <= 0.5 * ways[MADE]
 
 
 @kernel
@@ -135,16 +135,16 @@ def begin_list(rods, position, step, fraction, move):
         tip[i, 1] = x1 + length * (step[i, 1] - w1)
         tip[i, 2] = x2 + length * (step[i, 2] - w2)
     margin = MARGIN * rods.unit
-    rods.ways[MADE], rods.ways[ROOM], rods.ways[PATH] = margin, 0.5 * margin, 0.0
+    rods.ways[MADE], rods.ways[LEFT], rods.ways[PATH] = margin, 0.5 * margin, 0.0
     return margin
 
 
 @kernel
 def end_list(rods):
-    """Note from which path on pairs of the new list count; false if there is no room for it, and then there is none."""
+    """Note from which path on pairs of the new list count; false if there is no capacity, and then no list."""
     search, ways = rods.search, rods.ways
     if search.count[0] > search.point.shape[0]:
-        ways[MADE], ways[ROOM] = 0.0, -1.0
+        ways[MADE], ways[LEFT] = 0.0, -1.0
         return False
     first = math.inf
     for c in range(search.count[0]):

@@ -63,7 +63,7 @@ def facing_contacts(rods, position, path):
     """List the contacts nearer than the barrier distance; return how many, their smallest gap [m] (infinite without
     any), and the path before which no pair has one.
 
-    If there are more than there is room for, the rest is counted but not written.
+    If there are more than there is capacity for, the rest is counted but not written.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def facing_contacts(rods, position, path):
     path : float
         The present one [m].
     """
-    search, contacts, reach = rods.search, rods.contacts, rods.d_hat
+    search, contacts, d_hat = rods.search, rods.contacts, rods.d_hat
     until, edge_node = search.until, search.edge_node
     node, weight, normal = contacts.node, contacts.weight, contacts.normal
     found = 0
@@ -92,9 +92,9 @@ def facing_contacts(rods, position, path):
         p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]
         radii = search.edge_radius[a] + search.edge_radius[k]
         square = square_distance(p0, p1, p2, position, j)
-        until[c] = path + math.sqrt(square) - radii - reach
+        until[c] = path + math.sqrt(square) - radii - d_hat
         first = min(first, until[c])
-        if square > (radii + reach) ** 2 * SLACK:
+        if square > (radii + d_hat) ** 2 * SLACK:
             continue
         along = fraction_along(p0, p1, p2, position, j)
         at_start = 1 if along <= 0.0 else 0
@@ -116,7 +116,7 @@ def facing_contacts(rods, position, path):
                     continue
                 multiplicity, t = 1, 1.0
             gap = distance_at(p0, p1, p2, position, j, t) - radii
-            if not gap < reach:
+            if not gap < d_hat:
                 continue
             smallest = min(smallest, gap)
             found += 1

@@ -57,8 +57,8 @@ def motion_of_points(surfaces, bodies, system):
         if surfaces.node_free[i]:
             square = max(square, step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2)
     largest = math.sqrt(square)
-    for b in range(bodies.reach.shape[0]):
-        largest = max(largest, _fastest(system.motion, b, bodies.reach[b]))
+    for b in range(bodies.bounding_radius.shape[0]):
+        largest = max(largest, _fastest(system.motion, b, bodies.bounding_radius[b]))
     return largest
 
 
@@ -81,7 +81,7 @@ def step_bound(surfaces, system, at, closing):
         With the list of near pairs.
     system : System
         With the step: displacements of nodes, displacements and rotation vectors of bodies and of the world.
-    at : Place
+    at : Configuration
     closing : float
         By how much gaps close at most [m].
 
@@ -89,18 +89,18 @@ def step_bound(surfaces, system, at, closing):
     -------
     alpha : float
     blocking : int
-        Place in the list of the pair that sets the bound, −1 if none.
+        Configuration in the list of the pair that sets the bound, −1 if none.
     """
-    node_step, motion, position = system.node_step, system.motion, at.place
+    node_step, motion, position = system.node_step, system.motion, at.pose_position
     alpha, blocking = 1.0, -1
     for k in range(surfaces.near_count[0]):
-        i, s = surfaces.near_carrier[k], surfaces.near_surface[k]
-        x0, x1, x2 = at.carrier[i, 0], at.carrier[i, 1], at.carrier[i, 2]
+        i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
+        x0, x1, x2 = at.contact_point[i, 0], at.contact_point[i, 1], at.contact_point[i, 2]
         gap, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, x0, x1, x2)
         kept = KEPT_FRACTION * gap
         if gap - closing * alpha >= kept:
             continue
-        a, b = surfaces.follows[i], surfaces.body[s]
+        a, b = surfaces.moved_by[i], surfaces.body[s]
         r0 = r1 = r2 = turn_a = 0.0  # rotation of the contact point's body
         a0 = a1 = a2 = arm = 0.0  # arm on it
         if a >= 0:

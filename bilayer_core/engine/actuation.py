@@ -10,7 +10,7 @@ import math
 
 from ..jit import kernel, piece
 from ..jit.record import Indices, Matrix, Stack, Vector, record
-from ..kinematics.turning import spin_of, turn_by
+from ..kinematics.rotating import rotate_by, spin_of
 from ..model.records.status import READY
 from ..model.records.step import StageInputs
 from ..scene.piece import ROUNDING, Piece
@@ -106,7 +106,7 @@ def corner_after(actuation, time, same):
 
 
 @kernel
-def look_back(actuation, begin, same, inputs):
+def take_first_stimuli(actuation, begin, same, inputs):
     """Stimuli at the start of a step, after any jump there."""
     for c in range(actuation.stimulus.shape[0]):
         inputs.first[c] = _value(actuation.stimulus, c, _piece_until(actuation.stimulus, c, begin + same), begin)
@@ -161,7 +161,7 @@ def _follow_paths(paths, time, position, rotation, rates):
             rates[b, c] = rate * (shift[z, c] - shift[a, c])
         w0, w1, w2 = turn[z, 0] - turn[a, 0], turn[z, 1] - turn[a, 1], turn[z, 2] - turn[a, 2]
         v0, v1, v2 = turn[a, 0] + part * w0, turn[a, 1] + part * w1, turn[a, 2] + part * w2
-        turn_by(v0, v1, v2, paths.rotation, b, rotation, b)
+        rotate_by(v0, v1, v2, paths.rotation, b, rotation, b)
         rates[b, 3], rates[b, 4], rates[b, 5] = spin_of(v0, v1, v2, rate * w0, rate * w1, rate * w2)
 
 

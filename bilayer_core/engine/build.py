@@ -8,7 +8,7 @@ import numpy as np
 
 from ..contact.broad_phase import RodSearch
 from ..forces.added_mass import fluid_momentum
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
 from ..model.records.parts import (
@@ -72,20 +72,20 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             inertia=_inertia_of_bodies(model),
             freedom=bodies.freedom,
             freedom_first=6 * (np.argmax(bodies.freedom != 0.0, axis=0) // 6) if free else NONE,
-            reach=bodies.reach,
-            turns=np.array(
+            bounding_radius=bodies.bounding_radius,
+            rotates=np.array(
                 [f >= 0 or len(r) > 0 for f, r in zip(bodies.free_index, bodies.rotations, strict=False)], dtype=bool
             ),
         ),
         border=Border.zeros(sizes) if free else Border.absent(),
-        constrained=_held(model),
-        attachments=_grips(model) if free else Attachments.absent(),
+        constrained=_constrained(model),
+        attachments=_attachments(model) if free else Attachments.absent(),
         flow=_flow(model, sizes) if scene.fluid is not None else Flow.absent(),
         fluid=fluid_of(model, sizes) if len(model.fluid_mass) else Fluid.absent(),
         loads=_forces(model, "loads", model.dead_loads) if scene.loads else PointForces.absent(),
         followers=_forces(model, "followers", model.follower_loads) if scene.loads else PointForces.absent(),
         moments=_moments(model) if scene.loads else Moments.absent(),
-        meets=model.meets_surfaces or model.rod_surfaces is not None,
+        has_contact=model.has_surface_contact or model.rod_surfaces is not None,
         system=System.zeros(sizes),
     )
 
@@ -100,18 +100,18 @@ def _off_axis(model: Model, sizes: dict[str, int]) -> OffAxis:
     return OffAxis.zeros(sizes, joint=model.coupled_joint, slope=model.strain_slope)
 
 
-def _grips(model: Model) -> Attachments:
+def _attachments(model: Model) -> Attachments:
     return Attachments(
         holding=int((model.attached_free >= 0).sum()),
         unknown=model.solved_layout.attached,
         free=model.attached_free,
         of_unknown=model.solved_layout.attached_of_unknown,
-        wall_free=model.wall_free,
-        wall_joint=model.wall_joint,
+        clamp_edge_free=model.clamp_edge_free,
+        clamp_edge_joint=model.clamp_edge_joint,
     )
 
 
-def _held(model: Model) -> Constrained:
+def _constrained(model: Model) -> Constrained:
     return Constrained(
         node=model.attached_node,
         unknown=model.layout.attached,
@@ -119,51 +119,51 @@ def _held(model: Model) -> Constrained:
         body=model.attached_body,
         free=model.attached_free,
         position=model.attached_position,
-        wall_body=model.wall_body,
-        wall_free=model.wall_free,
-        wall_tangent=model.wall_tangent,
-        wall_director1=model.start_director1,
+        clamp_edge_body=model.clamp_edge_body,
+        clamp_edge_free=model.clamp_edge_free,
+        clamp_edge_tangent=model.clamp_edge_tangent,
+        clamp_edge_director1=model.start_director1,
     )
 
 
 def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
     """With an empty list of near pairs."""
-    carriers, surfaces, contact = model.carriers, model.surfaces, model.scene.contact
+    contact_points, surfaces, contact = model.contact_points, model.surfaces, model.scene.contact
     return Surfaces.zeros(
         sizes,
         d_hat=contact.barrier_distance,
         stiffness=contact.stiffness,
-        radius=carriers.radius,
-        weight=carriers.weight,
-        carrier_body=carriers.body,
+        radius=contact_points.radius,
+        weight=contact_points.weight,
+        contact_point_body=contact_points.body,
         free_index=model.bodies.free_index if model.free_count else NONE,
-        follows=carriers.follows,
-        node_free=carriers.follows[: model.node_count] < 0,
-        group=carriers.group,
-        point_position=carriers.position,
-        point_body=carriers.body[model.node_count :],
+        moved_by=contact_points.moved_by,
+        node_free=contact_points.moved_by[: model.node_count] < 0,
+        group=contact_points.group,
+        point_position=contact_points.position,
+        point_body=contact_points.body[model.node_count :],
         kind=surfaces.kind,
         size=surfaces.size,
         rounding=surfaces.rounding,
         bound=surfaces.bound,
         body=surfaces.body,
         position=surfaces.position,
-        turn=surfaces.turn,
-        meets=surfaces.meets,
+        rotation=surfaces.rotation,
+        can_collide=surfaces.can_collide,
         margin=np.full(1, -1.0),  # no list yet
     )
 
 
 def sliding_of(model: Model, sizes: dict[str, int]) -> Sliding:
     """Without contacts."""
-    carriers, law = model.carriers, model.scene.contact.friction
+    contact_points, law = model.contact_points, model.scene.contact.friction
     return Sliding.zeros(
         sizes,
         acts=law is not None and law.acts,
         threshold=law.speed_threshold if law is not None else 0.0,
-        coefficient=carriers.friction,
-        node_edges=carriers.node_edges,
-        node_axis=carriers.node_axis,
+        coefficient=contact_points.friction,
+        node_edges=contact_points.node_edges,
+        node_axis=contact_points.node_axis,
     )
 
 
@@ -237,10 +237,10 @@ def fluid_of(model: Model, sizes: dict[str, int]) -> Fluid:
 
 
 def _forces(model: Model, name: str, loads: PointLoads) -> PointForces:
-    before, after = columns(model.carriers.node_edges[loads.nodes.target])
+    before, after = columns(model.contact_points.node_edges[loads.nodes.target])
     return PointForces.zeros(
         {"loaded node": len(loads.nodes.target), "loaded body": len(loads.bodies.target)},
-        place=place_of(name),
+        energy_slot=slot_of(name),
         node=loads.nodes.target,
         node_load=loads.nodes.load,
         node_vector=loads.nodes.vector,

@@ -5,14 +5,14 @@ from __future__ import annotations
 from ..jit import call, kernel, piece
 from ..kinematics.copying import copy, copy_matrix, copy_row
 from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
-from ..kinematics.turning import turn_between, turn_by, turn_further, turned_by
+from ..kinematics.rotating import compose_quaternion, rotate_by, rotated_by, rotation_vector_between
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Place, Stage, StateArrays
+from ..model.records.step import Configuration, Stage, StateArrays
 
 
 @kernel
-def take_step(step, alpha, node_unknown, edge_unknown, position, turn, position_out, angle_out, turn_out):
+def take_step(step, alpha, node_unknown, edge_unknown, position, total_angle, position_out, angle_out, total_angle_out):
     """x + α δx of nodes, α δθ of edges and their turn since the start of the step."""
     for i in range(node_unknown.shape[0]):
         d = node_unknown[i]
@@ -21,7 +21,7 @@ def take_step(step, alpha, node_unknown, edge_unknown, position, turn, position_
     for k in range(edge_unknown.shape[0]):
         angle = alpha * step[edge_unknown[k]]
         angle_out[k] = angle
-        turn_out[k] = turn[k] + angle
+        total_angle_out[k] = total_angle[k] + angle
 
 
 @kernel
@@ -34,19 +34,19 @@ def second_director(tangent, director1, director2_out):
 
 
 @kernel
-def carry_points(body, local, position, rotation, arm_out, place_out):
+def attached_positions(body, local, position, rotation, arm_out, position_out):
     """X + R r of points r of bodies, and the arms R r [m]."""
     for k in range(body.shape[0]):
         b = body[k]
         for i in range(3):
             arm = rotation[b, i, 0] * local[k, 0] + rotation[b, i, 1] * local[k, 1] + rotation[b, i, 2] * local[k, 2]
             arm_out[k, i] = arm
-            place_out[k, i] = position[b, i] + arm
+            position_out[k, i] = position[b, i] + arm
 
 
 @kernel
-def carry_walls(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
-    """t and m1 of walls, edges from `first` on, turned with their bodies, and m2 = t × m1."""
+def attached_clamp_edges(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
+    """t and m1 of clamp edges, edges from `first` on, turned with their bodies, and m2 = t × m1."""
     for k in range(body.shape[0]):
         b, w = body[k], first + k
         for i in range(3):
@@ -60,7 +60,7 @@ def carry_walls(body, local_tangent, local_director1, rotation, first, tangent, 
 
 
 @kernel
-def carry_turns(body, local, rotation, turn_out):
+def attached_rotations(body, local, rotation, rotation_out):
     """R L of matrices L of bodies."""
     for k in range(body.shape[0]):
         b = body[k]
@@ -69,20 +69,22 @@ def carry_turns(body, local, rotation, turn_out):
                 total = 0.0
                 for m in range(3):
                     total += rotation[b, i, m] * local[k, m, j]
-                turn_out[k, i, j] = total
+                rotation_out[k, i, j] = total
 
 
 @kernel
-def put_held(held, strands, at):
+def _update_constrained(constrained, strands, at):
     """Nodes and clamps' directions that bodies hold."""
-    carry_points(held.body, held.position, at.place, at.rotation, at.arm, at.held)
-    for k in range(held.node.shape[0]):
+    attached_positions(
+        constrained.body, constrained.position, at.pose_position, at.rotation, at.arm, at.attached_position
+    )
+    for k in range(constrained.node.shape[0]):
         for c in range(3):
-            at.position[held.node[k], c] = at.held[k, c]
-    carry_walls(
-        held.wall_body,
-        held.wall_tangent,
-        held.wall_director1,
+            at.position[constrained.node[k], c] = at.attached_position[k, c]
+    attached_clamp_edges(
+        constrained.clamp_edge_body,
+        constrained.clamp_edge_tangent,
+        constrained.clamp_edge_director1,
         at.rotation,
         strands.edge_count,
         at.tangent,
@@ -92,35 +94,39 @@ def put_held(held, strands, at):
 
 
 @kernel
-def put_surfaces(surfaces, at):
+def _update_surfaces(surfaces, at):
     """Points of bodies and surfaces."""
     if not surfaces.exists:
         return
-    carry_points(surfaces.point_body, surfaces.point_position, at.place, at.rotation, at.point_arm, at.point)
-    carry_points(surfaces.body, surfaces.position, at.place, at.rotation, at.surface_arm, at.surface_place)
-    carry_turns(surfaces.body, surfaces.turn, at.rotation, at.surface_turn)
+    position, rotation = at.pose_position, at.rotation
+    attached_positions(surfaces.point_body, surfaces.point_position, position, rotation, at.point_arm, at.point)
+    attached_positions(surfaces.body, surfaces.position, position, rotation, at.surface_arm, at.surface_position)
+    attached_rotations(surfaces.body, surfaces.rotation, rotation, at.surface_rotation)
 
 
-@kernel
-def put_carried(bodies, held, surfaces, strands, at):
+@piece(int, Problem, Configuration)
+def update_attached(p, at):
     """What bodies carry, to where these are: free ones take their place in the list of all first."""
+    bodies = p.bodies
     for f in range(bodies.body_of_free.shape[0]):
         b = bodies.body_of_free[f]
-        copy_row(at.body_position, f, at.place, b)
+        copy_row(at.body_position, f, at.pose_position, b)
         copy_matrix(at.body_rotation, f, at.rotation, b)
-    put_held(held, strands, at)
-    put_surfaces(surfaces, at)
+    _update_constrained(p.constrained, p.strands, at)
+    _update_surfaces(p.surfaces, at)
+    return READY
+
+
+@piece(int, Problem, Configuration, Configuration)
+def transport_frames(p, base, at):
+    """Frames of `base`, carried to the positions of `at` and turned by its angles; in a plane those of positions."""
+    _transport_in_space(p.space, p.strands, base, at, at.angle)
+    _frames_in_plane(p.plane, p.strands, at)
+    return READY
 
 
 @kernel
-def carry_frames(space, plane, strands, base, at, angle):
-    """Frames of `base`, carried to the present positions and turned by `angle` [rad]; in a plane those of positions."""
-    _carry_in_space(space, strands, base, at, angle)
-    _carry_in_plane(plane, strands, at)
-
-
-@kernel
-def _carry_in_space(space, strands, base, at, angle):
+def _transport_in_space(space, strands, base, at, angle):
     if not space.exists:
         return
     edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
@@ -137,7 +143,7 @@ def _carry_in_space(space, strands, base, at, angle):
 
 
 @kernel
-def _carry_in_plane(plane, strands, at):
+def _frames_in_plane(plane, strands, at):
     if not plane.exists:
         return
     planar_frames(
@@ -152,44 +158,30 @@ def _carry_in_plane(plane, strands, at):
     )
 
 
-@piece(int, Problem, Place)
-def place_carried(p, at):
-    """`put_carried`"""
-    put_carried(p.bodies, p.constrained, p.surfaces, p.strands, at)
-    return READY
-
-
-@piece(int, Problem, Place, Place)
-def place_frames(p, base, at):
-    """`carry_frames`, by the angles of `at`."""
-    carry_frames(p.space, p.plane, p.strands, base, at, at.angle)
-    return READY
-
-
 @kernel
-def copy_prescribed(bodies, source_place, source_rotation, at):
+def copy_prescribed(bodies, source_position, source_rotation, at):
     """Take the poses of prescribed bodies."""
     for k in range(bodies.prescribed.shape[0]):
         b = bodies.prescribed[k]
-        copy_row(source_place, b, at.place, b)
+        copy_row(source_position, b, at.pose_position, b)
         copy_matrix(source_rotation, b, at.rotation, b)
 
 
-@piece(int, Problem, Place, float, Stage, Place)
+@piece(int, Problem, Configuration, float, Stage, Configuration)
 def move(p, base, alpha, stage, at):
     """Become `base` moved by α times the step in `System`."""
     bodies, strands, step, body_step = p.bodies, p.strands, p.system.step, p.system.body_step
-    copy_prescribed(bodies, base.place, base.rotation, at)
+    copy_prescribed(bodies, base.pose_position, base.rotation, at)
     take_step(
         step,
         alpha,
         strands.node_unknown,
         strands.edge_unknown,
         base.position,
-        base.turn,
+        base.total_angle,
         at.position,
         at.angle,
-        at.turn,
+        at.total_angle,
     )
     for i in range(strands.node_unknown.shape[0]):
         d = strands.node_unknown[i]
@@ -200,29 +192,29 @@ def move(p, base, alpha, stage, at):
             at.body_position[b, c] = base.body_position[b, c] + alpha * body_step[b, c]
             at.body_departure[b, c] = base.body_departure[b, c] + alpha * body_step[b, c]
         v0, v1, v2 = alpha * body_step[b, 3], alpha * body_step[b, 4], alpha * body_step[b, 5]
-        turn_by(v0, v1, v2, base.body_rotation, b, at.body_rotation, b)
-        turn_further(v0, v1, v2, base.body_turned, at.body_turned, b)
-    call(p.calls.place_carried, (p, at))
-    put_departure_of_held(p.constrained, stage, at)
-    call(p.calls.place_frames, (p, base, at))
+        rotate_by(v0, v1, v2, base.body_rotation, b, at.body_rotation, b)
+        compose_quaternion(v0, v1, v2, base.body_departure_quaternion, at.body_departure_quaternion, b)
+    call(p.calls.update_attached, (p, at))
+    departure_of_constrained(p.constrained, stage, at)
+    call(p.calls.transport_frames, (p, base, at))
     return READY
 
 
 @kernel
-def put_departure_of_held(held, stage, at):
+def departure_of_constrained(constrained, stage, at):
     """Departure of what bodies hold: that of a free body, and of the arm R̃ r with it; a prescribed one has digits to
     spare, because its inertia moves nothing.
     """
-    for k in range(held.node.shape[0]):
-        f, i = held.free[k], held.node[k]
+    for k in range(constrained.node.shape[0]):
+        f, i = constrained.free[k], constrained.node[k]
         if f < 0:
             for c in range(3):
                 at.departure[i, c] = at.position[i, c] - stage.predicted_position[i, c]
             continue
-        u = stage.held_arm[k, 0], stage.held_arm[k, 1], stage.held_arm[k, 2]
-        turned = turned_by(at.body_turned, f, u[0], u[1], u[2])
+        u = stage.attached_arm[k, 0], stage.attached_arm[k, 1], stage.attached_arm[k, 2]
+        turned = rotated_by(at.body_departure_quaternion, f, u[0], u[1], u[2])
         for c in range(3):
-            at.departure[i, c] = at.body_departure[f, c] + turned[c] + stage.held_lag[k, c]
+            at.departure[i, c] = at.body_departure[f, c] + turned[c] + stage.attached_lag[k, c]
 
 
 @kernel
@@ -230,7 +222,7 @@ def clear_departure(at):
     """Be where inertia takes everything."""
     at.departure[:] = 0.0
     at.body_departure[:] = 0.0
-    at.body_turned[:] = 0.0
+    at.body_departure_quaternion[:] = 0.0
 
 
 @kernel
@@ -244,19 +236,19 @@ def measure_departure(bodies, stage, at):
     for f in range(bodies.mass.shape[0]):
         for c in range(3):
             at.body_departure[f, c] = at.body_position[f, c] - stage.predicted_body_position[f, c]
-            at.body_turned[f, c] = 0.0
-        x, y, z = turn_between(stage.predicted_body_rotation, f, at.body_rotation, f)
-        turn_further(x, y, z, at.body_turned, at.body_turned, f)
+            at.body_departure_quaternion[f, c] = 0.0
+        x, y, z = rotation_vector_between(stage.predicted_body_rotation, f, at.body_rotation, f)
+        compose_quaternion(x, y, z, at.body_departure_quaternion, at.body_departure_quaternion, f)
 
 
-@piece(int, Problem, StateArrays, Place)
+@piece(int, Problem, StateArrays, Configuration)
 def take_state(p, state, at):
     """Start from a state."""
     bodies, strands = p.bodies, p.strands
     copy(state.position, at.position)
     clear_departure(at)
     for k in range(strands.edge_count):
-        at.turn[k] = 0.0
+        at.total_angle[k] = 0.0
         for c in range(3):
             at.director1[k, c] = state.director1[k, c]
     for k in range(state.twist.shape[0]):
@@ -265,7 +257,7 @@ def take_state(p, state, at):
         copy_row(state.body_position, bodies.body_of_free[f], at.body_position, f)
         copy_matrix(state.body_rotation, bodies.body_of_free[f], at.body_rotation, f)
     copy_prescribed(bodies, state.body_position, state.body_rotation, at)
-    call(p.calls.place_carried, (p, at))
+    call(p.calls.update_attached, (p, at))
     edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
     second_director(at.tangent, at.director1, at.director2)
     return READY

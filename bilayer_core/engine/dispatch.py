@@ -17,7 +17,7 @@ OF_RODS = {
     *("bound_between_rods", "find_rod_contacts", "list_near_rods", "near_pairs"),
     *("take_rod_contacts", "move_to_border"),
 }
-OF_FRICTION = {"where_friction_holds"}
+OF_FRICTION = {"limit_by_friction"}
 
 
 def calls_of(model: Model) -> Calls:
@@ -26,7 +26,7 @@ def calls_of(model: Model) -> Calls:
     skipped = IN_SPACE if model.plane is not None else IN_PLANE
     skipped = skipped | (OF_BODIES if model.free_count == 0 else set())
     skipped |= OF_BORDER if model.free_count == 0 and not rods else set()
-    skipped |= set() if model.meets_surfaces else OF_SURFACES
+    skipped |= set() if model.has_surface_contact else OF_SURFACES
     skipped |= set() if rods else OF_RODS
     skipped |= set() if friction and friction.acts else OF_FRICTION
     pieces = {name for name in Calls.names if name not in NAMES}

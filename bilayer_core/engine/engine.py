@@ -8,11 +8,11 @@ import numpy as np
 
 from ..integrators.method import Method
 from ..integrators.sdirk2 import METHOD as SELF_STARTING
-from ..model.carriers import carrier_names
+from ..model.contact_points import contact_point_names
 from ..model.force_list import Kind, kinds
-from ..model.force_places import NAMES
+from ..model.force_slots import NAMES
 from ..model.model import Model, scheduled_motion
-from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, PLACE, RESIDUAL, STATUS
+from ..model.records.outcome import BACKTRACKS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
 from ..model.records.problem import Sums
 from ..model.records.step import RunExtrema, StageInputs, StateArrays
 from ..model.rest_strains import RestStrains
@@ -46,7 +46,7 @@ class Engine:
     ----------
     actuation : Actuation or None
         What acts from outside; to be set before the first step.
-    end : Place
+    end : Configuration
         The configuration that was evaluated last.
     gap : float
         The smallest to a surface or another rod there [m], infinite without contact; between rods those below the
@@ -54,7 +54,7 @@ class Engine:
     stimulus : Array
         Value of each channel at the end of the last step, shape (n_channel,).
     touched : Array
-        Carriers that something pushed at the end of the last step, bool, shape (n_carrier,).
+        ContactPoints that something pushed at the end of the last step, bool, shape (n_contact_point,).
     extrema : RunExtrema
         Of the run.
     """
@@ -129,9 +129,9 @@ class Engine:
         problem, parts = self._storage.problem, self._integration
         known = parts is not None and parts.problem is problem and parts.actuation is self.actuation
         if not known or state is not self._state:
-            methods, kept = self._methods, state.copy()
-            arrays, kept_arrays = (
-                StateArrays(**{name: getattr(of, name) for name in StateArrays.names}) for of in (state, kept)
+            methods, start_state = self._methods, state.copy()
+            arrays, start_arrays = (
+                StateArrays(**{name: getattr(of, name) for name in StateArrays.names}) for of in (state, start_state)
             )
             self._state = state
             self._integration = parts = Integration(
@@ -145,8 +145,8 @@ class Engine:
                 control=self._control,
                 error_norm=self._error_norm,
                 work=self._work,
-                kept=kept_arrays,
-                kept_touched=self.touched.copy(),
+                start_state=start_arrays,
+                start_touched=self.touched.copy(),
                 extrema=self.extrema,
                 counts=self._counts,
             )
@@ -154,7 +154,7 @@ class Engine:
 
     def _take_end(self) -> None:
         """Note which configuration was evaluated last, and the smallest gap there."""
-        self.end = self._configurations[self._outcome.counts[PLACE]]
+        self.end = self._configurations[self._outcome.counts[CONFIGURATION]]
         self.gap = float(self._outcome.figures[GAP])
 
     def reserve(self, status: int) -> bool:
@@ -176,8 +176,8 @@ class Engine:
 
     @property
     def touching(self) -> Array:
-        """Which carriers something pushed at the last evaluation, shape (n_carrier,)."""
-        return np.any(self.sums.carrier != 0.0, axis=1)
+        """Which contact points something pushed at the last evaluation, shape (n_contact_point,)."""
+        return np.any(self.sums.contact_point != 0.0, axis=1)
 
     def who_blocks(self, pair: int) -> str:
         """What a message says of the near pair that blocks prescribed motion."""
@@ -185,7 +185,7 @@ class Engine:
             return "a rod would reach another"
         near = self._storage.problem.surfaces
         surface = self._model.surfaces.names[near.near_surface[pair]]
-        return f"{carrier_names(self._model)[near.near_carrier[pair]]} would reach the surface of {surface}"
+        return f"{contact_point_names(self._model)[near.near_contact_point[pair]]} would reach the surface of {surface}"
 
     @property
     def moved(self) -> float:
@@ -219,12 +219,12 @@ def new_inputs(model: Model, ends: int) -> StageInputs:
 def error_norm_of(model: Model) -> ErrorNorm:
     """What the defect of a model's steps is measured on."""
     ends = [strand.first_node for strand in model.strands] + [model.node_count]
-    shares = np.array(model.carriers.weight[: model.node_count])
+    shares = np.array(model.contact_points.weight[: model.node_count])
     return ErrorNorm(
         length=float(max(rod.path.length for rod in model.scene.rods)),
         first_node=np.array(ends, dtype=np.int64),
         weight=shares / np.repeat(np.add.reduceat(shares, ends[:-1]), np.diff(ends)),
         half_width=model.half_width if model.plane is None else np.zeros(0),
         body_of_free=model.bodies.body_of_free,
-        reach=model.bodies.reach,
+        bounding_radius=model.bodies.bounding_radius,
     )

@@ -28,7 +28,7 @@ import math
 from ..jit import kernel, piece
 from ..jit.record import Indices, Vector, record
 from ..jit.stack import stack_vector
-from ..kinematics.turning import turn_between
+from ..kinematics.rotating import rotation_vector_between
 from ..model.records.step import StateArrays
 
 
@@ -41,7 +41,7 @@ class ErrorNorm:
     weight: Vector  # part of its strand that each node stands for, shape (n_node,)
     half_width: Vector  # of each edge [m], shape (n_edge,); None in a plane, where edges do not turn
     body_of_free: Indices
-    reach: Vector  # of bodies [m], shape (n_body,)
+    bounding_radius: Vector  # of bodies [m], shape (n_body,)
 
 
 @piece(float, ErrorNorm, StateArrays, StateArrays, float)
@@ -64,7 +64,7 @@ def step_defect(norm, before, after, h):
     largest = math.sqrt(largest)
     for f in range(norm.body_of_free.shape[0]):
         b = norm.body_of_free[f]
-        largest = max(largest, _of_body(norm.reach[b], before, after, 0.5 * h, b))
+        largest = max(largest, _of_body(norm.bounding_radius[b], before, after, 0.5 * h, b))
     return largest / norm.length
 
 
@@ -113,13 +113,13 @@ def _of_edges(half_width, weight, before, after, half, first, last, strand):
 
 
 @kernel
-def _of_body(reach, before, after, half, b):
+def _of_body(bounding_radius, before, after, half, b):
     """D of the outermost point of a body [m]."""
-    turn = turn_between(before.body_rotation, b, after.body_rotation, b)
+    turn = rotation_vector_between(before.body_rotation, b, after.body_rotation, b)
     shifted = turned = 0.0
     for k in range(3):
         speed = before.body_velocity[b, k] + after.body_velocity[b, k]
         shifted += (after.body_position[b, k] - before.body_position[b, k] - half * speed) ** 2
         spin = before.body_angular_velocity[b, k] + after.body_angular_velocity[b, k]
         turned += (turn[k] - half * spin) ** 2
-    return math.sqrt(shifted) + reach * math.sqrt(turned)
+    return math.sqrt(shifted) + bounding_radius * math.sqrt(turned)

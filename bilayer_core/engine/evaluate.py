@@ -5,22 +5,22 @@ from __future__ import annotations
 import math
 
 from ..jit import call, piece
-from ..model.records.outcome import ENERGY, FRACTION, GAP, HELD_UP, STATUS
+from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, STATUS
 from ..model.records.problem import Problem
-from ..model.records.status import NO_ROOM_FOR_RODS, READY
-from ..model.records.step import Place, Stage
+from ..model.records.status import READY, ROD_CAPACITY_EXCEEDED
+from ..model.records.step import Configuration, Stage
 from .configuration import measure_departure
-from .newton import correction_speed, look_ahead
+from .newton import correction_speed, predicted_decrease
 
 
-@piece(int, Problem, Place, Stage, bool, bool)
+@piece(int, Problem, Configuration, Stage, bool, bool)
 def evaluate_at(p, at, stage, with_hessian, expands):
     """Sums of the selected forces at a configuration, however far it is from the last.
 
     Parameters
     ----------
     p : Problem
-    at : Place
+    at : Configuration
     stage : Stage
     with_hessian : bool
     expands : bool
@@ -36,7 +36,7 @@ def evaluate_at(p, at, stage, with_hessian, expands):
     if p.surfaces.exists:
         status = call(p.calls.list_surface_pairs, (p.surfaces, at, 0.0))
     if status == READY and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, at)):
-        status = NO_ROOM_FOR_RODS
+        status = ROD_CAPACITY_EXCEEDED
     if status == READY:
         measure_departure(p.bodies, stage, at)
         gap = call(p.calls.add_forces, (p, at, stage, with_hessian, False))
@@ -54,7 +54,7 @@ def speed_of_step(p, stage):
     return correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
 
 
-@piece(int, Problem, Place, Stage)
+@piece(int, Problem, Configuration, Stage)
 def bound_step(p, at, stage):
     """How far the step in `System` may go; the slip of its contacts is left in `Slips`.
 
@@ -64,9 +64,9 @@ def bound_step(p, at, stage):
         In `Outcome`: the fraction that keeps gaps open, the near pair that sets it, −1 without one, and the fraction at
         which friction holds the step up.
     """
-    slope, _ = look_ahead(p.strands, p.bodies, p.sums, p.system)
-    fraction = held_up = call(p.calls.bound, (p, at))
+    slope, _ = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
+    fraction = friction_fraction = call(p.calls.bound, (p, at))
     if p.slips.exists:
-        held_up = call(p.calls.where_friction_holds, (p, at, stage, slope, fraction))
-    p.outcome.figures[FRACTION], p.outcome.figures[HELD_UP] = fraction, held_up
+        friction_fraction = call(p.calls.limit_by_friction, (p, at, stage, slope, fraction))
+    p.outcome.figures[FRACTION], p.outcome.figures[FRICTION_FRACTION] = fraction, friction_fraction
     return p.outcome.counts[STATUS]

@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model.force_places import NAMES
+from ..model.force_slots import NAMES
 from ..model.model import Model
-from ..model.records.outcome import ENERGY, FRACTION, GAP, HELD_UP, PAIR, SHIFT, SIMPLIFIED
+from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, PAIR, SHIFT, SIMPLIFIED
 from ..model.records.problem import Problem, Sums
 from ..model.records.status import READY
-from ..model.records.step import Place, Point, Stage, StateArrays
+from ..model.records.step import Configuration, Point, Stage, StateArrays
 from ..model.state import State, initial_state
-from .configuration import move, place_frames, take_state
+from .configuration import move, take_state, transport_frames
 from .engine import new_inputs
 from .evaluate import bound_step, evaluate_at, speed_of_step
 from .linear.newton_matrix import EXACT, assemble, factorise, solve
-from .potential import follow, start_stage
+from .potential import start_stage, update_lagged
 from .stages import predict_stage, stand_still_stage, start_step_point
 from .storage import Storage, new_configuration, new_work
 
@@ -36,7 +36,7 @@ class StepBound:
         Of the step, at which all gaps are still open.
     pair : int
         The near pair that sets it, −1 without one.
-    held_up : float
+    friction_fraction : float
         Fraction, at most `fraction`, at which friction holds the step up.
     slip : Array
         Slip of each lagged contact along the step; see `forces.friction_limit`.
@@ -44,15 +44,15 @@ class StepBound:
 
     fraction: float
     pair: int
-    held_up: float
+    friction_fraction: float
     slip: Array
 
 
 class Evaluator:
     """Evaluates forces of a model, one or several or all, through the functions that steps use.
 
-    Its arrays are its own, so that evaluations leave a run as it is. A configuration is a `Place`; a stage is what a
-    step freezes (`predict` or `stand_still`, then `start_stage`).
+    Its arrays are its own, so that evaluations leave a run as it is. A stage is what a step freezes (`predict` or
+    `stand_still`, then `start_stage`).
 
     Attributes
     ----------
@@ -88,11 +88,11 @@ class Evaluator:
 
     # configurations
 
-    def new(self) -> Place:
+    def new(self) -> Configuration:
         """A configuration, of which only what does not move is in place."""
         return new_configuration(self.model)
 
-    def take_state(self, state: State, at: Place) -> None:
+    def take_state(self, state: State, at: Configuration) -> None:
         """Make a configuration that of a state."""
         self._take(state)
         take_state(self.problem, self._arrays, at)
@@ -104,7 +104,7 @@ class Evaluator:
                 if own.size:
                     own[...] = values
 
-    def move(self, base: Place, step: Array, body_step: Array, at: Place) -> None:
+    def move(self, base: Configuration, step: Array, body_step: Array, at: Configuration) -> None:
         """Make a configuration `base`, moved by a step of the unknowns, shape (size,), and of free bodies, shape
         (n_free, 6), both in space.
         """
@@ -115,14 +115,14 @@ class Evaluator:
         system = self.problem.system
         system.step[:], system.body_step[:] = step, body_step
 
-    def carry_frames(self, base: Place, angle: Array, at: Place) -> None:
+    def transport_frames(self, base: Configuration, angle: Array, at: Configuration) -> None:
         """Have frames of `base`, carried to the positions of `at` and turned by `angle` [rad], shape (n_edge,)."""
         at.angle[:] = angle
-        place_frames(self.problem, base, at)
+        transport_frames(self.problem, base, at)
 
     # stages
 
-    def start_point(self, state: State, at: Place) -> Point:
+    def start_point(self, state: State, at: Configuration) -> Point:
         """Positions and momenta at the start of a step from a state, whose configuration is `at`."""
         self._take(state)
         start_step_point(self.problem, self._arrays, at, self.point)
@@ -130,18 +130,18 @@ class Evaluator:
 
     def predict(
         self,
-        at: Place,
+        at: Configuration,
         lengths: tuple[float, float],
         rest_edge: Array,
         rest_joint: Array,
         load_factor: Array,
-        turned: Array | float = 0.0,
+        start_angle: Array | float = 0.0,
     ) -> None:
         """Freeze what a stage is from its origin, `point`; prescribed bodies rest where they are.
 
         Parameters
         ----------
-        at : Place
+        at : Configuration
             From which Newton begins.
         lengths : tuple of float
             γ h and γ′ h [s].
@@ -149,18 +149,18 @@ class Evaluator:
             Strains without stress, shapes (n_edge,), (n_joint, 3).
         load_factor : Array
             Of loads, shape (n_load,).
-        turned : Array or float
+        start_angle : Array or float
             Turn of edges from the start of the step to `at` [rad], shape (n_edge,).
         """
         self.set_drive(rest_edge, rest_joint, load_factor)
         self.stage.lengths[:] = lengths
-        self._work.turned[:] = turned
+        self._work.start_angle[:] = start_angle
         inputs = self._inputs
-        inputs.position[0], inputs.rotation[0], inputs.rates[0] = at.place[:-1], at.rotation[:-1], 0.0
+        inputs.position[0], inputs.rotation[0], inputs.rates[0] = at.pose_position[:-1], at.rotation[:-1], 0.0
         predict_stage(self.problem, self._arrays, self._work, inputs, 0, self.point, at)
 
     def stand_still(
-        self, state: State, at: Place, length: float, rest_edge: Array, rest_joint: Array, load_factor: Array
+        self, state: State, at: Configuration, length: float, rest_edge: Array, rest_joint: Array, load_factor: Array
     ) -> None:
         """Freeze a stage that ends where it begins, at `at`, with the velocities of a state: inertia asks for nothing.
 
@@ -176,15 +176,15 @@ class Evaluator:
         stage = self.stage
         stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest_edge, rest_joint, load_factor
 
-    def start_stage(self, at: Place) -> None:
+    def start_stage(self, at: Configuration) -> None:
         """Freeze contacts for friction, and have everything follow the configuration that follows one."""
         while (status := start_stage(self.problem, at, self.stage)) != READY:
             self._grow(status)
-        self.follow(at)
+        self.update_lagged(at)
 
-    def follow(self, at: Place) -> None:
+    def update_lagged(self, at: Configuration) -> None:
         """Let directions of drag and of followers, and the momentum of the fluid, be those of a configuration."""
-        follow(self.problem, at, self.stage)
+        update_lagged(self.problem, at, self.stage)
 
     # forces
 
@@ -208,19 +208,23 @@ class Evaluator:
         if "twisting" not in forces:
             self._stiffness[bends, 2] = 0.0
 
-    def forces(self, at: Place, forces: Iterable[str] | None = None) -> dict[str, float]:
+    def forces(self, at: Configuration, forces: Iterable[str] | None = None) -> dict[str, float]:
         """Energies [J] of all forces or of some by name; `sums` holds their derivatives by nodes, edges, pairs, and
         free bodies, of which nothing has been handed on to the unknowns.
         """
         return self._evaluate(at, forces, second=False, expands=False)
 
-    def evaluate(self, at: Place, forces: Iterable[str] | None = None, second: bool = False) -> dict[str, float]:
+    def evaluate(
+        self, at: Configuration, forces: Iterable[str] | None = None, second: bool = False
+    ) -> dict[str, float]:
         """Energies [J] of all forces or of some by name; their derivatives by the unknowns and by free bodies are in
         `sums`, with `second` those for `assemble` as well.
         """
         return self._evaluate(at, forces, second=second, expands=True)
 
-    def _evaluate(self, at: Place, forces: Iterable[str] | None, *, second: bool, expands: bool) -> dict[str, float]:
+    def _evaluate(
+        self, at: Configuration, forces: Iterable[str] | None, *, second: bool, expands: bool
+    ) -> dict[str, float]:
         self.select(forces)
         while (status := evaluate_at(self.problem, at, self.stage, second, expands)) != READY:
             self._grow(status)
@@ -230,7 +234,7 @@ class Evaluator:
 
     # the matrix
 
-    def assemble(self, at: Place) -> tuple[Array, Array, Array]:
+    def assemble(self, at: Configuration) -> tuple[Array, Array, Array]:
         """The matrix of the selected forces in the last evaluation with second derivatives, that of `at`: A as a band
         (`engine.linear.band`), U and D of free bodies, shapes (size + half-bandwidth, half-bandwidth + 1),
         (size, 6 n_free), (6 n_free, 6 n_free).
@@ -252,7 +256,7 @@ class Evaluator:
             return problem.system.band, np.zeros((size, 0)), np.zeros((0, 0))
         return problem.system.band, problem.border.border[:size], problem.border.corner
 
-    def factorise(self, at: Place) -> tuple[float, int]:
+    def factorise(self, at: Configuration) -> tuple[float, int]:
         """Factorise the matrix of the last evaluation of all forces with second derivatives, that of `at`.
 
         Returns
@@ -282,7 +286,7 @@ class Evaluator:
         self._put(step, body_step)
         return speed_of_step(self.problem, self.stage)
 
-    def bound(self, at: Place, step: Array, body_step: Array) -> StepBound:
+    def bound(self, at: Configuration, step: Array, body_step: Array) -> StepBound:
         """How far a step may go from the configuration of the last evaluation."""
         self._put(step, body_step)
         status = bound_step(self.problem, at, self.stage)
@@ -292,6 +296,6 @@ class Evaluator:
         problem, outcome = self.problem, self._storage.outcome
         count = int(problem.sliding.count[0]) if problem.sliding.exists else 0
         count += int(problem.rod_contact.sliding.count[0]) if problem.rod_contact.exists else 0
-        slip = problem.slips.way[:count].copy() if problem.slips.exists else np.zeros((0, 0))
+        slip = problem.slips.path[:count].copy() if problem.slips.exists else np.zeros((0, 0))
         figures = outcome.figures
-        return StepBound(float(figures[FRACTION]), int(outcome.counts[PAIR]), float(figures[HELD_UP]), slip)
+        return StepBound(float(figures[FRACTION]), int(outcome.counts[PAIR]), float(figures[FRICTION_FRACTION]), slip)

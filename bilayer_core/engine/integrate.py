@@ -15,16 +15,16 @@ import numpy as np
 from ..jit import call, kernel, piece, record_at
 from ..jit.record import Flags, Indices, Vector, record
 from ..kinematics.copying import copy
-from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, PLACE, RESIDUAL, STATUS
+from ..model.records.outcome import BACKTRACKS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
 from ..model.records.problem import Problem
 from ..model.records.status import CONVERGED, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
-from ..model.records.step import Method, Place, RunExtrema, StageInputs, StateArrays, Work
-from .actuation import Actuation, look_back, stimulus_has_jumped
+from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
+from .actuation import Actuation, stimulus_has_jumped, take_first_stimuli
 from .error_norm import ErrorNorm
 from .modes import STEP
 from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, after_rejection, after_success, fit, next_end
 
-place_at = record_at(Place)
+configuration_at = record_at(Configuration)
 TIME_ROUNDING = 1e-9
 """Part of a step, or of an output period, by which two times are the same."""
 
@@ -77,8 +77,8 @@ class Integration:
     control: StepControl
     error_norm: ErrorNorm
     work: Work
-    kept: StateArrays  # at the start of the step
-    kept_touched: Flags
+    start_state: StateArrays  # at the start of the step
+    start_touched: Flags
     extrema: RunExtrema
     counts: Counts
 
@@ -121,7 +121,7 @@ def _begin_again_after_jump(run):
     if jumped > 0:
         clock.next_step[0], clock.last_error[0] = min(clock.next_step[0], control.first), 0.0
     if jumped > 1 and run.method.history:
-        run.state.kept[0] = 0.0
+        run.state.has_history[0] = 0.0
 
 
 @kernel
@@ -129,7 +129,7 @@ def _has_to_start(run, h):
     """Whether the method needs stage derivatives of the step before, and there are none that hold."""
     if not run.method.history:
         return False
-    no_history, drives = run.state.kept[0] == 0.0, run.problem.drives
+    no_history, drives = run.state.has_history[0] == 0.0, run.problem.drives
     return no_history or stimulus_has_jumped(drives, run.state, run.inputs.first, run.actuation.ranges, h)
 
 
@@ -150,7 +150,7 @@ def _plan(control, clock, h, planned, error, iterations, shortened):
 def _leave(run, done, status, pair, end, gap):
     """Note how steps ended."""
     outcome = run.problem.outcome
-    outcome.counts[STATUS], outcome.counts[PAIR], outcome.counts[PLACE] = status, pair, end
+    outcome.counts[STATUS], outcome.counts[PAIR], outcome.counts[CONFIGURATION] = status, pair, end
     outcome.figures[GAP] = gap
     return done
 
@@ -180,7 +180,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         `INPUTS_END`: the actuation is to be continued from the present time.
     """
     p, state, work, clock, control, counts = run.problem, run.state, run.work, run.clock, run.control, run.counts
-    kept, inputs, numbers, lengths = run.kept, run.inputs, run.counts.numbers, run.counts.lengths
+    start_state, inputs, numbers, lengths = run.start_state, run.inputs, run.counts.numbers, run.counts.lengths
     found, figures, fixed = p.outcome.counts, p.outcome.figures, run.control.dt > 0.0
     status, pair, end, gap = READY, -1, 1, math.inf
     for k in range(most):
@@ -190,13 +190,13 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             return _leave(run, k, INPUTS_END, -1, end, gap)
         _begin_again_after_jump(run)
         planned = min(clock.next_step[0], control.longest) if clock.next_step[0] > 0.0 else control.first
-        look_back(run.actuation, begin, control.same, inputs)
+        take_first_stimuli(run.actuation, begin, control.same, inputs)
         method = run.method
         starts = _has_to_start(run, planned)
         if starts:
             method = run.starter
-        copy(state.values, kept.values)
-        copy(work.touched, run.kept_touched)
+        copy(state.values, start_state.values)
+        copy(work.touched, run.start_touched)
         h, time, error = planned, begin, math.inf
         rejected = iterations = 0
         residual = 0.0
@@ -207,9 +207,21 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             call(p.calls.drive_step, (run.actuation, method.nodes, begin, h, control.same, inputs))
             status = call(
                 p.calls.make_step,
-                (p, state, kept, method, run.method.history, STEP, inputs, work, h, newton_tolerance, max_iterations),
+                (
+                    p,
+                    state,
+                    start_state,
+                    method,
+                    run.method.history,
+                    STEP,
+                    inputs,
+                    work,
+                    h,
+                    newton_tolerance,
+                    max_iterations,
+                ),
             )
-            pair, end, iterations = found[PAIR], found[PLACE], found[ITERATIONS]
+            pair, end, iterations = found[PAIR], found[CONFIGURATION], found[ITERATIONS]
             residual, gap = figures[RESIDUAL], figures[GAP]
             if status != CONVERGED and status < MAX_ITERATIONS:
                 return _leave(run, k, status, pair, end, gap)
@@ -220,12 +232,12 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             if status == CONVERGED:
                 error = 0.0
                 if not fixed:
-                    defect = call(p.calls.step_defect, (run.error_norm, kept, state, h))
+                    defect = call(p.calls.step_defect, (run.error_norm, start_state, state, h))
                     error = method.estimate * defect / control.tolerance
                 if error <= 1.0:
                     break
-                copy(kept.values, state.values)
-                copy(run.kept_touched, work.touched)
+                copy(start_state.values, state.values)
+                copy(run.start_touched, work.touched)
                 status = TOO_INACCURATE
             if h <= GROWTH_LIMIT * control.shortest:
                 counts.failure[0], counts.failure[1], counts.failure[2] = h, residual, error
@@ -248,7 +260,10 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         clock.time[0] = time
         whole = not fixed or time == goal
         clock.step[0] += whole
-        call(p.calls.count_end, (p, state, place_at(work.places[end]), work.stage, gap, time, run.extrema))
+        call(
+            p.calls.count_end,
+            (p, state, configuration_at(work.configurations[end]), work.stage, gap, time, run.extrema),
+        )
         last = time == until or fixed and whole and time > until - 0.5 * control.dt
         if last or time >= due:
             return _leave(run, k + 1, CONVERGED, -1, end, gap)

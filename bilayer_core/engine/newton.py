@@ -4,7 +4,7 @@ The Hessian is exact. Once factorised it serves several corrections as long as e
 times the one before;
 a new correction of the gradient at hand costs a fraction of a new factorisation. The measure of convergence is the
 speed of the fastest material point in the last of them [m/s], which is still taken.
-What the potential takes at the configuration (`potential.follow`) moves along with every correction.
+What the potential takes at the configuration (`potential.update_lagged`) moves along with every correction.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import math
 from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack
 from ..kinematics.copying import copy
-from ..kinematics.turning import turn_between, turn_by, turn_further
+from ..kinematics.rotating import compose_quaternion, rotate_by, rotation_vector_between
 from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS, SWAPPED
 from ..model.records.problem import Problem
 from ..model.records.status import (
@@ -22,12 +22,12 @@ from ..model.records.status import (
     CONVERGED,
     LINE_SEARCH,
     MAX_ITERATIONS,
-    NO_ROOM_FOR_RODS,
     NOT_FINITE,
     READY,
+    ROD_CAPACITY_EXCEEDED,
 )
-from ..model.records.step import Place, Stage
-from .configuration import copy_prescribed, put_departure_of_held
+from ..model.records.step import Configuration, Stage
+from .configuration import copy_prescribed, departure_of_constrained
 from .modes import NEGATIVE, VALUE
 from .potential import evaluate
 
@@ -64,7 +64,7 @@ def correction_speed(strands, bodies, system, length):
         for c in range(3):
             shift += system.body_step[f, c] * system.body_step[f, c]
             turn += system.body_step[f, 3 + c] * system.body_step[f, 3 + c]
-        size = math.sqrt(shift) + bodies.reach[bodies.body_of_free[f]] * math.sqrt(turn)
+        size = math.sqrt(shift) + bodies.bounding_radius[bodies.body_of_free[f]] * math.sqrt(turn)
         if math.isnan(size):
             return size
         largest = max(largest, size)
@@ -88,12 +88,12 @@ LAST_DIGITS = 4.0 * 2.0**-52
 """Relative error of a coordinate by four units of its last digit."""
 
 
-@piece(float, Problem, Place)
+@piece(float, Problem, Configuration)
 def bound(p, at):
     """Largest fraction of `System.node_step` and `System.motion` that keeps all gaps open; the near pair that sets it
     (−1: none), and whether that could be found, are left in `Outcome`.
     """
-    _move_held(p.constrained, p.system, at)
+    _move_constrained(p.constrained, p.system, at)
     counts = p.outcome.counts
     counts[PAIR], counts[STATUS] = -1, READY
     fraction = 1.0
@@ -109,10 +109,10 @@ def bound(p, at):
 
 
 @kernel
-def _move_held(held, system, at):
+def _move_constrained(constrained, system, at):
     """Displacements of nodes that bodies hold."""
-    for k in range(held.node.shape[0]):
-        i, b = held.node[k], held.body[k]
+    for k in range(constrained.node.shape[0]):
+        i, b = constrained.node[k], constrained.body[k]
         r0, r1, r2 = system.motion[b, 3], system.motion[b, 4], system.motion[b, 5]
         system.node_step[i, 0] = system.motion[b, 0] + r1 * at.arm[k, 2] - r2 * at.arm[k, 1]
         system.node_step[i, 1] = system.motion[b, 1] + r2 * at.arm[k, 0] - r0 * at.arm[k, 2]
@@ -125,13 +125,13 @@ def _move_prescribed(bodies, start, position, rotation, motion):
     for k in range(bodies.prescribed.shape[0]):
         b = bodies.prescribed[k]
         for c in range(3):
-            motion[b, c] = position[b, c] - start.place[b, c]
+            motion[b, c] = position[b, c] - start.pose_position[b, c]
             motion[b, 3 + c] = 0.0
-        if bodies.turns[b]:
-            motion[b, 3], motion[b, 4], motion[b, 5] = turn_between(start.rotation, b, rotation, b)
+        if bodies.rotates[b]:
+            motion[b, 3], motion[b, 4], motion[b, 5] = rotation_vector_between(start.rotation, b, rotation, b)
 
 
-@piece(int, Problem, Place, Matrix, Stack, Stage, Place, bool)
+@piece(int, Problem, Configuration, Matrix, Stack, Stage, Configuration, bool)
 def first_guess_of(p, start, position, rotation, stage, guess, whole):
     """Set `guess` to `start` moved to where inertia takes it, or as far as no gap closes, prescribed bodies to given
     poses.
@@ -150,11 +150,11 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
         for f in range(free):
             b = bodies.body_of_free[f]
             for c in range(3):
-                system.motion[b, c] = fraction * stage.body_way[f, c]
-                system.motion[b, 3 + c] = fraction * stage.body_turn[f, c]
+                system.motion[b, c] = fraction * stage.predicted_body_shift[f, c]
+                system.motion[b, 3 + c] = fraction * stage.predicted_body_rotation_vector[f, c]
         for i in range(system.node_step.shape[0]):
             for c in range(3):
-                system.node_step[i, c] = fraction * stage.way[i, c]
+                system.node_step[i, c] = fraction * stage.predicted_shift[i, c]
         alpha = call(p.calls.bound, (p, start))
         if counts[STATUS] != READY:
             counts[PAIR] = -1
@@ -166,50 +166,50 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
         fraction *= (0.5 if attempt == 0 else 0.0) * alpha
     for i in range(system.node_step.shape[0]):
         for c in range(3):
-            guess.position[i, c] = start.position[i, c] + fraction * stage.way[i, c]
-            guess.departure[i, c] = (fraction - 1.0) * stage.way[i, c]
+            guess.position[i, c] = start.position[i, c] + fraction * stage.predicted_shift[i, c]
+            guess.departure[i, c] = (fraction - 1.0) * stage.predicted_shift[i, c]
     for k in range(p.strands.edge_count):
-        guess.turn[k] = fraction * stage.predicted_turn[k]
+        guess.total_angle[k] = fraction * stage.predicted_angle[k]
     copy_prescribed(bodies, position, rotation, guess)
     for f in range(free):
         for c in range(3):
-            guess.body_position[f, c] = start.body_position[f, c] + fraction * stage.body_way[f, c]
-            guess.body_departure[f, c] = (fraction - 1.0) * stage.body_way[f, c]
-            guess.body_turned[f, c] = 0.0
-        turn_by(
-            fraction * stage.body_turn[f, 0],
-            fraction * stage.body_turn[f, 1],
-            fraction * stage.body_turn[f, 2],
+            guess.body_position[f, c] = start.body_position[f, c] + fraction * stage.predicted_body_shift[f, c]
+            guess.body_departure[f, c] = (fraction - 1.0) * stage.predicted_body_shift[f, c]
+            guess.body_departure_quaternion[f, c] = 0.0
+        rotate_by(
+            fraction * stage.predicted_body_rotation_vector[f, 0],
+            fraction * stage.predicted_body_rotation_vector[f, 1],
+            fraction * stage.predicted_body_rotation_vector[f, 2],
             start.body_rotation,
             f,
             guess.body_rotation,
             f,
         )
         short = fraction - 1.0
-        turn_further(
-            short * stage.body_turn[f, 0],
-            short * stage.body_turn[f, 1],
-            short * stage.body_turn[f, 2],
-            guess.body_turned,
-            guess.body_turned,
+        compose_quaternion(
+            short * stage.predicted_body_rotation_vector[f, 0],
+            short * stage.predicted_body_rotation_vector[f, 1],
+            short * stage.predicted_body_rotation_vector[f, 2],
+            guess.body_departure_quaternion,
+            guess.body_departure_quaternion,
             f,
         )
-    call(p.calls.place_carried, (p, guess))
-    put_departure_of_held(p.constrained, stage, guess)
-    copy(guess.turn, guess.angle)
-    call(p.calls.place_frames, (p, start, guess))
+    call(p.calls.update_attached, (p, guess))
+    departure_of_constrained(p.constrained, stage, guess)
+    copy(guess.total_angle, guess.angle)
+    call(p.calls.transport_frames, (p, start, guess))
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]
     counts[PAIR] = -1
     return READY
 
 
-FACTORISE, FOLLOW, SEARCH = 0, 1, 2
+FACTORISE, UPDATE_LAGGED, SEARCH = 0, 1, 2
 """What an evaluation is for: a new matrix, a gradient in which only what follows the configuration has changed, a step
 of the line search."""
 
 
-@piece(int, Problem, Place, Place, Stage, float, int, int)
+@piece(int, Problem, Configuration, Configuration, Stage, float, int, int)
 def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     """Move `at` to the minimum of the potential, or only do there what is `wanted` (`modes`); `trial` is scratch.
 
@@ -227,7 +227,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         the speed of the last correction [m/s], and the smallest gap to a surface or another rod [m].
     """
     counts, figures = p.outcome.counts, p.outcome.figures
-    call(p.calls.follow, (p, at, stage))
+    call(p.calls.update_lagged, (p, at, stage))
     swapped, fresh, bounded, short, task = False, True, False, False, FACTORISE
     settled = False  # whether what is left to do is the last correction
     found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
@@ -243,12 +243,12 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
                 break
             found, curved = False, short or factorisations > 1
         if task != FACTORISE or not curved:
-            place = trial if task == SEARCH else at
-            if not found and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, place)):
-                status = NO_ROOM_FOR_RODS
+            configuration = trial if task == SEARCH else at
+            if not found and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, configuration)):
+                status = ROD_CAPACITY_EXCEEDED
                 break
             found, curved = True, curved or task == FACTORISE and wanted != VALUE
-            value, new_gap = evaluate(p, place, stage, curved, task == FOLLOW)
+            value, new_gap = evaluate(p, configuration, stage, curved, task == UPDATE_LAGGED)
             if wanted == VALUE:
                 gap, status = new_gap, CONVERGED
                 break
@@ -268,14 +268,14 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             iterations += not fresh
             fresh, previous = False, residual
             at, trial, swapped = trial, at, not swapped
-            if call(p.calls.follow, (p, at, stage)):
-                curved, task = False, FOLLOW
+            if call(p.calls.update_lagged, (p, at, stage)):
+                curved, task = False, UPDATE_LAGGED
             if short or halvings > 0:
                 task = FACTORISE
             if task != SEARCH:
                 continue
         else:
-            energy, gap = value, gap if task == FOLLOW else new_gap
+            energy, gap = value, gap if task == UPDATE_LAGGED else new_gap
             if task == FACTORISE:
                 if factorisations == 0 and not math.isfinite(energy):
                     status = NOT_FINITE
@@ -300,14 +300,14 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:
             task = FACTORISE
             continue
-        slope, noise = look_ahead(p.strands, p.bodies, p.sums, p.system)
+        slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
         alpha = call(p.calls.bound, (p, at))
         status = counts[STATUS]
         if status != READY:
             break
         bounded, halvings, task = alpha < 1.0, 0, SEARCH
         if fresh and not settled and p.slips.exists:
-            alpha = call(p.calls.where_friction_holds, (p, at, stage, slope, alpha))
+            alpha = call(p.calls.limit_by_friction, (p, at, stage, slope, alpha))
         short = alpha < 1.0
     counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
     counts[BACKTRACKS], figures[RESIDUAL], figures[GAP] = backtracks, residual, gap
@@ -315,7 +315,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
 
 
 @kernel
-def look_ahead(strands, bodies, sums, system):
+def predicted_decrease(strands, bodies, sums, system):
     """Slope of the potential along the present step, and the difference below which its values mean nothing [J]; the
     motion of nodes and bodies is left for the bound.
     """

@@ -6,28 +6,28 @@ import math
 
 from numba import types
 
-from ..forces.contact_on_bodies import clear_contact, hand_on_contact
+from ..forces.contact_on_bodies import clear_contact, condense_contact
 from ..jit import call, caller, kernel, piece
 from ..kinematics.copying import copy
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 from .linear.assembly import expand_gradient
 from .linear.attachments import condense_gradient
 
 
 def _signature(result, *more):
     """Of a piece of a force, which takes its own record first."""
-    records = (record.numba_type() for record in (Problem, Place, Stage))
+    records = (record.numba_type() for record in (Problem, Configuration, Stage))
     return result(types.int64, *records, *more)
 
 
 call_add = caller("a force", lambda _: _signature(types.float64, types.boolean))
 call_start = caller("the start of a force", lambda _: _signature(types.int64))
-call_follow = caller("a force that follows", lambda _: _signature(types.boolean))
+call_update_lagged = caller("a force that follows", lambda _: _signature(types.boolean))
 
 
-@piece(int, Problem, Place, Stage)
+@piece(int, Problem, Configuration, Stage)
 def start_stage(p, start, stage):
     """Freeze what a stage depends on: near pairs, friction's contacts, loads. Returns whether it can go on."""
     forces = p.forces
@@ -39,12 +39,12 @@ def start_stage(p, start, stage):
     return READY
 
 
-@piece(bool, Problem, Place, Stage)
-def follow(p, at, stage):
+@piece(bool, Problem, Configuration, Stage)
+def update_lagged(p, at, stage):
     """Let forces take from a configuration what they hold fixed between moves; whether any does."""
     forces, moved = p.forces, False
-    for k in range(forces.lasting, forces.follow.shape[0]):
-        moved |= call_follow(forces.follow[k], (forces.own[k], p, at, stage))
+    for k in range(forces.lasting, forces.update_lagged.shape[0]):
+        moved |= call_update_lagged(forces.update_lagged[k], (forces.own[k], p, at, stage))
     return moved
 
 
@@ -53,7 +53,7 @@ def evaluate(p, at, stage, with_hessian, again):
     """Potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface or a rod [m].
 
     Gradients always, second derivatives on request, are left in `Sums`. The contacts of rods are those found last. With
-    `again` the configuration is that of the last evaluation, and only what `follow` has changed since is found anew,
+    `again` the configuration is that of the last evaluation; only what `update_lagged` has changed since is found anew,
     without second derivatives and the gap.
     """
     gap = call(p.calls.add_forces, (p, at, stage, with_hessian, again))
@@ -64,7 +64,7 @@ def evaluate(p, at, stage, with_hessian, again):
     return energy, gap
 
 
-@piece(float, Problem, Place, Stage, bool, bool)
+@piece(float, Problem, Configuration, Stage, bool, bool)
 def add_forces(p, at, stage, with_hessian, again):
     """Energies and first derivatives by nodes, edges, pairs and bodies, second ones on request; parameters as for
     `evaluate`. Returns the smallest gap [m].
@@ -72,31 +72,31 @@ def add_forces(p, at, stage, with_hessian, again):
     forces, sums = p.forces, p.sums
     count, gap = forces.add.shape[0], math.inf
     if again:
-        copy(sums.lasting, sums.first)
+        copy(sums.lasting, sums.gradients)
     else:
         sums.energy[:] = 0.0
-        sums.first[:] = 0.0
+        sums.gradients[:] = 0.0
         if with_hessian:
-            sums.second[:] = 0.0
+            sums.hessians[:] = 0.0
             sums.links[0] = 0
-        clear_contact(p.meets, sums)
+        clear_contact(p.has_contact, sums)
     for k in range(forces.lasting if again else 0, count):
         if k == forces.lasting and not again:
             _keep_lasting(p)
         gap = min(gap, call_add(forces.add[k], (forces.own[k], p, at, stage, with_hessian)))
     if forces.lasting == count and not again:
-        hand_on_contact(p.meets, p.bodies, sums)
+        condense_contact(p.has_contact, p.bodies, sums)
     return gap
 
 
 @kernel
 def _keep_lasting(p):
     """Keep what stays as it is when other parts follow the configuration."""
-    hand_on_contact(p.meets, p.bodies, p.sums)
-    copy(p.sums.first, p.sums.lasting)
+    condense_contact(p.has_contact, p.bodies, p.sums)
+    copy(p.sums.gradients, p.sums.lasting)
 
 
-@piece(int, Problem, Place)
+@piece(int, Problem, Configuration)
 def expand_to_unknowns(p, at):
     """First derivatives from nodes, edges, pairs and bodies to the unknowns."""
     expand_gradient(p.bonds, p.strands, p.sums)

@@ -7,10 +7,10 @@ import math
 from ..jit import call, kernel, piece
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Place, RunExtrema, Stage, StateArrays
+from ..model.records.step import Configuration, RunExtrema, Stage, StateArrays
 
 
-@piece(int, Problem, StateArrays, Place, Stage, RunExtrema)
+@piece(int, Problem, StateArrays, Configuration, Stage, RunExtrema)
 def count_shape(p, state, at, stage, extrema):
     """Take the shape of a state, which is `at`, into the extrema: curvature, strain, and heights of bodies."""
     strands, rest_edge, figures, voronoi = p.strands, stage.rest_edge, extrema.figures, extrema.voronoi_length
@@ -31,14 +31,14 @@ def count_shape(p, state, at, stage, extrema):
     return READY
 
 
-@piece(int, Problem, StateArrays, Place, Stage, float, float, RunExtrema)
+@piece(int, Problem, StateArrays, Configuration, Stage, float, float, RunExtrema)
 def count_end(p, state, at, stage, gap, time, extrema):
     """Take the end of a step into the extrema: the smallest gap there [m] and the time [s] are given."""
     strands, figures, nodes = p.strands, extrema.figures, p.strands.node_mass.shape[0]
     height = largest = 0.0
     for i in range(nodes):
         height += strands.node_mass[i] * state.position[i, 2]
-        force = p.sums.carrier[i, 0] ** 2 + p.sums.carrier[i, 1] ** 2 + p.sums.carrier[i, 2] ** 2
+        force = p.sums.contact_point[i, 0] ** 2 + p.sums.contact_point[i, 1] ** 2 + p.sums.contact_point[i, 2] ** 2
         largest = max(largest, force)
     for k in range(extrema.mass_moment.shape[0]):
         height += extrema.mass_moment[k] * state.director1[k, 2]
@@ -55,7 +55,7 @@ def _count_contacts(surfaces, nodes, time, extrema):
     count = extrema.nodes
     count[:] = 0
     for c in range(surfaces.near_count[0]):
-        if surfaces.near_gap[c] < surfaces.d_hat and surfaces.near_carrier[c] < nodes:
+        if surfaces.near_gap[c] < surfaces.d_hat and surfaces.near_contact_point[c] < nodes:
             count[surfaces.near_surface[c]] += 1
     for s in range(count.shape[0]):
         extrema.most_nodes[s] = max(extrema.most_nodes[s], count[s])

@@ -20,16 +20,16 @@ from __future__ import annotations
 import math
 
 from ..forces.added_mass import momentum_at
-from ..forces.inertia import moment_of_turn
+from ..forces.inertia import moment_of_rotation
 from ..jit import kernel, piece
 from ..jit.stack import stack_matrix
 from ..kinematics.compensated import add_exactly
 from ..kinematics.copying import add_scaled, copy, copy_matrix, copy_row
-from ..kinematics.turning import inertia_tensor, solve_three, turn_between, turn_by
+from ..kinematics.rotating import inertia_tensor, rotate_by, rotation_vector_between, solve_three
 from ..kinematics.vector import row
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Method, Place, Point, Stage, StageInputs, StateArrays, Work
+from ..model.records.step import Configuration, Method, Point, Stage, StageInputs, StateArrays, Work
 from .configuration import clear_departure
 
 SPIN_ITERATIONS = 50
@@ -47,14 +47,14 @@ def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
     )
 
 
-@piece(int, Problem, StateArrays, Place, Point)
+@piece(int, Problem, StateArrays, Configuration, Point)
 def start_step_point(p, state, start, first):
     """The start of a step."""
     bodies = p.bodies
     first.displacement[:] = 0.0
     first.body_displacement[:] = 0.0
     copy(state.body_rotation, first.rotation)
-    first.turn[:] = 0.0
+    first.angle[:] = 0.0
     copy(state.velocity, first.velocity)
     copy(state.spin, first.spin)
     scratch = stack_matrix(3, 3)
@@ -71,18 +71,18 @@ def start_step_point(p, state, start, first):
 
 
 @piece(int, Work, Method, int)
-def place_origin(work, method, n):
+def set_origin(work, method, n):
     """Put the origin of stage n, or a step's end beyond its last stage, to where earlier stages have it.
 
     First note what the stage before has gained over its own origin: vectors, and rotation vectors of bodies. Rotations
     advance on their group.
     """
-    origin, end, gained, turned = work.origin, work.end, work.gained, work.gained_turn
+    origin, end, gained, turned = work.origin, work.end, work.gained, work.gained_rotation_vector
     if n > 0:
         for i in range(origin.vectors.shape[0]):
             gained[n - 1, i] = end.vectors[i] - origin.vectors[i]
         for b in range(origin.rotation.shape[0]):
-            x, y, z = turn_between(origin.rotation, b, end.rotation, b)
+            x, y, z = rotation_vector_between(origin.rotation, b, end.rotation, b)
             turned[n - 1, b, 0], turned[n - 1, b, 1], turned[n - 1, b, 2] = x, y, z
     copy(work.first.vectors, origin.vectors)
     copy(work.first.rotation, origin.rotation)
@@ -93,21 +93,21 @@ def place_origin(work, method, n):
         copy(origin.rotation, work.rotation)
         for b in range(origin.rotation.shape[0]):
             x, y, z = weight * turned[j, b, 0], weight * turned[j, b, 1], weight * turned[j, b, 2]
-            turn_by(x, y, z, work.rotation, b, origin.rotation, b)
+            rotate_by(x, y, z, work.rotation, b, origin.rotation, b)
     return READY
 
 
 @piece(int, Problem, StateArrays, Work, Method, int, float)
-def move_along(p, state, work, method, n, h):
-    """Move the origin of stage n by what the slopes at the start of a step of length h add to it."""
+def add_history_to_origin(p, state, work, method, n, h):
+    """Move the origin of stage n by what the stage derivatives at the start of a step of length h add to it."""
     bodies, point, first, scratch = p.bodies, work.origin, work.first, work.rotation
     along, bend, momenta = method.along[n], method.bend, method.momenta[n]  # weights of q̇ h, q̈ h² and ṗ h
     add_scaled(point.displacement, along * h, state.velocity)
     add_scaled(point.body_displacement, along * h, state.body_velocity)
-    add_scaled(point.turn, along * h, state.spin)
+    add_scaled(point.angle, along * h, state.spin)
     if bend != 0.0:
         add_scaled(point.displacement, bend * h * h, state.acceleration)
-        add_scaled(point.turn, bend * h * h, state.spin_acceleration)
+        add_scaled(point.angle, bend * h * h, state.spin_acceleration)
     add_scaled(point.velocity, momenta * h, state.acceleration)
     add_scaled(point.spin, momenta * h, state.spin_acceleration)
     add_scaled(point.body_velocity, momenta * h, state.body_acceleration)
@@ -133,7 +133,7 @@ def move_along(p, state, work, method, n, h):
             x += bend * h * h * rate[0]
             y += bend * h * h * rate[1]
             z += bend * h * h * rate[2]
-        turn_by(x, y, z, scratch, b, point.rotation, b)
+        rotate_by(x, y, z, scratch, b, point.rotation, b)
     return READY
 
 
@@ -149,13 +149,13 @@ def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned
         u, v, w = solve_three(scratch, momentum[f, 0], momentum[f, 1], momentum[f, 2])
         change = max(abs(u - x), abs(v - y), abs(w - z))
         x, y, z = u, v, w
-        turn_by(length * x, length * y, length * z, rotation, b, turned, f)
+        rotate_by(length * x, length * y, length * z, rotation, b, turned, f)
         if change <= SPIN_CHANGE * max(abs(x), abs(y), abs(z)):
             break
     return x, y, z
 
 
-@piece(int, Problem, StateArrays, Work, StageInputs, int, Point, Place)
+@piece(int, Problem, StateArrays, Work, StageInputs, int, Point, Configuration)
 def predict_stage(p, state, work, inputs, n, previous, start):
     """Frozen data of stage n from its origin; puts the origin of what bodies hold to where it has their velocity.
 
@@ -170,7 +170,7 @@ def predict_stage(p, state, work, inputs, n, previous, start):
         if f < 0:
             w0, w1, w2 = rates[b, 3], rates[b, 4], rates[b, 5]
             for c in range(3):
-                stage.origin_place[b, c] = position[b, c] - length * rates[b, c]
+                stage.origin_pose_position[b, c] = position[b, c] - length * rates[b, c]
             _set_back(rotation, b, length, w0, w1, w2, stage.origin_rotation, b)
         else:
             w0, w1, w2 = _spin_without_moment(
@@ -187,23 +187,24 @@ def predict_stage(p, state, work, inputs, n, previous, start):
             _set_back(stage.predicted_body_rotation, f, length, w0, w1, w2, stage.origin_rotation, b)
             for c in range(3):
                 moved = origin.body_displacement[b, c]
-                stage.origin_place[b, c] = state.body_position[b, c] + moved
-                stage.origin_body_position[f, c] = stage.origin_place[b, c]
+                stage.origin_pose_position[b, c] = state.body_position[b, c] + moved
+                stage.origin_body_position[f, c] = stage.origin_pose_position[b, c]
                 ahead = length * origin.body_velocity[f, c]
-                stage.predicted_body_position[f, c] = stage.origin_place[b, c] + ahead
-                stage.body_way[f, c] = (moved - previous.body_displacement[b, c]) + ahead
-            x, y, z = turn_between(start.body_rotation, f, stage.predicted_body_rotation, f)
-            stage.body_turn[f, 0], stage.body_turn[f, 1], stage.body_turn[f, 2] = x, y, z
+                stage.predicted_body_position[f, c] = stage.origin_pose_position[b, c] + ahead
+                stage.predicted_body_shift[f, c] = (moved - previous.body_displacement[b, c]) + ahead
+            x, y, z = rotation_vector_between(start.body_rotation, f, stage.predicted_body_rotation, f)
+            vector = stage.predicted_body_rotation_vector
+            vector[f, 0], vector[f, 1], vector[f, 2] = x, y, z
     for i in range(origin.displacement.shape[0]):
         for c in range(3):
             moved, ahead = origin.displacement[i, c], length * origin.velocity[i, c]
             stage.origin_position[i, c] = state.position[i, c] + moved
             stage.predicted_position[i, c] = stage.origin_position[i, c] + ahead
-            stage.way[i, c] = (moved - previous.displacement[i, c]) + ahead
-    _put_origin_of_held(p.constrained, origin, state, stage)
-    for k in range(origin.turn.shape[0]):
-        stage.origin_turn[k] = origin.turn[k] - work.turned[k]
-        stage.predicted_turn[k] = stage.origin_turn[k] + length * origin.spin[k]
+            stage.predicted_shift[i, c] = (moved - previous.displacement[i, c]) + ahead
+    _origin_of_constrained(p.constrained, origin, state, stage)
+    for k in range(origin.angle.shape[0]):
+        stage.origin_angle[k] = origin.angle[k] - work.start_angle[k]
+        stage.predicted_angle[k] = stage.origin_angle[k] + length * origin.spin[k]
     for i in range(origin.fluid_momentum.shape[0]):
         for c in range(3):
             stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
@@ -211,7 +212,7 @@ def predict_stage(p, state, work, inputs, n, previous, start):
     return READY
 
 
-@piece(int, Problem, StateArrays, Work, StageInputs, int, Point, Place)
+@piece(int, Problem, StateArrays, Work, StageInputs, int, Point, Configuration)
 def predict_end(p, state, work, inputs, n, previous, start):
     """Predict just the end of a step, which lies beyond its last stage; prescribed bodies are put there.
 
@@ -221,9 +222,9 @@ def predict_end(p, state, work, inputs, n, previous, start):
     for i in range(end.displacement.shape[0]):
         for c in range(3):
             stage.predicted_position[i, c] = state.position[i, c] + end.displacement[i, c]
-            stage.way[i, c] = end.displacement[i, c] - previous.displacement[i, c]
-    for k in range(end.turn.shape[0]):
-        stage.predicted_turn[k] = end.turn[k] - work.turned[k]
+            stage.predicted_shift[i, c] = end.displacement[i, c] - previous.displacement[i, c]
+    for k in range(end.angle.shape[0]):
+        stage.predicted_angle[k] = end.angle[k] - work.start_angle[k]
     for b in range(end.rotation.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
@@ -231,10 +232,11 @@ def predict_end(p, state, work, inputs, n, previous, start):
             continue
         for c in range(3):
             stage.predicted_body_position[f, c] = state.body_position[b, c] + end.body_displacement[b, c]
-            stage.body_way[f, c] = end.body_displacement[b, c] - previous.body_displacement[b, c]
+            stage.predicted_body_shift[f, c] = end.body_displacement[b, c] - previous.body_displacement[b, c]
         copy_matrix(end.rotation, b, stage.predicted_body_rotation, f)
-        x, y, z = turn_between(start.body_rotation, f, stage.predicted_body_rotation, f)
-        stage.body_turn[f, 0], stage.body_turn[f, 1], stage.body_turn[f, 2] = x, y, z
+        x, y, z = rotation_vector_between(start.body_rotation, f, stage.predicted_body_rotation, f)
+        vector = stage.predicted_body_rotation_vector
+        vector[f, 0], vector[f, 1], vector[f, 2] = x, y, z
     _take_twist(start, stage)
     return READY
 
@@ -245,7 +247,7 @@ def _take_twist(start, stage):
         stage.twist[k] = start.joint_strain[k, 2]
 
 
-@piece(int, Problem, StateArrays, Place, bool, Stage)
+@piece(int, Problem, StateArrays, Configuration, bool, Stage)
 def stand_still_stage(p, state, start, with_fluid, stage):
     """Frozen data of a stage in which inertia wants everything to stay where it is.
 
@@ -256,24 +258,24 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     for b in range(state.body_position.shape[0]):
         w0, w1, w2 = row(state.body_angular_velocity, b)
         for c in range(3):
-            stage.origin_place[b, c] = start.place[b, c] - length * state.body_velocity[b, c]
-        turn_by(-length * w0, -length * w1, -length * w2, start.rotation, b, stage.origin_rotation, b)
+            stage.origin_pose_position[b, c] = start.pose_position[b, c] - length * state.body_velocity[b, c]
+        rotate_by(-length * w0, -length * w1, -length * w2, start.rotation, b, stage.origin_rotation, b)
     for f in range(bodies.body_of_free.shape[0]):
-        copy_row(stage.origin_place, bodies.body_of_free[f], stage.origin_body_position, f)
+        copy_row(stage.origin_pose_position, bodies.body_of_free[f], stage.origin_body_position, f)
     copy(start.body_position, stage.predicted_body_position)
     copy(start.body_rotation, stage.predicted_body_rotation)
-    stage.body_turn[:] = 0.0
-    stage.way[:] = 0.0
-    stage.body_way[:] = 0.0
-    copy(start.arm, stage.held_arm)
-    stage.held_lag[:] = 0.0
+    stage.predicted_body_rotation_vector[:] = 0.0
+    stage.predicted_shift[:] = 0.0
+    stage.predicted_body_shift[:] = 0.0
+    copy(start.arm, stage.attached_arm)
+    stage.attached_lag[:] = 0.0
     clear_departure(start)
     copy(start.position, stage.predicted_position)
     copy(start.position, stage.origin_position)
     add_scaled(stage.origin_position, -length, state.velocity)
-    stage.predicted_turn[:] = 0.0
-    stage.origin_turn[:] = 0.0
-    add_scaled(stage.origin_turn, -length, state.spin)
+    stage.predicted_angle[:] = 0.0
+    stage.origin_angle[:] = 0.0
+    add_scaled(stage.origin_angle, -length, state.spin)
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:
         momentum_at(p.fluid, start, state.velocity, stage.origin_fluid_momentum)
@@ -281,7 +283,7 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     return READY
 
 
-@piece(float, Problem, Place, Place)
+@piece(float, Problem, Configuration, Configuration)
 def distance(p, start, end):
     """Largest displacement of a material point from one configuration to another [m]."""
     bodies, strands, largest = p.bodies, p.strands, 0.0
@@ -290,15 +292,15 @@ def distance(p, start, end):
         for c in range(3):
             square += (end.position[i, c] - start.position[i, c]) ** 2
         largest = max(largest, math.sqrt(square))
-    for k in range(end.turn.shape[0]):
-        largest = max(largest, abs(end.turn[k]) * strands.half_width[k])
+    for k in range(end.total_angle.shape[0]):
+        largest = max(largest, abs(end.total_angle[k]) * strands.half_width[k])
     for f in range(bodies.mass.shape[0]):
         square = 0.0
         for c in range(3):
             square += (end.body_position[f, c] - start.body_position[f, c]) ** 2
-        x, y, z = turn_between(start.body_rotation, f, end.body_rotation, f)
+        x, y, z = rotation_vector_between(start.body_rotation, f, end.body_rotation, f)
         turn = math.sqrt(x * x + y * y + z * z)
-        largest = max(largest, math.sqrt(square) + bodies.reach[bodies.body_of_free[f]] * turn)
+        largest = max(largest, math.sqrt(square) + bodies.bounding_radius[bodies.body_of_free[f]] * turn)
     return largest
 
 
@@ -313,32 +315,32 @@ def _set_back(rotation, b, length, w0, w1, w2, out, c):
 
 
 @kernel
-def _put_origin_of_held(held, origin, state, stage):
+def _origin_of_constrained(constrained, origin, state, stage):
     length = stage.lengths[0]
-    for k in range(held.node.shape[0]):
-        b, i, f = held.body[k], held.node[k], held.free[k]
+    for k in range(constrained.node.shape[0]):
+        b, i, f = constrained.body[k], constrained.node[k], constrained.free[k]
         for c in range(3):
-            place = stage.origin_place[b, c]
+            position = stage.origin_pose_position[b, c]
             for m in range(3):
-                place += stage.origin_rotation[b, c, m] * held.position[k, m]
-            origin.displacement[i, c] = place - state.position[i, c]
-            stage.origin_position[i, c] = place
-            stage.predicted_position[i, c] = place + length * origin.velocity[i, c]
+                position += stage.origin_rotation[b, c, m] * constrained.position[k, m]
+            origin.displacement[i, c] = position - state.position[i, c]
+            stage.origin_position[i, c] = position
+            stage.predicted_position[i, c] = position + length * origin.velocity[i, c]
         if f < 0:
             continue
         for c in range(3):
-            stage.held_arm[k, c] = 0.0
+            stage.attached_arm[k, c] = 0.0
             for m in range(3):
-                stage.held_arm[k, c] += stage.predicted_body_rotation[f, c, m] * held.position[k, m]
+                stage.attached_arm[k, c] += stage.predicted_body_rotation[f, c, m] * constrained.position[k, m]
         w0, w1, w2 = row(stage.body_spin, f)
-        u0, u1, u2 = row(stage.held_arm, k)
+        u0, u1, u2 = row(stage.attached_arm, k)
         v0, v1, v2 = row(origin.velocity, i)
-        stage.held_lag[k, 0] = length * (origin.body_velocity[f, 0] + (w1 * u2 - w2 * u1) - v0)
-        stage.held_lag[k, 1] = length * (origin.body_velocity[f, 1] + (w2 * u0 - w0 * u2) - v1)
-        stage.held_lag[k, 2] = length * (origin.body_velocity[f, 2] + (w0 * u1 - w1 * u0) - v2)
+        stage.attached_lag[k, 0] = length * (origin.body_velocity[f, 0] + (w1 * u2 - w2 * u1) - v0)
+        stage.attached_lag[k, 1] = length * (origin.body_velocity[f, 1] + (w2 * u0 - w0 * u2) - v1)
+        stage.attached_lag[k, 2] = length * (origin.body_velocity[f, 2] + (w0 * u1 - w1 * u0) - v2)
 
 
-@piece(int, Problem, StateArrays, Work, StageInputs, int, Place)
+@piece(int, Problem, StateArrays, Work, StageInputs, int, Configuration)
 def end_stage(p, state, work, inputs, n, end):
     """The end of stage n, which was solved with the configuration `end`.
 
@@ -355,7 +357,8 @@ def end_stage(p, state, work, inputs, n, end):
             continue
         copy_matrix(end.body_rotation, f, point.rotation, b)
         # moment of inertia's potential at the end: −ax(R̃ J Rᵀ)/(γ γ′ h²), see `forces.inertia`
-        moment = moment_of_turn(bodies.second_moment, f, stage.predicted_body_rotation, end.body_turned)
+        reference, beyond = stage.predicted_body_rotation, end.body_departure_quaternion
+        moment = moment_of_rotation(bodies.second_moment, f, reference, beyond)
         factor = 1.0 / length  # γ′ h times 1/(γ γ′ h²)
         for c in range(3):
             velocity, departure = origin.body_velocity[f, c], end.body_departure[f, c]
@@ -368,27 +371,27 @@ def end_stage(p, state, work, inputs, n, end):
             velocity, departure = origin.velocity[i, c], end.departure[i, c]
             point.velocity[i, c] = velocity + departure / length
             point.displacement[i, c] = origin.displacement[i, c] + (length * velocity + departure)
-    for k in range(point.turn.shape[0]):
-        point.turn[k] = work.turned[k] + end.turn[k]
-        point.spin[k] = (end.turn[k] - stage.origin_turn[k]) / length
+    for k in range(point.angle.shape[0]):
+        point.angle[k] = work.start_angle[k] + end.total_angle[k]
+        point.spin[k] = (end.total_angle[k] - stage.origin_angle[k]) / length
     momentum_at(p.fluid, end, point.velocity, point.fluid_momentum)
     return READY
 
 
-@piece(int, Problem, StateArrays, Point, Place, StageInputs, int)
+@piece(int, Problem, StateArrays, Point, Configuration, StageInputs, int)
 def write_end(p, state, last, end, inputs, n):
     """Take the end of a step, its point n, into the state."""
-    bodies, held, position, rates = p.bodies, p.constrained, inputs.position[n], inputs.rates[n]
+    bodies, constrained, position, rates = p.bodies, p.constrained, inputs.position[n], inputs.rates[n]
     copy(last.velocity, state.velocity)
-    _write_velocity_of_held(held, end, rates, state)
+    _write_velocity_of_constrained(constrained, end, rates, state)
     momentum_at(p.fluid, end, last.velocity, state.fluid_excess)
     for i in range(state.fluid_excess.shape[0]):
         for c in range(3):
             state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]
     copy(last.spin, state.spin)
     _move_positions(state.position, state.position_low, last.displacement)
-    for k in range(held.node.shape[0]):
-        i = held.node[k]
+    for k in range(constrained.node.shape[0]):
+        i = constrained.node[k]
         for c in range(3):
             state.position[i, c], state.position_low[i, c] = end.position[i, c], 0.0
     _move_positions(state.body_position, state.body_position_low, last.body_displacement)
@@ -410,7 +413,7 @@ def write_end(p, state, last, end, inputs, n):
     return READY
 
 
-@piece(int, Problem, Place, StateArrays)
+@piece(int, Problem, Configuration, StateArrays)
 def write_shape(p, at, state):
     """Take positions, frames, and the poses of free bodies into the state."""
     bodies = p.bodies
@@ -442,11 +445,11 @@ def _write_frames(bodies, strands, at, state):
 
 
 @kernel
-def _write_velocity_of_held(held, end, rates, state):
-    for k in range(held.node.shape[0]):
-        if held.free[k] >= 0:
+def _write_velocity_of_constrained(constrained, end, rates, state):
+    for k in range(constrained.node.shape[0]):
+        if constrained.free[k] >= 0:
             continue
-        b, i = held.body[k], held.node[k]
+        b, i = constrained.body[k], constrained.node[k]
         w0, w1, w2 = rates[b, 3], rates[b, 4], rates[b, 5]
         state.velocity[i, 0] = rates[b, 0] + w1 * end.arm[k, 2] - w2 * end.arm[k, 1]
         state.velocity[i, 1] = rates[b, 1] + w2 * end.arm[k, 0] - w0 * end.arm[k, 2]
@@ -473,19 +476,19 @@ def _write_orthonormal(matrix, f, out, b):
 
 
 @kernel
-def _keep(rate, end, origin, length, carry):
+def _keep_derivative(rate, end, origin, length, carry):
     a, b, c = rate.reshape(rate.size), end.reshape(end.size), origin.reshape(origin.size)
     for i in range(a.shape[0]):
         a[i] = ((b[i] - c[i]) / length - carry * a[i]) / (1.0 - carry)
 
 
 @piece(int, StateArrays, Point, Point, float, float)
-def keep_slopes(state, origin, end, momentum_length, carry):
-    """Write the slopes of momenta at the end of the last stage of a step into the state."""
-    _keep(state.acceleration, end.velocity, origin.velocity, momentum_length, carry)
-    _keep(state.spin_acceleration, end.spin, origin.spin, momentum_length, carry)
-    _keep(state.body_acceleration, end.body_velocity, origin.body_velocity, momentum_length, carry)
-    _keep(state.body_moment, end.angular_momentum, origin.angular_momentum, momentum_length, carry)
-    _keep(state.fluid_force, end.fluid_momentum, origin.fluid_momentum, momentum_length, carry)
-    state.kept[0] = 1.0
+def keep_stage_derivatives(state, origin, end, momentum_length, carry):
+    """Write the stage derivatives of momenta at the end of the last stage of a step into the state."""
+    _keep_derivative(state.acceleration, end.velocity, origin.velocity, momentum_length, carry)
+    _keep_derivative(state.spin_acceleration, end.spin, origin.spin, momentum_length, carry)
+    _keep_derivative(state.body_acceleration, end.body_velocity, origin.body_velocity, momentum_length, carry)
+    _keep_derivative(state.body_moment, end.angular_momentum, origin.angular_momentum, momentum_length, carry)
+    _keep_derivative(state.fluid_force, end.fluid_momentum, origin.fluid_momentum, momentum_length, carry)
+    state.has_history[0] = 1.0
     return READY

@@ -8,22 +8,22 @@ from ..jit import call, kernel, piece, record_at
 from ..kinematics.copying import copy
 from ..model.records.outcome import (
     BACKTRACKS,
+    CONFIGURATION,
     FACTORISATIONS,
     GAP,
     ITERATIONS,
     PAIR,
-    PLACE,
     RESIDUAL,
     SWAPPED,
 )
 from ..model.records.problem import Problem
 from ..model.records.status import BEYOND, BLOCKED, CONVERGED, MAX_ITERATIONS, READY
-from ..model.records.step import Method, Place, StageInputs, StateArrays, Work
-from ..scene.transduction import grown, lagged
+from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
+from ..scene.transduction import eigenstrain_of, lagged
 from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, STEP, VALUE, WITHOUT_INERTIA
 from .stages import write_twist
 
-place_at = record_at(Place)
+configuration_at = record_at(Configuration)
 
 
 @kernel
@@ -40,10 +40,10 @@ def grow(drives, law_strain, rest_edge_out, rest_joint_out):
 
 @kernel
 def _compare_touched(sums, touched):
-    """Note which carriers something pushes; whether they are those of before."""
+    """Note which contact points something pushes; whether they are those of before."""
     same = True
     for i in range(touched.shape[0]):
-        pushed = sums.carrier[i, 0] != 0.0 or sums.carrier[i, 1] != 0.0 or sums.carrier[i, 2] != 0.0
+        pushed = sums.contact_point[i, 0] != 0.0 or sums.contact_point[i, 1] != 0.0 or sums.contact_point[i, 2] != 0.0
         same &= pushed == touched[i]
         touched[i] = pushed
     return same
@@ -58,7 +58,8 @@ def drive_stage(p, state, inputs, n, work):
         first, last = inputs.first[channel], inputs.stimulus[n, channel]
         lags = drives.law_rising[i], drives.law_falling[i]
         transduction[i] = lagged(state.transduction[i], first, last, lags[0], lags[1], inputs.elapsed[n])
-        strain[i] = grown(transduction[i], drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i])
+        law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
+        strain[i] = eigenstrain_of(transduction[i], law[0], law[1], law[2])
     grow(drives, strain, stage.rest_edge, stage.rest_joint)
     for i in range(stage.load_factor.shape[0]):
         stage.load_factor[i] = inputs.load_factor[n, i]
@@ -74,7 +75,7 @@ def _total(energy):
 
 
 @piece(int, Problem, StateArrays, StateArrays, Method, bool, int, StageInputs, Work, float, float, int)
-def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, max_iterations):
+def make_step(p, state, start_state, method, with_history, mode, inputs, work, h, tolerance, max_iterations):
     """Advance a state by a step of length h [s]; it changes only if every stage converged and its end can be reached.
 
     Everything happens in passes through one loop, because the compiler would make a copy of all that is called in two
@@ -93,7 +94,7 @@ def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, m
     method : Method
         For this step.
     keeps : bool
-        Whether the integrator of the run keeps slopes.
+        Whether the integrator of the run keeps stage derivatives.
     mode : int
         From `modes`.
     inputs : StageInputs
@@ -113,14 +114,14 @@ def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, m
     first, origin, end, stage = work.first, work.origin, work.end, work.stage
     counts, figures = p.outcome.counts, p.outcome.figures
     s, e, t = 0, 1, 2
-    call(p.calls.take_state, (p, state, place_at(work.places[s])))
+    call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
     points, stages = method.couplings.shape
     passes = 1
     if mode == STEP:
         passes = stages if points == stages else points + 1
-        call(p.calls.start_step_point, (p, state, place_at(work.places[s]), first))
+        call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), first))
         stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
-        work.turned[:] = 0.0
+        work.start_angle[:] = 0.0
     else:
         stage.lengths[:] = EVALUATION_TIME if mode == EVALUATE_STATE else h if mode == SETTLE else WITHOUT_INERTIA
     iterations = factorisations = backtracks = 0
@@ -132,24 +133,24 @@ def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, m
         beyond = mode == STEP and n == stages
         stays = mode != STEP or n == points
         position, rotation = inputs.position[point], inputs.rotation[point]
-        start = place_at(work.places[s])
+        start = configuration_at(work.configurations[s])
         if stays:
             call(p.calls.stand_still_stage, (p, state, start, mode == SETTLE or mode == COUNT, stage))
             position, rotation = state.body_position, state.body_rotation
         else:
-            call(p.calls.place_origin, (work, method, n))
+            call(p.calls.set_origin, (work, method, n))
             call(p.calls.drive_stage, (p, state, inputs, n, work))
             if beyond:
                 call(p.calls.predict_end, (p, state, work, inputs, n, previous, start))
             else:
-                if keeps and method.history:
-                    call(p.calls.move_along, (p, state, work, method, n, h))
+                if with_history and method.history:
+                    call(p.calls.add_history_to_origin, (p, state, work, method, n, h))
                 call(p.calls.predict_stage, (p, state, work, inputs, n, previous, start))
         status = READY
         if not beyond:
             status = call(p.calls.start_stage, (p, start, stage))
         if status == READY and (not stays or mode == SETTLE):
-            guess = place_at(work.places[e])
+            guess = configuration_at(work.configurations[e])
             status = call(p.calls.first_guess_of, (p, start, position, rotation, stage, guess, beyond))
             if status != READY:
                 pair, residual = counts[PAIR], math.inf
@@ -161,7 +162,7 @@ def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, m
         residual = 0.0
         if status == READY and not beyond:
             wanted = NEGATIVE if mode == COUNT else VALUE if stays and mode != SETTLE else MINIMUM
-            guess, scratch = place_at(work.places[e]), place_at(work.places[t])
+            guess, scratch = configuration_at(work.configurations[e]), configuration_at(work.configurations[t])
             status = call(p.calls.minimise_potential, (p, guess, scratch, stage, tolerance, max_iterations, wanted))
             if counts[SWAPPED]:
                 e, t = t, e
@@ -170,39 +171,39 @@ def make_step(p, state, kept, method, keeps, mode, inputs, work, h, tolerance, m
             backtracks += counts[BACKTRACKS]
             residual, gap = figures[RESIDUAL], figures[GAP]
         if mode == SETTLE and (status == CONVERGED or status == MAX_ITERATIONS):
-            work.moved[0] = call(p.calls.distance, (p, start, place_at(work.places[e])))
-            call(p.calls.write_shape, (p, place_at(work.places[e]), state))
+            work.moved[0] = call(p.calls.distance, (p, start, configuration_at(work.configurations[e])))
+            call(p.calls.write_shape, (p, configuration_at(work.configurations[e]), state))
         if stays and mode == STEP and (status != CONVERGED or not math.isfinite(_total(p.sums.energy))):
-            copy(kept.values, state.values)
+            copy(start_state.values, state.values)
             status, residual = BEYOND if status == CONVERGED else status, math.inf
         if mode != STEP or not (beyond or status == CONVERGED):
             break
         if stays:
-            write_twist(place_at(work.places[e]), state)
+            write_twist(configuration_at(work.configurations[e]), state)
             continue
         worst = max(worst, residual)
         last = origin
         if not beyond:
             last = end
-            call(p.calls.end_stage, (p, state, work, inputs, n, place_at(work.places[e])))
+            call(p.calls.end_stage, (p, state, work, inputs, n, configuration_at(work.configurations[e])))
         if n + 1 == points:
-            call(p.calls.write_end, (p, state, last, place_at(work.places[e]), inputs, n))
+            call(p.calls.write_end, (p, state, last, configuration_at(work.configurations[e]), inputs, n))
             for i in range(state.transduction.shape[0]):
                 state.transduction[i] = work.transduction[i]
-            if keeps:  # for the step after, which can take them if nothing touches anew
-                call(p.calls.keep_slopes, (state, origin, last, stage.lengths[1], method.carry))
-                state.kept[0] = _compare_touched(p.sums, work.touched)
+            if with_history:  # for the step after, which can take them if nothing touches anew
+                call(p.calls.keep_stage_derivatives, (state, origin, last, stage.lengths[1], method.carry))
+                state.has_history[0] = _compare_touched(p.sums, work.touched)
         if n + 1 < passes:
             if not beyond:
                 previous = end
-            copy(last.turn, work.turned)
+            copy(last.angle, work.start_angle)
             s, e = e, s
-            place_at(work.places[s]).turn[:] = 0.0
+            configuration_at(work.configurations[s]).total_angle[:] = 0.0
         if beyond:
             stage.lengths[:] = EVALUATION_TIME
     else:
         status, residual = CONVERGED, worst
-    counts[PAIR], counts[PLACE], counts[ITERATIONS] = pair, e, iterations
+    counts[PAIR], counts[CONFIGURATION], counts[ITERATIONS] = pair, e, iterations
     counts[FACTORISATIONS], counts[BACKTRACKS] = factorisations, backtracks
     figures[RESIDUAL], figures[GAP] = residual, gap
     return status

@@ -13,8 +13,8 @@ from ..model.model import Model
 from ..model.records.outcome import COUNTS, FIGURES
 from ..model.records.parts import ContactColumns, Plane, RodContact, RodContactList, Sliding, Slips, Space, Surfaces
 from ..model.records.problem import BorderedSystem, Outcome, Problem, Sums
-from ..model.records.status import NO_ROOM, NO_ROOM_FOR_RODS, NO_ROOM_IN_BORDER
-from ..model.records.step import Place, Point, Stage, Work
+from ..model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEEDED, ROD_CAPACITY_EXCEEDED
+from ..model.records.step import Configuration, Point, Stage, Work
 from ..model.rod_surfaces import NearPairs
 from ..model.sizes import sizes_of
 from .build import contact_columns_of, lasting_groups, plane_of, rod_contact_of, sliding_of, slips_of, surfaces_of
@@ -24,18 +24,18 @@ Array = np.ndarray
 PAIRS_PER_POINT = 8
 """Of rods near each other: for how many there is capacity at first."""
 FIRST = ("node", "edge", "pair", "body")
-"""Parts of `Sums.first`."""
+"""Parts of `Sums.gradients`."""
 SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
-"""Parts of `Sums.second`, with those of the dimension."""
+"""Parts of `Sums.hessians`, with those of the dimension."""
 IN_SPACE = ("top_hessian", "bottom_hessian")
 IN_PLANE = ("polar_hessian", "cross_hessian", "pair_hessian", "mixed_hessian")
 
 
 @dataclass
 class Capacity:
-    """For how much of what varies in number there is room."""
+    """For how much of what varies in number there is capacity."""
 
-    near: int  # pairs of carriers and surfaces
+    near: int  # pairs of contact points and surfaces
     contacts: int  # of rods
     sliding: int  # of them, at the start of a stage
     columns: int  # of the border
@@ -61,7 +61,7 @@ class Storage:
         require_computed(model.forces)
         self._model, self._sizes = model, sizes_of(model)
         points = len(model.rod_surfaces.point_edge) if model.rod_surfaces is not None else 0
-        near = self._sizes["carrier"] if model.meets_surfaces and self._sizes["surface"] else 0
+        near = self._sizes["contact_point"] if model.has_surface_contact and self._sizes["surface"] else 0
         self._capacity = Capacity(near, points, points, model.bodies.freedom.shape[1])
         self._pairs: NearPairs | None = None
         if points:
@@ -81,7 +81,7 @@ class Storage:
         first, sums = zeros_in_one(shapes_of(Sums, sizes, FIRST))
         second, parts = zeros_in_one(shapes_of(Sums, sizes, SECOND) | {("own", name): own[name] for name in names})
         sums |= {name: parts[name] for name in SECOND}
-        sums |= {"first": first, "second": second, "lasting": np.zeros_like(first)}
+        sums |= {"gradients": first, "hessians": second, "lasting": np.zeros_like(first)}
         sums["selected"] = np.ones(sizes["force"], dtype=bool)
         of_dimension = {name: parts["own", name] for name in names}
         if model.plane is None:
@@ -98,7 +98,7 @@ class Storage:
 
     def _make(self) -> Problem:
         model, capacity, before = self._model, self._capacity, self._problem
-        surfaces, rods = model.meets_surfaces, self._pairs is not None
+        surfaces, rods = model.has_surface_contact, self._pairs is not None
         sizes = self._sizes | {
             "near": capacity.near,
             "link": 2 * capacity.near,
@@ -107,7 +107,7 @@ class Storage:
             "path": PATH_SIZE,
         }
         border = rods or model.free_count
-        same = before is not None and surfaces and len(before.surfaces.near_carrier) == capacity.near
+        same = before is not None and surfaces and len(before.surfaces.near_contact_point) == capacity.near
         records = dict(
             **self._groups,
             bordered=BorderedSystem.zeros(sizes, width=self._width) if border else BorderedSystem.absent(),
@@ -144,16 +144,16 @@ class Storage:
         Contacts of friction, and which forces are selected, stay.
         """
         capacity, before = self._capacity, self.problem
-        if status == NO_ROOM:
+        if status == PAIR_CAPACITY_EXCEEDED:
             capacity.near = 2 * max(1, capacity.near)
-        elif status == NO_ROOM_FOR_RODS:
+        elif status == ROD_CAPACITY_EXCEEDED:
             found = int(before.rod_contact.contacts.count[0])
             if self._pairs.count > self._pairs.capacity:
                 self._pairs.reserve(2 * self._pairs.count)
             if found > capacity.contacts:
                 capacity.contacts = 2 * found
             capacity.sliding = max(capacity.sliding, capacity.contacts)
-        elif status == NO_ROOM_IN_BORDER:
+        elif status == BORDER_CAPACITY_EXCEEDED:
             capacity.columns = 2 * int(self._width[0])
         else:
             return False
@@ -169,20 +169,21 @@ def _take_over(old: Sliding | RodContactList, new: Sliding | RodContactList, cou
         target[used] = source[used]
 
 
-def new_configuration(model: Model) -> Place:
+def new_configuration(model: Model) -> Configuration:
     """Arrays of a configuration, of which everything that does not move is in place."""
     sizes, surfaces = sizes_of(model), model.surfaces
-    carrier, edges = np.zeros((sizes["carrier"], 3)), sizes["edge+wall"]
-    at = Place.zeros(
+    contact_point, edges = np.zeros((sizes["contact_point"], 3)), sizes["edge+clamp"]
+    at = Configuration.zeros(
         sizes,
-        carrier=carrier,
-        position=carrier[: model.node_count],
-        point=carrier[model.node_count :],
+        contact_point=contact_point,
+        position=contact_point[: model.node_count],
+        point=contact_point[model.node_count :],
         length=np.ones(edges),
         rotation=np.tile(np.eye(3), (sizes["body+world"], 1, 1)),
     )
     if not (surfaces.body < sizes["body"]).any():
-        at.surface_place[:], at.surface_arm[:], at.surface_turn[:] = surfaces.position, surfaces.position, surfaces.turn
+        at.surface_position[:], at.surface_arm[:] = surfaces.position, surfaces.position
+        at.surface_rotation[:] = surfaces.rotation
     return at
 
 
@@ -192,7 +193,7 @@ def new_point(sizes: dict[str, int]) -> Point:
     return Point.zeros(sizes, vectors=vectors, **parts)
 
 
-def new_work(model: Model, configurations: list[Place], stages: int) -> Work:
+def new_work(model: Model, configurations: list[Configuration], stages: int) -> Work:
     """Room for steps of so many stages."""
     sizes = sizes_of(model)
     first = new_point(sizes)
@@ -200,7 +201,7 @@ def new_work(model: Model, configurations: list[Place], stages: int) -> Work:
     stage.origin_rotation[-1] = np.eye(3)
     return Work.zeros(
         sizes | {"stage": stages, "point vector": first.vectors.size},
-        places=np.array([at.address for at in configurations], dtype=np.int64),
+        configurations=np.array([at.address for at in configurations], dtype=np.int64),
         stage=stage,
         first=first,
         origin=new_point(sizes),

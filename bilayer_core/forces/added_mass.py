@@ -50,15 +50,15 @@ import math
 
 from ..jit import call, kernel, piece
 from ..kinematics.copying import copy
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Fluid
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 
-ADDED_MASS = place_of("added mass")
+ADDED_MASS = slot_of("added mass")
 
 
-@piece(float, Fluid, Place)
+@piece(float, Fluid, Configuration)
 def fluid_momentum(fluid, at):
     """Write P of nodes and ∂T/∂(ε, θ) of edges at the velocities and spins in `fluid` there; return T [J]."""
     mass, edge_node, flow, velocity, spin = fluid.mass, fluid.edge_node, fluid.velocity, fluid.node_velocity, fluid.spin
@@ -96,7 +96,7 @@ def momentum_at(fluid, at, velocity, momentum_out):
     copy(fluid.momentum, momentum_out)
 
 
-@piece(float, Fluid, Problem, Place, Stage, bool)
+@piece(float, Fluid, Problem, Configuration, Stage, bool)
 def add_added_mass(fluid, p, at, stage, with_hessian):
     """Add the potential of the fluid's inertia and its derivatives by nodes and edges, z being where it was updated."""
     sums, h, momentum_length = p.sums, stage.lengths[0], stage.lengths[1]
@@ -104,7 +104,12 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
         return math.inf
     mass, edge_node, flow, shape_gradient = fluid.mass, fluid.edge_node, fluid.velocity, fluid.shape_gradient
     direction1, direction2, origin_momentum = fluid.direction1, fluid.direction2, stage.origin_fluid_momentum
-    position, origin, turn, predicted_turn = at.position, stage.origin_position, at.turn, stage.predicted_turn
+    position, origin, total_angle, predicted_angle = (
+        at.position,
+        stage.origin_position,
+        at.total_angle,
+        stage.predicted_angle,
+    )
     node_gradient, node_hessian = sums.node, sums.node_hessian
     edge_gradient, edge_hessian = sums.edge, sums.edge_hessian
     energy = 0.0
@@ -135,8 +140,8 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
             lengthening = position[first + 1, c] - origin[first + 1, c] - position[first, c] + origin[first, c]
             energy -= shape_gradient[k, c] * lengthening
             edge_gradient[k, c] -= shape_gradient[k, c]
-        inertia, ahead = mass[k, 2] / (h * momentum_length), turn[k] - predicted_turn[k]
-        energy += 0.5 * inertia * ahead**2 - shape_gradient[k, 3] * turn[k]
+        inertia, ahead = mass[k, 2] / (h * momentum_length), total_angle[k] - predicted_angle[k]
+        energy += 0.5 * inertia * ahead**2 - shape_gradient[k, 3] * total_angle[k]
         edge_gradient[k, 3] += inertia * ahead - shape_gradient[k, 3]
         if with_hessian:
             edge_hessian[k, 3, 3] += inertia
@@ -144,7 +149,7 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
     return math.inf
 
 
-@piece(bool, Fluid, Problem, Place, Stage)
+@piece(bool, Fluid, Problem, Configuration, Stage)
 def update_fluid(fluid, p, at, stage):
     """Make a configuration z: take directions and ∂T/∂q from it."""
     velocity, position, origin, h = fluid.node_velocity, at.position, stage.origin_position, stage.lengths[0]

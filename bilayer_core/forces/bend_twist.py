@@ -83,12 +83,12 @@ from ..kinematics.vector import (
     row,
     scaled,
 )
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Space
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 
-BENDING, TWISTING, BOND = map(place_of, ("bending", "twisting", "bond"))
+BENDING, TWISTING, BOND = map(slot_of, ("bending", "twisting", "bond"))
 TWO_PI = 2.0 * math.pi
 
 
@@ -104,7 +104,7 @@ def bend_by_strains(off_axis, strands, at, stage):
         k = joint[i]
         a, b = strands.joint_a[k], strands.joint_b[k]
         shift = 0.0
-        if slope[i, 0] != 0.0:  # a wall has none, and no rest length
+        if slope[i, 0] != 0.0:  # a clamp edge has none, and no rest length
             shift += slope[i, 0] * (length[a] - rest_length[a])
         if slope[i, 1] != 0.0:
             shift += slope[i, 1] * (length[b] - rest_length[b])
@@ -154,7 +154,7 @@ def stretch_bend(off_axis, strands, at, sums, with_hessian):
             cross_out[k, 3, n] -= k1 * sb * ta * b[n]
 
 
-@piece(float, Space, Problem, Place, Stage, bool)
+@piece(float, Space, Problem, Configuration, Stage, bool)
 def add_bending(_, p, at, stage, with_hessian):
     """Add bending and twisting, and bonds as far as they are of this kind, with their derivatives by edges.
 

@@ -38,12 +38,12 @@ from ..kinematics.vector import (
     row,
     scaled,
 )
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Space
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 
-BOND = place_of("bond")
+BOND = slot_of("bond")
 
 
 @kernel
@@ -89,7 +89,7 @@ def _strain_gradients(p, length, t, m1, m2):
     )
 
 
-@piece(float, Space, Problem, Place, Stage, bool)
+@piece(float, Space, Problem, Configuration, Stage, bool)
 def add_bonds(space, p, at, stage, with_hessian):
     """Add the translation of every pair of edges with its derivatives by their vector p and by edges."""
     strands, bonds, sums = p.strands, p.bonds, p.sums

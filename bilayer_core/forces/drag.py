@@ -22,12 +22,12 @@ import math
 
 from ..jit import kernel, piece
 from ..kinematics.vector import add_row, add_upper_outer_sum, combine, combine3, cross, dot, row, scaled
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Flow
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 
-DRAG = place_of("drag")
+DRAG = slot_of("drag")
 
 
 @kernel
@@ -41,7 +41,7 @@ def node_directions(before, after, at):
     return t, m, cross(t, m)
 
 
-@piece(float, Flow, Problem, Place, Stage, bool)
+@piece(float, Flow, Problem, Configuration, Stage, bool)
 def add_drag(flow, p, at, stage, with_hessian):
     """Add the dissipation potential of drag and its derivatives by nodes."""
     sums, h = p.sums, stage.lengths[0]
@@ -69,7 +69,7 @@ def add_drag(flow, p, at, stage, with_hessian):
     return math.inf
 
 
-@piece(bool, Flow, Problem, Place, Stage)
+@piece(bool, Flow, Problem, Configuration, Stage)
 def update_directions_of_drag(flow, p, at, stage):
     """Take the directions of drag from a configuration; whether there are any."""
     direction = flow.direction

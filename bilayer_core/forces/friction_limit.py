@@ -22,7 +22,7 @@ import math
 from ..contact.friction_law import friction_over_speed, friction_slope
 from ..jit import kernel, piece
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 from .rod_contact import rod_slip_along
 from .surface_friction import slip_paths
 
@@ -83,13 +83,13 @@ def friction_limit(count, path, threshold, slope, bound):
     return middle
 
 
-@piece(float, Problem, Place, Stage, float, float)
-def where_friction_holds(p, at, stage, slope, bound):
+@piece(float, Problem, Configuration, Stage, float, float)
+def limit_by_friction(p, at, stage, slope, bound):
     """`friction_limit` of the present step by all contacts; the matrix that it was solved with is that of `at`."""
     slips, sliding, system, count = p.slips, p.sliding, p.system, 0
     if sliding.exists:
         count = sliding.count[0]
-        slip_paths(sliding, p.surfaces, at, stage, system, slips.way)
+        slip_paths(sliding, p.surfaces, at, stage, system, slips.path)
     if p.rod_contact.exists:
-        count = rod_slip_along(p.rod_contact, stage, at.position, system.node_step, count, slips.way)
-    return friction_limit(count, slips.way, slips.threshold, slope, bound) if count > 0 else bound
+        count = rod_slip_along(p.rod_contact, stage, at.position, system.node_step, count, slips.path)
+    return friction_limit(count, slips.path, slips.threshold, slope, bound) if count > 0 else bound

@@ -31,20 +31,20 @@ import math
 
 from ..jit import kernel, piece
 from ..jit.stack import stack_matrix
-from ..kinematics.turning import real_part
-from ..model.force_places import place_of
+from ..kinematics.rotating import real_part
+from ..model.force_slots import slot_of
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 
-INERTIA, DAMPING, GRAVITY = map(place_of, ("inertia", "damping", "gravity"))
+INERTIA, DAMPING, GRAVITY = map(slot_of, ("inertia", "damping", "gravity"))
 
 
 @kernel
-def angle_spring(inertia, factor, turn, reference, edge_gradient_out):
+def angle_spring(inertia, factor, angle, reference, edge_gradient_out):
     """Add ½ factor Σ J (θ − θ_ref)² of edges, by their turns since the start of the step [rad], and return it [J]."""
     energy = 0.0
     for k in range(inertia.shape[0]):
-        difference = turn[k] - reference[k]
+        difference = angle[k] - reference[k]
         force = factor * inertia[k] * difference
         edge_gradient_out[k, 3] += force
         energy += 0.5 * force * difference
@@ -84,7 +84,7 @@ def second_moment_beyond(second_moment, f, reference_rotation, turned, s_out, n_
 
 
 @kernel
-def moment_of_turn(second_moment, f, reference_rotation, turned):
+def moment_of_rotation(second_moment, f, reference_rotation, turned):
     """ax(A) [kg m²] of free body f, as a tuple; parameters as for `second_moment_beyond`."""
     s, n, a = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
     second_moment_beyond(second_moment, f, reference_rotation, turned, s, n, a)
@@ -94,7 +94,8 @@ def moment_of_turn(second_moment, f, reference_rotation, turned):
 @kernel
 def body_inertia(bodies, factor, at, stage, sums, with_hessian):
     """Add the inertia of free bodies and its derivatives by (X, φ); return it [J]."""
-    mass, departure, turned, reference = bodies.mass, at.body_departure, at.body_turned, stage.predicted_body_rotation
+    mass, departure, turned = bodies.mass, at.body_departure, at.body_departure_quaternion
+    reference = stage.predicted_body_rotation
     gradient, hessian = sums.body, sums.body_hessian
     energy = 0.0
     s, n, a = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
@@ -120,7 +121,7 @@ def body_inertia(bodies, factor, at, stage, sums, with_hessian):
     return energy
 
 
-@piece(float, int, Problem, Place, Stage, bool)
+@piece(float, int, Problem, Configuration, Stage, bool)
 def add_inertial_forces(_, p, at, stage, with_hessian):
     """Add inertia, mass damping and gravity with their gradients by nodes, edges and free bodies."""
     strands, bodies, sums, h = p.strands, p.bodies, p.sums, stage.lengths[0]
@@ -134,7 +135,7 @@ def add_inertial_forces(_, p, at, stage, with_hessian):
             for c in range(3):
                 gradient[i, c] += weight * departure[i, c]
                 energy += 0.5 * weight * departure[i, c] * departure[i, c]
-        energy += angle_spring(spin_inertia, factor, at.turn, stage.predicted_turn, sums.edge)
+        energy += angle_spring(spin_inertia, factor, at.total_angle, stage.predicted_angle, sums.edge)
         sums.energy[INERTIA] = energy + body_inertia(bodies, factor, at, stage, sums, with_hessian)
     if p.damping > 0.0 and sums.selected[DAMPING]:
         factor = p.damping / h
@@ -145,7 +146,9 @@ def add_inertial_forces(_, p, at, stage, with_hessian):
                 moved = position[i, c] - origin[i, c]
                 gradient[i, c] += weight * moved
                 energy += 0.5 * weight * moved * moved
-        sums.energy[DAMPING] = energy + angle_spring(spin_inertia, factor, at.turn, stage.origin_turn, sums.edge)
+        sums.energy[DAMPING] = energy + angle_spring(
+            spin_inertia, factor, at.total_angle, stage.origin_angle, sums.edge
+        )
     g = p.gravity
     if (g[0] != 0.0 or g[1] != 0.0 or g[2] != 0.0) and sums.selected[GRAVITY]:
         energy = gravity(mass, g, position, gradient)

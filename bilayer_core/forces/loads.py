@@ -25,14 +25,14 @@ import math
 from ..jit import kernel, piece
 from ..jit.stack import stack_matrix
 from ..kinematics.vector import combine3
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Moments, PointForces
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 from .drag import node_directions
 
-MOMENTS = place_of("moments")
+MOMENTS = slot_of("moments")
 
 
 @kernel
@@ -56,17 +56,17 @@ def in_axes_of_body(vector, k, factor, rotation, f, vector_out):
             vector_out[k, c] += factor * rotation[f, c, a] * vector[k, a]
 
 
-@piece(float, PointForces, Problem, Place, Stage, bool)
+@piece(float, PointForces, Problem, Configuration, Stage, bool)
 def add_point_forces(loads, p, at, stage, with_hessian):
     """Add the potential of forces and its gradient by nodes and free bodies."""
     sums = p.sums
-    if sums.selected[loads.place]:
+    if sums.selected[loads.energy_slot]:
         energy = point_force(loads.node, loads.on_nodes, at.position, sums.node)
-        sums.energy[loads.place] = energy + point_force(loads.body, loads.on_bodies, at.body_position, sums.body)
+        sums.energy[loads.energy_slot] = energy + point_force(loads.body, loads.on_bodies, at.body_position, sums.body)
     return math.inf
 
 
-@piece(int, PointForces, Problem, Place, Stage)
+@piece(int, PointForces, Problem, Configuration, Stage)
 def start_dead_loads(loads, p, start, stage):
     """Forces of fixed direction by their factors at the stage."""
     for k in range(loads.node.shape[0]):
@@ -78,7 +78,7 @@ def start_dead_loads(loads, p, start, stage):
     return READY
 
 
-@piece(bool, PointForces, Problem, Place, Stage)
+@piece(bool, PointForces, Problem, Configuration, Stage)
 def update_followers(loads, p, at, stage):
     """Followers take their directions from a configuration; whether there are any."""
     node, body = loads.node, loads.body
@@ -94,7 +94,7 @@ def update_followers(loads, p, at, stage):
     return node.shape[0] + body.shape[0] > 0
 
 
-@piece(float, Moments, Problem, Place, Stage, bool)
+@piece(float, Moments, Problem, Configuration, Stage, bool)
 def add_moments(moments, p, at, stage, with_hessian):
     """Add −½ Σ M·ax(R R̃ᵀ) and its derivatives by the turns φ of free bodies."""
     sums = p.sums
@@ -130,7 +130,7 @@ def add_moments(moments, p, at, stage, with_hessian):
     return math.inf
 
 
-@piece(bool, Moments, Problem, Place, Stage)
+@piece(bool, Moments, Problem, Configuration, Stage)
 def update_moments(moments, p, at, stage):
     """Moments by their factors, those that follow in the axes of their bodies; whether any does."""
     body, dead = moments.body, moments.dead

@@ -27,18 +27,18 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel, piece
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Plane
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 from .bend_twist import bend_by_strains
 
-STRETCHING, BENDING, BOND = map(place_of, ("stretching", "bending", "bond"))
+STRETCHING, BENDING, BOND = map(slot_of, ("stretching", "bending", "bond"))
 
 
 @kernel
 def measure_in_plane(plane, strands, at):
-    """Write t and m = n/l of every edge and wall in the plane, (t_p, t_q, m_p, m_q), into `Plane.frame`."""
+    """Write t and m = n/l of every edge and clamp edge in the plane, (t_p, t_q, m_p, m_q), into `Plane.frame`."""
     axes, length, tangent, frame = strands.axes, at.length, at.tangent, plane.frame
     p0, p1, p2 = axes[0, 0], axes[0, 1], axes[0, 2]
     q0, q1, q2 = axes[1, 0], axes[1, 1], axes[1, 2]
@@ -118,14 +118,14 @@ def planar_stretch_bend(off_axis, plane, strands, at, with_hessian):
         gradient[b, 0] -= moment * sb
         if with_hessian:
             cosine = frame[a, 0] * frame[b, 0] + frame[a, 1] * frame[b, 1]
-            turning = 2.0 * side[a] * k1 / (1.0 + cosine)
+            rotating = 2.0 * side[a] * k1 / (1.0 + cosine)
             hessian[a, 0] += k1 * sa * sa
             hessian[b, 0] += k1 * sb * sb
-            hessian[a, 1] += turning * sa
-            hessian[b, 1] -= turning * sb
+            hessian[a, 1] += rotating * sa
+            hessian[b, 1] -= rotating * sb
             cross_hessian[k, 0] += k1 * sa * sb
-            cross_hessian[k, 1] -= turning * sa
-            cross_hessian[k, 2] += turning * sb
+            cross_hessian[k, 1] -= rotating * sa
+            cross_hessian[k, 2] += rotating * sb
 
 
 @kernel
@@ -175,7 +175,7 @@ def planar_bond(bonds, plane, strands, at, sums, with_hessian):
     return energy
 
 
-@piece(float, Plane, Problem, Place, Stage, bool)
+@piece(float, Plane, Problem, Configuration, Stage, bool)
 def add_elasticity_in_plane(plane, p, at, stage, with_hessian):
     """Add stretching, bending and bonds; first derivatives by edges and pairs in space, second ones by l, φ and p."""
     strands, bonds, off_axis, sums = p.strands, p.bonds, p.off_axis, p.sums

@@ -41,10 +41,10 @@ class Term:
         Its own record, from the model and from the records of a problem by name; None if it needs none, and absent if
         it does not act.
     add : Piece
-        Energies and derivatives at a configuration, added to `Sums`: of the own record, Problem, Place, Stage and
+        Energies and derivatives, added to `Sums`: of the own record, Problem, Configuration, Stage and
         whether second derivatives are asked for. Returns the smallest gap that it knows [m], or infinity.
     start : Piece or None
-        Freezes what a stage depends on: of the own record, Problem, Place and Stage. Returns a status.
+        Freezes what a stage depends on: of the own record, Problem, Configuration and Stage. Returns a status.
     follow : Piece or None
         Takes from a configuration what is held fixed between the moves of Newton's method, by the same arguments.
         Returns whether there is anything.
@@ -54,7 +54,7 @@ class Term:
     record: Callable[[Model, dict[str, Any]], Record | None]
     add: Piece
     start: Piece | None = None
-    follow: Piece | None = None
+    update_lagged: Piece | None = None
 
 
 TERMS: tuple[Term, ...] = (
@@ -67,10 +67,10 @@ TERMS: tuple[Term, ...] = (
     Term(("barrier",), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),
     Term(("friction",), lambda model, of: of["sliding"], add_surface_friction, start_surface_friction),
     Term(("rod barrier", "rod friction"), lambda model, of: of["rod_contact"], add_rod_contact, start_rod_contact),
-    Term(("followers",), lambda model, of: of["followers"], add_point_forces, follow=update_followers),
-    Term(("moments",), lambda model, of: of["moments"], add_moments, follow=update_moments),
-    Term(("drag",), lambda model, of: of["flow"], add_drag, follow=update_directions_of_drag),
-    Term(("added mass",), lambda model, of: of["fluid"], add_added_mass, follow=update_fluid),
+    Term(("followers",), lambda model, of: of["followers"], add_point_forces, update_lagged=update_followers),
+    Term(("moments",), lambda model, of: of["moments"], add_moments, update_lagged=update_moments),
+    Term(("drag",), lambda model, of: of["flow"], add_drag, update_lagged=update_directions_of_drag),
+    Term(("added mass",), lambda model, of: of["fluid"], add_added_mass, update_lagged=update_fluid),
 )
 """In the order of the sum; those that follow the configuration come last."""
 
@@ -105,7 +105,7 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
         own = term.record(model, records)
         if set(term.names) & set(model.forces) and (own is None or own.exists):
             chosen.append((term, own))
-    chosen.sort(key=lambda pair: pair[0].follow is not None)
+    chosen.sort(key=lambda pair: pair[0].update_lagged is not None)
 
     def column(value: Callable) -> np.ndarray:
         return np.array([value(*pair) for pair in chosen], dtype=np.int64)
@@ -114,8 +114,8 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
         own=column(lambda term, own: own.address if own is not None else 0),
         add=column(lambda term, own: term.add.address),
         start=column(lambda term, own: term.start.address if term.start else 0),
-        follow=column(lambda term, own: term.follow.address if term.follow else 0),
-        lasting=sum(term.follow is None for term, _ in chosen),
+        update_lagged=column(lambda term, own: term.update_lagged.address if term.update_lagged else 0),
+        lasting=sum(term.update_lagged is None for term, _ in chosen),
     )
     table.holds = [own for _, own in chosen]  # whose addresses are in it
     return table

@@ -46,20 +46,20 @@ from ..contact.segment import facing_contacts
 from ..jit import call, kernel, piece
 from ..jit.record import Matrix
 from ..jit.stack import stack_vector
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.outcome import STATUS
 from ..model.records.parts import RodContact
 from ..model.records.problem import Problem
-from ..model.records.status import NO_ROOM_FOR_RODS, READY
-from ..model.records.step import Place, Stage
+from ..model.records.status import READY, ROD_CAPACITY_EXCEEDED
+from ..model.records.step import Configuration, Stage
 
-ROD_BARRIER, ROD_FRICTION = map(place_of, ("rod barrier", "rod friction"))
+ROD_BARRIER, ROD_FRICTION = map(slot_of, ("rod barrier", "rod friction"))
 
 
 @piece(bool, Problem, Matrix, Matrix, float, float)
 def list_near_rods(p, position, step, fraction, move):
     """Have a list of near pairs for a part of a step of nodes from `position`, in which they move by `move` [m]; false
-    if there is no room for it.
+    if there is no capacity for it.
     """
     rods = p.rod_contact
     if list_serves(rods, position, step, fraction, move):
@@ -69,9 +69,9 @@ def list_near_rods(p, position, step, fraction, move):
     return end_list(rods)
 
 
-@piece(bool, Problem, Place)
+@piece(bool, Problem, Configuration)
 def find_rod_contacts(p, at):
-    """Find where rods are nearer to each other than the barrier distance; false if there is no room for that."""
+    """Find where rods are nearer to each other than the barrier distance; false if there is no capacity for that."""
     rods = p.rod_contact
     if not call(p.calls.list_near_rods, (p, at.position, rods.no_step, 0.0, 0.0)):
         return False
@@ -83,23 +83,23 @@ def find_rod_contacts(p, at):
     return found[0] <= rods.contacts.point.shape[0]
 
 
-@piece(float, Problem, Place)
+@piece(float, Problem, Configuration)
 def bound_between_rods(p, at):
     """Largest fraction of `System.node_step` that keeps rods apart; the status is left in `Outcome`."""
     rods, step, status = p.rod_contact, p.system.node_step, p.outcome.counts
     status[STATUS] = READY
     move, limit = reachable(step, rods.unit)
     if not call(p.calls.list_near_rods, (p, at.position, step, limit, limit * move)):
-        status[STATUS] = NO_ROOM_FOR_RODS
+        status[STATUS] = ROD_CAPACITY_EXCEEDED
         return 0.0
     return rod_step_bound(rods, at.position, step, limit, 2.0 * limit * move)
 
 
-@piece(int, RodContact, Problem, Place, Stage)
+@piece(int, RodContact, Problem, Configuration, Stage)
 def start_rod_contact(rods, p, start, stage):
     """Freeze the contacts of friction."""
     if not call(p.calls.find_rod_contacts, (p, start)):
-        return NO_ROOM_FOR_RODS
+        return ROD_CAPACITY_EXCEEDED
     found, sliding = rods.contacts, rods.sliding
     sliding.count[0] = found.count[0] if rods.slides else 0
     for c in range(sliding.count[0]):
@@ -113,14 +113,14 @@ def start_rod_contact(rods, p, start, stage):
     return READY
 
 
-@piece(float, RodContact, Problem, Place, Stage, bool)
+@piece(float, RodContact, Problem, Configuration, Stage, bool)
 def add_rod_contact(rods, p, at, stage, with_hessian):
     """Barrier and friction at the contacts found last; returns the smallest gap below the barrier distance [m]."""
     sums = p.sums
     if rods.contacts.count[0] > 0 and sums.selected[ROD_BARRIER]:
-        sums.energy[ROD_BARRIER] = _add_barrier(rods, at.position, sums.carrier)
+        sums.energy[ROD_BARRIER] = _add_barrier(rods, at.position, sums.contact_point)
     if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
-        sums.energy[ROD_FRICTION] = _add_friction(rods, stage, at.position, sums.carrier)
+        sums.energy[ROD_FRICTION] = _add_friction(rods, stage, at.position, sums.contact_point)
     return rods.gap[0]
 
 
@@ -221,7 +221,7 @@ def _add_friction(rods, stage, position, gradient):
 
 
 @kernel
-def rod_slip_along(rods, stage, position, node_step, begin, way_out):
+def rod_slip_along(rods, stage, position, node_step, begin, path_out):
     """Write the way of every lagged contact in a Newton step (`forces.friction_limit`): a is the direction of the slip.
 
     Parameters
@@ -232,7 +232,7 @@ def rod_slip_along(rods, stage, position, node_step, begin, way_out):
         Of nodes, and their displacement [m], shape (n_node, 3).
     begin : int
         Row of the first contact.
-    way_out : Array
+    path_out : Array
         Written: shape (≥ begin + number of contacts, `friction_limit.PATH_SIZE`).
 
     Returns
@@ -261,8 +261,8 @@ def rod_slip_along(rods, stage, position, node_step, begin, way_out):
             total += rate[m] * rate[m]
         size, k = math.sqrt(square), begin + c
         along = together / size if size > 0.0 else math.sqrt(total)
-        way_out[k, 0], way_out[k, 1] = size, along
-        way_out[k, 2], way_out[k, 3] = 0.0, math.sqrt(max(total - along * along, 0.0))
-        way_out[k, 4] = way_out[k, 5] = way_out[k, 6] = coefficient * coefficient
-        way_out[k, 7], way_out[k, 8] = contacts.normal_force[c], coefficient * stage.lengths[0]
+        path_out[k, 0], path_out[k, 1] = size, along
+        path_out[k, 2], path_out[k, 3] = 0.0, math.sqrt(max(total - along * along, 0.0))
+        path_out[k, 4] = path_out[k, 5] = path_out[k, 6] = coefficient * coefficient
+        path_out[k, 7], path_out[k, 8] = contacts.normal_force[c], coefficient * stage.lengths[0]
     return begin + contacts.count[0]

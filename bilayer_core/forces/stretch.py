@@ -13,15 +13,15 @@ import math
 
 from ..jit import piece
 from ..kinematics.vector import add_row, add_upper_outer, add_upper_projector, row
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Space
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 
-STRETCHING = place_of("stretching")
+STRETCHING = slot_of("stretching")
 
 
-@piece(float, Space, Problem, Place, Stage, bool)
+@piece(float, Space, Problem, Configuration, Stage, bool)
 def add_stretching(_, p, at, stage, with_hessian):
     """Add the stretching of every edge and its derivatives by edge vectors."""
     strands, sums = p.strands, p.sums

@@ -26,13 +26,13 @@ from ..contact.near import gap_normal
 from ..contact.shapes import shape_curvature
 from ..jit import call, kernel, piece
 from ..jit.stack import stack_matrix, stack_vector
-from ..model.force_places import place_of
+from ..model.force_slots import slot_of
 from ..model.records.parts import Surfaces
 from ..model.records.problem import Problem
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative
 
-BARRIER = place_of("barrier")
+BARRIER = slot_of("barrier")
 
 
 @kernel
@@ -47,7 +47,7 @@ def _in_world(axes, s, factor, h, m_out):
             m_out[i, j] = v0 * axes[s, j, 0] + v1 * axes[s, j, 1] + v2 * axes[s, j, 2]
 
 
-@piece(float, Surfaces, Problem, Place, Stage, bool)
+@piece(float, Surfaces, Problem, Configuration, Stage, bool)
 def add_surface_barrier(surfaces, p, at, stage, with_hessian):
     """Add the barrier between every contact point and every surface near it; returns the smallest gap [m].
 
@@ -62,8 +62,8 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
     g, n, arm, lever = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
     arm[0] = arm[1] = arm[2] = 0.0
     for k in range(surfaces.near_count[0]):
-        i, s = surfaces.near_carrier[k], surfaces.near_surface[k]
-        x0, x1, x2 = at.carrier[i, 0], at.carrier[i, 1], at.carrier[i, 2]
+        i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
+        x0, x1, x2 = at.contact_point[i, 0], at.contact_point[i, 1], at.contact_point[i, 2]
         d, n[0], n[1], n[2], p0, p1, p2 = gap_normal(surfaces, at, i, s, x0, x1, x2)
         surfaces.near_gap[k] = d
         min_gap = min(min_gap, d)
@@ -72,22 +72,22 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
         if d <= 0.0:
             energy = math.inf
             break
-        a, b = surfaces.carrier_body[i], surfaces.body[s]
+        a, b = surfaces.contact_point_body[i], surfaces.body[s]
         stiffness = surfaces.stiffness * surfaces.weight[i]
         energy += stiffness * barrier(d, d_hat)
         slope = stiffness * barrier_gradient(d, d_hat)
         for c in range(3):
             g[c] = slope * n[c]
-            lever[c] = at.carrier[i, c] - at.place[b, c]
-            sums.carrier[i, c] += g[c]
+            lever[c] = at.contact_point[i, c] - at.pose_position[b, c]
+            sums.contact_point[i, c] += g[c]
         if a >= 0:
             for c in range(3):
-                arm[c] = at.carrier[i, c] - at.place[a, c]
+                arm[c] = at.contact_point[i, c] - at.pose_position[a, c]
             add_force(sums.contact, a, 1.0, arm, g)
         add_force(sums.contact, b, -1.0, lever, g)
         if with_hessian:
             h = shape_curvature(surfaces.kind[s], size[s, 0], size[s, 1], size[s, 2], p0, p1, p2)
-            _in_world(at.surface_turn, s, slope, h, m)
+            _in_world(at.surface_rotation, s, slope, h, m)
             curvature = stiffness * barrier_hessian(d, d_hat)
             for c in range(3):
                 for e in range(c, 3):
@@ -97,7 +97,7 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
     return min_gap
 
 
-@piece(int, Surfaces, Problem, Place, Stage)
+@piece(int, Surfaces, Problem, Configuration, Stage)
 def start_surface_barrier(surfaces, p, start, stage):
     """List the pairs that are near at the start of a stage; returns a status."""
     return call(p.calls.list_surface_pairs, (surfaces, start, 0.0))

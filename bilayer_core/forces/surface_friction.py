@@ -31,15 +31,15 @@ from ..contact.near import gap_normal
 from ..jit import kernel, piece
 from ..jit.stack import stack_matrix, stack_vector
 from ..kinematics.copying import copy_matrix
-from ..kinematics.turning import product_transposed
-from ..model.force_places import place_of
+from ..kinematics.rotating import product_transposed
+from ..model.force_slots import slot_of
 from ..model.records.parts import Sliding
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Place, Stage
+from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative
 
-FRICTION = place_of("friction")
+FRICTION = slot_of("friction")
 
 
 @kernel
@@ -86,21 +86,22 @@ def _slip(sliding, surfaces, at, stage, k, arm_out, lever_out, slip_out):
     (not written for a node) and on that of the surface [m].
     """
     i = sliding.first[k]
-    a, b = surfaces.carrier_body[i], surfaces.body[sliding.surface[k]]
-    turn, origin_turn, position, origin = sliding.turn, sliding.origin_turn, at.place, stage.origin_place
+    a, b = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
+    rotation, origin_rotation = sliding.rotation, sliding.origin_rotation
+    position, origin = at.pose_position, stage.origin_pose_position
     for c in range(3):
         slip_out[c] = 0.0 if a >= 0 else at.position[i, c] - stage.origin_position[i, c]
         if a >= 0:
             now, before = 0.0, 0.0
             for d in range(3):
-                now += turn[a, c, d] * sliding.arm[k, d]
-                before += origin_turn[a, c, d] * sliding.arm[k, d]
+                now += rotation[a, c, d] * sliding.arm[k, d]
+                before += origin_rotation[a, c, d] * sliding.arm[k, d]
             arm_out[c] = now
             slip_out[c] += position[a, c] - origin[a, c] + (now - before)
         now, before = 0.0, 0.0
         for d in range(3):
-            now += turn[b, c, d] * sliding.lever[k, d]
-            before += origin_turn[b, c, d] * sliding.lever[k, d]
+            now += rotation[b, c, d] * sliding.lever[k, d]
+            before += origin_rotation[b, c, d] * sliding.lever[k, d]
         lever_out[c] = now
         slip_out[c] -= position[b, c] - origin[b, c] + (now - before)
 
@@ -121,7 +122,7 @@ def slip_paths(sliding, surfaces, at, stage, system, path_out):
     a, coefficient, step_length = sliding.axis, sliding.coefficient, stage.lengths[0]
     for k in range(sliding.count[0]):
         i = sliding.first[k]
-        body, under = surfaces.carrier_body[i], surfaces.body[sliding.surface[k]]
+        body, under = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
         _slip(sliding, surfaces, at, stage, k, arm, lever, slip)
         for c in range(3):
             rate[c] = 0.0 if body >= 0 else system.node_step[i, c]
@@ -141,14 +142,14 @@ def slip_paths(sliding, surfaces, at, stage, system, path_out):
         path_out[k, 8] = largest * step_length if largest > 0.0 else step_length
 
 
-@piece(float, Sliding, Problem, Place, Stage, bool)
+@piece(float, Sliding, Problem, Configuration, Stage, bool)
 def add_surface_friction(sliding, p, at, stage, with_hessian):
     """Add the dissipation potential of the lagged contacts; returns infinity, as it knows no gap."""
     surfaces, sums = p.surfaces, p.sums
     if not (sliding.acts and sums.selected[FRICTION]):
         return math.inf
     for b in range(at.rotation.shape[0]):
-        product_transposed(at.rotation, b, sliding.back, b, sliding.turn, b)
+        product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
     axis, coefficient, threshold = sliding.axis, sliding.coefficient, sliding.threshold
     arm, lever, u = stack_vector(3), stack_vector(3), stack_vector(3)
     g, q, across, hessian = stack_vector(3), stack_vector(3), stack_vector(3), stack_matrix(3, 3)
@@ -159,7 +160,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         largest = max(coefficient[i, 0], coefficient[i, 1], coefficient[i, 2])
         if largest == 0.0:
             continue
-        a, b = surfaces.carrier_body[i], surfaces.body[sliding.surface[k]]
+        a, b = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
         _slip(sliding, surfaces, at, stage, k, arm, lever, u)
         _across(sliding, k, across)
         forward = u[0] * axis[k, 0] + u[1] * axis[k, 1] + u[2] * axis[k, 2]
@@ -173,7 +174,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         for c in range(3):
             q[c] = ca * forward * axis[k, c] + cs * sideways * across[c]
             g[c] = ratio * q[c]
-            sums.carrier[i, c] += g[c]
+            sums.contact_point[i, c] += g[c]
         if a >= 0:
             add_force(sums.contact, a, 1.0, arm, g)
         add_force(sums.contact, b, -1.0, lever, g)
@@ -191,7 +192,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
     return math.inf
 
 
-@piece(int, Sliding, Problem, Place, Stage)
+@piece(int, Sliding, Problem, Configuration, Stage)
 def start_surface_friction(sliding, p, start, stage):
     """List the contacts at the start of a stage, with their normal forces, directions and arms; returns a status.
 
@@ -202,23 +203,23 @@ def start_surface_friction(sliding, p, start, stage):
         return READY
     for b in range(start.rotation.shape[0]):
         copy_matrix(start.rotation, b, sliding.back, b)
-        product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_turn, b)
+        product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_rotation, b)
     n, count = stack_vector(3), 0
     for k in range(surfaces.near_count[0]):
-        i, s = surfaces.near_carrier[k], surfaces.near_surface[k]
-        x0, x1, x2 = start.carrier[i, 0], start.carrier[i, 1], start.carrier[i, 2]
+        i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
+        x0, x1, x2 = start.contact_point[i, 0], start.contact_point[i, 1], start.contact_point[i, 2]
         d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, start, i, s, x0, x1, x2)
         if not 0.0 < d < surfaces.d_hat:
             continue
-        a, b = surfaces.carrier_body[i], surfaces.body[s]
+        a, b = surfaces.contact_point_body[i], surfaces.body[s]
         sliding.first[count], sliding.surface[count] = i, s
         sliding.load[count] = -surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
         below = surfaces.radius[i] if a >= 0 else surfaces.radius[i] + d
         for c in range(3):
-            touched = start.carrier[i, c] - below * n[c]
+            touched = start.contact_point[i, c] - below * n[c]
             sliding.normal[count, c] = n[c]
-            sliding.arm[count, c] = touched - start.place[a, c] if a >= 0 else 0.0
-            sliding.lever[count, c] = touched - start.place[b, c]
+            sliding.arm[count, c] = touched - start.pose_position[a, c] if a >= 0 else 0.0
+            sliding.lever[count, c] = touched - start.pose_position[b, c]
         axis = _forward(sliding, start, i, n[0], n[1], n[2])
         sliding.axis[count, 0], sliding.axis[count, 1], sliding.axis[count, 2] = axis
         count += 1

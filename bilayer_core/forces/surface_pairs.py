@@ -11,14 +11,14 @@ from ..jit import call, piece
 from ..model.records.outcome import PAIR, STATUS
 from ..model.records.parts import Surfaces
 from ..model.records.problem import Problem
-from ..model.records.status import NO_ROOM, READY
-from ..model.records.step import Place
+from ..model.records.status import PAIR_CAPACITY_EXCEEDED, READY
+from ..model.records.step import Configuration
 
 MOTION_MARGIN = 4.0
 """Margin of a list, in units of the motion that demands it."""
 
 
-@piece(int, Surfaces, Place, float)
+@piece(int, Surfaces, Configuration, float)
 def list_surface_pairs(surfaces, at, motion):
     """Make the list of near pairs valid at a configuration and whatever can be reached from it by `motion` [m].
 
@@ -28,16 +28,16 @@ def list_surface_pairs(surfaces, at, motion):
         return READY
     margin = max(surfaces.d_hat, MOTION_MARGIN * motion)
     count = list_near(surfaces, at, margin)
-    if count > surfaces.near_carrier.shape[0]:
+    if count > surfaces.near_contact_point.shape[0]:
         surfaces.margin[0] = -1.0
         surfaces.near_count[0] = 0
-        return NO_ROOM
+        return PAIR_CAPACITY_EXCEEDED
     surfaces.near_count[0] = count
     surfaces.margin[0] = margin
     return READY
 
 
-@piece(float, Problem, Place)
+@piece(float, Problem, Configuration)
 def bound_at_surfaces(p, at):
     """Largest fraction of the present step that keeps gaps to surfaces open; the near pair that sets it (−1: none) and
     a status are left in `Outcome`.

@@ -10,10 +10,10 @@ For q̇ = v, M v̇ = −∂V/∂q a stage is an implicit Euler step of length γ
     q = q̄ + γ h v,  M v = M v̄ − γ h ∂V/∂q   ⇔   minimise ½|q − q̃|²_M/(γ h)² + V(q),   q̃ = q̄ + γ h v̄,   v = (q − q̄)/(γ h)
 
 so every stage is the minimum of an incremental potential, and neither Newton nor contact knows which integrator runs.
-The slopes of earlier stages follow from their results; no force is evaluated for them.
+The stage derivatives of earlier stages follow from their results; no force is evaluated for them.
 
-An integrator may also begin with the slopes fₙ at the start of the step, which the step before has left (`History`),
-and may advance momenta over a length γ′ h that is not that of positions: then γ γ′ stands for γ² in the potential.
+An integrator may also begin with the derivatives fₙ at the start of the step, which the step before has left
+(`History`), and may advance momenta over a length γ′ h that is not that of positions: then γ γ′ stands for γ² in the potential.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ..model.records.step import Method as MethodArrays
 
 @dataclass(frozen=True)
 class History:
-    """How a method uses slopes at the start of a step. Where they jump, a step of another method stands in.
+    """How a method uses stage derivatives at the start of a step. Where they jump, a step of another method stands in.
 
     Attributes
     ----------
@@ -86,7 +86,7 @@ class Method:
     def __post_init__(self):
         if self.weights is not None and self.history is not None:
             raise ValueError(
-                f"{self.name}: slopes are those of a last stage that ends the step, so `weights` must be None"
+                f"{self.name}: the last stage has to end the step where derivatives are kept: `weights` must be None"
             )
 
     @property
@@ -95,7 +95,7 @@ class Method:
         return self.nodes if self.weights is None else (*self.nodes, 1.0)
 
     def arrays(self) -> MethodArrays:
-        """The coefficients as compiled loops take them; couplings are over γ, and `weights` are a row more of them."""
+        """The coefficients as the engine takes them; couplings are over γ, and `weights` are a row more of them."""
         stages, history = len(self.nodes), self.history
         rows = self.couplings if self.weights is None else (*self.couplings, self.weights)
         couplings = np.zeros((len(rows), stages))

@@ -1,6 +1,6 @@
 """SDIRK2 (Alexander 1977): two stages, order 2, L-stable and stiffly accurate, γ = 1 − 1/√2.
 
-    stage 1 at t + γ h from (qₙ, vₙ);   stage 2 at t + h, its origin (1 − γ) h along the slopes of stage 1
+    stage 1 at t + γ h from (qₙ, vₙ);   stage 2 at t + h, its origin (1 − γ) h along the stage derivatives of stage 1
 
 It starts from positions and velocities alone: a jump of a stimulus or a new contact at the beginning of a step leaves
 nothing behind. A stiff vibration (a contact) is gone after one step, as with implicit Euler; a slow one is damped at

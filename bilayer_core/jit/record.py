@@ -55,7 +55,7 @@ class RecordType(types.Type):
     fields : dict
         Numba type of each field.
     offset : dict
-        Place of each field [words].
+        Configuration of each field [words].
     """
 
     def __init__(self, declared: type[Record], fields: dict[str, types.Type]):

@@ -20,15 +20,15 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
     count = len(scene.bodies)
     velocity, angular_velocity = np.zeros((count, 3)), np.zeros((count, 3))
     freedom = []
-    for place, index in enumerate(free):
+    for slot, index in enumerate(free):
         motion = scene.bodies[index].motion
         allowed = np.zeros((6 * len(free), motions.shape[1] if isinstance(motion, Free) else 1))
         if isinstance(motion, Free):
             velocity[index], angular_velocity[index] = motion.velocity, motion.angular_velocity
-            allowed[6 * place : 6 * place + 6] = motions
+            allowed[6 * slot : 6 * slot + 6] = motions
         else:
             velocity[index] = motion.speed * np.array(motion.axis)
-            allowed[6 * place : 6 * place + 3, 0] = motion.axis
+            allowed[6 * slot : 6 * slot + 3, 0] = motion.axis
         freedom.append(allowed)
     shapes = tuple(shape_of(body.surface) if body.surface else None for body in scene.bodies)
     free_index = np.full(count + 1, -1, dtype=np.int64)
@@ -47,7 +47,7 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
         isotropic=np.array([np.array_equal(j, j[0, 0] * np.eye(3)) for j in moments], dtype=bool),
         second_moment=moments,
         freedom=np.concatenate(freedom, axis=1) if freedom else np.zeros((0, 0)),
-        reach=_reach(scene, found, shapes, free, moments),
+        bounding_radius=_bounding_radii(scene, found, shapes, free, moments),
         shapes=shapes,
         times=tuple(np.array(motion.times, dtype=float) for motion in schedules),
         displacements=tuple(np.array(motion.displacements, dtype=float).reshape(-1, 3) for motion in schedules),
@@ -55,22 +55,23 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
     )
 
 
-def _reach(
+def _bounding_radii(
     scene: SceneConfig, found: Collected, shapes: tuple[Shape | None, ...], free: list[int], moments: np.ndarray
 ) -> np.ndarray:
     """Largest distance of what each body, and last the world, carries from its position [m]: nodes, points, surface; of
     a free body without a surface at least its radius of gyration.
     """
-    reach = np.zeros(len(shapes) + 1)
+    bounding_radius = np.zeros(len(shapes) + 1)
     for index, moment in zip(free, moments, strict=True):
-        reach[index] = np.sqrt(np.trace(moment) / scene.bodies[index].motion.mass)
+        bounding_radius[index] = np.sqrt(np.trace(moment) / scene.bodies[index].motion.mass)
     for index, (body, shape) in enumerate(zip(scene.bodies, shapes, strict=True)):
         if shape is not None:
-            reach[index] = shape.bound if np.isfinite(shape.bound) else 0.0
-        reach[index] = max([reach[index], *(float(np.linalg.norm(point.position)) for point in body.contact_points)])
+            bounding_radius[index] = shape.bound if np.isfinite(shape.bound) else 0.0
+        distances = (float(np.linalg.norm(point.position)) for point in body.contact_points)
+        bounding_radius[index] = max([bounding_radius[index], *distances])
     arms = np.linalg.norm(found.column("attached_position", width=3), axis=1)
-    np.maximum.at(reach, found.column("attached_body", np.int64), arms)
-    return reach
+    np.maximum.at(bounding_radius, found.column("attached_body", np.int64), arms)
+    return bounding_radius
 
 
 def _second_moment(body: Body, shape: Shape | None) -> np.ndarray:

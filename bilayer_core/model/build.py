@@ -6,7 +6,7 @@ import numpy as np
 
 from ..scene.config import SceneConfig
 from .bodies import build_bodies
-from .carriers import build_contact, refuse_penetration
+from .contact_points import build_contact, refuse_penetration
 from .force_list import acting
 from .laminate import add_laminate
 from .layout import number_unknowns
@@ -42,10 +42,10 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found, plane)
-    carriers, surfaces = build_contact(scene, found, bodies)
-    walls = found.column("wall_tangent", width=3)
-    wall_a = _resolve_walls(found.column("joint_a", np.int64), edge_count)
-    wall_b = _resolve_walls(found.column("joint_b", np.int64), edge_count)
+    contact_points, surfaces = build_contact(scene, found, bodies)
+    clamp_edges = found.column("clamp_edge_tangent", width=3)
+    clamp_a = _resolve_clamp_edges(found.column("joint_a", np.int64), edge_count)
+    clamp_b = _resolve_clamp_edges(found.column("joint_b", np.int64), edge_count)
 
     def joined(name: str, dtype=float, width: int | None = None) -> np.ndarray:
         return np.concatenate([found.column(name, dtype, width), found.column(bond_joints + name, dtype, width)])
@@ -65,27 +65,27 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
             axes=plane.axes,
             normal=plane.normal,
             side=_sides(plane, found, bodies),
-            joint_after=_joints_after(wall_a, wall_b, edge_count),
+            joint_after=_joints_after(clamp_a, clamp_b, edge_count),
             layout=number_unknowns(*numbered, dimension=2),
         ),
         bodies=bodies,
-        carriers=carriers,
+        contact_points=contact_points,
         surfaces=surfaces,
         dead_loads=build_loads(scene, found, bodies, "world"),
         follower_loads=build_loads(scene, found, bodies, "material"),
         rod_surfaces=build_rod_surfaces(scene, found),
         node_count=found.node_count,
         edge_count=edge_count,
-        wall_count=len(walls),
-        bend_count=len(wall_a),
+        clamp_edge_count=len(clamp_edges),
+        bend_count=len(clamp_a),
         start_position=found.column("position", width=3),
-        start_director1=np.concatenate([found.column("director1", width=3), found.column("wall_director1", width=3)]),
-        wall_tangent=walls,
+        start_director1=np.concatenate([found.column(name, width=3) for name in ("director1", "clamp_edge_director1")]),
+        clamp_edge_tangent=clamp_edges,
         attached_node=attached,
         attached_body=found.column("attached_body", np.int64),
         attached_position=found.column("attached_position", width=3),
-        wall_body=found.column("attached_body", np.int64),
-        wall_joint=_joints_of_walls(wall_a, wall_b, edge_count, len(walls)),
+        clamp_edge_body=found.column("attached_body", np.int64),
+        clamp_edge_joint=_joints_of_clamp_edges(clamp_a, clamp_b, edge_count, len(clamp_edges)),
         drag_node=found.column("drag_node", np.int64),
         drag_edge=found.column("drag_edge", np.int64, 2),
         drag_coefficient=found.column("drag_coefficient", width=3),
@@ -110,8 +110,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         law_gain=laws[:, 3].copy(),
         law_reference=laws[:, 4].copy(),
         law_saturation=laws[:, 5].copy(),
-        joint_a=np.concatenate([wall_a, found.column("bond_joint_a", np.int64)]),
-        joint_b=np.concatenate([wall_b, found.column("bond_joint_b", np.int64)]),
+        joint_a=np.concatenate([clamp_a, found.column("bond_joint_a", np.int64)]),
+        joint_b=np.concatenate([clamp_b, found.column("bond_joint_b", np.int64)]),
         joint_stiffness=joined("joint_stiffness", width=3),
         joint_rest=joined("joint_rest", width=3),
         joint_node=joined("joint_node", np.int64),
@@ -129,12 +129,13 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
 
 
 def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
-    """Sign σ of m1 = σ normal × t of edges and walls, shape (n_edge + n_wall,)."""
+    """Sign σ of m1 = σ normal × t of edges and clamp edges, shape (n_edge + n_clamp_edge,)."""
     turn = bodies.start_rotation[found.column("attached_body", np.int64)]
-    walls = [np.einsum("kij,kj->ki", turn, found.column(f"wall_{name}", width=3)) for name in ("tangent", "director1")]
+    columns = [found.column(f"clamp_edge_{name}", width=3) for name in ("tangent", "director1")]
+    clamp_edges = [np.einsum("kij,kj->ki", turn, column) for column in columns]
     tangent, director1 = (
-        np.concatenate([found.column(name, width=3), of_walls])
-        for name, of_walls in zip(("tangent", "director1"), walls, strict=True)
+        np.concatenate([found.column(name, width=3), of_clamp_edges])
+        for name, of_clamp_edges in zip(("tangent", "director1"), clamp_edges, strict=True)
     )
     return np.sign(np.einsum("ki,ki->k", director1, np.cross(plane.normal, tangent)))
 
@@ -147,14 +148,14 @@ def _joints_after(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int) -> 
     return joints
 
 
-def _resolve_walls(edges: np.ndarray, edge_count: int) -> np.ndarray:
-    """Edges of joints; walls were entered as −1 − wall because the number of edges was not known then."""
+def _resolve_clamp_edges(edges: np.ndarray, edge_count: int) -> np.ndarray:
+    """Edges of joints; clamp edges were entered as −1 − clamp edge because the number of edges was not known then."""
     return np.where(edges < 0, edge_count - 1 - edges, edges)
 
 
-def _joints_of_walls(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int, walls: int) -> np.ndarray:
-    """The joint that each wall takes part in, shape (n_wall,)."""
-    joints = np.empty(walls, dtype=np.int64)
+def _joints_of_clamp_edges(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int, clamp_edges: int) -> np.ndarray:
+    """The joint that each clamp edge takes part in, shape (n_clamp_edge,)."""
+    joints = np.empty(clamp_edges, dtype=np.int64)
     for edges in (joint_a, joint_b):
         of_wall = np.flatnonzero(edges >= edge_count)
         joints[edges[of_wall] - edge_count] = of_wall

@@ -43,7 +43,7 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
     model : str
         ``"laminate"`` or ``"two_rod"``.
     history : str
-        Name of the integrator if it keeps slopes from step to step, else empty.
+        Name of the integrator if it keeps stage derivatives from step to step, else empty.
     """
     used = {layer.material for rod in scene.rods for layer in rod.layers}
     fluid = scene.fluid if scene.fluid is not None and scene.fluid.added_mass is not None else None

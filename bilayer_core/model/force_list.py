@@ -1,7 +1,7 @@
 """The list of forces, from which the plan, the engine, the energy budget and the documentation take theirs.
 
 A force has its line here and its formula in `forces/`; the part of the engine that computes it asks for its place by
-name (`model.force_places.place_of`). An engine refuses to be built for a scene that needs a force that no term of
+name (`model.force_slots.slot_of`). An engine refuses to be built for a scene that needs a force that no term of
 `forces.register` computes.
 """
 
@@ -15,8 +15,8 @@ from functools import cached_property
 from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
 from ..scene.load import Load
-from .meeting import Meeting, meetings
-from .parties import contact_pairs
+from .colliders import contact_pairs
+from .rod_pairs import RodPair, rod_pairs
 
 
 class Kind(Enum):
@@ -42,14 +42,14 @@ class Question:
         return contact_pairs(self.scene)
 
     @cached_property
-    def meetings(self) -> tuple[Meeting, ...]:
+    def rod_pairs(self) -> tuple[RodPair, ...]:
         """Rods that may meet each other or themselves."""
-        return meetings(self.scene)
+        return rod_pairs(self.scene)
 
     @property
     def rods_touch(self) -> bool:
         """Whether the contact of any rods is computed."""
-        return any(meeting.active for meeting in self.meetings)
+        return any(rod_pair.active for rod_pair in self.rod_pairs)
 
     def loads(self, frame: str) -> list[Load]:
         """Those that are fixed in the frame of the world, or of the material."""
@@ -119,10 +119,10 @@ def _friction(q: Question) -> str | None:
 def _rod_barrier(q: Question) -> str | None:
     if q.rods_touch:
         return None
-    reasons = {meeting.reason for meeting in q.meetings}
+    reasons = {rod_pair.reason for rod_pair in q.rod_pairs}
     if len(reasons) == 1:
         return reasons.pop()
-    return "; ".join(f"{meeting.what}: {meeting.reason}" for meeting in q.meetings)
+    return "; ".join(f"{rod_pair.what}: {rod_pair.reason}" for rod_pair in q.rod_pairs)
 
 
 def _rod_friction(q: Question) -> str | None:

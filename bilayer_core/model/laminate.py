@@ -50,8 +50,8 @@ def add_laminate(
     axis = _axis(layers)
     shape = strand_shape(rod, np.full(rod.stations, axis), 0, rod.stations - 1, turn)
     halves = [
-        layer_halves(scene, rod, place, axis, shape, layer.length / shape.lengths, layer.present)
-        for place, layer in enumerate(layers)
+        layer_halves(scene, rod, slot, axis, shape, layer.length / shape.lengths, layer.present)
+        for slot, layer in enumerate(layers)
     ]
     whole = WholeSection(scene, rod, halves, shape)
     low, high = _faces(rod, axis)
@@ -96,16 +96,16 @@ def add_laminate(
 def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
     nodes, edges = np.arange(rod.stations), np.arange(rod.stations - 1)
     layers = []
-    for place, layer in enumerate(rod.layers):
+    for slot, layer in enumerate(rod.layers):
         first, last = rod.covered_stations(layer)
-        height = side(rod, place) * values_at(layer.thickness, rod.edge_length * nodes)
+        height = side(rod, slot) * values_at(layer.thickness, rod.edge_length * nodes)
         section = sections(rod, layer, scene.materials[layer.material], edges + 0.5)
         layers.append(
             _Placed(
                 section,
                 (first <= edges) & (edges < last),
                 strand_shape(rod, height, 0, rod.stations - 1, lambda vectors, about=False: vectors).lengths,
-                side(rod, place) * section.thickness,
+                side(rod, slot) * section.thickness,
             )
         )
     return layers
@@ -137,7 +137,7 @@ def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandAr
     """Each layer on those nodes of a laminate's strand where it is."""
     _, thickness = outline(rod, np.arange(rod.stations))
     layers = []
-    for place, layer in enumerate(rod.layers):
+    for slot, layer in enumerate(rod.layers):
         first, last = rod.covered_stations(layer)
         own = slice(first, last + 1)
         layers.append(
@@ -150,8 +150,8 @@ def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandAr
                 node_count=last - first + 1,
                 first_edge=strand.first_edge + first,
                 width=strand.width[own],
-                thickness=thickness[place, own],
-                offset=side(rod, place) * thickness[place, own] - axis,
+                thickness=thickness[slot, own],
+                offset=side(rod, slot) * thickness[slot, own] - axis,
                 curvature=strand.curvature[own],
             )
         )

@@ -48,9 +48,9 @@ ON_AXIS = 1e-12
 """Of √(AD): a coupling B that is rounding."""
 
 
-def side(rod: Rod, place: int) -> float:
+def side(rod: Rod, slot: int) -> float:
     """Height of a layer's middle over the path, in its thicknesses."""
-    return 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[place]
+    return 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,10 @@ class LayerHalves:
 
 
 def layer_halves(
-    scene: SceneConfig, rod: Rod, place: int, axis: float, shape: StrandShape, stretch: Array, present: Array
+    scene: SceneConfig, rod: Rod, slot: int, axis: float, shape: StrandShape, stretch: Array, present: Array
 ) -> LayerHalves:
     """A layer in the halves of edges; `stretch` is λ, shape (n_edge,)."""
-    layer = rod.layers[place]
+    layer = rod.layers[slot]
     stations = (np.arange(rod.stations - 1)[:, None] + [0.25, 0.75]).ravel()
     section = sections(rod, layer, scene.materials[layer.material], stations)
     along = rod.edge_length * stations
@@ -99,7 +99,7 @@ def layer_halves(
         twist=twist / ratio,
         twist_moment=twist * values_at(layer.natural_twist, along).reshape(-1, 2),
         natural_moment=moment,
-        height=side(rod, place) * section.thickness.reshape(-1, 2) - axis,
+        height=side(rod, slot) * section.thickness.reshape(-1, 2) - axis,
     )
 
 

@@ -38,7 +38,7 @@ class Bodies(ReadOnlyArrays):
     freedom: (
         Array  # motions (X, φ) that free bodies are allowed, one a column, orthonormal, shape (6 n_free, n_freedom)
     )
-    reach: Array  # largest distance of what a body carries, or a radius of gyration [m], shape (n_body + 1,)
+    bounding_radius: Array  # largest distance of what a body carries, or a radius of gyration [m], shape (n_body + 1,)
     shapes: tuple[Shape | None, ...]  # surface of each body
     times: tuple[Array, ...]  # keyframes of each prescribed body [s]
     displacements: tuple[Array, ...]  # and its displacements there [m], shape (n_keyframe, 3)
@@ -46,26 +46,26 @@ class Bodies(ReadOnlyArrays):
 
 
 @dataclass(frozen=True)
-class Carriers(ReadOnlyArrays):
+class ContactPoints(ReadOnlyArrays):
     """Points with a radius that feel surfaces: all nodes, then *points* of bodies (contact points of the scene; corners
     and rims of surfaces), then *centres* of balls and points of obstacles.
     """
 
-    weight: Array  # Δl of the barrier [m], shape (n_carrier,)
-    radius: Array  # distance of the farther face, offset, or radius [m], shape (n_carrier,)
-    friction: Array  # coefficients forward, backward and sideways, shape (n_carrier, 3)
+    weight: Array  # Δl of the barrier [m], shape (n_contact_point,)
+    radius: Array  # distance of the farther face, offset, or radius [m], shape (n_contact_point,)
+    friction: Array  # coefficients forward, backward and sideways, shape (n_contact_point, 3)
     node_edges: Array  # edges before and after each node, the same at an end, shape (n_node, 2)
     node_axis: Array  # which direction counts as forward: 0 t, 1 m1, 2 m2, shape (n_node,)
-    body: Array  # body that takes the force, −1 for nodes, shape (n_carrier,)
-    follows: Array  # body that moves it, −1 for nodes that none holds, shape (n_carrier,)
-    position: Array  # of points and centres in the body's frame [m], shape (n_carrier − n_node, 3)
+    body: Array  # body that takes the force, −1 for nodes, shape (n_contact_point,)
+    moved_by: Array  # body that moves it, −1 for nodes that none holds, shape (n_contact_point,)
+    position: Array  # of points and centres in the body's frame [m], shape (n_contact_point − n_node, 3)
     point_count: int
-    group: Array  # carriers of a group meet the same surfaces, shape (n_carrier,)
+    group: Array  # contact points of a group meet the same surfaces, shape (n_contact_point,)
 
 
 @dataclass(frozen=True)
 class Surfaces(ReadOnlyArrays):
-    """Surfaces that carriers can meet: obstacles, then bodies'. See `contact.shapes` for their numbers."""
+    """Surfaces that contact points can meet: obstacles, then bodies'. See `contact.shapes` for their numbers."""
 
     names: tuple[str, ...]
     kind: Array  # shape (n_surface,)
@@ -74,8 +74,8 @@ class Surfaces(ReadOnlyArrays):
     bound: Array  # radius of a ball about the position that holds it [m], shape (n_surface,)
     body: Array  # body that it belongs to, or the world, shape (n_surface,)
     position: Array  # in the body's frame [m], shape (n_surface, 3)
-    turn: Array  # its own axes in the body's frame, shape (n_surface, 3, 3)
-    meets: Array  # whether carriers of a group can meet it, shape (n_surface, n_group)
+    rotation: Array  # its own axes in the body's frame, shape (n_surface, 3, 3)
+    can_collide: Array  # whether contact points of a group can meet it, shape (n_surface, n_group)
 
 
 @dataclass(frozen=True)
@@ -109,9 +109,9 @@ class PointLoads:
 class Model(ReadOnlyArrays):
     """Flat arrays of a scene; indices run over strands in order, and along each strand.
 
-    Edges n_edge … n_edge + n_wall − 1 are the fixed directions of clamps ("walls"). *Joints* are pairs of edges with
-    a bending and
-    twisting element: inner nodes and clamps first (`bend_count`), then the rotation bonds of paired layers.
+    Edges n_edge … n_edge + n_clamp_edge − 1 are *clamp edges*, the fixed directions of clamps. *Joints* are pairs of
+    edges with a bending and twisting element: inner nodes and clamps first (`bend_count`), then the rotation bonds of
+    paired layers.
     """
 
     scene: SceneConfig
@@ -120,7 +120,7 @@ class Model(ReadOnlyArrays):
     layout: Layout
     plane: InPlane | None  # None in three dimensions
     bodies: Bodies
-    carriers: Carriers
+    contact_points: ContactPoints
     surfaces: Surfaces
     dead_loads: PointLoads  # of fixed direction
     follower_loads: PointLoads  # along path, normal and path × normal of a rod, or in the axes of a body
@@ -128,17 +128,19 @@ class Model(ReadOnlyArrays):
 
     node_count: int
     edge_count: int
-    wall_count: int
+    clamp_edge_count: int
     bend_count: int
 
     start_position: Array  # of nodes [m], shape (n_node, 3)
-    start_director1: Array  # of edges, and of walls in the frame of their bodies, unit, shape (n_edge + n_wall, 3)
-    wall_tangent: Array  # in the frame of its body, unit, shape (n_wall, 3)
+    start_director1: (
+        Array  # of edges, and of clamp edges in their bodies' frames, unit, shape (n_edge + n_clamp_edge, 3)
+    )
+    clamp_edge_tangent: Array  # in the frame of its body, unit, shape (n_clamp_edge, 3)
     attached_node: Array  # nodes held by bodies, shape (n_attached,)
     attached_body: Array  # shape (n_attached,)
     attached_position: Array  # in the body's frame [m], shape (n_attached, 3)
-    wall_body: Array  # body of each wall, shape (n_wall,)
-    wall_joint: Array  # joint of each wall, shape (n_wall,)
+    clamp_edge_body: Array  # body of each clamp edge, shape (n_clamp_edge,)
+    clamp_edge_joint: Array  # joint of each clamp edge, shape (n_clamp_edge,)
 
     drag_node: Array  # nodes that carry a share of their station's drag, shape (n_drag,)
     drag_edge: Array  # edges before and after each, shape (n_drag, 2)
@@ -175,7 +177,7 @@ class Model(ReadOnlyArrays):
     joint_node: Array  # node at which a bend acts, −1 for bonds, shape (n_joint,)
     voronoi_length: Array  # of bends and clamps [m], shape (bend_count,)
     coupled_joint: Array  # joints whose κ̄₁ depends on the strains of their edges, shape (n_coupled,)
-    strain_coupling: Array  # b of either edge, 0 for a wall [rad], shape (n_coupled, 2)
+    strain_coupling: Array  # b of either edge, 0 for a clamp edge [rad], shape (n_coupled, 2)
 
     pair_top: Array  # paired edges, shape (n_pair,)
     pair_bottom: Array
@@ -184,21 +186,21 @@ class Model(ReadOnlyArrays):
 
     @property
     def strain_slope(self) -> Array:
-        """b/|ē| of coupled joints [rad/m], 0 for a wall, shape (n_coupled, 2), read-only: ∂κ̄₁ by lengths of edges."""
+        """b/|ē| of coupled joints [rad/m], 0 for a clamp edge, shape (n_coupled, 2): ∂κ̄₁ by lengths."""
         edges = np.stack([self.joint_a, self.joint_b], axis=1)[self.coupled_joint]
-        slope = self.strain_coupling / np.concatenate([self.rest_length, np.ones(self.wall_count)])[edges]
+        slope = self.strain_coupling / np.concatenate([self.rest_length, np.ones(self.clamp_edge_count)])[edges]
         slope.flags.writeable = False
         return slope
 
     @property
     def point_count(self) -> int:
         """Number of contact points of bodies, corners and rims of their surfaces among them."""
-        return self.carriers.point_count
+        return self.contact_points.point_count
 
     @property
-    def meets_surfaces(self) -> bool:
-        """Whether any carrier can meet a surface."""
-        return self.scene.contact is not None and bool(self.surfaces.meets.any())
+    def has_surface_contact(self) -> bool:
+        """Whether any contact point can meet a surface."""
+        return self.scene.contact is not None and bool(self.surfaces.can_collide.any())
 
     @property
     def free_count(self) -> int:
@@ -234,9 +236,9 @@ class Model(ReadOnlyArrays):
         return self.bodies.free_index[self.attached_body]
 
     @property
-    def wall_free(self) -> Array:
-        """Free body of each wall, −1 if its body is prescribed, shape (n_wall,)."""
-        return self.bodies.free_index[self.wall_body]
+    def clamp_edge_free(self) -> Array:
+        """Free body of each clamp edge, −1 if its body is prescribed, shape (n_clamp_edge,)."""
+        return self.bodies.free_index[self.clamp_edge_body]
 
 
 def keyframes_about(times: Array, values: Array, time: float) -> tuple[float, float, Array, Array]:

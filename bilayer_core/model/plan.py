@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from ..errors import SceneError
 from ..scene.config import Coupling, SceneConfig
 from ..scene.profile import extremes
+from .colliders import contact_pairs
 from .force_list import planned
 from .laminate import uneven_faces
-from .meeting import meetings, passing_warnings
-from .parties import contact_pairs
 from .planarity import find_plane, require_plane
+from .rod_pairs import passing_warnings, rod_pairs
 from .validity import validity_warnings
 
 MODELS = ("two_rod", "laminate")
@@ -113,4 +113,4 @@ def _choose(key: str, asked, of_scene, allowed: tuple) -> tuple | None:
 
 
 def _contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
-    return (*contact_pairs(scene), *(meeting.what for meeting in meetings(scene) if meeting.active))
+    return (*contact_pairs(scene), *(rod_pair.what for rod_pair in rod_pairs(scene) if rod_pair.active))

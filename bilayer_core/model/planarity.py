@@ -67,7 +67,7 @@ class _Survey:
     def __init__(self, scene: SceneConfig, plane: Plane):
         self._scene, self._plane, self._normal = scene, plane, plane.normal
         self._size = max(rod.path.length for rod in scene.rods)
-        self._reach = max(
+        self._extent = max(
             (abs(self._height(self._place(body, p.position))) for body in scene.bodies for p in body.contact_points),
             default=0.0,
         )
@@ -190,7 +190,7 @@ class _Survey:
 
     def _fits(self, shape: Shape, position: Array, turn: Array, free: bool = False) -> bool:
         """Whether a surface is symmetric about the plane, or runs on along the normal wherever it can be touched."""
-        axes = turn @ shape.turn
+        axes = turn @ shape.rotation
         if shape.kind == "plane":
             return self._lies_in(axes[:, 2])
         if shape.kind == "sphere":
@@ -202,4 +202,4 @@ class _Survey:
             return False
         if free or self._free_surface:
             return self._is_on(position)
-        return self._is_on(position) or abs(self._height(position)) + self._reach <= shape.core[along]
+        return self._is_on(position) or abs(self._height(position)) + self._extent <= shape.core[along]

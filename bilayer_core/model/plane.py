@@ -60,7 +60,7 @@ class InPlane(ReadOnlyArrays):
     axes, normal : Array
         Of the plane, shapes (2, 3), (3,).
     side : Array
-        σ of every edge and wall: m1 = σ normal × t, m2 = σ normal, shape (n_edge + n_wall,).
+        σ of every edge and clamp edge: m1 = σ normal × t, m2 = σ normal, shape (n_edge + n_clamp_edge,).
     joint_after : Array
         Joint between each edge and the next one, −1 at the end of a strand, shape (n_edge,).
     layout : Layout

@@ -10,7 +10,7 @@ import numpy as np
 from ..contact.broad_phase import RodSearch, near_pairs, scratch
 from ..scene.config import SceneConfig
 from .layout import ReadOnlyArrays
-from .meeting import meetings
+from .rod_pairs import rod_pairs
 from .strands import Collected
 from .validity import EdgeFigures
 
@@ -40,25 +40,25 @@ class RodSurfaces(ReadOnlyArrays):
     point_fraction: Array  # place on its edge, 0 … 1, shape (n_point,)
     point_arc: Array  # along the path of its rod [m], shape (n_point,)
     point_weight: Array  # Δl [m], shape (n_point,)
-    rod_meets: Array  # whether two rods, or one and itself, can meet, shape (n_rod, n_rod)
+    rod_can_collide: Array  # whether two rods, or one and itself, can meet, shape (n_rod, n_rod)
     rod_joined: Array  # whether one body holds both, or both ends of one, shape (n_rod, n_rod)
     rod_exclusion: Array  # arc distance from which on a rod sees itself [m], shape (n_rod,)
 
 
 def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | None:
     """The surfaces of rods, or None if none of them can meet."""
-    decisions = [meeting for meeting in meetings(scene) if meeting.active]
+    decisions = [rod_pair for rod_pair in rod_pairs(scene) if rod_pair.active]
     if not decisions:
         return None
     place = [index for index, rod in enumerate(scene.rods) for _ in rod.copies]  # of each expanded rod in the scene
     rods = [scene.rods[index] for index in place]
     names = [name for rod in scene.rods for name in rod.copies]
-    meets = np.zeros((len(rods), len(rods)), dtype=bool)
-    for meeting in decisions:
-        for a in (i for i, p in enumerate(place) if p == meeting.first):
-            for b in (i for i, p in enumerate(place) if p == meeting.second):
-                if meeting.first != meeting.second or (a != b) == meeting.copies:
-                    meets[a, b] = meets[b, a] = True
+    can_collide = np.zeros((len(rods), len(rods)), dtype=bool)
+    for rod_pair in decisions:
+        for a in (i for i, p in enumerate(place) if p == rod_pair.first):
+            for b in (i for i, p in enumerate(place) if p == rod_pair.second):
+                if rod_pair.first != rod_pair.second or (a != b) == rod_pair.copies:
+                    can_collide[a, b] = can_collide[b, a] = True
     joined = np.array(
         [[_joined(a, b, itself=i == j) for j, b in enumerate(rods)] for i, a in enumerate(rods)], dtype=bool
     )
@@ -77,7 +77,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         length = found.column("rest_length")[strand.first_edge : strand.first_edge + strand.node_count - 1]
         radius = float(node_radius[strand.first_node : strand.first_node + strand.node_count].max())
         per_edge = max(1, math.ceil(float(length.max()) / radius * (1.0 - 1e-9)))
-        if not meets[number].any():
+        if not can_collide[number].any():
             per_edge = 0
         for name, values in _strand_points(rod.edge_length, strand.first_station, length, per_edge).items():
             parts.setdefault(name, []).append(values)
@@ -93,7 +93,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     return RodSurfaces(
         **arrays,
         first_point=np.concatenate([[0], np.cumsum(counts)]),
-        rod_meets=meets,
+        rod_can_collide=can_collide,
         rod_joined=joined,
         rod_exclusion=np.array(exclusion),
     )
@@ -147,7 +147,7 @@ class NearPairs:
         box, sweep, met = scratch(len(edge_node))
         base, tip = np.zeros((2, *start_position.shape))
         names = ("edge_radius", "edge_rod", "edge_first", "edge_arc", "first_point", "point_edge", "point_fraction")
-        names += ("point_arc", "rod_meets", "rod_joined", "rod_exclusion")
+        names += ("point_arc", "rod_can_collide", "rod_joined", "rod_exclusion")
         self._geometry = dict(
             start_position=np.array(start_position),
             base=base,
@@ -167,11 +167,11 @@ class NearPairs:
 
     @property
     def capacity(self) -> int:
-        """For how many there is room."""
+        """For how many there is capacity."""
         return len(self.search.point)
 
     def reserve(self, capacity: int) -> None:
-        """Have room for so many pairs, none of which is listed then."""
+        """Have capacity for so many pairs, none of which is listed then."""
         self.search = RodSearch(
             **self._geometry,
             count=np.zeros(1, dtype=np.int64),
@@ -182,10 +182,10 @@ class NearPairs:
             until=np.empty(capacity),
         )
 
-    def find(self, base: Array, touch: float, reach: float, tip: Array | None = None) -> None:
+    def find(self, base: Array, touch: float, search_distance: float, tip: Array | None = None) -> None:
         """List the pairs with a gap below `reach` [m] where nodes are, or on their straight way from `base` to `tip`
         [m], shape (n_node, 3); for `touch` see `near_pairs`.
         """
         self.search.base[:], self.search.tip[:] = base, base if tip is None else tip
-        while near_pairs(self.search, touch, reach) > self.capacity:
+        while near_pairs(self.search, touch, search_distance) > self.capacity:
             self.reserve(2 * self.count)

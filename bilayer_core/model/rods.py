@@ -21,10 +21,10 @@ def add_bonded_rods(
 ) -> None:
     """Add one copy of a rod: its strands, their drag, and the bond between them."""
     spans = []
-    for place, layer in enumerate(rod.layers):
+    for slot, layer in enumerate(rod.layers):
         first, last = rod.covered_stations(layer)
         at_nodes, at_edges = _sections(scene, rod, layer, first, last)
-        side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[place]
+        side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
         shape = strand_shape(rod, side * at_nodes.thickness, first, last, turn)
         spans.append((first, last, found.node_count, found.edge_count))
         strand = StrandArrays(

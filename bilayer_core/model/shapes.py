@@ -34,7 +34,7 @@ class Shape:
     kind: str
     half: np.ndarray
     rounding: float
-    turn: np.ndarray
+    rotation: np.ndarray
     rim_points: int = 0
 
     @property
@@ -73,7 +73,7 @@ class Shape:
             points = np.concatenate([rim + side * core[2] * np.array([0.0, 0.0, 1.0]) for side in (-1.0, 1.0)])
             length = 2.0 * np.pi * self.half[0] / self.rim_points
         found = np.unique(points + 0.0, axis=0)  # + 0.0: one kind of zero
-        return found @ self.turn.T, self.rounding, length * len(points) / len(found)
+        return found @ self.rotation.T, self.rounding, length * len(points) / len(found)
 
     def inertia(self, mass: float, shell: bool = False) -> np.ndarray:
         """Inertia tensor of the solid shape, without regard to its rounding, or of a hollow ball [kg m²]."""
@@ -85,7 +85,7 @@ class Shape:
         else:
             across = 0.25 * a**2 + c**2 / 3.0
             moments = np.array([across, across, 0.5 * a**2])
-        return mass * (self.turn * moments) @ self.turn.T
+        return mass * (self.rotation * moments) @ self.rotation.T
 
 
 def axis_frame(axis: np.ndarray) -> np.ndarray:
@@ -126,7 +126,7 @@ def signed_distance(shape: Shape, points: np.ndarray) -> np.ndarray:
     points : ndarray
         [m], shape (·, 3).
     """
-    own, core = points @ shape.turn, shape.core
+    own, core = points @ shape.rotation, shape.core
     if shape.kind == "plane":
         return own[:, 2]
     if shape.kind == "sphere":

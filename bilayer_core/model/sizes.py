@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from .force_list import on_nodes
-from .force_places import NAMES
+from .force_slots import NAMES
 from .model import Model
 
 
 def sizes_of(model: Model) -> dict[str, int]:
     """How many there are of everything that does not change in number."""
     layout, bodies, scene = model.solved_layout, len(model.bodies.names), model.scene
-    edges, in_plane, in_fluid = model.edge_count + model.wall_count, model.plane is not None, len(model.fluid_mass) > 0
-    carriers, joints, pairs = len(model.carriers.weight), len(model.joint_a), len(model.pair_top)
+    edges, in_plane, in_fluid = (
+        model.edge_count + model.clamp_edge_count,
+        model.plane is not None,
+        len(model.fluid_mass) > 0,
+    )
+    contact_points, joints, pairs = len(model.contact_points.weight), len(model.joint_a), len(model.pair_top)
     return {
         "node": model.node_count,
         "edge": model.edge_count,
-        "edge+wall": edges,
+        "edge+clamp": edges,
         "joint": joints,
         "pair": pairs,
         "strand": len(model.strands),
         "attached": len(model.attached_node),
-        "carrier": carriers,
-        "point": carriers - model.node_count,
+        "contact_point": contact_points,
+        "point": contact_points - model.node_count,
         "surface": len(model.surfaces.names),
         "body": bodies,
         "body+world": bodies + 1,

@@ -43,7 +43,7 @@ class State:
     body_rotation: Array  # shape (n_body, 3, 3)
     body_velocity: Array  # [m/s], shape (n_body, 3)
     body_angular_velocity: Array  # [rad/s], shape (n_body, 3)
-    kept: Array  # 1 if the five parts below are what the last step left, shape (1,), or (0,) without a use for them
+    has_history: Array  # 1 if the five parts below are those of the last step, shape (1,), or (0,) without a use
     acceleration: Array  # of nodes [m/s²], shape (n_node, 3); like the others empty if the integrator has no history
     spin_acceleration: Array  # of edges [rad/s²], shape (n_edge,)
     body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
@@ -137,7 +137,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
 
     Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
-    `with_history` makes room for what some integrators keep from step to step; `fingerprint` says what the state
+    `with_history` makes arrays for what some integrators keep from step to step; `fingerprint` says what the state
     belongs to (`model.fingerprint`).
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
@@ -160,7 +160,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         body_rotation=bodies.start_rotation.copy(),
         body_velocity=bodies.start_velocity.copy(),
         body_angular_velocity=bodies.start_angular_velocity.copy(),
-        kept=np.zeros(int(with_history)),
+        has_history=np.zeros(int(with_history)),
         acceleration=np.zeros((with_history * model.node_count, 3)),
         spin_acceleration=np.zeros(with_history * model.edge_count),
         body_acceleration=np.zeros((with_history * model.free_count, 3)),

@@ -213,12 +213,12 @@ def add_strand(
             continue
         body = body_index[clamp]
         own = rotation_matrix(np.array(scene.bodies[body].rotation))  # columns: axes of the body's frame
-        wall = -1 - sum(len(part) for part in found.columns.get("wall_tangent", []))
+        wall = -1 - sum(len(part) for part in found.columns.get("clamp_edge_tangent", []))
         node = end % nodes
         pair = (wall, first_edge) if end == 0 else (first_edge + edges - 1, wall)
         found.add(
-            wall_tangent=shape.end_tangents[[end]] @ own,
-            wall_director1=shape.end_normals[[end]] @ own,
+            clamp_edge_tangent=shape.end_tangents[[end]] @ own,
+            clamp_edge_director1=shape.end_normals[[end]] @ own,
             attached_node=first_node + node,
             attached_body=body,
             attached_position=(shape.positions[end] - np.array(scene.bodies[body].position))[None] @ own,

@@ -121,14 +121,14 @@ def _of_barrier(name: str, thin: float, distance: float) -> Figure:
 
 def _of_edges(rod: Rod, thin: float, distance: float) -> Figure:
     """Of a rod whose least thickness is `thin` [m]."""
-    reach = COARSE * (thin + distance)
+    longest = COARSE * (thin + distance)
     return Figure(
         f"rods.{rod.name}",
         "edge length",
         f"{1e3 * rod.edge_length:.3g} mm",
-        f"at most {1e3 * reach:.3g} mm, {COARSE:g} times least thickness and barrier distance together",
+        f"at most {1e3 * longest:.3g} mm, {COARSE:g} times least thickness and barrier distance together",
         "only nodes feel surfaces, and a small obstacle fits between them; more stations bring them closer"
-        if rod.edge_length > reach
+        if rod.edge_length > longest
         else "",
     )
 

@@ -1,4 +1,4 @@
-"""Schedules piece by piece: between two corners or jumps each is one formula, which compiled loops evaluate, too."""
+"""Schedules piece by piece: between two corners or jumps each is one formula, which the engine evaluates, too."""
 
 from __future__ import annotations
 

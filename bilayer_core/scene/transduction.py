@@ -44,7 +44,7 @@ def lagged(filtered, first, last, rising, falling, dt):
 
 
 @kernel
-def grown(filtered, gain, reference, saturation):
+def eigenstrain_of(filtered, gain, reference, saturation):
     """Eigenstrain of a law: linear near the reference, with a smooth limit.
 
     η = S tanh(g (y - y0)/S), which tends to g (y - y0) for infinite S. Its slope is g (1 - (η/S)²): g at the
@@ -65,14 +65,14 @@ def grown(filtered, gain, reference, saturation):
     return strain if math.isinf(saturation) else saturation * math.tanh(strain / saturation)
 
 
-def follow(filtered: np.ndarray, first, last, rising, falling, dt: float) -> np.ndarray:
+def first_order_lag(filtered: np.ndarray, first, last, rising, falling, dt: float) -> np.ndarray:
     """`lagged` for each of some laws, shape (n,)."""
     return _for_each(lagged.py_func, filtered, first, last, rising, falling, dt)
 
 
 def free_strain(filtered: np.ndarray, gain, reference, saturation) -> np.ndarray:
-    """`grown` for each of some laws, shape (n,)."""
-    return _for_each(grown.py_func, filtered, gain, reference, saturation)
+    """`eigenstrain_of` for each of some laws, shape (n,)."""
+    return _for_each(eigenstrain_of.py_func, filtered, gain, reference, saturation)
 
 
 def _for_each(law, *arguments) -> np.ndarray:

@@ -42,7 +42,7 @@ from ..engine.modes import EVALUATION_TIME
 from ..kinematics.rotation import rotation_matrix
 from ..model.force_list import Kind, kinds
 from ..model.model import Model
-from ..model.records.step import Place
+from ..model.records.step import Configuration
 from ..model.rest_strains import RestStrains
 from ..model.state import State
 from .fluid_energy import survey_fluid
@@ -73,7 +73,7 @@ class _Instant:
     `power` has for every dissipative term that of all forces, and that of those on what prescribed bodies impose.
     """
 
-    at: Place
+    at: Configuration
     kinetic: float
     imposed_kinetic: float
     fluid: _Fluid | None
@@ -101,19 +101,19 @@ class EnergyLedger:
 
     def begin(self, state: State, rest: RestStrains, load_factor: Array) -> None:
         """Start from zero at a state, with the rest strains and the factors of loads there."""
-        self._first = self._last = self._look(state, rest, load_factor)
+        self._first = self._last = self._evaluate_state(state, rest, load_factor)
         self._work: dict[str, float] = defaultdict(float)  # of each force [J]
         self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
         self._stimulus = 0.0
 
     def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
         """Add the works of a step of length `h` [s] that has just been accepted."""
-        before, after = self._last, self._look(state, rest, load_factor)
+        before, after = self._last, self._evaluate_state(state, rest, load_factor)
         moved = displacement(self._model, before.at, after.at)
         imposed = of_prescribed(self._model, moved)
         way = _Way(self._model, self._evaluator, before, state, moved)
         halfway = before.rest.halfway_to(rest)
-        middle = self._look_at(way.at(0.5), way.state, halfway, 0.5 * (before.load_factor + load_factor))
+        middle = self._evaluate_at(way.at(0.5), way.state, halfway, 0.5 * (before.load_factor + load_factor))
         for name, gradient in after.gradient.items():
             three = before.gradient[name], middle.gradient[name], gradient
             rates = [np.array([motion.work(each) for motion in (moved, imposed)]) for each in three]
@@ -193,12 +193,12 @@ class EnergyLedger:
         work = float(np.vdot(turned, imposed.edge[: self._model.edge_count]))
         return work - 0.5 * float(np.vdot(pushed, before.velocity[held] + after.velocity[held]))
 
-    def _force(self, name: str, at: Place) -> tuple[float, Gradient]:
+    def _force(self, name: str, at: Configuration) -> tuple[float, Gradient]:
         """Energy [J] and derivatives of one force at a configuration."""
         energy = self._evaluator.forces(at, (name,))[name]
         return energy, Gradient.copy_of(self._evaluator.sums, self._model)
 
-    def _look_at_fluid(self, at: Place, state: State) -> _Fluid | None:
+    def _evaluate_fluid(self, at: Configuration, state: State) -> _Fluid | None:
         model = self._model
         if not len(model.fluid_mass):
             return None
@@ -206,12 +206,12 @@ class EnergyLedger:
         carried = float(fluid.momentum.sum(axis=0) @ fluid.velocity)
         return _Fluid(relative + carried, fluid.momentum, fluid.shape_gradient)
 
-    def _look(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
+    def _evaluate_state(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
         at = self._evaluator.new()
         self._evaluator.take_state(state, at)
-        return self._look_at(at, state, rest, load_factor)
+        return self._evaluate_at(at, state, rest, load_factor)
 
-    def _look_at(self, at: Place, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
+    def _evaluate_at(self, at: Configuration, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
         model, evaluator = self._model, self._evaluator
         moving = velocity(model, at, state)
         imposed = of_prescribed(model, moving)
@@ -227,7 +227,7 @@ class EnergyLedger:
         return _Instant(
             at=at,
             kinetic=kinetic_energy(model, state),
-            fluid=self._look_at_fluid(at, state),
+            fluid=self._evaluate_fluid(at, state),
             velocity=state.velocity.copy(),
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
             rest=rest,
@@ -239,11 +239,11 @@ class EnergyLedger:
         )
 
 
-def _resistance(model: Model, at: Place, rest: RestStrains) -> tuple[Array, Array]:
+def _resistance(model: Model, at: Configuration, rest: RestStrains) -> tuple[Array, Array]:
     """Derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
     strain = at.length[: model.edge_count] / model.rest_length - 1.0
     bend = at.joint_strain[:, 0] - rest.joint[:, 0]
-    of_edges = np.concatenate([strain, np.zeros(model.wall_count)])
+    of_edges = np.concatenate([strain, np.zeros(model.clamp_edge_count)])
     coupled = np.stack([model.joint_a, model.joint_b], axis=1)[model.coupled_joint]
     bend[model.coupled_joint] -= np.einsum("ki,ki->k", model.strain_coupling, of_edges[coupled])
     moment = model.joint_stiffness[:, 0] * bend
@@ -257,15 +257,15 @@ class _Way:
         self._model, self._evaluator, self._begin, self._moved = model, evaluator, begin.at, moved
         self.state = end.copy()
 
-    def at(self, part: float) -> Place:
+    def at(self, part: float) -> Configuration:
         """Configuration after a part of the way; `state` goes along, its velocities apart."""
         begin, moved, state, evaluator = self._begin, self._moved, self.state, self._evaluator
         state.position[:] = begin.position + part * moved.node
         state.twist[:] = begin.joint_strain[:, 2]
-        state.body_position[:] = begin.place[:-1] + part * moved.contact[:-1, :3]
+        state.body_position[:] = begin.pose_position[:-1] + part * moved.contact[:-1, :3]
         for b, turn in enumerate(moved.contact[:-1, 3:]):
             state.body_rotation[b] = rotation_matrix(part * turn) @ begin.rotation[b]
         at = evaluator.new()
         evaluator.take_state(state, at)
-        evaluator.carry_frames(begin, part * moved.edge[: self._model.edge_count, 3], at)
+        evaluator.transport_frames(begin, part * moved.edge[: self._model.edge_count, 3], at)
         return at

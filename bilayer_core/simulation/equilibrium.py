@@ -99,7 +99,7 @@ class _Search:
         self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
         if len(state.transduction):
             state.transduction[:] = stepper.surroundings.stimulus_at(state, self.time)[model.law_channel]
-        for still in (state.velocity, state.spin, state.body_velocity, state.body_angular_velocity, state.kept):
+        for still in (state.velocity, state.spin, state.body_velocity, state.body_angular_velocity, state.has_history):
             still.fill(0.0)
         rest = stepper.surroundings.rest_strains_of(state.transduction)
         stepper.engine.set_drive(rest, stepper.surroundings.load_factor(self.time))

@@ -8,25 +8,25 @@ from ..engine.build import fluid_of
 from ..forces.added_mass import fluid_momentum
 from ..model.model import Model
 from ..model.records.parts import Fluid
-from ..model.records.step import Place
+from ..model.records.step import Configuration
 from ..model.sizes import sizes_of
 
 Array = np.ndarray
 
 
-def momentum_of_fluid(model: Model, at: Place, velocity: Array) -> Array:
+def momentum_of_fluid(model: Model, at: Configuration, velocity: Array) -> Array:
     """Momentum of the fluid at each node [N s], shape (n_node, 3); (0, 3) without added mass."""
     if not len(model.fluid_mass):
         return np.zeros((0, 3))
     return survey_fluid(model, at, velocity, np.zeros(model.edge_count))[1].momentum
 
 
-def energy_of_fluid(model: Model, at: Place, velocity: Array, spin: Array) -> float:
+def energy_of_fluid(model: Model, at: Configuration, velocity: Array, spin: Array) -> float:
     """Kinetic energy of the fluid relative to its flow [J]."""
     return survey_fluid(model, at, velocity, spin)[0]
 
 
-def survey_fluid(model: Model, at: Place, velocity: Array, spin: Array) -> tuple[float, Fluid]:
+def survey_fluid(model: Model, at: Configuration, velocity: Array, spin: Array) -> tuple[float, Fluid]:
     """T [J], and the fluid with P and ∂T/∂q; see `forces.added_mass.fluid_momentum`."""
     fluid = fluid_of(model, sizes_of(model))
     fluid.node_velocity[:], fluid.spin[:] = velocity, spin

@@ -12,9 +12,9 @@ def kinetic_energy(model: Model, state: State) -> float:
     """Of nodes, of edges about their tangents, and of free bodies [J]."""
     kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
     kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
-    for place, body in enumerate(model.bodies.body_of_free):
+    for slot, body in enumerate(model.bodies.body_of_free):
         velocity, spin = state.body_velocity[body], state.body_angular_velocity[body]
-        rotation, second = state.body_rotation[body], model.bodies.second_moment[place]
+        rotation, second = state.body_rotation[body], model.bodies.second_moment[slot]
         inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
-        kinetic += 0.5 * float(model.bodies.mass[place] * velocity @ velocity + spin @ inertia @ spin)
+        kinetic += 0.5 * float(model.bodies.mass[slot] * velocity @ velocity + spin @ inertia @ spin)
     return kinetic

@@ -9,7 +9,7 @@ import numpy as np
 from ..kinematics.rotation import rotation_vector
 from ..model.model import Model
 from ..model.records.problem import Sums
-from ..model.records.step import Place
+from ..model.records.step import Configuration
 from ..model.state import State
 
 Array = np.ndarray
@@ -55,7 +55,7 @@ class Motion:
 
 
 def compose(model: Model, node: Array, turn: Array, wall: Array, contact: Array) -> Motion:
-    """A motion from that of nodes, of edges about their tangents (n_edge,), of walls (n_wall, 4), of all bodies."""
+    """A motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of all bodies."""
     i = model.edge_node
     edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), wall])
     middle = 0.5 * (node[i] + node[i + 1])
@@ -63,23 +63,23 @@ def compose(model: Model, node: Array, turn: Array, wall: Array, contact: Array)
     return Motion(node, edge, middle[model.pair_top] - middle[model.pair_bottom], body, contact)
 
 
-def displacement(model: Model, start: Place, end: Place) -> Motion:
+def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:
     """From one configuration to another; turns, each by less than half a turn, are those beyond parallel transport."""
     edges = model.edge_count
     turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
     wall = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
-    contact = np.hstack([end.place - start.place, np.zeros_like(end.place)])
+    contact = np.hstack([end.pose_position - start.pose_position, np.zeros_like(end.pose_position)])
     for b in range(len(model.bodies.names)):
         contact[b, 3:] = rotation_vector(end.rotation[b] @ start.rotation[b].T)
     return compose(model, end.position - start.position, turn[:edges], wall, contact)
 
 
-def velocity(model: Model, at: Place, state: State) -> Motion:
+def velocity(model: Model, at: Configuration, state: State) -> Motion:
     """Velocities of a state whose configuration is `at`."""
     world = np.zeros((1, 6))
     contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
     tangent = at.tangent[model.edge_count :]
-    spin = contact[model.wall_body, 3:]
+    spin = contact[model.clamp_edge_body, 3:]
     wall = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
     return compose(model, state.velocity, state.spin, wall, contact)
 
@@ -89,12 +89,12 @@ def of_prescribed(model: Model, motion: Motion) -> Motion:
     prescribed = model.bodies.free_index < 0
     held = np.zeros(model.node_count, dtype=bool)
     held[model.attached_node] = model.attached_free < 0
-    walls = motion.edge[model.edge_count :]
+    clamp_edges = motion.edge[model.edge_count :]
     return compose(
         model,
         np.where(held[:, None], motion.node, 0.0),
         np.zeros(model.edge_count),
-        np.where(prescribed[model.wall_body, None], walls, 0.0),
+        np.where(prescribed[model.clamp_edge_body, None], clamp_edges, 0.0),
         np.where(prescribed[:, None], motion.contact, 0.0),
     )
 

@@ -79,7 +79,7 @@ def _strand(s: StrandArrays) -> Strand:
 def _shape_info(shape: Shape, position: Array | None = None, turn: Array | None = None) -> ShapeInfo:
     """A shape of an owner at a pose, by default that of the owner's frame."""
     place = (0.0, 0.0, 0.0) if position is None else tuple(position.tolist())
-    turn = shape.turn if turn is None else turn @ shape.turn
+    turn = shape.rotation if turn is None else turn @ shape.rotation
     rounding = 0.0 if shape.kind == "sphere" else shape.rounding
     size, quaternion = (2.0 * shape.half).tolist(), quaternion_from_matrix(turn).tolist()
     return ShapeInfo(shape.kind, tuple(size), rounding, place, tuple(quaternion))
@@ -100,15 +100,15 @@ def velocities_with_points(model: Model, state: State) -> Array:
 
 def _points(model: Model, state: State) -> tuple[Array, Array]:
     """Body of each point, shape (n_point,), and its arm from the body's position [m], shape (n_point, 3)."""
-    body = model.carriers.body[model.node_count : model.node_count + model.point_count]
-    arms = np.einsum("kij,kj->ki", state.body_rotation[body], model.carriers.position[: model.point_count])
+    body = model.contact_points.body[model.node_count : model.node_count + model.point_count]
+    arms = np.einsum("kij,kj->ki", state.body_rotation[body], model.contact_points.position[: model.point_count])
     return body, arms
 
 
 def contact_forces(stepper: Stepper) -> Array:
     """Barrier and friction force on nodes and contact points [N], shape (n_node + n_point, 3)."""
     model = stepper.model
-    return -stepper.engine.sums.carrier[: model.node_count + model.point_count]
+    return -stepper.engine.sums.contact_point[: model.node_count + model.point_count]
 
 
 def body_wrenches(stepper: Stepper) -> Array:

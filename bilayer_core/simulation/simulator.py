@@ -30,7 +30,7 @@ from .stepper import Stepper, StepReport
 
 Array = np.ndarray
 STEPS_AT_ONCE = 64
-"""That a compiled loop makes before anyone is asked whether to go on."""
+"""That the engine makes before anyone is asked whether to go on."""
 
 
 class Simulator:

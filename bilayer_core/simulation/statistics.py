@@ -80,7 +80,7 @@ class RunStatistics:
         self.com_max_height, self.min_gap, self.max_contact_force, *shape = extrema.figures.tolist()
         self.max_curvature, self.max_strain = shape
         self.body_tops = dict(zip(model.bodies.names, extrema.body_top.tolist(), strict=True))
-        if not model.meets_surfaces:
+        if not model.has_surface_contact:
             return
         for surface, body in enumerate(model.surfaces.body):
             if body < len(model.bodies.names):

@@ -15,7 +15,7 @@ from ..errors import InputError, SimulationError
 from ..integrators.method import Method
 from ..model.model import Model
 from ..model.records.status import INPUTS_END, TOO_INACCURATE
-from ..model.records.step import Place
+from ..model.records.step import Configuration
 from ..model.state import State
 from .energy_budget import EnergyLedger
 from .step_choice import Steps
@@ -111,7 +111,7 @@ class Stepper:
         self.ledger: EnergyLedger | None = None
 
     @property
-    def end(self) -> Place:
+    def end(self) -> Configuration:
         """The configuration of the state after the last step or evaluation."""
         return self.engine.end
 

@@ -129,7 +129,7 @@ def test_a_refused_step_leaves_nothing(integrator):
     assert report.inaccurate > 0 and report.length < 0.02
     with_parts(second, next_step=report.length)
     assert second.step().rejected == 0
-    for name in ("time", "step", "position", "velocity", "director1", "kept", "acceleration", "transduction"):
+    for name in ("time", "step", "position", "velocity", "director1", "has_history", "acceleration", "transduction"):
         np.testing.assert_array_equal(part(second, name), part(first, name))
     assert second.budget() == first.budget()
 

@@ -62,7 +62,7 @@ def random_problem(seed=0):
     start, bent = evaluator.new(), evaluator.new()
     evaluator.take_state(state, start)
     bent.position[:] = start.position + 4e-4 * rng.standard_normal((model.node_count, 3))
-    evaluator.carry_frames(start, 0.3 * rng.standard_normal(model.edge_count), bent)
+    evaluator.transport_frames(start, 0.3 * rng.standard_normal(model.edge_count), bent)
     return evaluator, bent, rng.standard_normal((model.node_count, 3)), rng.standard_normal(model.edge_count)
 
 
@@ -84,7 +84,7 @@ def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
 
     def displaced(position, angle):
         moved.position[:] = at.position + position
-        evaluator.carry_frames(at, angle, moved)
+        evaluator.transport_frames(at, angle, moved)
         return energy_of_fluid(model, moved, velocity, spin)
 
     gradient = shape_gradient_of(model, at, velocity)
@@ -257,7 +257,7 @@ def force_of_drag(simulator, state, at):
     present = evaluator.new()
     evaluator.take_state(state, present)
     evaluator.stand_still(state, present, 1.0, rest.edge, rest.joint, load_factor)
-    evaluator.follow(at)
+    evaluator.update_lagged(at)
     evaluator.forces(present, ("drag",))
     return -evaluator.sums.node.sum(axis=0)
 
@@ -279,5 +279,5 @@ def test_forces_of_the_fluid_act_along_the_directions_at_the_end_of_the_step(add
     assert np.abs(lost - along_the_end).max() < 1e-6 * largest
     assert np.abs(lost - along_the_start).max() > 1e-2 * largest
     assert evaluator.speed(*left_of_step(evaluator, end)) < simulator.scene.solver.newton_tolerance
-    evaluator.follow(start)
+    evaluator.update_lagged(start)
     assert evaluator.speed(*left_of_step(evaluator, end)) > 100.0 * simulator.scene.solver.newton_tolerance

@@ -185,6 +185,6 @@ def test_derivatives_of_contact_agree_with_differences_at_every_feature_of_a_sha
     near = problem.evaluator.problem.surfaces
     count = near.near_count[0]
     touching = near.near_gap[:count] < 1e-3
-    nodes = near.near_carrier[:count] < problem.model.node_count
+    nodes = near.near_contact_point[:count] < problem.model.node_count
     assert touching[nodes].any() and np.count_nonzero(touching[~nodes]) >= 2  # strip, ball and box
     assert (problem.coupling > 0.0) == (owner == "free")

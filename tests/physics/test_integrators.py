@@ -257,4 +257,4 @@ def test_no_step_writes_beyond_the_values_of_its_state(integrator):
     description, _ = PROBLEMS["cantilever"]
     simulator = Simulator(load_scene(description), dt=2.5e-4, integrator=integrator)
     simulator.run(1e-3)
-    assert simulator._stepper.engine._integration.kept.values.shape == simulator.save_state().shape
+    assert simulator._stepper.engine._integration.start_state.values.shape == simulator.save_state().shape

@@ -62,7 +62,7 @@ def test_frames_carried_along_a_rigid_turn_turn_with_the_body():
         following.position[:] = now.position @ turn.T
         # a rigid turn spins each edge about its tangent by the turn's component along it
         tangents = now.tangent[: evaluator.model.edge_count]
-        evaluator.carry_frames(now, tangents @ (axis / steps), following)
+        evaluator.transport_frames(now, tangents @ (axis / steps), following)
         now, following = following, evaluator.new()
     assert elastic_energy(evaluator, now) == pytest.approx(before, rel=1e-6)
 
@@ -94,7 +94,7 @@ def test_twist_of_a_bonded_strip_costs_its_torsional_stiffness_at_every_mesh(tor
         [x, -start.position[:, 2] * np.sin(angle), start.position[:, 2] * np.cos(angle)], axis=1
     )
     middle = 0.5 * (angle[model.edge_node] + angle[model.edge_node + 1])
-    evaluator.carry_frames(start, middle, shape)
+    evaluator.transport_frames(start, middle, shape)
     sections = [rectangle(model.scene.materials["gel"], 0.01, t) for t in (1e-3, 1.5e-3)]
     tilt = bond(*sections, model.scene.coupling, torsion).tilt
     stiffness = sum(s.twisting_stiffness for s in sections) + tilt * (0.5 * 2.5e-3) ** 2

@@ -200,7 +200,7 @@ def test_contact_counts_from_the_outer_face():
     model = build_model(load_scene(content), "laminate")
     (strand,) = model.strands
     low, high = (strand.offset + side * strand.thickness for side in (-0.5, 0.5))
-    assert model.carriers.radius == pytest.approx(np.maximum(high, -low))
+    assert model.contact_points.radius == pytest.approx(np.maximum(high, -low))
     faces = model.start_position[:, 2] + np.array([low, high])
     assert faces[0] == pytest.approx(np.full(21, -1e-3))
     assert faces[1] == pytest.approx(np.where(np.arange(21) < 4, 0.0, 3e-3))

@@ -35,7 +35,7 @@ def bent_rod(rng, joints):
     straight, bent = evaluator.new(), evaluator.new()
     evaluator.take_state(state, straight)
     bent.position[1:] = bent.position[0] + np.cumsum(random_frames(rng, model.edge_count)[0], axis=0)
-    evaluator.carry_frames(straight, rng.standard_normal(model.edge_count), bent)
+    evaluator.transport_frames(straight, rng.standard_normal(model.edge_count), bent)
     rest_joint = rng.standard_normal(rest.joint.shape)
     evaluator.stand_still(state, straight, 1.0, rest.edge, rest_joint, load_factor)
     return evaluator, bent, rest_joint

@@ -84,7 +84,7 @@ def test_the_section_is_drawn_and_touches_as_it_is():
     (drawn,) = simulator.description.strands
     assert drawn.width == pytest.approx(np.linspace(10e-3, 2e-3, 21))
     assert drawn.thickness == pytest.approx(np.linspace(1e-3, 3e-3, 21))
-    assert simulator.model.carriers.radius == pytest.approx(0.5 * drawn.thickness)
+    assert simulator.model.contact_points.radius == pytest.approx(0.5 * drawn.thickness)
 
 
 def test_the_warnings_are_about_the_worst_section():

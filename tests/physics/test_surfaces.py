@@ -12,7 +12,7 @@ from bilayer_core.jit import kernel, record_at
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.records.parts import Surfaces
 from bilayer_core.model.records.problem import System
-from bilayer_core.model.records.step import Place
+from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.shapes import NUMBER, Shape, axis_frame, signed_distance
 
 HALF = {
@@ -22,7 +22,7 @@ HALF = {
     "cylinder": (0.25, 0.25, 0.2),
 }
 
-surfaces_at, place_at, system_at = record_at(Surfaces), record_at(Place), record_at(System)
+surfaces_at, configuration_at, system_at = record_at(Surfaces), record_at(Configuration), record_at(System)
 
 
 def record_of(declared, **values):
@@ -33,18 +33,18 @@ def record_of(declared, **values):
 
 @kernel
 def gap_between(surfaces, at, i, s):
-    point, place = place_at(at).carrier, place_at(at)
-    return gap_normal(surfaces_at(surfaces), place, i, s, point[i, 0], point[i, 1], point[i, 2])[0]
+    point, configuration = configuration_at(at).contact_point, configuration_at(at)
+    return gap_normal(surfaces_at(surfaces), configuration, i, s, point[i, 0], point[i, 1], point[i, 2])[0]
 
 
 @kernel
 def bound_of(surfaces, system, at, closing):
-    return step_bound(surfaces_at(surfaces), system_at(system), place_at(at), closing)
+    return step_bound(surfaces_at(surfaces), system_at(system), configuration_at(at), closing)
 
 
 @kernel
 def count_near(surfaces, at, margin):
-    return list_near(surfaces_at(surfaces), place_at(at), margin)
+    return list_near(surfaces_at(surfaces), configuration_at(at), margin)
 
 
 def surface_cloud(kind, rng, count=200_000):
@@ -117,7 +117,7 @@ class Pair:
     def __init__(self, kind, rng, turning):
         rounding = 0.05 if kind == "sphere" else rng.choice([0.0, 0.03])
         self.place, self.turn = rng.uniform(-0.1, 0.1, (1, 3)), rotation_matrix(rng.standard_normal(3))[None]
-        self.carrier = rng.uniform(-0.8, 0.8, (1, 3))
+        self.contact_point = rng.uniform(-0.8, 0.8, (1, 3))
         self.body = np.array([1 if turning else -1])
         one = np.zeros(1, dtype=np.int64)
         self.surfaces = record_of(
@@ -126,16 +126,18 @@ class Pair:
             size=np.array([HALF[kind]]),
             rounding=np.array([rounding]),
             radius=np.array([0.01]),
-            follows=self.body,
+            moved_by=self.body,
             body=one,
-            near_carrier=one,
+            near_contact_point=one,
             near_surface=one,
             near_count=np.ones(1, dtype=np.int64),
         )
-        self.position = np.concatenate([self.place, self.carrier + rng.uniform(-0.3, 0.3, (1, 3)), np.zeros((1, 3))])
+        self.position = np.concatenate(
+            [self.place, self.contact_point + rng.uniform(-0.3, 0.3, (1, 3)), np.zeros((1, 3))]
+        )
         self.motion = np.zeros((3, 6))
         self.motion[0, :3] = 0.4 * rng.standard_normal(3)
-        aim = rng.uniform(0.5, 2.0) * (self.place - self.carrier)[0]
+        aim = rng.uniform(0.5, 2.0) * (self.place - self.contact_point)[0]
         self.motion[1, :3] = self.motion[0, :3] + aim + 0.2 * rng.standard_normal(3)
         if turning:
             self.motion[:2, 3:] = rng.choice([0.1, 1.0]) * rng.standard_normal((2, 3))
@@ -144,12 +146,14 @@ class Pair:
     def at(self, t):
         """Configuration at a part of the step."""
         turn = (rotation_matrix(t * self.motion[0, 3:]) @ self.turn[0])[None]
-        x = self.carrier + t * self.step
+        x = self.contact_point + t * self.step
         if self.body[0] == 1:
-            arm = rotation_matrix(t * self.motion[1, 3:]) @ (self.carrier - self.position[1])[0]
+            arm = rotation_matrix(t * self.motion[1, 3:]) @ (self.contact_point - self.position[1])[0]
             x = (self.position[1] + t * self.motion[1, :3] + arm)[None]
         place = self.place + t * self.motion[0, :3]
-        return record_of(Place, carrier=x, surface_place=place, surface_turn=turn, place=self.position)
+        return record_of(
+            Configuration, contact_point=x, surface_position=place, surface_rotation=turn, pose_position=self.position
+        )
 
     def gap(self, t):
         at = self.at(t)
@@ -187,12 +191,12 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
     bound = np.array([np.inf, 0.1, 0.5, 0.5])
     turn = np.array([rotation_matrix(rng.standard_normal(3)) for _ in kinds])
     radius, group = np.full(300, 0.01), np.tile([0, 1], 150)
-    meets = np.array([[True, True], [True, False], [False, True], [True, True]])
-    listed = {name: np.zeros(1200, dtype=np.int64) for name in ("near_carrier", "near_surface")}
-    then = {"listed_carrier": (300, 3), "listed_place": (4, 3), "listed_turn": (4, 3, 3)}
+    can_collide = np.array([[True, True], [True, False], [False, True], [True, True]])
+    listed = {name: np.zeros(1200, dtype=np.int64) for name in ("near_contact_point", "near_surface")}
+    then = {"listed_contact_point": (300, 3), "listed_surface_position": (4, 3), "listed_surface_rotation": (4, 3, 3)}
     for reach, spread in ((0.05, 1.0), (0.01, 5.0)):
-        place, carrier = rng.uniform(-spread, spread, (4, 3)), rng.uniform(-spread, spread, (300, 3))
-        at = record_of(Place, carrier=carrier, surface_place=place, surface_turn=turn)
+        place, contact_point = rng.uniform(-spread, spread, (4, 3)), rng.uniform(-spread, spread, (300, 3))
+        at = record_of(Configuration, contact_point=contact_point, surface_position=place, surface_rotation=turn)
         surfaces = record_of(
             Surfaces,
             d_hat=reach,
@@ -202,7 +206,7 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
             bound=bound,
             radius=radius,
             group=group,
-            meets=meets,
+            can_collide=can_collide,
             extent=np.zeros(4),
             **listed,
             **{name: np.zeros(shape) for name, shape in then.items()},
@@ -211,15 +215,19 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
             (s, i): gap_between(surfaces.address, at.address, i, s)
             for s in range(4)
             for i in range(300)
-            if meets[s, group[i]]
+            if can_collide[s, group[i]]
         }
         count = count_near(surfaces.address, at.address, 0.02)
-        pairs = list(zip(*(listed[name][:count].tolist() for name in ("near_surface", "near_carrier")), strict=True))
+        pairs = list(
+            zip(*(listed[name][:count].tolist() for name in ("near_surface", "near_contact_point")), strict=True)
+        )
         assert pairs == sorted(pairs) and set(pairs) <= gaps.keys()
         assert {pair for pair, gap in gaps.items() if gap <= reach + 0.02} <= set(pairs)
         assert min(gaps, key=gaps.get) in pairs
         assert count < len(gaps)
-        assert np.array_equal(surfaces.listed_carrier, carrier) and np.array_equal(surfaces.listed_turn, turn)
+        assert np.array_equal(surfaces.listed_contact_point, contact_point) and np.array_equal(
+            surfaces.listed_surface_rotation, turn
+        )
 
 
 @pytest.mark.parametrize("kind", ["sphere", "box", "cylinder"])

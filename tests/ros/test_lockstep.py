@@ -47,7 +47,7 @@ def test_what_came_before_the_tick_acts_but_is_no_answer(inputs):
     inputs.receive_all([0.5])
     assert lockstep.changes(0.0) == {"humidity": 0.5}
     inputs.receive("humidity", 0.75)
-    lockstep.reach(0.1)
+    lockstep.advance_to(0.1)
     assert lockstep.waiting
     inputs.receive("humidity", 1.0)
     assert not lockstep.waiting
@@ -61,7 +61,7 @@ def test_a_refused_message_is_no_answer(lockstep, inputs):
 
 def test_between_ticks_nothing_is_awaited_published_or_taken(lockstep, inputs, published):
     answer(inputs, lockstep, 2.0)
-    lockstep.reach(2.05)
+    lockstep.advance_to(2.05)
     inputs.receive("humidity", 0.75)
     lockstep.repeat(2.05)
     assert (lockstep.waiting, lockstep.changes(2.05), published) == (False, {}, [2.0])
@@ -71,7 +71,7 @@ def test_between_ticks_nothing_is_awaited_published_or_taken(lockstep, inputs, p
 @pytest.mark.parametrize("time", [2.1 - 1e-12, 2.1, 2.13])
 def test_a_tick_is_reached_when_it_is_crossed_to_rounding(lockstep, inputs, published, time):
     answer(inputs, lockstep, 2.0)
-    lockstep.reach(time)
+    lockstep.advance_to(time)
     assert (lockstep.waiting, published) == (True, [2.0, time])
     assert lockstep.next_stop(time) == pytest.approx(2.2)
 
@@ -88,7 +88,7 @@ def test_a_time_that_stands_still_is_repeated_until_it_is_left(lockstep, inputs,
 
 def test_a_reset_asks_anew(lockstep, inputs, published):
     answer(inputs, lockstep, 2.0)
-    lockstep.reach(2.1)
+    lockstep.advance_to(2.1)
     inputs.receive("humidity", 0.75)
     lockstep.reset()
     lockstep.start(0.0)

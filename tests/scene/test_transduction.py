@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from bilayer_core.scene.transduction import follow, free_strain
+from bilayer_core.scene.transduction import first_order_lag, free_strain
 
 
 @pytest.mark.parametrize("change", [0.0, 0.2], ids=["held", "linear"])
@@ -17,13 +17,13 @@ def test_the_lag_over_one_step_is_the_solution_of_its_equation_rising_and_fallin
 
     exact = solve_ivp(rate, (0.0, dt), start, rtol=1e-11, atol=1e-13, method="DOP853")
     # The reference is known to its own tolerance of 1e-11 a step, over some hundred steps.
-    np.testing.assert_allclose(follow(start, first, last, rising, falling, dt), exact.y[:, -1], rtol=1e-9)
+    np.testing.assert_allclose(first_order_lag(start, first, last, rising, falling, dt), exact.y[:, -1], rtol=1e-9)
 
 
 def test_without_a_time_constant_the_material_follows_at_once():
     now = np.zeros(2)
     np.testing.assert_array_equal(
-        follow(np.array([0.2, 0.9]), np.zeros(2), np.array([1.0, 0.7]), now, now, 1e-3), [1.0, 0.7]
+        first_order_lag(np.array([0.2, 0.9]), np.zeros(2), np.array([1.0, 0.7]), now, now, 1e-3), [1.0, 0.7]
     )
 
 
@@ -32,14 +32,16 @@ def test_a_hundred_steps_are_one_step(target):
     start, target, rising, falling = np.array([0.1]), np.array([target]), np.array([0.02]), np.array([0.05])
     filtered = start
     for _ in range(100):
-        filtered = follow(filtered, target, target, rising, falling, 1e-4)
+        filtered = first_order_lag(filtered, target, target, rising, falling, 1e-4)
     # A hundred roundings of 1e-16 each.
-    np.testing.assert_allclose(filtered, follow(start, target, target, rising, falling, 1e-2), rtol=1e-13)
+    np.testing.assert_allclose(filtered, first_order_lag(start, target, target, rising, falling, 1e-2), rtol=1e-13)
 
 
 def test_a_step_much_longer_than_the_lag_ends_at_the_stimulus():
     lag = np.array([1e-9])
-    np.testing.assert_array_equal(follow(np.array([0.0]), np.array([0.6]), np.array([0.6]), lag, lag, 1.0), [0.6])
+    np.testing.assert_array_equal(
+        first_order_lag(np.array([0.0]), np.array([0.6]), np.array([0.6]), lag, lag, 1.0), [0.6]
+    )
 
 
 def test_without_saturation_the_strain_is_linear_about_the_reference():

@@ -12,7 +12,7 @@ from bilayer_core.errors import ForceError
 from bilayer_core.model import force_list
 from bilayer_core.model.build import build_model
 from bilayer_core.model.force_list import FORCES, Force, Kind, markdown_table
-from bilayer_core.model.force_places import NAMES, place_of
+from bilayer_core.model.force_slots import NAMES, slot_of
 
 SPRING = Force("spring", Kind.CONSERVATIVE, "spring.py", lambda _: None)
 
@@ -31,7 +31,7 @@ def test_a_force_that_is_only_in_the_list_is_refused_when_a_scene_needs_it(monke
 
 def test_the_engine_computes_no_force_that_is_not_in_the_list():
     with pytest.raises(LookupError, match="force 'spring': is not in the list"):
-        place_of("spring")
+        slot_of("spring")
 
 
 @pytest.mark.parametrize(

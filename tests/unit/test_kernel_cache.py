@@ -23,7 +23,7 @@ model = build_model(load_scene("cantilever"), "laminate", 2)
 evaluator, state = Evaluator(model), initial_state(model)
 at = evaluator.new()
 evaluator.take_state(state, at)
-evaluator.carry_frames(at, np.zeros(model.edge_count), at)
+evaluator._transport_frames(at, np.zeros(model.edge_count), at)
 nothing = np.zeros((len(model.joint_a), 3))
 evaluator.stand_still(state, at, 1.0, np.full(model.edge_count, 0.01), nothing, np.zeros(0))
 evaluator.start_stage(at)
@@ -106,6 +106,6 @@ def test_workers_compile_this_package_and_not_one_of_its_name_where_they_start(t
     decoy.write_text("raise ImportError('not this one')")
     monkeypatch.chdir(tmp_path)
     left, done, printed = queue.SimpleQueue(), queue.SimpleQueue(), []
-    left.put("place_carried")
+    left.put("update_attached")
     compile_all._feed(left, done, printed)
     assert not printed and done.get(timeout=1.0) is not None

@@ -65,7 +65,7 @@ def simulate(beam: Cantilever, case: Case) -> Answer:
 
 
 def _tip(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Place of the last node [m] at the end of the step: positions in `data` are those at its start."""
+    """Configuration of the last node [m] at the end of the step: positions in `data` are those at its start."""
     body = model.flex_vertbodyid[-1]
     address = model.jnt_qposadr[model.body_jntadr[body]]
     return model.body_pos[body] + data.qpos[address : address + 3]

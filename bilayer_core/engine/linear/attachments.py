@@ -34,8 +34,8 @@ def condense_gradient(constrained, strands, at, sums):
             of_bodies[f, 3] += r1 * g2 - r2 * g1
             of_bodies[f, 4] += r2 * g0 - r0 * g2
             of_bodies[f, 5] += r0 * g1 - r1 * g0
-    for k in range(constrained.wall_free.shape[0]):
-        f, w = constrained.wall_free[k], strands.edge_count + k
+    for k in range(constrained.clamp_edge_free.shape[0]):
+        f, w = constrained.clamp_edge_free[k], strands.edge_count + k
         if f >= 0:
             g0, g1, g2 = row(sums.edge, w)
             t0, t1, t2 = row(at.tangent, w)
@@ -117,8 +117,8 @@ def condense_clamp_edges(attachments, strands, at, sums, border):
     """Add the second derivatives of clamps' elements with respect to the rotation of free bodies to U and D."""
     jacobian, scratch = stack_matrix(4, 3), stack_matrix(3, 6)  # of a clamp edge: ∂(e, θ)/∂φ = [−[t]×; tᵀ]
     values = stack_matrix(4, 3)
-    for k in range(attachments.wall_free.shape[0]):
-        f, w, x = attachments.wall_free[k], strands.edge_count + k, attachments.wall_joint[k]
+    for k in range(attachments.clamp_edge_free.shape[0]):
+        f, w, x = attachments.clamp_edge_free[k], strands.edge_count + k, attachments.clamp_edge_joint[k]
         if f < 0:
             continue
         base = 6 * f + 3
@@ -154,8 +154,8 @@ def condense_clamp_edges(attachments, strands, at, sums, border):
 def condense_clamp_edges_in_plane(attachments, plane, strands, at, border):
     """`condense_clamp_edges` in a plane, where the angle of a clamp edge is that of its body about the normal."""
     normal, frame, values, scratch = plane.normal, plane.frame, stack_matrix(4, 3), stack_matrix(3, 6)
-    for k in range(attachments.wall_free.shape[0]):
-        f, w, x = attachments.wall_free[k], strands.edge_count + k, attachments.wall_joint[k]
+    for k in range(attachments.clamp_edge_free.shape[0]):
+        f, w, x = attachments.clamp_edge_free[k], strands.edge_count + k, attachments.clamp_edge_joint[k]
         if f < 0:
             continue
         base = 6 * f + 3

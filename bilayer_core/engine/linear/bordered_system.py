@@ -6,13 +6,13 @@ from ...jit import kernel, piece
 from ...kinematics.copying import copy
 from ...model.records.problem import Problem
 from ...model.records.status import READY
-from ...model.records.step import Place
+from ...model.records.step import Configuration
 from .attachments import condense_clamp_edges, condense_clamp_edges_in_plane, condense_nodes
-from .contact_columns import hand_contacts_to_bodies
+from .contact_columns import condense_contacts_to_bodies
 from .dense import count_negative_dense, factor_dense, solve_dense
 
 
-@piece(int, Problem, Place)
+@piece(int, Problem, Configuration)
 def assemble_bodies(p, at):
     """U and D of free bodies: links of contact, and what they hold. Whether U is not zero is left in `coupled`."""
     border, coupled, attachments, strands, sums = p.border, p.bordered.coupled, p.attachments, p.strands, p.sums
@@ -23,7 +23,7 @@ def assemble_bodies(p, at):
         _add_links(strands, sums, border.border)
     if attachments.holding > 0:
         coupled[0] = 1
-        hand_contacts_to_bodies(p.contact_columns, attachments, strands, at, border)
+        condense_contacts_to_bodies(p.contact_columns, attachments, strands, at, border)
         condense_nodes(attachments, strands, at, sums, p.system.band, border)
         if p.space.exists:
             condense_clamp_edges(attachments, strands, at, sums, border)

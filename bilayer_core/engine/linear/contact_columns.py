@@ -137,7 +137,7 @@ def _choose_nodes(columns, strands):
 
 
 @kernel
-def hand_contacts_to_bodies(columns, attachments, strands, at, border):
+def condense_contacts_to_bodies(columns, attachments, strands, at, border):
     """Add the blocks between the edges of contacts, of nodes that free bodies hold, to these bodies' border and corner;
     see `engine.linear.attachments`.
     """
@@ -176,7 +176,7 @@ def hand_contacts_to_bodies(columns, attachments, strands, at, border):
 @piece(bool, Problem)
 def move_to_border(p):
     """Move contact columns from the band to the border, and add to them what is between the edges of contacts; false if
-    there is no room for them, but `BorderedSystem.width` is what it would be.
+    there is no capacity for them, but `BorderedSystem.width` is what it would be.
     """
     columns, bordered, strands = p.contact_columns, p.bordered, p.strands
     nodes, base = columns.counts[NODES], bordered.width[0]
@@ -201,18 +201,18 @@ def move_to_border(p):
 @kernel
 def _move_from_band(columns, bordered, strands, base, band):
     """Move contact columns to the border and corner, those from `base` on; the band keeps those of the identity."""
-    border, corner, place = bordered.border, bordered.schur, columns.column
+    border, corner, slot = bordered.border, bordered.schur, columns.column
     bandwidth, nodes = strands.bandwidth, columns.counts[NODES]
     for k in range(nodes):
         for column in range(columns.row[k], columns.row[k] + strands.dimension):
-            own = base + place[column]
+            own = base + slot[column]
             for c in range(base):
                 corner[c, own] = corner[own, c] = border[c, column]
                 border[c, column] = 0.0
             for i in range(max(0, column - bandwidth), min(strands.size, column + bandwidth + 1)):
                 value = band[column, i - column] if i >= column else band[i, column - i]
-                if place[i] >= 0:
-                    corner[base + place[i], own] = value
+                if slot[i] >= 0:
+                    corner[base + slot[i], own] = value
                 else:
                     border[own, i] = value
     hold_unknowns(columns.row[:nodes], strands.dimension, bandwidth, band)
@@ -221,7 +221,7 @@ def _move_from_band(columns, bordered, strands, base, band):
 @kernel
 def _add_between(columns, bordered, node_row, base):
     """Add the blocks between the edges of contacts, of nodes that no body holds; one node of each has columns."""
-    dimension, place, attached = columns.matrix.shape[1], columns.column, columns.attached
+    dimension, slot, attached = columns.matrix.shape[1], columns.column, columns.attached
     for c in range(columns.counts[CONTACTS]):
         for pair in range(4):
             m, n = pair // 2, pair % 2
@@ -231,7 +231,7 @@ def _add_between(columns, bordered, node_row, base):
             for x in range(dimension):
                 for y in range(dimension):
                     row, column = node_row[i] + x, node_row[j] + y
-                    a, b = place[row], place[column]
+                    a, b = slot[row], slot[column]
                     value = _block(columns, c, m, 2 + n, x, y)
                     if a >= 0 and b >= 0:
                         bordered.schur[base + a, base + b] += value

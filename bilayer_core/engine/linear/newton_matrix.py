@@ -21,8 +21,8 @@ from ...jit import call, caller, piece
 from ...jit.record import Matrix, Vector
 from ...model.records.outcome import SHIFT, SIMPLIFIED
 from ...model.records.problem import BorderedSystem, Problem
-from ...model.records.status import INDEFINITE, NO_ROOM_IN_BORDER, NOT_FINITE, READY
-from ...model.records.step import Place, Stage
+from ...model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
+from ...model.records.step import Configuration, Stage
 from ..modes import SLOWEST_GROWTH
 from . import bordered_system, planar_assembly  # noqa: F401 (declare pieces)
 from .assembly import hold_unknowns
@@ -42,7 +42,7 @@ EXACT = np.int64(0)
 all that takes it once more.)"""
 
 
-@piece(int, Problem, Place, float, int)
+@piece(int, Problem, Configuration, float, int)
 def assemble(p, at, factor, simplified):
     """The matrix of the last evaluation, that of `at`, with `factor` times the masses [1/s²]: the band, and the border
     and corner of free bodies. Nodes that bodies hold are rows of the identity.
@@ -63,7 +63,7 @@ def assemble(p, at, factor, simplified):
     return READY
 
 
-@piece(int, Problem, Place, Stage, bool)
+@piece(int, Problem, Configuration, Stage, bool)
 def factorise(p, at, stage, counts):
     """Assemble and factorise the matrix of the last evaluation, that of `at`.
 
@@ -91,7 +91,7 @@ def factorise(p, at, stage, counts):
         if p.border.exists:
             call(p.calls.restrict_bodies, (p, of_bodies))
         if p.contact_columns.exists and not call(p.calls.move_to_border, (p,)):
-            return NO_ROOM_IN_BORDER
+            return BORDER_CAPACITY_EXCEEDED
         if counts:
             negative = call_factor(p.calls.count_band, (band, strands.size))
         else:

@@ -17,10 +17,10 @@ from ...jit import kernel, piece
 from ...kinematics.vector import dot, row
 from ...model.records.problem import Problem
 from ...model.records.status import READY
-from ...model.records.step import Place
+from ...model.records.step import Configuration
 
 
-@piece(int, Problem, Place, float)
+@piece(int, Problem, Configuration, float)
 def assemble_in_plane(p, at, factor):
     """Write second derivatives in a plane, and `factor` times the masses, into a band of zeros."""
     _put_edges(p.plane, p.strands, at.length, p.sums.node_hessian, factor, p.system.band)

@@ -1,4 +1,4 @@
-"""What compiled loops take of a model: its arrays, in groups.
+"""What the engine takes of a model: its arrays, in groups.
 
 What a scene does not need is there with arrays of length zero, and says that it does not exist (`jit.record`): one
 program serves all scenes of a dimension.
@@ -70,9 +70,9 @@ class Plane:
     normal: Vector
     side: Vector
     joint_after: Indices  # between each edge and the next, −1 at the end of a strand, shape (n_edge,)
-    frame: Matrix = ("edge+wall", 4)
-    polar_gradient: Matrix = ("edge+wall", 2)
-    polar_hessian: Matrix = ("edge+wall", 3)
+    frame: Matrix = ("edge+clamp", 4)
+    polar_gradient: Matrix = ("edge+clamp", 2)
+    polar_hessian: Matrix = ("edge+clamp", 3)
     cross_hessian: Matrix = ("joint", 4)
     pair_hessian: Matrix = ("pair", 3)
     mixed_hessian: Matrix = ("pair", 4)
@@ -109,8 +109,8 @@ class Bodies:
     inertia: Vector  # factor of the shift for each unknown of free bodies: m and tr(J), shape (6 n_free,)
     freedom: Matrix
     freedom_first: Indices  # the first unknown of the body that each of its columns moves, shape (n_freedom,)
-    reach: Vector
-    turns: Flags  # whether a body can turn, bool
+    bounding_radius: Vector
+    rotates: Flags  # whether a body can turn, bool
 
 
 @record
@@ -123,10 +123,10 @@ class Constrained:
     body: Indices
     free: Indices
     position: Matrix  # in the body's frame
-    wall_body: Indices
-    wall_free: Indices
-    wall_tangent: Matrix  # in the body's frame
-    wall_director1: Matrix  # likewise, after the edges' own: shape (n_edge + n_wall, 3)
+    clamp_edge_body: Indices
+    clamp_edge_free: Indices
+    clamp_edge_tangent: Matrix  # in the body's frame
+    clamp_edge_director1: Matrix  # likewise, after the edges' own: shape (n_edge + n_clamp_edge, 3)
 
 
 @record
@@ -137,21 +137,21 @@ class Attachments:
     unknown: Indices  # rows of the matrix
     free: Indices
     of_unknown: Indices
-    wall_free: Indices
-    wall_joint: Indices
+    clamp_edge_free: Indices
+    clamp_edge_joint: Indices
 
 
 @record
 class Surfaces:
-    """Carriers, surfaces, and the list of near pairs with what it was made for; see `contact.near`."""
+    """ContactPoints, surfaces, and the list of near pairs with what it was made for; see `contact.near`."""
 
     d_hat: float
     stiffness: float
     radius: Vector
     weight: Vector
-    carrier_body: Indices
+    contact_point_body: Indices
     free_index: Indices  # places of all bodies among the free ones; none if none is free
-    follows: Indices
+    moved_by: Indices
     node_free: Flags
     group: Indices
     point_position: Matrix  # of points and centres in their bodies' frames
@@ -162,17 +162,17 @@ class Surfaces:
     bound: Vector
     body: Indices
     position: Matrix
-    turn: Stack
-    meets: FlagTable
-    near_carrier: Indices = ("near",)
+    rotation: Stack
+    can_collide: FlagTable
+    near_contact_point: Indices = ("near",)
     near_surface: Indices = ("near",)
     near_gap: Vector = ("near",)
     near_count: Indices = (1,)
     margin: Vector  # shape (1,)
     extent: Vector = ("surface",)
-    listed_carrier: Matrix = ("carrier", 3)
-    listed_place: Matrix = ("surface", 3)
-    listed_turn: Stack = ("surface", 3, 3)
+    listed_contact_point: Matrix = ("contact_point", 3)
+    listed_surface_position: Matrix = ("surface", 3)
+    listed_surface_rotation: Stack = ("surface", 3, 3)
 
 
 @record
@@ -193,8 +193,8 @@ class Sliding:
     arm: Matrix = ("near", 3)
     lever: Matrix = ("near", 3)
     back: Stack = ("body+world", 3, 3)
-    turn: Stack = ("body+world", 3, 3)
-    origin_turn: Stack = ("body+world", 3, 3)
+    rotation: Stack = ("body+world", 3, 3)
+    origin_rotation: Stack = ("body+world", 3, 3)
 
 
 @record
@@ -202,7 +202,7 @@ class Slips:
     """Slip of all lagged contacts along a Newton step; see `forces.friction_limit`."""
 
     threshold: float
-    way: Matrix = ("slip", "path")
+    path: Matrix = ("slip", "path")
 
 
 @record
@@ -282,8 +282,8 @@ class Fluid:
     velocity: Vector  # U [m/s], shape (3,)
     edge_node: Indices  # first node of each edge, shape (n_edge,)
     mass: Matrix  # m₁ l̄ and m₂ l̄ [kg] and j l̄ [kg m²] of each edge, shape (n_edge, 3)
-    direction1: Matrix = ("edge+wall", 3)  # m1 of edges and walls at z
-    direction2: Matrix = ("edge+wall", 3)
+    direction1: Matrix = ("edge+clamp", 3)  # m1 of edges and clamp edges at z
+    direction2: Matrix = ("edge+clamp", 3)
     node_velocity: Matrix = ("node", 3)  # at which `fluid_momentum` finds the two that follow [m/s]
     spin: Vector = ("edge",)  # likewise [rad/s]
     momentum: Matrix = ("node", 3)  # P of nodes [N s]
@@ -295,7 +295,7 @@ class Fluid:
 class PointForces:
     """Forces of fixed direction, or that turn with what they act on (then with the edges of their nodes)."""
 
-    place: int  # of their energy in `Sums`
+    energy_slot: int  # of their energy in `Sums`
     node: Indices
     node_load: Indices
     node_vector: Matrix

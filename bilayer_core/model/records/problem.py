@@ -29,19 +29,19 @@ from .parts import (
 class Sums:
     """First and second derivatives to which forces add, and what becomes of them for the unknowns."""
 
-    energy: Vector = ("force",)  # of each, in the order of `model.force_places` [J]
+    energy: Vector = ("force",)  # of each, in the order of `model.force_slots` [J]
     selected: Flags = ("force",)  # whether a force is computed, in that order; in steps all are
-    first: Vector  # node, edge, pair and body in one piece, for clearing
+    gradients: Vector  # node, edge, pair and body in one piece, for clearing
     lasting: Vector  # the part of it that stays as it is when other parts follow the configuration
     node: Matrix = ("node", 3)  # ∂/∂x of nodes [N]
-    edge: Matrix = ("edge+wall", 4)  # ∂/∂(e, θ) of edges and walls
+    edge: Matrix = ("edge+clamp", 4)  # ∂/∂(e, θ) of edges and clamp edges
     pair: Matrix = ("pair", 3)  # ∂/∂p of paired edges
     body: Matrix = ("free", 6)  # ∂/∂(X, φ) of free bodies
-    carrier: Matrix = ("carrier", 3)  # ∂/∂x of carriers by contact alone [N], of which nodes take theirs
+    contact_point: Matrix = ("contact_point", 3)  # ∂/∂x of contact points by contact alone [N]; nodes take theirs
     contact: Matrix = ("body+world", 6)  # ∂/∂(X, φ) of all bodies by contact alone, of which free ones take theirs
     gradient: Vector = ("unknown",)  # of the unknowns, zero where nodes are held
     attached: Matrix = ("attached", 3)  # of held nodes before that
-    second: Vector  # all second derivatives but links in one piece
+    hessians: Vector  # all second derivatives but links in one piece
     edge_hessian: Stack = ("edge with hessian", 4, 4)
     cross_hessian: Stack = ("joint in space", 4, 4)
     pair_hessian: Stack = ("pair in space", 3, 3)
@@ -99,7 +99,7 @@ class ForceTable:
     own: Indices
     add: Indices
     start: Indices
-    follow: Indices
+    update_lagged: Indices
     lasting: int
 
 
@@ -109,8 +109,8 @@ class Calls:
 
     take_state: Address
     move: Address
-    place_carried: Address
-    place_frames: Address
+    update_attached: Address
+    transport_frames: Address
     list_surface_pairs: Address
     bound_at_surfaces: Address
     add_contact_to_bodies: Address
@@ -118,10 +118,10 @@ class Calls:
     find_rod_contacts: Address
     list_near_rods: Address
     near_pairs: Address
-    where_friction_holds: Address
+    limit_by_friction: Address
     first_guess_of: Address
     start_stage: Address
-    follow: Address
+    update_lagged: Address
     add_forces: Address
     expand_to_unknowns: Address
     assemble: Address
@@ -141,8 +141,8 @@ class Calls:
     count_border: Address
     minimise_potential: Address
     start_step_point: Address
-    place_origin: Address
-    move_along: Address
+    set_origin: Address
+    add_history_to_origin: Address
     drive_stage: Address
     predict_stage: Address
     predict_end: Address
@@ -151,7 +151,7 @@ class Calls:
     write_end: Address
     write_shape: Address
     distance: Address
-    keep_slopes: Address
+    keep_stage_derivatives: Address
     make_step: Address
     jumps_at: Address
     corner_after: Address
@@ -196,7 +196,7 @@ class Problem:
     rod_contact: RodContact
     slips: Slips
     contact_columns: ContactColumns
-    meets: bool  # whether anything can touch anything
+    has_contact: bool  # whether anything can touch anything
     flow: Flow
     fluid: Fluid
     loads: PointForces

@@ -1,14 +1,14 @@
-"""How a loop ends, or what keeps it from going on by itself."""
+"""How steps end, or what keeps them from going on."""
 
 from __future__ import annotations
 
 READY = 0
-NO_ROOM = 1
-"""There are more near pairs with surfaces than room for them."""
-NO_ROOM_FOR_RODS = 2
+PAIR_CAPACITY_EXCEEDED = 1
+"""There are more near pairs with surfaces than capacity for them."""
+ROD_CAPACITY_EXCEEDED = 2
 """Likewise of rods with rods, or more contacts."""
-NO_ROOM_IN_BORDER = 3
-"""Contacts of rods have more columns than the border has room for."""
+BORDER_CAPACITY_EXCEEDED = 3
+"""Contacts of rods have more columns than the border has capacity for."""
 INPUTS_END = 4
 """What acts from outside is not known as far as the step reaches."""
 CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND = 5, 10, 11, 12, 13, 14, 15

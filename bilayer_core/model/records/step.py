@@ -6,35 +6,35 @@ from ...jit.record import Flags, Indices, Matrix, Stack, Tensor, Vector, record
 
 
 @record
-class Place:
+class Configuration:
     """A configuration: positions, frames and bodies at one point of a Newton iteration.
 
     Sizes in shapes are those of `model.sizes`.
     """
 
-    carrier: Matrix = ("carrier", 3)  # all carriers [m]: the first are the nodes, the others points of bodies
+    contact_point: Matrix = ("contact_point", 3)  # all [m]: the first are nodes, the others on bodies
     position: Matrix = ("node", 3)  # of nodes [m]
-    point: Matrix = ("point", 3)  # of the other carriers [m]
-    length: Vector = ("edge+wall",)  # of edges and walls [m]
-    tangent: Matrix = ("edge+wall", 3)  # of edges and walls, unit
-    director1: Matrix = ("edge+wall", 3)  # likewise
-    director2: Matrix = ("edge+wall", 3)
-    turn: Vector = ("edge",)  # of edges about their tangents since the start of the step [rad]
+    point: Matrix = ("point", 3)  # of the other contact points [m]
+    length: Vector = ("edge+clamp",)  # of edges and clamp edges [m]
+    tangent: Matrix = ("edge+clamp", 3)  # of edges and clamp edges, unit
+    director1: Matrix = ("edge+clamp", 3)  # likewise
+    director2: Matrix = ("edge+clamp", 3)
+    total_angle: Vector = ("edge",)  # of edges about their tangents since the start of the step [rad]
     angle: Vector = ("edge",)  # of edges in the last move [rad]
     joint_strain: Matrix = ("joint", 3)  # κ₁ κ₂ ψ of joints, ψ unwrapped [rad]
     body_position: Matrix = ("free", 3)  # of free bodies [m]
     body_rotation: Stack = ("free", 3, 3)  # of free bodies
-    place: Matrix = ("body+world", 3)  # of all bodies and last of the world [m]
+    pose_position: Matrix = ("body+world", 3)  # of all bodies and last of the world [m]
     rotation: Stack = ("body+world", 3, 3)  # likewise
-    surface_place: Matrix = ("surface", 3)  # of surfaces [m]
-    surface_turn: Stack = ("surface", 3, 3)  # their axes
+    surface_position: Matrix = ("surface", 3)  # of surfaces [m]
+    surface_rotation: Stack = ("surface", 3, 3)  # their axes
     arm: Matrix = ("attached", 3)  # from the position of its body to each attached node [m]
-    held: Matrix = ("attached", 3)  # of attached nodes [m]
+    attached_position: Matrix = ("attached", 3)  # of attached nodes [m]
     point_arm: Matrix = ("point", 3)  # like `arm`, of points
     surface_arm: Matrix = ("surface", 3)  # and of surfaces
     departure: Matrix = ("node", 3)  # of nodes from where inertia takes them, x − x̃ [m]: its digits are not those of x
     body_departure: Matrix = ("free", 3)  # of free bodies, X − X̃ [m]
-    body_turned: Matrix = ("free", 3)  # vector part of their unit quaternion from R̃ to R; see `forces.inertia`
+    body_departure_quaternion: Matrix = ("free", 3)  # vector part of that from R̃ to R; see `forces.inertia`
 
 
 @record
@@ -46,9 +46,9 @@ class Stage:
 
     lengths: Vector = (2,)  # γ h and γ′ h [s], where p = p̄ + γ′ h × force for momenta
     origin_position: Matrix = ("node", 3)  # of nodes [m]
-    origin_turn: Vector = ("edge",)  # of edges, counted from the start of the stage [rad]
+    origin_angle: Vector = ("edge",)  # of edges, counted from the start of the stage [rad]
     origin_body_position: Matrix = ("free", 3)  # of free bodies [m]
-    origin_place: Matrix = ("body+world", 3)  # of all bodies and last of the world [m]
+    origin_pose_position: Matrix = ("body+world", 3)  # of all bodies and last of the world [m]
     origin_rotation: Stack = (
         "body+world",
         3,
@@ -56,19 +56,19 @@ class Stage:
     )  # likewise; R̄ is no rotation: (R − R̄)/(γ h) is dR/dt
     origin_fluid_momentum: Matrix = ("wet", 3)  # P̄ of the fluid at nodes [N s]; none without added mass
     predicted_position: Matrix = ("node", 3)  # x̃ of nodes [m]
-    predicted_turn: Vector = ("edge",)  # of edges that inertia prefers, counted from the start of the stage [rad]
+    predicted_angle: Vector = ("edge",)  # of edges that inertia prefers, counted from the start of the stage [rad]
     predicted_body_position: Matrix = ("free", 3)  # X̃ of free bodies [m]
     predicted_body_rotation: Stack = ("free", 3, 3)  # R̃ of free bodies
     twist: Vector = ("joint",)  # of joints at the start of the stage
     rest_edge: Vector = ("edge",)  # strains without stress
     rest_joint: Matrix = ("joint", 3)  # of joints; what strains off the axis add is not in it
     load_factor: Vector = ("load",)
-    body_turn: Matrix = ("free", 3)  # rotation vector to where inertia takes free bodies
-    way: Matrix = ("node", 3)  # of nodes, from the start of the stage to where inertia takes them [m]
-    body_way: Matrix = ("free", 3)  # likewise of free bodies
+    predicted_body_rotation_vector: Matrix = ("free", 3)  # rotation vector to where inertia takes free bodies
+    predicted_shift: Matrix = ("node", 3)  # of nodes, from the start of the stage to where inertia takes them [m]
+    predicted_body_shift: Matrix = ("free", 3)  # likewise of free bodies
     body_spin: Matrix = ("free", 3)  # with which they turn there [rad/s]
-    held_arm: Matrix = ("attached", 3)  # of what free bodies hold, R̃ r [m]
-    held_lag: Matrix = ("attached", 3)  # by which bodies without forces would take these farther than inertia [m]
+    attached_arm: Matrix = ("attached", 3)  # of what free bodies hold, R̃ r [m]
+    attached_lag: Matrix = ("attached", 3)  # by which bodies without forces would take these farther than inertia [m]
 
 
 @record
@@ -82,7 +82,7 @@ class Point:
     vectors: Vector  # all but rotations, in one piece, of which the following are views
     displacement: Matrix = ("node", 3)  # of nodes [m]
     body_displacement: Matrix = ("body", 3)  # of all bodies [m]
-    turn: Vector = ("edge",)  # of edges about their tangents since the start of the step [rad]
+    angle: Vector = ("edge",)  # of edges about their tangents since the start of the step [rad]
     velocity: Matrix = ("node", 3)  # of nodes [m/s]
     spin: Vector = ("edge",)  # of edges [rad/s]
     body_velocity: Matrix = ("free", 3)  # of free bodies [m/s]
@@ -139,19 +139,19 @@ class RunExtrema:
 class Work:
     """Places and points that a step needs."""
 
-    places: Indices  # addresses of configurations, shape (3,)
+    configurations: Indices  # addresses of configurations, shape (3,)
     stage: Stage
     first: Point
     origin: Point  # of the stage at hand, or the end of a step beyond its last stage
     end: Point
     gained: Matrix = ("stage", "point vector")  # by each stage over its origin, in the vectors of points
-    gained_turn: Stack = ("stage", "body", 3)  # likewise rotation vectors of bodies
+    gained_rotation_vector: Stack = ("stage", "body", 3)  # likewise rotation vectors of bodies
     moved: Vector = (1,)  # largest displacement in a round of statics [m]
-    turned: Vector = ("edge",)  # of edges, from the start of the step to that of the stage [rad]
+    start_angle: Vector = ("edge",)  # of edges, from the start of the step to that of the stage [rad]
     rotation: Stack = ("body", 3, 3)  # scratch
     transduction: Vector = ("law",)  # at a stage
     strain: Vector = ("law",)  # of laws at a stage
-    touched: Flags = ("carrier",)  # carriers that something pushed at the end of the last step
+    touched: Flags = ("contact_point",)  # contact points that something pushed at the end of the last step
 
 
 @record
@@ -171,7 +171,7 @@ class StateArrays:
     body_rotation: Stack
     body_velocity: Matrix
     body_angular_velocity: Matrix
-    kept: Vector
+    has_history: Vector
     acceleration: Matrix
     spin_acceleration: Vector
     body_acceleration: Matrix

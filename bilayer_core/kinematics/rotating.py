@@ -11,7 +11,7 @@ from ..jit import kernel
 
 
 @kernel
-def turn_by(v0, v1, v2, matrix, b, out, c):
+def rotate_by(v0, v1, v2, matrix, b, out, c):
     """out[c] = exp([v]×) matrix[b] for a rotation vector v [rad], by Rodrigues' formula; `out[c]` is not `matrix[b]`.
 
     Column by column: exp([v]×) u = u + s v × u + k v × (v × u).
@@ -31,7 +31,7 @@ def turn_by(v0, v1, v2, matrix, b, out, c):
 
 
 @kernel
-def turn_between(first, a, last, b):
+def rotation_vector_between(first, a, last, b):
     """Rotation vector [rad] of last[b] first[a]ᵀ, by less than half a turn, as a tuple."""
     q00 = q11 = q22 = q21 = q12 = q02 = q20 = q10 = q01 = 0.0
     for k in range(3):
@@ -51,14 +51,14 @@ def turn_between(first, a, last, b):
 
 
 @kernel
-def turn_further(v0, v1, v2, turned, out, f):
+def compose_quaternion(v0, v1, v2, turned, out, f):
     """out[f] = vector part of the unit quaternion of exp([v]×) after that of turned[f]; they may be the same array.
 
     Of turns by less than half a turn, whose quaternions have a positive real part. Small turns keep all their digits,
     which a matrix next to the unit matrix does not.
     """
     angle2 = v0 * v0 + v1 * v1 + v2 * v2
-    if angle2 < 1e-8:  # as in `turn_by`
+    if angle2 < 1e-8:  # as in `rotate_by`
         s, w = 0.5 - angle2 / 48.0, 1.0 - angle2 / 8.0
     else:
         angle = math.sqrt(angle2)
@@ -79,7 +79,7 @@ def real_part(turned, f):
 
 
 @kernel
-def turned_by(turned, f, u0, u1, u2):
+def rotated_by(turned, f, u0, u1, u2):
     """(E − 1) u = 2 w q×u + 2 q×(q×u) for the rotation E of the quaternion with the vector part q = turned[f], as a
     tuple.
     """

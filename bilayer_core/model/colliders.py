@@ -1,4 +1,4 @@
-"""Which carriers of a scene can meet which surfaces."""
+"""Which contact points of a scene can meet which surfaces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Mobility(IntEnum):
 
 
 @dataclass(frozen=True)
-class Party:
+class Collider:
     """What carries points, a surface, or both.
 
     Attributes
@@ -37,7 +37,7 @@ class Party:
     mobility: Mobility
 
 
-RODS = Party("rods", -1, "", Mobility.FREE)
+RODS = Collider("rods", -1, "", Mobility.FREE)
 
 
 def mobility_of(body: Body) -> Mobility:
@@ -47,48 +47,48 @@ def mobility_of(body: Body) -> Mobility:
     return Mobility.SCHEDULED if body.motion.moves else Mobility.FIXED
 
 
-def parties(scene: SceneConfig) -> tuple[list[Party], list[Party]]:
+def colliders(scene: SceneConfig) -> tuple[list[Collider], list[Collider]]:
     """Bodies and obstacles."""
     bodies = [
-        Party(body.name, index, body.surface.shape if body.surface else "", mobility_of(body))
+        Collider(body.name, index, body.surface.shape if body.surface else "", mobility_of(body))
         for index, body in enumerate(scene.bodies)
     ]
     first = len(bodies)
-    obstacles = [Party(o.name, first + i, o.type, Mobility.FIXED) for i, o in enumerate(scene.obstacles)]
+    obstacles = [Collider(o.name, first + i, o.type, Mobility.FIXED) for i, o in enumerate(scene.obstacles)]
     return bodies, obstacles
 
 
-def points_meet(carrier: Party, surface: Party) -> bool:
+def points_can_collide(point: Collider, surface: Collider) -> bool:
     """Whether nodes or contact points of one can meet the surface of another: one of the two must move."""
-    return surface.kind != "" and carrier.order != surface.order and max(carrier.mobility, surface.mobility) > 0
+    return surface.kind != "" and point.order != surface.order and max(point.mobility, surface.mobility) > 0
 
 
-def shapes_meet(carrier: Party, surface: Party) -> bool:
+def shapes_can_collide(point: Collider, surface: Collider) -> bool:
     """Whether the centre of a ball, corners or rims of one are to meet the surface of another: one of them must be
     free.
 
-    Against a ball its own centre is all that is needed, and of two balls one is the carrier, the first of the bodies.
+    Against a ball its own centre is all that is needed, and of two balls the first of the bodies has it.
     """
-    if not (carrier.kind and surface.kind) or carrier.order == surface.order:
+    if not (point.kind and surface.kind) or point.order == surface.order:
         return False
-    if max(carrier.mobility, surface.mobility) < Mobility.FREE or carrier.kind == "plane":
+    if max(point.mobility, surface.mobility) < Mobility.FREE or point.kind == "plane":
         return False
-    return surface.kind != "sphere" or (carrier.kind == "sphere" and carrier.order < surface.order)
+    return surface.kind != "sphere" or (point.kind == "sphere" and point.order < surface.order)
 
 
 def contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
     """Which parts of a scene can meet, each with how it is resolved."""
     if scene.contact is None:
         return ()
-    bodies, obstacles = parties(scene)
-    pairs = [f"rods – {s.name} (nodes against {s.kind})" for s in (*obstacles, *bodies) if points_meet(RODS, s)]
-    for carrier in (*bodies, *obstacles):
+    bodies, obstacles = colliders(scene)
+    pairs = [f"rods – {s.name} (nodes against {s.kind})" for s in (*obstacles, *bodies) if points_can_collide(RODS, s)]
+    for point in (*bodies, *obstacles):
         for surface in (*obstacles, *bodies):
             how = []
-            if carrier.order < len(bodies) and scene.bodies[carrier.order].contact_points:
-                how += ["contact points"] if points_meet(carrier, surface) else []
-            if shapes_meet(carrier, surface):
-                how += [{"sphere": "ball", "box": "corners", "cylinder": "rims"}[carrier.kind]]
+            if point.order < len(bodies) and scene.bodies[point.order].contact_points:
+                how += ["contact points"] if points_can_collide(point, surface) else []
+            if shapes_can_collide(point, surface):
+                how += [{"sphere": "ball", "box": "corners", "cylinder": "rims"}[point.kind]]
             if how:
-                pairs.append(f"{carrier.name} – {surface.name} ({' and '.join(how)} against {surface.kind})")
+                pairs.append(f"{point.name} – {surface.name} ({' and '.join(how)} against {surface.kind})")
     return tuple(pairs)

@@ -8,8 +8,8 @@ NAMES = tuple(kinds())
 """Of forces, in the order of the sum."""
 
 
-def place_of(name: str) -> int:
-    """Place of a force, for the module that computes it: nothing else may ask."""
+def slot_of(name: str) -> int:
+    """Configuration of a force, for the module that computes it: nothing else may ask."""
     if name not in NAMES:
         raise LookupError(f"force {name!r}: is not in the list, bilayer_core/model/force_list.py: {', '.join(NAMES)}")
     return NAMES.index(name)

@@ -33,7 +33,7 @@ HALF_TURN = math.pi
 
 
 @dataclass(frozen=True)
-class Meeting:
+class RodPair:
     """Two rods of a scene by their place in it, copies of one, or one and itself; and what was decided about them.
 
     `possible` is what geometry says, `active` whether contact is computed, `geometry` and `reason` why.
@@ -49,26 +49,26 @@ class Meeting:
     reason: str
 
 
-def meetings(scene: SceneConfig) -> tuple[Meeting, ...]:
+def rod_pairs(scene: SceneConfig) -> tuple[RodPair, ...]:
     """All pairs of rods, with the decision and its reason."""
     found = []
     for index, rod in enumerate(scene.rods):
-        found.append(Meeting(index, index, False, f"{rod.name} – itself", *_decide(scene, _can_close(scene, rod))))
+        found.append(RodPair(index, index, False, f"{rod.name} – itself", *_decide(scene, _can_close(scene, rod))))
         if len(rod.copies) > 1:
             can = _can_reach(scene, rod, rod)
-            found.append(Meeting(index, index, True, f"{rod.name} – its copies", *_decide(scene, can)))
+            found.append(RodPair(index, index, True, f"{rod.name} – its copies", *_decide(scene, can)))
         for other in range(index):
             can = _can_reach(scene, scene.rods[other], rod)
-            found.append(Meeting(other, index, False, f"{scene.rods[other].name} – {rod.name}", *_decide(scene, can)))
+            found.append(RodPair(other, index, False, f"{scene.rods[other].name} – {rod.name}", *_decide(scene, can)))
     return tuple(found)
 
 
 def passing_warnings(scene: SceneConfig) -> Iterator[str]:
     """Warnings of rods that could meet, but would pass through each other."""
-    for meeting in meetings(scene):
-        if meeting.possible and not meeting.active:
-            why = f"{meeting.reason}; by geometry: {meeting.geometry}"
-            yield f"rods may pass through each other: {meeting.what} ({why})"
+    for rod_pair in rod_pairs(scene):
+        if rod_pair.possible and not rod_pair.active:
+            why = f"{rod_pair.reason}; by geometry: {rod_pair.geometry}"
+            yield f"rods may pass through each other: {rod_pair.what} ({why})"
 
 
 def _decide(scene: SceneConfig, by_geometry: tuple[bool, str]) -> tuple[bool, bool, str, str]:
@@ -110,8 +110,8 @@ def _can_reach(scene: SceneConfig, first: Rod, second: Rod) -> tuple[bool, str]:
     regions = [_region(scene, rod) for rod in (first, second)]
     if any(region is None for region in regions):
         return True, "nothing keeps them apart"
-    (center_a, reach_a), (center_b, reach_b) = regions
-    apart = float(np.linalg.norm(center_a - center_b)) - reach_a - reach_b
+    (center_a, radius_a), (center_b, radius_b) = regions
+    apart = float(np.linalg.norm(center_a - center_b)) - radius_a - radius_b
     if apart > scene.contact.barrier_distance if scene.contact else apart > 0.0:
         return False, f"held {1e3 * apart:.3g} mm apart by their clamps"
     return True, "both reach the space between their clamps"

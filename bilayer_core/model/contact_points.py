@@ -1,0 +1,217 @@
+"""ContactPoints and surfaces of a scene: what may touch what, and whether it does at the start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import PenetrationError
+from ..scene.config import SceneConfig
+from .colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
+from .model import Bodies, ContactPoints, Model, Surfaces
+from .shapes import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
+from .strand_arrays import StrandArrays
+from .strands import Collected
+
+
+@dataclass(frozen=True)
+class _Owned:
+    """A shape and what it belongs to: its collider, its body or the world, and its pose in that frame."""
+
+    collider: Collider
+    shape: Shape
+    body: int
+    position: np.ndarray
+    rotation: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A contact point that is no node: its body or the world, and the surfaces that it meets."""
+
+    position: np.ndarray
+    radius: float
+    length: float
+    body: int
+    can_collide: list[bool]
+
+
+def build_contact(scene: SceneConfig, found: Collected, bodies: Bodies) -> tuple[ContactPoints, Surfaces]:
+    """ContactPoints, and the surfaces that they can meet."""
+    of_bodies, _ = colliders(scene)
+    owned = _shapes(scene, bodies)
+    surfaces = owned if scene.contact is not None else []
+    owners = [surface.collider for surface in surfaces]
+    points = [
+        _Point(
+            np.array(p.position), p.offset, p.length, index, [points_can_collide(of_bodies[index], s) for s in owners]
+        )
+        for index, body in enumerate(scene.bodies)
+        for p in body.contact_points
+    ]
+    generated = [point for part in owned for point in _points_of(part, owners)]
+    world = len(scene.bodies)
+    shown = points + [p for p in generated if p.body != world and p.position.any()]
+    hidden = [p for p in generated if p.body == world or not p.position.any()]  # obstacles and centres of balls
+    others = shown + hidden
+
+    nodes = found.node_count
+    moved_by = np.full(nodes + len(others), -1, dtype=np.int64)
+    moved_by[found.column("attached_node", np.int64)] = found.column("attached_body", np.int64)
+    moved_by[nodes:] = [p.body for p in others]
+    body = moved_by.copy()
+    body[:nodes] = -1
+    rows = np.zeros((nodes + len(others), len(surfaces)), dtype=bool)
+    clear = scene.contact.barrier_distance if scene.contact is not None else 0.0
+    rows[:nodes] = _nodes_can_collide(found, bodies, of_bodies, surfaces, moved_by, clear)
+    rows[nodes:] = np.array([p.can_collide for p in others], dtype=bool).reshape(len(others), len(surfaces))
+    used = rows.any(axis=0)
+    surfaces = [surface for surface, is_used in zip(surfaces, used, strict=True) if is_used]
+    groups, group = np.unique(rows[:, used], axis=0, return_inverse=True)
+
+    contact_points = ContactPoints(
+        weight=np.concatenate([found.column("node_weight"), [p.length for p in others]]),
+        radius=np.concatenate([found.column("node_radius"), [p.radius for p in others]]),
+        friction=_friction_of_contact_points(scene, nodes, len(moved_by)),
+        node_edges=found.column("node_edges", np.int64, 2),
+        node_axis=found.column("node_axis", np.int64),
+        body=body,
+        moved_by=moved_by,
+        position=np.array([p.position for p in others], dtype=float).reshape(-1, 3),
+        point_count=len(shown),
+        group=group.reshape(-1).astype(np.int64),
+    )
+    return contact_points, Surfaces(
+        names=tuple(s.collider.name for s in surfaces),
+        kind=np.array([NUMBER[s.shape.kind] for s in surfaces], dtype=np.int64),
+        size=np.array([s.shape.core for s in surfaces]).reshape(-1, 3),
+        rounding=np.array([s.shape.rounding for s in surfaces]),
+        bound=np.array([s.shape.bound for s in surfaces]),
+        body=np.array([s.body for s in surfaces], dtype=np.int64),
+        position=np.array([s.position for s in surfaces]).reshape(-1, 3),
+        rotation=np.array([s.rotation @ s.shape.rotation for s in surfaces]).reshape(-1, 3, 3),
+        can_collide=np.ascontiguousarray(groups.T),
+    )
+
+
+def _shapes(scene: SceneConfig, bodies: Bodies) -> list[_Owned]:
+    """Shapes of obstacles, then of bodies."""
+    of_bodies, of_obstacles = colliders(scene)
+    world = len(scene.bodies)
+    found = [
+        _Owned(collider, shape_of(obstacle), world, *obstacle_pose(obstacle))
+        for collider, obstacle in zip(of_obstacles, scene.obstacles, strict=True)
+    ]
+    return found + [
+        _Owned(collider, shape, collider.order, np.zeros(3), np.eye(3))
+        for collider, shape in zip(of_bodies, bodies.shapes, strict=True)
+        if shape is not None
+    ]
+
+
+def _points_of(part: _Owned, owners: list[Collider]) -> list[_Point]:
+    """Centre, corners or rims of a shape, if they meet a surface."""
+    can_collide = [shapes_can_collide(part.collider, surface) for surface in owners]
+    if not any(can_collide):
+        return []
+    points, radius, length = part.shape.points()
+    return [_Point(part.position + part.rotation @ point, radius, length, part.body, can_collide) for point in points]
+
+
+def _nodes_can_collide(
+    found: Collected,
+    bodies: Bodies,
+    of_bodies: list[Collider],
+    surfaces: list[_Owned],
+    moved_by: np.ndarray,
+    clear: float,
+) -> np.ndarray:
+    """Which nodes meet which surfaces, shape (n_node, n_surface).
+
+    A node that a body holds does not meet the body's own surface, nor do its neighbours along the strand up to the
+    first that is clear of the barrier: a rod may grow out of a body.
+    """
+    nodes = found.node_count
+    rows = np.zeros((nodes, len(surfaces)), dtype=bool)
+    position, radius = found.column("position", width=3), found.column("node_radius")
+    for column, surface in enumerate(surfaces):
+        rows[:, column] = points_can_collide(RODS, surface.collider)
+        for node in np.flatnonzero(moved_by[:nodes] >= 0):
+            rows[node, column] = points_can_collide(of_bodies[moved_by[node]], surface.collider)
+        if surface.body == len(bodies.names):
+            continue
+        base, rotation = bodies.start_position[surface.body], bodies.start_rotation[surface.body]
+        gap = signed_distance(surface.shape, (position - base) @ rotation) - radius
+        for node in np.flatnonzero(moved_by[:nodes] == surface.body):
+            strand = next(s for s in found.strands if s.first_node <= node < s.first_node + s.node_count)
+            rows[_from_clamp(node, strand, gap, clear), column] = False
+    return rows
+
+
+def _from_clamp(node: int, strand: StrandArrays, gap: np.ndarray, clear: float) -> list[int]:
+    """Nodes of a strand from its held end to the first whose gap is at least `clear`, that one excluded."""
+    last = strand.first_node + strand.node_count - 1
+    order = range(node, last + 1) if node == strand.first_node else range(node, strand.first_node - 1, -1)
+    held = [node]
+    for other in order[1:]:
+        if gap[other] >= clear:
+            break
+        held.append(other)
+    return held
+
+
+def _friction_of_contact_points(scene: SceneConfig, nodes: int, contact_points: int) -> np.ndarray:
+    """Friction coefficients forward, backward and sideways of each contact point, shape (n_contact_point, 3)."""
+    law = scene.contact.friction if scene.contact else None
+    coefficients = np.full((contact_points, 3), law.coefficient if law else 0.0)
+    coefficients[:nodes] = law.of_rods if law else 0.0
+    return coefficients
+
+
+def contact_point_names(model: Model) -> list[str]:
+    """What each contact point is called in messages."""
+    names = [f"node {k} of {s.name}" for s in model.strands for k in range(s.node_count)]
+    parts = [*model.bodies.names, "an obstacle"]
+    contact_points = model.contact_points
+    for k, body in enumerate(contact_points.body[model.node_count :]):
+        centre = k >= contact_points.point_count and not contact_points.position[k].any()
+        names.append(f"body {parts[body]}" if centre else f"contact point {k} ({parts[body]})")
+    return names
+
+
+def start_contact_points(model: Model) -> np.ndarray:
+    """Positions of all contact points at the start [m], shape (n_contact_point, 3)."""
+    bodies, body = model.bodies, model.contact_points.body[model.node_count :]
+    base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[body]
+    rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[body]
+    return np.concatenate(
+        [model.start_position, base + np.einsum("kij,kj->ki", rotation, model.contact_points.position)]
+    )
+
+
+def refuse_penetration(model: Model) -> None:
+    """Raise PenetrationError if a contact point starts behind a surface that it meets, or touching it."""
+    contact_points, surfaces, bodies = model.contact_points, model.surfaces, model.bodies
+    position, faults = start_contact_points(model), []
+    base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[surfaces.body]
+    rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[surfaces.body]
+    for s, name in enumerate(surfaces.names):
+        core = Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, rotation[s] @ surfaces.rotation[s])
+        origin = base[s] + rotation[s] @ surfaces.position[s]
+        gap = signed_distance(core, position - origin) - surfaces.rounding[s] - contact_points.radius
+        behind = np.flatnonzero((gap <= 0.0) & surfaces.can_collide[s][contact_points.group])
+        faults += [(gap[i], i, name) for i in behind]
+    if faults:
+        depth, contact_point, surface = min(faults)
+        names = contact_point_names(model)
+        surface = f"body {surface}" if surface in bodies.names else surface
+        raise PenetrationError(
+            f"{model.scene.name}: the scene starts in penetration: {names[contact_point]} at "
+            f"({', '.join(f'{1e3 * c:.3f}' for c in position[contact_point])}) mm is {abs(1e3 * depth):.4g} mm behind "
+            f"the surface of {surface}{f', and {len(faults) - 1} more' if len(faults) > 1 else ''}; "
+            "all gaps must be positive at the start"
+        )
+
+
+_KIND = {number: kind for kind, number in NUMBER.items()}
