@@ -246,6 +246,7 @@ def take_state(p, state, at):
     """Start from a state."""
     bodies, strands = p.bodies, p.strands
     copy(state.position, at.position)
+    copy(state.memory, p.memory)
     clear_departure(at)
     for k in range(strands.edge_count):
         at.total_angle[k] = 0.0

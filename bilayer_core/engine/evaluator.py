@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..forces.register import memory_size
 from ..model.force_slots import NAMES
 from ..model.model import Model
 from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, PAIR, SHIFT, SIMPLIFIED
@@ -66,7 +67,7 @@ class Evaluator:
         # a stiffness of its own, whose columns are set to zero where bending or twisting is left out
         self._stiffness = model.joint_stiffness.copy()
         self._storage = Storage(replace(model, joint_stiffness=self._stiffness.view()))
-        self._state = initial_state(model)
+        self._state = initial_state(model, memory=memory_size(model))
         self._arrays = StateArrays(**{name: getattr(self._state, name) for name in StateArrays.names})
         self._work, self._inputs = new_work(model, [], 1), new_inputs(model, 1)
         self.stage: Stage = self._work.stage

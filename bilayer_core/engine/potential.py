@@ -24,6 +24,7 @@ def _signature(result, *more):
 
 call_add = caller("a force", lambda _: _signature(types.float64, types.boolean))
 call_start = caller("the start of a force", lambda _: _signature(types.int64))
+call_end = caller("the end of a force", lambda _: _signature(types.int64))
 call_update_lagged = caller("a force that follows", lambda _: _signature(types.boolean))
 
 
@@ -46,6 +47,18 @@ def update_lagged(p, at, stage):
     for k in range(forces.lasting, forces.update_lagged.shape[0]):
         moved |= call_update_lagged(forces.update_lagged[k], (forces.own[k], p, at, stage))
     return moved
+
+
+@piece(int, Problem, Configuration, Stage)
+def end_forces(p, at, stage):
+    """Let forces write what they carry on to the next step, and their energies at the end of this one."""
+    forces = p.forces
+    for k in range(forces.end.shape[0]):
+        if forces.end[k] != 0:
+            status = call_end(forces.end[k], (forces.own[k], p, at, stage))
+            if status != READY:
+                return status
+    return READY
 
 
 @kernel

@@ -20,8 +20,8 @@ from ..model.records.problem import Problem
 from ..model.records.status import BEYOND, BLOCKED, CONVERGED, MAX_ITERATIONS, READY
 from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of, lagged
+from .ends import write_twist
 from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, STEP, VALUE, WITHOUT_INERTIA
-from .stages import write_twist
 
 configuration_at = record_at(Configuration)
 
@@ -203,6 +203,11 @@ def make_step(p, state, start_state, method, with_history, mode, inputs, work, h
             stage.lengths[:] = EVALUATION_TIME
     else:
         status, residual = CONVERGED, worst
+        ended = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
+        copy(p.memory, state.memory)
+        if ended != READY:
+            copy(start_state.values, state.values)
+            status = ended
     counts[PAIR], counts[CONFIGURATION], counts[ITERATIONS] = pair, e, iterations
     counts[FACTORISATIONS], counts[BACKTRACKS] = factorisations, backtracks
     figures[RESIDUAL], figures[GAP] = residual, gap

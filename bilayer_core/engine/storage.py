@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..forces.friction_limit import PATH_SIZE
-from ..forces.register import force_table, require_computed
+from ..forces.register import force_table, memory_size, require_computed
 from ..jit import shapes_of, zeros_in_one
 from ..model.model import Model
 from ..model.records.outcome import COUNTS, FIGURES
@@ -68,7 +68,7 @@ class Storage:
             geometry = model.rod_surfaces, model.edge_node, model.start_position
             self._pairs = NearPairs(*geometry, PAIRS_PER_POINT * points)
         self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
-        self._width = np.zeros(1, dtype=np.int64)
+        self._width, self._memory = np.zeros(1, dtype=np.int64), np.zeros(memory_size(model))
         self._sums, of_dimension = self._lasting_sums()
         self._groups = lasting_groups(model, self._sizes) | of_dimension
         self._problem: Problem | None = None
@@ -117,6 +117,7 @@ class Storage:
             slips=slips_of(model, sizes) if surfaces or rods else Slips.absent(),
             contact_columns=ContactColumns.absent(),
             sums=Sums.zeros(sizes, **self._sums),
+            memory=self._memory,
         )
         if rods:
             records["contact_columns"] = contact_columns_of(model, sizes, capacity.contacts + capacity.sliding)

@@ -53,7 +53,7 @@ def add_force(gradient_out, body, sign, arm, g):
 
 
 @kernel
-def add_second_derivative(p, m, g, arm, lever, rotating, i, a, b):
+def add_second_derivative(p, m, g, arm, lever, turning, i, a, b):
     """Add the second derivative of one contact to `Sums`.
 
     Parameters
@@ -76,7 +76,7 @@ def add_second_derivative(p, m, g, arm, lever, rotating, i, a, b):
                 p.sums.node_hessian[i, c, d] += m[c, d]
     free = p.surfaces.free_index
     if free.shape[0] > 0 and (free[b] >= 0 or (a >= 0 and free[a] >= 0)):
-        call(p.calls.add_contact_to_bodies, (p, m, g, arm, lever, rotating, i, a, b))
+        call(p.calls.add_contact_to_bodies, (p, m, g, arm, lever, turning, i, a, b))
 
 
 @kernel
@@ -88,7 +88,7 @@ def _skew(a, out):
 
 
 @piece(int, Problem, Matrix, Vector, Vector, Vector, float, int, int, int)
-def add_contact_to_bodies(p, m, g, arm, lever, rotating, i, a, b):
+def add_contact_to_bodies(p, m, g, arm, lever, turning, i, a, b):
     """The part of `add_second_derivative` that free bodies have; at least one of the two is free."""
     sums, free = p.sums, p.surfaces.free_index
     jacobian, upper = stack_matrix(3, 12), stack_matrix(12, 12)  # by (x or X_A, φ_A, X_B, φ_B)
@@ -113,10 +113,10 @@ def add_contact_to_bodies(p, m, g, arm, lever, rotating, i, a, b):
     for k in range(3):
         for n in range(k, 3):
             upper[3 + k, 3 + n] += 0.5 * (arm[k] * g[n] + g[k] * arm[n])
-            upper[9 + k, 9 + n] += 0.5 * rotating * (lever[k] * g[n] + g[k] * lever[n])
+            upper[9 + k, 9 + n] += 0.5 * turning * (lever[k] * g[n] + g[k] * lever[n])
         upper[3 + k, 3 + k] -= of_arm
-        upper[9 + k, 9 + k] -= rotating * of_lever
-    if rotating > 0.0:
+        upper[9 + k, 9 + k] -= turning * of_lever
+    if turning > 0.0:
         for k in range(3):
             for n in range(3):
                 upper[k, 9 + n] -= crossed[k, n]

@@ -118,14 +118,14 @@ def planar_stretch_bend(off_axis, plane, strands, at, with_hessian):
         gradient[b, 0] -= moment * sb
         if with_hessian:
             cosine = frame[a, 0] * frame[b, 0] + frame[a, 1] * frame[b, 1]
-            rotating = 2.0 * side[a] * k1 / (1.0 + cosine)
+            turning = 2.0 * side[a] * k1 / (1.0 + cosine)
             hessian[a, 0] += k1 * sa * sa
             hessian[b, 0] += k1 * sb * sb
-            hessian[a, 1] += rotating * sa
-            hessian[b, 1] -= rotating * sb
+            hessian[a, 1] += turning * sa
+            hessian[b, 1] -= turning * sb
             cross_hessian[k, 0] += k1 * sa * sb
-            cross_hessian[k, 1] -= rotating * sa
-            cross_hessian[k, 2] += rotating * sb
+            cross_hessian[k, 1] -= turning * sa
+            cross_hessian[k, 2] += turning * sb
 
 
 @kernel

@@ -48,6 +48,13 @@ class Term:
     follow : Piece or None
         Takes from a configuration what is held fixed between the moves of Newton's method, by the same arguments.
         Returns whether there is anything.
+    end : Piece or None
+        At the end of an accepted step, by the same arguments: writes its values of `Problem.memory`, and its energy
+        there where that is not what `add` found. Returns a status.
+    memory : callable or None
+        How many values a model's force carries from step to step, per contact or otherwise; None if none. They are part
+        of the state, and 0 at the start of a run. Where in `Problem.memory` they begin is given to `record` as
+        ``of["memory"]``.
     """
 
     names: tuple[str, ...]
@@ -55,6 +62,8 @@ class Term:
     add: Piece
     start: Piece | None = None
     update_lagged: Piece | None = None
+    end: Piece | None = None
+    memory: Callable[[Model], int] | None = None
 
 
 TERMS: tuple[Term, ...] = (
@@ -91,6 +100,15 @@ def require_computed(forces: Iterable[str]) -> None:
         )
 
 
+def _carried(term: Term, model: Model) -> int:
+    return term.memory(model) if term.memory is not None and set(term.names) & set(model.forces) else 0
+
+
+def memory_size(model: Model) -> int:
+    """How many values the forces of a model carry from step to step (`Problem.memory`)."""
+    return sum(_carried(term, model) for term in TERMS)
+
+
 def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
     """The terms that act in a model.
 
@@ -100,11 +118,12 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
     records : dict
         Of its problem, by name.
     """
-    chosen = []
+    chosen, carried = [], 0
     for term in TERMS:
-        own = term.record(model, records)
+        own = term.record(model, records | {"memory": carried})
         if set(term.names) & set(model.forces) and (own is None or own.exists):
             chosen.append((term, own))
+        carried += _carried(term, model)
     chosen.sort(key=lambda pair: pair[0].update_lagged is not None)
 
     def column(value: Callable) -> np.ndarray:
@@ -115,6 +134,7 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
         add=column(lambda term, own: term.add.address),
         start=column(lambda term, own: term.start.address if term.start else 0),
         update_lagged=column(lambda term, own: term.update_lagged.address if term.update_lagged else 0),
+        end=column(lambda term, own: term.end.address if term.end else 0),
         lasting=sum(term.update_lagged is None for term, _ in chosen),
     )
     table.holds = [own for _, own in chosen]  # whose addresses are in it

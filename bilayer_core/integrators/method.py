@@ -13,7 +13,8 @@ so every stage is the minimum of an incremental potential, and neither Newton no
 The stage derivatives of earlier stages follow from their results; no force is evaluated for them.
 
 An integrator may also begin with the derivatives fₙ at the start of the step, which the step before has left
-(`History`), and may advance momenta over a length γ′ h that is not that of positions: then γ γ′ stands for γ² in the potential.
+(`History`), and may advance momenta over a length γ′ h that is not that of positions: then γ γ′ stands for γ² in the
+potential.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from ..model.records.step import Method as MethodArrays
 
 @dataclass(frozen=True)
 class History:
-    """How a method uses stage derivatives at the start of a step. Where they jump, a step of another method stands in.
+    """How a method uses derivatives at the start of a step. Where they jump, a step of another method stands in.
 
     Attributes
     ----------

@@ -43,6 +43,7 @@ class State:
     body_rotation: Array  # shape (n_body, 3, 3)
     body_velocity: Array  # [m/s], shape (n_body, 3)
     body_angular_velocity: Array  # [rad/s], shape (n_body, 3)
+    memory: Array  # what forces carry from step to step (`forces.register`), shape (n_memory,)
     has_history: Array  # 1 if the five parts below are those of the last step, shape (1,), or (0,) without a use
     acceleration: Array  # of nodes [m/s²], shape (n_node, 3); like the others empty if the integrator has no history
     spin_acceleration: Array  # of edges [rad/s²], shape (n_edge,)
@@ -133,12 +134,12 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
             )
 
 
-def initial_state(model: Model, with_history: bool = False, fingerprint: Array | None = None) -> State:
+def initial_state(model: Model, with_history: bool = False, fingerprint: Array | None = None, memory: int = 0) -> State:
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
 
     Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
-    `with_history` makes arrays for what some integrators keep from step to step; `fingerprint` says what the state
-    belongs to (`model.fingerprint`).
+    `with_history` makes arrays for what some integrators keep from step to step, `memory` for so many values of forces;
+    `fingerprint` says what the state belongs to (`model.fingerprint`).
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
     channels = list(model.scene.stimuli.values())
@@ -160,6 +161,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         body_rotation=bodies.start_rotation.copy(),
         body_velocity=bodies.start_velocity.copy(),
         body_angular_velocity=bodies.start_angular_velocity.copy(),
+        memory=np.zeros(memory),
         has_history=np.zeros(int(with_history)),
         acceleration=np.zeros((with_history * model.node_count, 3)),
         spin_acceleration=np.zeros(with_history * model.edge_count),

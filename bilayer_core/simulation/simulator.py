@@ -10,6 +10,7 @@ import numpy as np
 
 from ..engine.report import IntegrationReport
 from ..errors import InputError, SimulationError
+from ..forces.register import memory_size
 from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
 from ..model.build import build_model
@@ -85,7 +86,7 @@ class Simulator:
         self._start_over()
 
     def _initial_state(self) -> State:
-        return initial_state(self.model, self._keeps_history, self._fingerprint)
+        return initial_state(self.model, self._keeps_history, self._fingerprint, memory_size(self.model))
 
     def _start_over(self) -> None:
         self.statistics = RunStatistics(com_max_height=float(self.com[2]))

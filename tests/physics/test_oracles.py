@@ -11,7 +11,7 @@ from sample_scenes import layer, rod, scene
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.engine.evaluator import Evaluator
-from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, factor_signed, solve_band, width
+from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, solve_band, width
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 from bilayer_core.kinematics.vector import angle
@@ -100,7 +100,7 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
             band[j, r] = dense[j + r, j]
     indefinite = band.copy()
     indefinite[41, 0] = -5.0
-    assert factor_band(band, n, width(b)) == -1
+    assert factor_band(band, n, b, False) == -1
     right = np.zeros((n + b, 6))
     right[:n] = rng.standard_normal((n, 6))
     expected = np.linalg.solve(dense, right[:n])
@@ -115,7 +115,7 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     assert scaled[:, :n] == pytest.approx(columns[:, :n] / band[:n, 0], rel=1e-10, abs=1e-12)
     backward_band(band, n, width(b), columns[2])
     assert columns[2, :n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
-    assert factor_band(indefinite, n, width(b)) == 41
+    assert factor_band(indefinite, n, b, False) == 41
 
 
 @pytest.mark.parametrize("shift", [0.5, -2.0, -7.0])
@@ -133,7 +133,7 @@ def test_the_signed_factor_counts_negative_eigenvalues(shift):
             band[j, r] = dense[j + r, j]
     expected = np.count_nonzero(np.linalg.eigvalsh(dense) < 0.0)
     assert 0 < expected < n
-    assert factor_signed(band, n, width(b)) == expected
+    assert factor_band(band, n, b, True) == expected
 
 
 def test_barrier_derivatives_agree_with_differences_and_vanish_at_its_distance():

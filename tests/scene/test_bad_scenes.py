@@ -64,7 +64,7 @@ def faults_of(content) -> list[str]:
         ("rods.arm.stations", 2, "found 2; must be a whole number of at least 3"),
         ("rods.arm.stations", 10.5, "found 10.5; must be a whole number of at least 3"),
         ("bodies.ball.motion.shell", "perhaps", 'found "perhaps"; must be true or false'),
-        ("fluid.added_mass", 3, "found 3; must be true, false, or a mapping of `through`, `sideways`, `rotating`"),
+        ("fluid.added_mass", 3, "found 3; must be true, false, or a mapping of `through`, `sideways`, `turning`"),
         # numbers and units
         ("duration", float("nan"), "found NaN; must be a time [s] above 0"),
         ("gravity[2]", float("-inf"), "found -Infinity; must be an acceleration [m/s^2]"),

@@ -21,7 +21,7 @@ class BandProblem:
 
 @piece(int, BandProblem)
 def solve_band_for_a_test(p):
-    status = call_factor(p.factor, (p.band, p.size))
+    status = call_factor(p.factor, (p.band, p.size, False))
     call_solve(p.forward, (p.band, p.size, p.right))
     call_solve(p.backward, (p.band, p.size, p.right))
     return status

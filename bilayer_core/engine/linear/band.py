@@ -17,32 +17,17 @@ def width(half_bandwidth: int) -> tuple[int, ...]:
 
 
 @kernel
-def factor_band(band, n, bandwidth):
-    """Factorise in place; return −1, or the first column whose pivot is not positive."""
-    b = len(bandwidth)
-    for j in range(n):
-        pivot = band[j, 0]
-        if not pivot > 0.0:
-            return j
-        inverse = 1.0 / pivot
-        for r in range(1, b + 1):
-            multiplier = band[j, r] * inverse
-            for s in range(r, b + 1):
-                band[j + r, s - r] -= multiplier * band[j, s]
-        for r in range(1, b + 1):
-            band[j, r] *= inverse
-    return -1
+def factor_band(band, n, b, counts):
+    """Factorise a matrix of half-bandwidth `b` in place.
 
-
-@kernel
-def factor_signed(band, n, bandwidth):
-    """Factorise a matrix that need not be positive definite, in place; return the number of its negative pivots, which
-    is that of negative eigenvalues (Sylvester's law of inertia).
+    Returns −1, or the first column whose pivot is not positive; or, if it `counts`, the number of negative pivots
+    whatever their signs, which is that of negative eigenvalues (Sylvester's law of inertia).
     """
-    b = len(bandwidth)
     negative = 0
     for j in range(n):
         pivot = band[j, 0]
+        if not counts and not pivot > 0.0:
+            return j
         negative += pivot < 0.0
         inverse = 1.0 / pivot
         for r in range(1, b + 1):
@@ -51,7 +36,7 @@ def factor_signed(band, n, bandwidth):
                 band[j + r, s - r] -= multiplier * band[j, s]
         for r in range(1, b + 1):
             band[j, r] *= inverse
-    return negative
+    return negative if counts else -1
 
 
 @kernel
@@ -142,39 +127,6 @@ def eliminate_band(band, n, b, m, border, scaled_out, corner):
             corner[a, c] -= total
             if c < a:
                 corner[c, a] -= total
-
-
-@kernel
-def factor_any(band, n):
-    """`factor_band` for a half-bandwidth that only the band knows."""
-    b = band.shape[1] - 1
-    for j in range(n):
-        pivot = band[j, 0]
-        if not pivot > 0.0:
-            return j
-        _eliminate_column(band, j, b, 1.0 / pivot)
-    return -1
-
-
-@kernel
-def count_any(band, n):
-    """`factor_signed` for a half-bandwidth that only the band knows."""
-    b, negative = band.shape[1] - 1, 0
-    for j in range(n):
-        pivot = band[j, 0]
-        negative += pivot < 0.0
-        _eliminate_column(band, j, b, 1.0 / pivot)
-    return negative
-
-
-@kernel
-def _eliminate_column(band, j, b, inverse):
-    for r in range(1, b + 1):
-        multiplier = band[j, r] * inverse
-        for s in range(r, b + 1):
-            band[j + r, s - r] -= multiplier * band[j, s]
-    for r in range(1, b + 1):
-        band[j, r] *= inverse
 
 
 @kernel

@@ -33,7 +33,7 @@ SHIFT_GROWTH = 10.0
 LARGEST_SHIFT = 1e8
 
 
-call_factor = caller("factor_band", lambda _: types.int64(Matrix, types.int64))
+call_factor = caller("factor_band", lambda _: types.int64(Matrix, types.int64, types.boolean))
 call_solve = caller("forward_band", lambda _: types.int64(Matrix, types.int64, Vector))
 call_eliminate = caller("eliminate_band", lambda _: types.int64(Matrix, types.int64, BorderedSystem.numba_type()))
 """What depends on the half-bandwidth; see `engine.linear.band`."""
@@ -92,11 +92,8 @@ def factorise(p, at, stage, counts):
             call(p.calls.restrict_bodies, (p, of_bodies))
         if p.contact_columns.exists and not call(p.calls.move_to_border, (p,)):
             return BORDER_CAPACITY_EXCEEDED
-        if counts:
-            negative = call_factor(p.calls.count_band, (band, strands.size))
-        else:
-            negative = 0 if call_factor(p.calls.factor_band, (band, strands.size)) < 0 else 1
-        if counts or negative == 0:
+        negative = call_factor(p.calls.factor_band, (band, strands.size, counts))
+        if counts or negative < 0:
             if p.bordered.exists and p.bordered.coupled[0] == 1:
                 call_eliminate(p.calls.eliminate_band, (band, strands.size, p.bordered))
             if counts:

@@ -15,17 +15,14 @@ from ...model.records.status import READY
 from .band import (
     backward_any,
     backward_band,
-    count_any,
     eliminate_band,
-    factor_any,
     factor_band,
-    factor_signed,
     forward_any,
     forward_band,
     width,
 )
 
-NAMES = ("factor_band", "count_band", "forward_band", "backward_band", "eliminate_band")
+NAMES = ("factor_band", "forward_band", "backward_band", "eliminate_band")
 KNOWN = tuple(sorted({b for of_layers in HALF_BANDWIDTH.values() for b in of_layers.values()}))
 """Half-bandwidths that have a set of their own."""
 
@@ -39,11 +36,8 @@ def _of_width(half_bandwidth: int) -> dict[str, Piece]:
     """The set for a half-bandwidth."""
     bandwidth, suffix = width(half_bandwidth), str(half_bandwidth)
 
-    def factor(band, n):
-        return factor_band(band, n, bandwidth)
-
-    def count(band, n):
-        return factor_signed(band, n, bandwidth)
+    def factor(band, n, counts):
+        return factor_band(band, n, half_bandwidth, counts)
 
     def forward(band, n, right):
         forward_band(band, n, bandwidth, right)
@@ -57,13 +51,12 @@ def _of_width(half_bandwidth: int) -> dict[str, Piece]:
         eliminate_band(band, n, half_bandwidth, wide.width[0], wide.border, wide.scaled, wide.schur)
         return READY
 
-    return _set(factor, count, forward, backward, eliminate, suffix)
+    return _set(factor, forward, backward, eliminate, suffix)
 
 
-def _set(factor, count, forward, backward, eliminate, suffix: str) -> dict[str, Piece]:
+def _set(factor, forward, backward, eliminate, suffix: str) -> dict[str, Piece]:
     pieces = (
-        _declare(factor, suffix, int, Matrix, int),
-        _declare(count, suffix, int, Matrix, int),
+        _declare(factor, suffix, int, Matrix, int, bool),
         _declare(forward, suffix, int, Matrix, int, Vector),
         _declare(backward, suffix, int, Matrix, int, Vector),
         _declare(eliminate, suffix, int, Matrix, int, BorderedSystem),
@@ -74,11 +67,8 @@ def _set(factor, count, forward, backward, eliminate, suffix: str) -> dict[str, 
 def _of_any_width() -> dict[str, Piece]:
     """The set that takes the half-bandwidth from the band itself."""
 
-    def factor(band, n):
-        return factor_any(band, n)
-
-    def count(band, n):
-        return count_any(band, n)
+    def factor(band, n, counts):
+        return factor_band(band, n, band.shape[1] - 1, counts)
 
     def forward(band, n, right):
         forward_any(band, n, right)
@@ -92,7 +82,7 @@ def _of_any_width() -> dict[str, Piece]:
         eliminate_band(band, n, band.shape[1] - 1, wide.width[0], wide.border, wide.scaled, wide.schur)
         return READY
 
-    return _set(factor, count, forward, backward, eliminate, "any")
+    return _set(factor, forward, backward, eliminate, "any")
 
 
 _SETS = {half_bandwidth: _of_width(half_bandwidth) for half_bandwidth in KNOWN}

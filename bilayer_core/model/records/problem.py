@@ -100,6 +100,7 @@ class ForceTable:
     add: Indices
     start: Indices
     update_lagged: Indices
+    end: Indices
     lasting: int
 
 
@@ -123,6 +124,7 @@ class Calls:
     start_stage: Address
     update_lagged: Address
     add_forces: Address
+    end_forces: Address
     expand_to_unknowns: Address
     assemble: Address
     factorise: Address
@@ -160,7 +162,6 @@ class Calls:
     count_shape: Address
     count_end: Address
     factor_band: int  # those of the scene's half-bandwidth
-    count_band: int
     forward_band: int
     backward_band: int
     eliminate_band: int
@@ -203,6 +204,7 @@ class Problem:
     followers: PointForces
     moments: Moments
     sums: Sums
+    memory: Vector  # what forces carry from step to step; see `forces.register`
     system: System
     forces: ForceTable
     calls: Calls

@@ -171,6 +171,7 @@ class StateArrays:
     body_rotation: Stack
     body_velocity: Matrix
     body_angular_velocity: Matrix
+    memory: Vector
     has_history: Vector
     acceleration: Matrix
     spin_acceleration: Vector
