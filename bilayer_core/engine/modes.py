@@ -1,16 +1,12 @@
-"""What the compiled step is asked for. All are modes of one function: the compiler would make a copy of evaluation,
-matrix and Newton's method for each function that calls them.
-"""
+"""What may be asked of a state at rest, and of Newton's method."""
 
 from __future__ import annotations
 
-STEP = 0
-"""Advance in time."""
-EVALUATE_STATE = 1
+EVALUATE_STATE = 0
 """Evaluate the potential at the state as it stands, without second derivatives."""
-SETTLE = 2
+SETTLE = 1
 """One round of statics: minimise the potential with inertia that wants everything to stay where it is."""
-COUNT = 3
+COUNT = 2
 """Count the directions in which the state is unstable."""
 
 EVALUATION_TIME = 1e-6

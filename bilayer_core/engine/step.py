@@ -1,4 +1,4 @@
-"""One step, all its stages, in one compiled function."""
+"""One step with all its stages, and what is asked of a state at rest."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..model.records.status import BEYOND, BLOCKED, CONVERGED, MAX_ITERATIONS, R
 from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of, lagged
 from .ends import write_twist
-from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, STEP, VALUE, WITHOUT_INERTIA
+from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, VALUE, WITHOUT_INERTIA
 
 configuration_at = record_at(Configuration)
 
@@ -67,40 +67,57 @@ def drive_stage(p, state, inputs, n, work):
 
 
 @kernel
-def _total(energy):
-    total = 0.0
-    for k in range(energy.shape[0]):
-        total += energy[k]
-    return total
+def _clear(outcome):
+    """Begin to count what Newton's method needs."""
+    counts, figures = outcome.counts, outcome.figures
+    counts[ITERATIONS] = counts[FACTORISATIONS] = counts[BACKTRACKS] = 0
+    figures[RESIDUAL], figures[GAP] = 0.0, math.inf
 
 
-@piece(int, Problem, StateArrays, StateArrays, Method, bool, int, StageInputs, Work, float, float, int)
-def make_step(p, state, start_state, method, with_history, mode, inputs, work, h, tolerance, max_iterations):
+@kernel
+def _solve(p, work, at, scratch, tolerance, max_iterations, wanted):
+    """Let Newton's method do what is `wanted` from configuration number `at` on; its status, and the numbers of the
+    configuration where it ended and of the other one. What it needed is added to `Outcome`.
+    """
+    counts = p.outcome.counts
+    before = counts[ITERATIONS], counts[FACTORISATIONS], counts[BACKTRACKS]
+    first, second = configuration_at(work.configurations[at]), configuration_at(work.configurations[scratch])
+    arguments = p, first, second, work.stage, tolerance, max_iterations, wanted
+    status = call(p.calls.minimise_potential, arguments)
+    counts[ITERATIONS] += before[0]
+    counts[FACTORISATIONS] += before[1]
+    counts[BACKTRACKS] += before[2]
+    if counts[SWAPPED]:
+        return status, scratch, at
+    return status, at, scratch
+
+
+@kernel
+def _leave(p, status, pair, end):
+    """Note the near pair that blocks motion, −1 without one, and the number of the last configuration."""
+    p.outcome.counts[PAIR], p.outcome.counts[CONFIGURATION] = pair, end
+    return status
+
+
+@piece(int, Problem, StateArrays, StateArrays, Method, bool, StageInputs, Work, float, float, int)
+def make_step(p, state, start_state, method, with_history, inputs, work, h, tolerance, max_iterations):
     """Advance a state by a step of length h [s]; it changes only if every stage converged and its end can be reached.
 
-    Everything happens in passes through one loop, because the compiler would make a copy of all that is called in two
-    places. A pass solves a stage. Where a step ends beyond its last stage (`Method.couplings`), one more pass moves
-    there, and the last looks at the potential as it is there. In other modes there is one pass, from the state at rest,
-    or as it stands; rest strains and factors of loads in `work.stage` are those to use then.
+    Where a step ends beyond its last stage (`Method.couplings`), it moves there, and evaluates the potential there.
 
     Parameters
     ----------
     p : Problem
     state : StateArrays
-        In the mode `SETTLE` it takes the shape found, if one was, or if the potential has at least fallen as far as the
-        iterations went.
-    kept : StateArrays
-        The same at the start of the step; in other modes not used.
+    start_state : StateArrays
+        The same.
     method : Method
         For this step.
-    keeps : bool
+    with_history : bool
         Whether the integrator of the run keeps stage derivatives.
-    mode : int
-        From `modes`.
     inputs : StageInputs
     work : Work
     h : float
-        In the mode `SETTLE` the length over which inertia acts; not used by `EVALUATE_STATE` and `COUNT`.
     tolerance : float
         [m/s]
     max_iterations : int
@@ -108,107 +125,151 @@ def make_step(p, state, start_state, method, with_history, mode, inputs, work, h
     Returns
     -------
     status : int
-        In `Outcome`: the blocking pair, −1 if none, the place in `work.places` of the last configuration, numbers of
-        iterations, factorisations and backtracks, the residual and the gap.
+        In `Outcome`: the blocking pair, −1 if none, the number in `work.configurations` of the last configuration,
+        numbers of iterations, factorisations and backtracks, the largest residual and the gap.
     """
-    first, origin, end, stage = work.first, work.origin, work.end, work.stage
-    counts, figures = p.outcome.counts, p.outcome.figures
+    stage, previous, figures = work.stage, work.first, p.outcome.figures
     s, e, t = 0, 1, 2
+    ends, stages = method.couplings.shape
+    _clear(p.outcome)
     call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
-    points, stages = method.couplings.shape
-    passes = 1
-    if mode == STEP:
-        passes = stages if points == stages else points + 1
-        call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), first))
-        stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
-        work.start_angle[:] = 0.0
-    else:
-        stage.lengths[:] = EVALUATION_TIME if mode == EVALUATE_STATE else h if mode == SETTLE else WITHOUT_INERTIA
-    iterations = factorisations = backtracks = 0
-    worst, residual, gap = 0.0, 0.0, math.inf
-    status, pair = READY, -1
-    previous = first
-    for n in range(passes):
-        point = min(n, points - 1)
-        beyond = mode == STEP and n == stages
-        stays = mode != STEP or n == points
-        position, rotation = inputs.position[point], inputs.rotation[point]
-        start = configuration_at(work.configurations[s])
-        if stays:
-            call(p.calls.stand_still_stage, (p, state, start, mode == SETTLE or mode == COUNT, stage))
-            position, rotation = state.body_position, state.body_rotation
-        else:
-            call(p.calls.set_origin, (work, method, n))
-            call(p.calls.drive_stage, (p, state, inputs, n, work))
-            if beyond:
-                call(p.calls.predict_end, (p, state, work, inputs, n, previous, start))
-            else:
-                if with_history and method.history:
-                    call(p.calls.add_history_to_origin, (p, state, work, method, n, h))
-                call(p.calls.predict_stage, (p, state, work, inputs, n, previous, start))
-        status = READY
-        if not beyond:
-            status = call(p.calls.start_stage, (p, start, stage))
-        if status == READY and (not stays or mode == SETTLE):
-            guess = configuration_at(work.configurations[e])
-            status = call(p.calls.first_guess_of, (p, start, position, rotation, stage, guess, beyond))
-            if status != READY:
-                pair, residual = counts[PAIR], math.inf
-                if beyond and status == BLOCKED:
-                    status, pair = BEYOND, -1
-                break
-        elif status == READY:
-            e = s
-        residual = 0.0
-        if status == READY and not beyond:
-            wanted = NEGATIVE if mode == COUNT else VALUE if stays and mode != SETTLE else MINIMUM
-            guess, scratch = configuration_at(work.configurations[e]), configuration_at(work.configurations[t])
-            status = call(p.calls.minimise_potential, (p, guess, scratch, stage, tolerance, max_iterations, wanted))
-            if counts[SWAPPED]:
-                e, t = t, e
-            iterations += counts[ITERATIONS]
-            factorisations += counts[FACTORISATIONS]
-            backtracks += counts[BACKTRACKS]
-            residual, gap = figures[RESIDUAL], figures[GAP]
-        if mode == SETTLE and (status == CONVERGED or status == MAX_ITERATIONS):
-            work.moved[0] = call(p.calls.distance, (p, start, configuration_at(work.configurations[e])))
-            call(p.calls.write_shape, (p, configuration_at(work.configurations[e]), state))
-        if stays and mode == STEP and (status != CONVERGED or not math.isfinite(_total(p.sums.energy))):
-            copy(start_state.values, state.values)
-            status, residual = BEYOND if status == CONVERGED else status, math.inf
-        if mode != STEP or not (beyond or status == CONVERGED):
-            break
-        if stays:
-            write_twist(configuration_at(work.configurations[e]), state)
-            continue
-        worst = max(worst, residual)
-        last = origin
-        if not beyond:
-            last = end
-            call(p.calls.end_stage, (p, state, work, inputs, n, configuration_at(work.configurations[e])))
-        if n + 1 == points:
-            call(p.calls.write_end, (p, state, last, configuration_at(work.configurations[e]), inputs, n))
-            for i in range(state.transduction.shape[0]):
-                state.transduction[i] = work.transduction[i]
-            if with_history:  # for the step after, which can take them if nothing touches anew
-                call(p.calls.keep_stage_derivatives, (state, origin, last, stage.lengths[1], method.carry))
-                state.has_history[0] = _compare_touched(p.sums, work.touched)
-        if n + 1 < passes:
-            if not beyond:
-                previous = end
-            copy(last.angle, work.start_angle)
+    call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), work.first))
+    stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
+    work.start_angle[:] = 0.0
+    worst = 0.0
+    for n in range(stages):
+        start, guess = configuration_at(work.configurations[s]), configuration_at(work.configurations[e])
+        call(p.calls.set_origin, (work, method, n))
+        call(p.calls.drive_stage, (p, state, inputs, n, work))
+        if with_history and method.history:
+            call(p.calls.add_history_to_origin, (p, state, work, method, n, h))
+        call(p.calls.predict_stage, (p, state, work, inputs, n, previous, start))
+        status = call(p.calls.start_stage, (p, start, stage))
+        if status != READY:
+            return _leave(p, status, -1, e)
+        status = call(p.calls.first_guess_of, (p, start, inputs.position[n], inputs.rotation[n], stage, guess, False))
+        if status != READY:
+            figures[RESIDUAL] = math.inf
+            return _leave(p, status, p.outcome.counts[PAIR], e)
+        status, e, t = _solve(p, work, e, t, tolerance, max_iterations, MINIMUM)
+        if status != CONVERGED:
+            return _leave(p, status, -1, e)
+        worst = max(worst, figures[RESIDUAL])
+        call(p.calls.end_stage, (p, state, work, inputs, n, configuration_at(work.configurations[e])))
+        if n + 1 < ends:
+            previous = work.end
+            copy(work.end.angle, work.start_angle)
             s, e = e, s
             configuration_at(work.configurations[s]).total_angle[:] = 0.0
-        if beyond:
-            stage.lengths[:] = EVALUATION_TIME
+    if ends > stages:
+        status, e = _end_beyond(p, state, start_state, method, inputs, work, s, e)
+        if status != READY:
+            figures[RESIDUAL] = math.inf
+            return _leave(p, status, -1, e)
     else:
-        status, residual = CONVERGED, worst
-        ended = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
-        copy(p.memory, state.memory)
-        if ended != READY:
-            copy(start_state.values, state.values)
-            status = ended
-    counts[PAIR], counts[CONFIGURATION], counts[ITERATIONS] = pair, e, iterations
-    counts[FACTORISATIONS], counts[BACKTRACKS] = factorisations, backtracks
-    figures[RESIDUAL], figures[GAP] = residual, gap
-    return status
+        end = configuration_at(work.configurations[e])
+        call(p.calls.write_end, (p, state, work.end, end, inputs, stages - 1))
+        if with_history:  # for the step after, which can take them if nothing touches anew
+            call(p.calls.keep_stage_derivatives, (state, work.origin, work.end, stage.lengths[1], method.carry))
+            state.has_history[0] = _compare_touched(p.sums, work.touched)
+    copy(work.transduction, state.transduction)
+    status = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
+    copy(p.memory, state.memory)
+    if status != READY:
+        copy(start_state.values, state.values)
+        return _leave(p, status, -1, e)
+    figures[RESIDUAL] = worst
+    return _leave(p, CONVERGED, -1, e)
+
+
+@kernel
+def _end_beyond(p, state, start_state, method, inputs, work, s, e):
+    """Move from the last stage, configuration number `s`, to the end of a step, and evaluate the potential there, in
+    number `e`; `BEYOND` if a surface is in the way, or if the potential is not finite there.
+    """
+    n, stage = method.couplings.shape[1], work.stage
+    start, end = configuration_at(work.configurations[s]), configuration_at(work.configurations[e])
+    call(p.calls.set_origin, (work, method, n))
+    call(p.calls.drive_stage, (p, state, inputs, n, work))
+    call(p.calls.predict_end, (p, state, work, inputs, n, work.end, start))
+    status = call(p.calls.first_guess_of, (p, start, inputs.position[n], inputs.rotation[n], stage, end, True))
+    if status != READY:
+        return BEYOND if status == BLOCKED else status, e
+    call(p.calls.write_end, (p, state, work.origin, end, inputs, n))
+    end.total_angle[:] = 0.0
+    stage.lengths[:] = EVALUATION_TIME
+    status, e = _evaluate_at_rest(p, state, work, e, s, False)
+    finite = 0.0
+    for k in range(p.sums.energy.shape[0]):
+        finite += p.sums.energy[k]
+    if status != CONVERGED or not math.isfinite(finite):
+        copy(start_state.values, state.values)
+        return BEYOND if status == CONVERGED else status, e
+    write_twist(configuration_at(work.configurations[e]), state)
+    return READY, e
+
+
+@kernel
+def _evaluate_at_rest(p, state, work, at, scratch, counts):
+    """Evaluate the potential at configuration number `at`, where inertia asks for nothing, or if it `counts`, find how
+    many eigenvalues of its Hessian are negative; the status, and the number of the configuration.
+    """
+    here = configuration_at(work.configurations[at])
+    call(p.calls.stand_still_stage, (p, state, here, counts, work.stage))
+    status = call(p.calls.start_stage, (p, here, work.stage))
+    if status != READY:
+        return status, at
+    status, at, _ = _solve(p, work, at, scratch, 0.0, 1, NEGATIVE if counts else VALUE)
+    return status, at
+
+
+@piece(int, Problem, StateArrays, Work, int, float, float, int)
+def treat_state(p, state, work, mode, length, tolerance, max_iterations):
+    """Evaluate the potential at a state as it stands, count its unstable directions, or make a round of statics.
+
+    Rest strains and factors of loads in `work.stage` are those to use.
+
+    Parameters
+    ----------
+    p : Problem
+    state : StateArrays
+        In the mode `SETTLE` it takes the shape found, if one was, or if the potential has at least fallen as far as the
+        iterations went.
+    work : Work
+    mode : int
+        From `modes`.
+    length : float
+        In the mode `SETTLE` that over which inertia acts [s].
+    tolerance : float
+        In the mode `SETTLE` [m/s].
+    max_iterations : int
+        Likewise.
+
+    Returns
+    -------
+    status : int
+        `Outcome` is as for `make_step`.
+    """
+    s, e, t = 0, 1, 2
+    start, guess, stage = configuration_at(work.configurations[s]), configuration_at(work.configurations[e]), work.stage
+    _clear(p.outcome)
+    call(p.calls.take_state, (p, state, start))
+    if mode != SETTLE:
+        stage.lengths[:] = EVALUATION_TIME if mode == EVALUATE_STATE else WITHOUT_INERTIA
+        status, e = _evaluate_at_rest(p, state, work, s, t, mode == COUNT)
+        return _leave(p, status, -1, e)
+    stage.lengths[:] = length
+    call(p.calls.stand_still_stage, (p, state, start, True, stage))
+    status = call(p.calls.start_stage, (p, start, stage))
+    if status != READY:
+        return _leave(p, status, -1, e)
+    status = call(p.calls.first_guess_of, (p, start, state.body_position, state.body_rotation, stage, guess, False))
+    if status != READY:
+        p.outcome.figures[RESIDUAL] = math.inf
+        return _leave(p, status, p.outcome.counts[PAIR], e)
+    status, e, t = _solve(p, work, e, t, tolerance, max_iterations, MINIMUM)
+    if status == CONVERGED or status == MAX_ITERATIONS:
+        end = configuration_at(work.configurations[e])
+        work.moved[0] = call(p.calls.distance, (p, start, end))
+        call(p.calls.write_shape, (p, end, state))
+    return _leave(p, status, -1, e)
