@@ -42,6 +42,7 @@ class Surroundings:
         self._ranges = np.array([c.maximum - c.minimum for c in scene.stimuli.values()], dtype=float)
         self._paths = paths_of(model)
         self._begin, self._override = 0.0, np.full(len(self._channels), math.nan)
+        self.actuation: Actuation | None = None
         self.actuation = self._pieces_about(0.0)
 
     def stimulus_at(self, state: State, time: float) -> Array:
@@ -87,16 +88,19 @@ class Surroundings:
         channels = zip(self._channels, self._override.tolist(), strict=True)
         fixed = [schedule if math.isnan(value) else value for schedule, value in channels]
         rows = [_next_pieces(of, time - self._ahead, time + self._ahead) for of in [*fixed, *self._loads]]
-        size = max((len(row) for row in rows), default=1)
-        table = np.array([row + [row[-1]] * (size - len(row)) for row in rows]).reshape(-1, size, len(Piece._fields))
-        count = len(fixed)
-        return Actuation(
-            stimulus=np.ascontiguousarray(table[:count]),
-            load=np.ascontiguousarray(table[count:]),
-            ranges=self._ranges,
-            horizon=np.array([min((row[-1].until for row in rows), default=math.inf)]),
-            paths=self._paths,
-        )
+        size = max((len(row) for row in rows), default=0)
+        size = max(size, PIECES_AT_ONCE)  # so that it seldom changes
+        padded = [row + [row[-1]] * (size - len(row)) for row in rows]
+        table = np.array(padded).reshape(len(rows), size, len(Piece._fields))
+        stimulus, load = np.split(table, [len(self._channels)])
+        horizon = min((row[-1].until for row in rows), default=math.inf)
+        present = self.actuation
+        if present is None or present.stimulus.shape != stimulus.shape or present.load.shape != load.shape:
+            return Actuation(
+                stimulus=stimulus, load=load, ranges=self._ranges, horizon=np.array([horizon]), paths=self._paths
+            )
+        present.stimulus[:], present.load[:], present.horizon[0] = stimulus, load, horizon
+        return present
 
 
 def _next_pieces(schedule: Pieces | float, begin: float, end: float) -> list[Piece]:
