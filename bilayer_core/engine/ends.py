@@ -11,6 +11,7 @@ import math
 from ..forces.added_mass import momentum_at
 from ..forces.inertia import moment_of_rotation
 from ..jit import kernel, piece
+from ..jit.flat import flat
 from ..jit.stack import stack_matrix
 from ..kinematics.compensated import add_exactly
 from ..kinematics.copying import copy, copy_matrix, copy_row
@@ -158,7 +159,7 @@ def _write_orthonormal(matrix, f, out, b):
 
 @kernel
 def _keep_derivative(rate, end, origin, length, carry):
-    a, b, c = rate.reshape(rate.size), end.reshape(end.size), origin.reshape(origin.size)
+    a, b, c = flat(rate), flat(end), flat(origin)
     for i in range(a.shape[0]):
         a[i] = ((b[i] - c[i]) / length - carry * a[i]) / (1.0 - carry)
 

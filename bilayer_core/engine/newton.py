@@ -35,6 +35,7 @@ ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 20
 KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
 BACKTRACKING = 0.5
 MAX_BACKTRACKS = 30
+SAFE_PART = 0.5  # of the smallest gap, which a last correction may close without a look at each pair
 ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the potential below it mean nothing
 
 
@@ -300,6 +301,9 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:
             task = FACTORISE
             continue
+        if settled and 2.0 * residual * stage.lengths[0] <= SAFE_PART * min(gap, _least_gap_of_rods(p.rod_contact)):
+            alpha, bounded, halvings, task = 1.0, False, 0, SEARCH  # two points that move towards each other keep a gap
+            continue
         slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
         alpha = call(p.calls.bound, (p, at))
         status = counts[STATUS]
@@ -312,6 +316,12 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
     counts[BACKTRACKS], figures[RESIDUAL], figures[GAP] = backtracks, residual, gap
     return status
+
+
+@kernel
+def _least_gap_of_rods(rods):
+    """Gap above which contacts of rods are not counted [m]; infinite where rods cannot meet."""
+    return rods.d_hat if rods.exists else math.inf
 
 
 @kernel

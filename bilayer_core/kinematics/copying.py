@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from ..jit import kernel
+from ..jit.flat import flat
 
 
 @kernel
 def copy(source, target):
     """target = source, for contiguous arrays."""
-    a, b = source.reshape(source.size), target.reshape(target.size)
+    a, b = flat(source), flat(target)
     for i in range(a.shape[0]):
         b[i] = a[i]
 
@@ -16,7 +17,7 @@ def copy(source, target):
 @kernel
 def add_scaled(target, factor, source):
     """target += factor source, for contiguous arrays."""
-    a, b = source.reshape(source.size), target.reshape(target.size)
+    a, b = flat(source), flat(target)
     for i in range(a.shape[0]):
         b[i] += factor * a[i]
 

@@ -71,13 +71,15 @@ def restrict_bodies(p, shift):
     for a in range(n):
         for row in range(columns.shape[1]):
             columns[a, row] = 0.0
-    for row in range(p.strands.size):  # few of which are not zero
-        present = 0.0
-        for i in range(m):
-            present += abs(rows[row, i])
-        if present != 0.0:
-            for a in range(n):
-                first = p.bodies.freedom_first[a]
+    for row in range(p.strands.size):  # in few of which a body has values that are not zero
+        before, present = -1, 0.0
+        for a in range(n):
+            first = p.bodies.freedom_first[a]
+            if first != before:
+                before, present = first, 0.0
+                for i in range(first, first + 6):
+                    present += abs(rows[row, i])
+            if present != 0.0:
                 for i in range(first, first + 6):
                     columns[a, row] += freedom[i, a] * rows[row, i]
     return READY
