@@ -87,7 +87,7 @@ GROUP = 4
 
 @kernel
 def _come_near(box, a, b, distance):
-    """Whether two boxes of the tree are nearer than `reach` along each axis."""
+    """Whether two boxes of the tree are nearer than `distance` along each axis."""
     for c in range(3):
         if box[b, c] >= box[a, 3 + c] + distance or box[b, 3 + c] <= box[a, c] - distance:
             return False
@@ -134,11 +134,11 @@ def _run_about(search, first, last, near):
         if (k > first and edge_first[k]) or not _goes_on(search, k, d0, d1, d2, share):
             return 0, 0
     begin, end = first, last + 1
-    distance = edge_arc[first, 0] - RUN * exclusion
-    while not edge_first[begin] and edge_arc[begin, 0] > distance and _goes_on(search, begin - 1, d0, d1, d2, share):
+    limit = edge_arc[first, 0] - RUN * exclusion
+    while not edge_first[begin] and edge_arc[begin, 0] > limit and _goes_on(search, begin - 1, d0, d1, d2, share):
         begin -= 1
-    distance = edge_arc[last, 1] + RUN * exclusion
-    while end < edge_first.shape[0] and not edge_first[end] and edge_arc[end, 0] < distance:
+    limit = edge_arc[last, 1] + RUN * exclusion
+    while end < edge_first.shape[0] and not edge_first[end] and edge_arc[end, 0] < limit:
         if not _goes_on(search, end, d0, d1, d2, share):
             break
         end += 1
@@ -147,7 +147,7 @@ def _run_about(search, first, last, near):
 
 @kernel
 def _near_leaves(box, leaves, own, distance, begin, end, met_out):
-    """List the leaves of the tree whose boxes come nearer than `reach` to that of the node `own`, ascending, but for
+    """List the leaves of the tree whose boxes come nearer than `distance` to that of the node `own`, ascending, but for
     those from `begin` to `end`, in the first row of `met_out`; return how many there are.
     """
     count = 0
@@ -171,7 +171,7 @@ def _near_leaves(box, leaves, own, distance, begin, end, met_out):
 
 @piece(int, RodSearch, float, float)
 def near_pairs(search, touch, distance):
-    """List points and segments that may come to a gap below `reach` in a straight motion of nodes, ordered by point,
+    """List points and segments that may come to a gap below `distance` in a straight motion of nodes, ordered by point,
     then by segment; return how many there are.
 
     If there are more than there is capacity for, the rest is counted but not written.
@@ -180,7 +180,7 @@ def near_pairs(search, touch, distance):
     ----------
     search : RodSearch
         In `until` is left how far each gap at the beginning is above `touch` [m].
-    touch, reach : float
+    touch, distance : float
         Gap below which joined rods touch by construction, and gap below which pairs are listed [m].
     """
     position, tip, edge_node, edge_radius = search.base, search.tip, search.edge_node, search.edge_radius

@@ -183,8 +183,8 @@ class NearPairs:
         )
 
     def find(self, base: Array, touch: float, search_distance: float, tip: Array | None = None) -> None:
-        """List the pairs with a gap below `reach` [m] where nodes are, or on their straight way from `base` to `tip`
-        [m], shape (n_node, 3); for `touch` see `near_pairs`.
+        """List the pairs with a gap below `search_distance` [m] where nodes are, or on their straight way from
+        `base` to `tip` [m], shape (n_node, 3); for `touch` see `near_pairs`.
         """
         self.search.base[:], self.search.tip[:] = base, base if tip is None else tip
         while near_pairs(self.search, touch, search_distance) > self.capacity:

@@ -36,7 +36,7 @@ class State:
     velocity: Array  # [m/s], shape (n_node, 3)
     director1: Array  # material director m1 of edges, unit, shape (n_edge, 3)
     spin: Array  # rate of edges about their tangent [rad/s], shape (n_edge,)
-    fluid_excess: Array  # the fluid's momentum less that of `velocity` [N s], shape (n_node, 3) or (0, 3) (`stages`)
+    fluid_excess: Array  # momentum of the fluid less that of `velocity` [N s], shape (n_node, 3) or (0, 3)
     twist: Array  # of joints when forces were last evaluated [rad]: tells whole turns apart, shape (n_joint,)
     body_position: Array  # [m], shape (n_body, 3)
     body_position_low: Array  # what rounding cut off `body_position` [m], shape (n_body, 3)
