@@ -13,7 +13,7 @@ from ..jit.record import Indices, Matrix, Stack, Vector, record
 from ..kinematics.rotating import rotate_by, spin_of
 from ..model.records.status import READY
 from ..model.records.step import StageInputs
-from ..scene.piece import ROUNDING, Piece
+from ..scene.piece import ROUNDING, Piece, value_of_piece
 
 
 @record
@@ -51,11 +51,9 @@ NO_JUMP = 1e-9
 @kernel
 def _value(pieces, row, k, time):
     """`Piece.value`"""
-    s = max(time - pieces[row, k, BEGIN], 0.0)
-    value = pieces[row, k, LEVEL] + pieces[row, k, RATE] * s
-    if pieces[row, k, AMPLITUDE] != 0.0:
-        value += pieces[row, k, AMPLITUDE] * math.sin(pieces[row, k, FREQUENCY] * s + pieces[row, k, PHASE])
-    return value
+    level, begin, rate = pieces[row, k, LEVEL], pieces[row, k, BEGIN], pieces[row, k, RATE]
+    wave = pieces[row, k, AMPLITUDE], pieces[row, k, FREQUENCY], pieces[row, k, PHASE]
+    return value_of_piece(time, level, begin, rate, wave[0], wave[1], wave[2])
 
 
 @kernel

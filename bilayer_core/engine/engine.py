@@ -11,7 +11,7 @@ from ..integrators.sdirk2 import METHOD as SELF_STARTING
 from ..model.contact_points import contact_point_names
 from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES
-from ..model.model import Model, scheduled_motion
+from ..model.model import Model
 from ..model.records.outcome import BACKTRACKS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
 from ..model.records.problem import Sums
 from ..model.records.step import RunExtrema, StageInputs, StateArrays
@@ -208,10 +208,10 @@ class Engine:
 
 
 def new_inputs(model: Model, ends: int) -> StageInputs:
-    """Arrays for what acts at so many ends of stages, with prescribed bodies where their paths begin."""
+    """Arrays for what acts at so many ends of stages, with prescribed bodies at the start of their paths."""
     inputs = StageInputs.zeros(sizes_of(model) | {"stage end": ends})
     for b in np.flatnonzero(model.bodies.free_index[:-1] < 0):
-        inputs.position[:, b], inputs.rotation[:, b], _ = scheduled_motion(model.bodies, b, 0.0)
+        inputs.position[:, b], inputs.rotation[:, b] = model.bodies.start_position[b], model.bodies.start_rotation[b]
     return inputs
 
 

@@ -23,21 +23,25 @@ def _signature(result, *more):
 
 
 call_add = caller("a force", lambda _: _signature(types.float64, types.boolean))
-call_start = caller("the start of a force", lambda _: _signature(types.int64))
-call_end = caller("the end of a force", lambda _: _signature(types.int64))
+call_briefly = caller("the start or end of a force", lambda _: _signature(types.int64))
 call_update_lagged = caller("a force that follows", lambda _: _signature(types.boolean))
+
+
+@kernel
+def _call_each(addresses, p, at, stage):
+    """Call what forces have at their addresses, until one says that it cannot go on."""
+    for k in range(addresses.shape[0]):
+        if addresses[k] != 0:
+            status = call_briefly(addresses[k], (p.forces.own[k], p, at, stage))
+            if status != READY:
+                return status
+    return READY
 
 
 @piece(int, Problem, Configuration, Stage)
 def start_stage(p, start, stage):
     """Freeze what a stage depends on: near pairs, friction's contacts, loads. Returns whether it can go on."""
-    forces = p.forces
-    for k in range(forces.start.shape[0]):
-        if forces.start[k] != 0:
-            status = call_start(forces.start[k], (forces.own[k], p, start, stage))
-            if status != READY:
-                return status
-    return READY
+    return _call_each(p.forces.start, p, start, stage)
 
 
 @piece(bool, Problem, Configuration, Stage)
@@ -52,13 +56,7 @@ def update_lagged(p, at, stage):
 @piece(int, Problem, Configuration, Stage)
 def end_forces(p, at, stage):
     """Let forces write what they carry on to the next step, and their energies at the end of this one."""
-    forces = p.forces
-    for k in range(forces.end.shape[0]):
-        if forces.end[k] != 0:
-            status = call_end(forces.end[k], (forces.own[k], p, at, stage))
-            if status != READY:
-                return status
-    return READY
+    return _call_each(p.forces.end, p, at, stage)
 
 
 @kernel

@@ -23,21 +23,6 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
     return np.eye(3) + a * matrix + b * (matrix @ matrix)
 
 
-def angular_velocity(vector: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Angular velocity [rad/s] of exp([v]×) while its rotation vector v [rad] changes at a rate [rad/s], shape (3,).
-
-    ω = v̇ + (1 − cos θ)/θ² v × v̇ + (θ − sin θ)/θ³ v × (v × v̇),   θ = |v|
-    """
-    angle2 = float(vector @ vector)
-    if angle2 < 1e-8:
-        a, b = 0.5 - angle2 / 24.0, 1.0 / 6.0 - angle2 / 120.0
-    else:
-        angle = np.sqrt(angle2)
-        a, b = (1.0 - np.cos(angle)) / angle2, (1.0 - np.sin(angle) / angle) / angle2
-    across = np.cross(vector, rate)
-    return rate + a * across + b * np.cross(vector, across)
-
-
 def rotation_vector(matrix: np.ndarray) -> np.ndarray:
     """Rotation vector [rad] of a rotation matrix by less than half a turn, the inverse of `rotation_matrix`, shape
     (3,).

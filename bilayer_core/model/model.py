@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rotation import angular_velocity, rotation_matrix
 from ..scene.config import SceneConfig
 from .layout import Layout, ReadOnlyArrays
 from .plane import InPlane
@@ -239,37 +238,3 @@ class Model(ReadOnlyArrays):
     def clamp_edge_free(self) -> Array:
         """Free body of each clamp edge, −1 if its body is prescribed, shape (n_clamp_edge,)."""
         return self.bodies.free_index[self.clamp_edge_body]
-
-
-def keyframes_about(times: Array, values: Array, time: float) -> tuple[float, float, Array, Array]:
-    """Time of the keyframe before `time`, time until the next [s], value there, way to the next, shape (3,) each;
-    the way is zero before the first, after the last, and without any.
-    """
-    if len(times) == 0 or len(values) == 0:
-        return 0.0, 1.0, np.zeros(3), np.zeros(3)
-    right = int(np.searchsorted(times, time, side="right"))
-    if right in (0, len(times)):
-        return 0.0, 1.0, values[max(right - 1, 0)], np.zeros(3)
-    begin = float(times[right - 1])
-    return begin, float(times[right]) - begin, values[right - 1], values[right] - values[right - 1]
-
-
-def between_keyframes(times: Array, values: Array, time: float) -> tuple[Array, Array]:
-    """Value and rate of a schedule of vectors: cubic smoothstep between keyframes, constant outside them; (3,) each."""
-    begin, duration, value, way = keyframes_about(times, values, time)
-    s = (time - begin) / duration
-    return value + s * s * (3.0 - 2.0 * s) * way, 6.0 * s * (1.0 - s) / duration * way
-
-
-def scheduled_motion(bodies: Bodies, index: int, time: float) -> tuple[Array, Array, Array]:
-    """Position [m], shape (3,), and rotation of a prescribed body, shape (3, 3), with velocity and angular velocity
-    [m/s, rad/s], shape (6,).
-    """
-    times, rates = bodies.times[index], np.zeros(6)
-    moved, rates[:3] = between_keyframes(times, bodies.displacements[index], time)
-    position = bodies.start_position[index] + moved
-    if not len(bodies.rotations[index]):
-        return position, bodies.start_rotation[index], rates
-    turn, rate = between_keyframes(times, bodies.rotations[index], time)
-    rates[3:] = angular_velocity(turn, rate)
-    return position, rotation_matrix(turn) @ bodies.start_rotation[index], rates

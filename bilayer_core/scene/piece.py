@@ -8,12 +8,24 @@ from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
+from ..jit import kernel
+
 ROUNDING = 1e-9
 """Part of a period by which a wave switches early, so that rounding of the time never delays it by a step."""
 NEARLY = 1e-3
 """Part of a step by which one looks back from its end for the piece that it lies in; more than any early switch."""
 SAME = 1e-6
 """Part of a step by which two times are the same."""
+
+
+@kernel
+def value_of_piece(t, level, begin, rate, amplitude, frequency, phase):
+    """Value of a `Piece` at time t [s], for the engine as well."""
+    s = max(t - begin, 0.0)
+    value = level + rate * s
+    if amplitude != 0.0:
+        value += amplitude * math.sin(frequency * s + phase)
+    return value
 
 
 class Piece(NamedTuple):
@@ -44,9 +56,7 @@ class Piece(NamedTuple):
 
     def value(self, t: float) -> float:
         """Value at time `t` [s]; at the end, where the schedule may jump, that from before."""
-        s = max(t - self.begin, 0.0)
-        line = self.level + self.rate * s
-        return line + self.amplitude * math.sin(self.frequency * s + self.phase) if self.amplitude else line
+        return value_of_piece.py_func(t, *self[1:])
 
     def later(self, delay: float, until: float) -> Piece:
         """The same `delay` [s] later, cut off at `until` [s]."""

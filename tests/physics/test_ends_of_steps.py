@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 from moving_scenes import ADAPTIVE, cantilever, driven, falling, part, simulate
+from oracles.prescribed_motion import scheduled_motion
 from sample_scenes import contact, everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
 from bilayer_core.integrators.register import INTEGRATORS
-from bilayer_core.model.model import scheduled_motion
 from bilayer_core.record.memory import MemoryRecorder
 
 # where steps end

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from oracles.prescribed_motion import angular_velocity, between_keyframes
 
-from bilayer_core.kinematics.rotation import angular_velocity, rotation_matrix, rotation_vector
-from bilayer_core.model.model import between_keyframes
+from bilayer_core.kinematics.rotation import rotation_matrix, rotation_vector
 
 
 @pytest.mark.parametrize("size", [1e-6, 0.3, 2.5])
