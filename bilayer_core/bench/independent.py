@@ -96,7 +96,7 @@ class SplineRod:
             acceleration[free, axis] = cho_solve(self._solve[axis], force[free, axis]) - self.damping * v[free, axis]
         return np.concatenate([v.ravel(), acceleration.ravel()])
 
-    def march(self, times: Array, corner: float | None = None, tolerance: float = 1e-6) -> tuple[Array, Array]:
+    def integrate(self, times: Array, corner: float | None = None, tolerance: float = 1e-6) -> tuple[Array, Array]:
         """Ways of tip and mass centre [m], shapes (n_time, 2), at times [s] from 0; `corner` is one of the drive's."""
         y = np.concatenate([self.start.ravel(), np.zeros(2 * self.count)])
         ends = [times[0], *([corner] if corner else []), times[-1]]
@@ -117,7 +117,7 @@ def cantilever(spans: int = 20) -> Array:
     area = width * thickness
     rod = SplineRod(0.1, e * area, e * width * thickness**3 / 12.0, density * area, spans, gravity=9.81)
     times = np.arange(251) * 2e-3
-    return _in_space(times, rod.march(times)[0])
+    return _in_space(times, rod.integrate(times)[0])
 
 
 def snap(spans: int = 10) -> Array:
@@ -129,7 +129,7 @@ def snap(spans: int = 10) -> Array:
     stiffness = e * width * h
     own = e * width * h**3 / 12.0
 
-    def grown(time: float) -> float:
+    def eigenstrain_force(time: float) -> float:
         return stiffness * strain * min(time / ramp, 1.0)
 
     rod = SplineRod(
@@ -139,11 +139,11 @@ def snap(spans: int = 10) -> Array:
         2.0 * density * width * h,
         spans,
         damping=20.0,
-        force=grown,
-        moment=lambda t: 0.5 * h * grown(t),
+        force=eigenstrain_force,
+        moment=lambda t: 0.5 * h * eigenstrain_force(t),
     )
     times = np.arange(201) * 1e-3
-    return _in_space(times, rod.march(times, corner=ramp)[1])
+    return _in_space(times, rod.integrate(times, corner=ramp)[1])
 
 
 def _in_space(times: Array, way: Array) -> Array:

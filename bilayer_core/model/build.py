@@ -7,7 +7,7 @@ import numpy as np
 from ..scene.config import SceneConfig
 from .bodies import build_bodies
 from .contact_points import build_contact, refuse_penetration
-from .force_list import acting
+from .force_list import active_forces
 from .laminate import add_laminate
 from .layout import number_unknowns
 from .model import Bodies, Model
@@ -56,7 +56,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     mass_moment = found.column("mass_moment")
     arrays = Model(
         scene=scene,
-        forces=acting(scene, model, dimension),
+        forces=active_forces(scene, model, dimension),
         strands=tuple(found.strands),
         layout=number_unknowns(*numbered),
         plane=None

@@ -184,7 +184,7 @@ def planned(scene: SceneConfig, model: str, dimension: int) -> dict[str, str]:
     return {name: "active" if reason is None else f"skipped: {reason}" for name, reason in reasons.items()}
 
 
-def acting(scene: SceneConfig, model: str, dimension: int) -> tuple[str, ...]:
+def active_forces(scene: SceneConfig, model: str, dimension: int) -> tuple[str, ...]:
     """Names of the forces with an energy that a scene needs."""
     terms = planned(scene, model, dimension)
     return tuple(force.name for force in FORCES if force.kind is not None and terms[force.name] == "active")

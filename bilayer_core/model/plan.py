@@ -59,7 +59,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         If a choice does not exist.
     """
     solver, reasons = scene.solver, {}
-    chosen_model, reasons["model"] = _choose("model", model, solver.model, MODELS) or leanest_model(scene)
+    chosen_model, reasons["model"] = _choose("model", model, solver.model, MODELS) or simplest_model(scene)
     asked = _choose("dimension", dimension, solver.dimension, DIMENSIONS)
     if asked is not None and asked[0] == 2:
         asked = 2, f"{asked[1]}: all stays in {require_plane(scene)}"
@@ -83,7 +83,7 @@ def _warnings_of(model: str, scene: SceneConfig) -> tuple[str, ...]:
     return tuple(map(str, uneven_faces(scene))) if model == "laminate" and scene.contact is not None else ()
 
 
-def leanest_model(scene: SceneConfig) -> tuple[str, str]:
+def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     """The model with the fewest unknowns that computes what a scene asks for, and why it is that one."""
     if scene.coupling != Coupling():
         return "two_rod", "`coupling` is set: only two rods have a bond that gives"

@@ -11,7 +11,7 @@ from .fingerprint import FREE, difference
 from .model import Model
 
 Array = np.ndarray
-MOMENT = 1e-3
+LAST_STEP = 1e-3
 """Length of a step that ends at time 0, for the value of a schedule before a jump there [s]."""
 
 
@@ -143,7 +143,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
     channels = list(model.scene.stimuli.values())
-    before = np.array([channel.schedule.value_before(0.0, MOMENT) for channel in channels])
+    before = np.array([channel.schedule.value_before(0.0, LAST_STEP) for channel in channels])
     return State(
         time=np.zeros(1),
         step=np.zeros(1),

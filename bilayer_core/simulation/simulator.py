@@ -28,6 +28,7 @@ from .result import BodyView, RunResult, Termination
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
 from .stepper import Stepper, StepReport
+from .summary import summarise
 
 Array = np.ndarray
 STEPS_AT_ONCE = 64
@@ -413,6 +414,4 @@ class Simulator:
         """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for
         ``--summary``.
         """
-        from .summary import summarise
-
         return summarise(self)

@@ -19,7 +19,7 @@ CHOSEN = {
 
 
 @pytest.mark.parametrize(("name", "chosen"), CHOSEN.items(), ids=CHOSEN)
-def test_bundled_scenes_run_by_the_leanest_model_in_the_plane_where_they_stay_in_one(name, chosen):
+def test_bundled_scenes_run_by_the_simplest_model_in_the_plane_where_they_stay_in_one(name, chosen):
     simulator = Simulator(load_scene(name))
     assert (simulator.plan.model, simulator.plan.dimension) == chosen
     assert simulator.plan.integrator == "sdirk2"

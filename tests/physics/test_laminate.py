@@ -10,7 +10,7 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.beam2d.scene import beam_of, set_stimuli
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.model.build import build_model
-from bilayer_core.model.plan import leanest_model, make_plan
+from bilayer_core.model.plan import make_plan, simplest_model
 from bilayer_core.simulation.surroundings import Surroundings
 from bilayer_core.validate.bending import PAIRS, THICKNESS, strip
 from bilayer_core.validate.references import timoshenko
@@ -206,15 +206,15 @@ def test_contact_counts_from_the_outer_face():
     assert faces[1] == pytest.approx(np.where(np.arange(21) < 4, 0.0, 3e-3))
 
 
-def test_the_leanest_model_is_the_laminate_unless_a_scene_needs_two_rods():
+def test_the_simplest_model_is_the_laminate_unless_a_scene_needs_two_rods():
     plain = scene([rod([layer("bottom"), layer("top")])])
-    assert leanest_model(load_scene(plain))[0] == "laminate"
-    soft = leanest_model(load_scene(plain | {"coupling": {"bending": 3.0}}))
+    assert simplest_model(load_scene(plain))[0] == "laminate"
+    soft = simplest_model(load_scene(plain | {"coupling": {"bending": 3.0}}))
     assert soft[0] == "two_rod" and "coupling" in soft[1]
     twisted = scene([rod([layer("bottom"), layer("top", natural_twist=3.0)], torsion="layers")])
-    assert leanest_model(load_scene(twisted))[0] == "two_rod"
+    assert simplest_model(load_scene(twisted))[0] == "two_rod"
     twisted["rods"][0]["torsion"] = "laminate"
-    assert leanest_model(load_scene(twisted))[0] == "laminate"
+    assert simplest_model(load_scene(twisted))[0] == "laminate"
 
 
 def test_the_plan_says_that_there_is_no_bond():

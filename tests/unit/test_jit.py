@@ -8,7 +8,6 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from numba.core.errors import TypingError
 
 from bilayer_core.jit import Address, addresses, call, caller, kernel, piece, record, record_at
 from bilayer_core.jit.kernel import exact_kernel
@@ -131,7 +130,7 @@ def test_a_call_with_other_types_than_declared_is_an_error_of_compilation():
     def call_with_the_wrong_record(w):
         return call(w.change_for_a_test, (w.inner,))
 
-    with pytest.raises(TypingError, match="is called with .*Inner.*; it takes .*Outer"):
+    with pytest.raises(numba.errors.TypingError, match="is called with .*Inner.*; it takes .*Outer"):
         _ = call_with_the_wrong_record.address
 
 

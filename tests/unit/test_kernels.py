@@ -8,7 +8,7 @@ from pathlib import Path
 
 PROGRAM = """
 import gc, json
-from numba.core.registry import CPUDispatcher
+from numba.extending import is_jitted
 from sample_scenes import everything
 from bilayer_core import Simulator, load_scene
 from bilayer_core.jit.piece import PIECES
@@ -19,7 +19,7 @@ simulator.contact_forces, simulator.curvatures
 compiled = [
     f"{of.py_func.__module__}.{of.py_func.__name__}"
     for of in gc.get_objects()
-    if isinstance(of, CPUDispatcher) and of.py_func.__module__.startswith("bilayer_core") and of.signatures
+    if is_jitted(of) and of.py_func.__module__.startswith("bilayer_core") and of.signatures
 ]
 print(json.dumps([sorted(compiled), sorted(name for name, of in PIECES.items() if of.seconds)]))
 """

@@ -47,8 +47,8 @@ def _of_width(half_bandwidth: int) -> dict[str, Piece]:
         backward_band(band, n, bandwidth, right)
         return READY
 
-    def eliminate(band, n, wide):
-        eliminate_band(band, n, half_bandwidth, wide.width[0], wide.border, wide.scaled, wide.schur)
+    def eliminate(band, n, bordered):
+        eliminate_band(band, n, half_bandwidth, bordered.width[0], bordered.border, bordered.scaled, bordered.schur)
         return READY
 
     return _set(factor, forward, backward, eliminate, suffix)
@@ -78,8 +78,8 @@ def _of_any_width() -> dict[str, Piece]:
         backward_any(band, n, right)
         return READY
 
-    def eliminate(band, n, wide):
-        eliminate_band(band, n, band.shape[1] - 1, wide.width[0], wide.border, wide.scaled, wide.schur)
+    def eliminate(band, n, bordered):
+        eliminate_band(band, n, band.shape[1] - 1, bordered.width[0], bordered.border, bordered.scaled, bordered.schur)
         return READY
 
     return _set(factor, forward, backward, eliminate, "any")
