@@ -80,7 +80,7 @@ def summary(run: RunData, scales: Scales) -> str:
     """What is shown and at which scales, in Markdown."""
     description = run.description
     nodes = sum(strand.nodes.stop - strand.nodes.start for strand in description.strands)
-    settings = [f"{name} {text}" for name, text in description.settings.items() if name not in versions()]
+    settings = [f"{name} {_short(text)}" for name, text in description.settings.items() if name not in versions()]
     percent = 100 * scales.strain_limit
     lines = [
         f"**{description.scene_name}: {description.title}**",
@@ -95,3 +95,11 @@ def summary(run: RunData, scales: Scales) -> str:
         lines.append(f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.")
     lines.append(f"- **Computed with:** {', '.join(settings)}.")
     return "\n".join(lines)
+
+
+def _short(text: str) -> str:
+    """A number with four digits, which a log has with all of them; other text as it is."""
+    try:
+        return f"{float(text):.4g}"
+    except ValueError:
+        return text

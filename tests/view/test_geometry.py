@@ -122,7 +122,10 @@ def test_the_text_beside_the_picture_states_its_scales():
     memory = MemoryRecorder()
     synthetic_run.run(memory, np.array([0.0, 2.0]))
     run = memory.run_data()
+    exact = {**run.description.settings, "newton_tolerance": "2.6950000000000005e-06"}
+    run = replace(run, description=replace(run.description, settings=exact))
     text = summary(run, choose_scales(run))
+    assert "newton_tolerance 2.695e-06" in text
     assert "from −6 % (blue) over 0 (grey) to +6 % (red)" in text
     # Arrows of 21.5 mN become a quarter of the robot's 116 mm, up to rounding of the scale.
     assert "8 mN for 10 mm" in text
