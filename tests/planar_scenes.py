@@ -19,7 +19,10 @@ def turn_to(ahead):
 
 
 def everything_in_plane(ahead, hub="prescribed", stations=6):
-    """Two bilayer arms of a hub over a ball on the ground in a vertical plane: every force at work."""
+    """Two bilayer arms of a hub over a ball on the ground in a vertical plane: every force at work.
+
+    They are as wide as a layer is thick: a plane does not see that the border of a wide one is farther from the ball.
+    """
     spacing, across = 1.1e-3, np.cross(ahead, [0, 0, 1])
     active = layer(
         "active", interval=[spacing, spacing * (stations - 2)], eigenstrain={"stimulus": "humidity", "gain": 0.06}
@@ -29,6 +32,7 @@ def everything_in_plane(ahead, hub="prescribed", stations=6):
         length=spacing * (stations - 1),
         stations=stations,
         name="arm",
+        width=1e-3,
         clamp_start="hub",
         pattern={"count": 2},
     )

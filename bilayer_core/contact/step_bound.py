@@ -6,7 +6,16 @@ So from a moment t of the step on
     d(t + τ) ≥ d + d′ τ − ½ C τ²,   |p″| ≤ C = |φ_A|² |a| + 2 |φ_B| V + |φ_B|² (|ρ| + V),
     V = |δX_A − δX_B| + |φ_A| |a|
 
-for a contact point of body A at the arm a, a surface of body B and ρ between them; C is zero where nothing turns.
+for a contact point of body A at the arm a, a surface of body B and ρ between them; C is zero where nothing turns. A contact
+point of a rod at an arm A from its node (`model.rod_points`) turns with edges e, whose ends move along straight lines,
+or on arcs of bodies that hold them. Its tangent t = e/|e| is reached from t₀ by the shortest arc: its frame turns by
+
+    ω = t × ṫ + (θ̇ − (t₀ × t)·ṫ/(1 + t₀·t)) t,   ω × A = ω·t (t × A) − (ṫ·A) t
+
+the last part only where t leaves a great circle, for an edge with an end that is held. While an edge keeps half its
+length l, |ṫ| ≤ 2 |ė|/l, and t is at most a sixth of a half turn from t₀. So ω ≤ W = 2.6 |ė|/l + |δθ|, and in V and C
+|φ_A| |a| is W |A|, |φ_A|² |a| is (4 W² + 3 |ë|/l) |A| and what its node has itself.
+
 Advancing to the τ at which the right side falls to the kept gap, again and again, approaches the first moment at which
 d does from below: without turning this is Newton's method on a convex function, exact for a plane at once. A contact
 point cannot jump over a surface however long the step (continuous collision detection; Li et al. 2020, sec. 5).
@@ -17,6 +26,8 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
+from ..jit.stack import stack_vector
+from ..kinematics.vector import row
 from .near import gap_normal
 from .shapes import SPHERE
 
@@ -50,13 +61,67 @@ def _fastest(motion, b, extent):
 
 
 @kernel
-def motion_of_points(surfaces, bodies, system):
+def _speed_of_node(surfaces, system, at, i):
+    """Bounds of the speed and the acceleration of a node during a step, in units of its length [m]: one that a body
+    holds moves on an arc.
+    """
+    step, b = system.node_step, surfaces.moved_by[i]
+    if b < 0:
+        return math.sqrt(step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2), 0.0
+    motion, square = system.motion, 0.0
+    for c in range(3):
+        square += (at.position[i, c] - at.pose_position[b, c]) ** 2
+    turn = math.sqrt(motion[b, 3] ** 2 + motion[b, 4] ** 2 + motion[b, 5] ** 2)
+    return _fastest(motion, b, math.sqrt(square)), turn * turn * math.sqrt(square)
+
+
+@kernel
+def _turn_of_edge(surfaces, strands, system, at, e):
+    """Bounds of |ė|/l, |θ̇| and |ë|/l of an edge during a step."""
+    n, step, square = strands.edge_node[e], system.node_step, 0.0
+    for c in range(3):
+        square += (step[n + 1, c] - step[n, c]) ** 2
+    _, first = _speed_of_node(surfaces, system, at, n)
+    _, second = _speed_of_node(surfaces, system, at, n + 1)
+    acceleration = (first + second) / at.length[e]
+    return math.sqrt(square) / at.length[e] + acceleration, abs(system.turn[e]), acceleration
+
+
+@kernel
+def _turn_at_node(surfaces, strands, system, at, i):
+    """The largest of `_turn_of_edge` of the edges at a node."""
+    before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
+    slope, angle, change = _turn_of_edge(surfaces, strands, system, at, before)
+    slope_, angle_, change_ = _turn_of_edge(surfaces, strands, system, at, after)
+    return max(slope, slope_), max(angle, angle_), max(change, change_)
+
+
+@kernel
+def _motion_of_rod_points(surfaces, strands, system, at):
+    """Largest motion in a step of a contact point with an arm from its node [m].
+
+    The angle between an edge and where it is by a part α of a step is at most π/2 α |ė|/l, or π if |ė|/l is above 1.
+    """
+    points, largest = surfaces.rod_points, 0.0
+    if not points.exists:
+        return largest
+    for k in range(points.node.shape[0]):
+        i = points.node[k]
+        slope, angle, _ = _turn_at_node(surfaces, strands, system, at, i)
+        turn = (0.5 * math.pi if slope <= 1.0 else math.pi) * slope + angle
+        arm = math.sqrt(points.arm[k, 0] ** 2 + points.arm[k, 1] ** 2)
+        largest = max(largest, _speed_of_node(surfaces, system, at, i)[0] + arm * turn)
+    return largest
+
+
+@kernel
+def motion_of_points(surfaces, bodies, strands, system, at):
     """Largest motion of a contact point in a step [m]."""
     step, square = system.node_step, 0.0
     for i in range(surfaces.node_free.shape[0]):
         if surfaces.node_free[i]:
             square = max(square, step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2)
-    largest = math.sqrt(square)
+    largest = max(math.sqrt(square), _motion_of_rod_points(surfaces, strands, system, at))
     for b in range(bodies.bounding_radius.shape[0]):
         largest = max(largest, _fastest(system.motion, b, bodies.bounding_radius[b]))
     return largest
@@ -72,7 +137,70 @@ def motion_of_surfaces(surfaces, system):
 
 
 @kernel
-def step_bound(surfaces, system, at, closing):
+def _carry(t0, t1, t2, m0, m1, m2, angle, u0, u1, u2):
+    """A vector m normal to the unit tangent t, carried to the unit tangent u and turned about it."""
+    scale = (m0 * u0 + m1 * u1 + m2 * u2) / (1.0 + t0 * u0 + t1 * u1 + t2 * u2)
+    m0, m1, m2 = m0 - scale * (t0 + u0), m1 - scale * (t1 + u1), m2 - scale * (t2 + u2)
+    c, s = math.cos(angle), math.sin(angle)
+    return c * m0 + s * (u1 * m2 - u2 * m1), c * m1 + s * (u2 * m0 - u0 * m2), c * m2 + s * (u0 * m1 - u1 * m0)
+
+
+@kernel
+def _node_at(surfaces, system, at, i, t):
+    """Displacement of a node at a part t of a step, and its rate, as one tuple."""
+    step, b = system.node_step, surfaces.moved_by[i]
+    if b < 0:
+        return t * step[i, 0], t * step[i, 1], t * step[i, 2], step[i, 0], step[i, 1], step[i, 2]
+    motion, x, p = system.motion, at.position, at.pose_position
+    a0, a1, a2 = x[i, 0] - p[b, 0], x[i, 1] - p[b, 1], x[i, 2] - p[b, 2]
+    r0, r1, r2 = motion[b, 3], motion[b, 4], motion[b, 5]
+    b0, b1, b2 = _turned(a0, a1, a2, t, r0, r1, r2)
+    return (
+        t * motion[b, 0] + b0 - a0,
+        t * motion[b, 1] + b1 - a1,
+        t * motion[b, 2] + b2 - a2,
+        motion[b, 0] + r1 * b2 - r2 * b1,
+        motion[b, 1] + r2 * b0 - r0 * b2,
+        motion[b, 2] + r0 * b1 - r1 * b0,
+    )
+
+
+@kernel
+def _rod_point_at(surfaces, strands, system, at, k, t, moved_out, rate_out):
+    """Write the displacement of a contact point with an arm at a part t of a step, and its rate."""
+    points, turn = surfaces.rod_points, system.turn
+    moved = _node_at(surfaces, system, at, points.node[k], t)
+    for c in range(3):
+        moved_out[c], rate_out[c] = moved[c], moved[3 + c]
+    for side in range(2):
+        e = surfaces.node_edges[points.node[k], side]
+        n, length, tangent = strands.edge_node[e], at.length[e], row(at.tangent, e)
+        first, last = _node_at(surfaces, system, at, n, t), _node_at(surfaces, system, at, n + 1, t)
+        m, w = row(at.director1, e), row(at.director2, e)
+        a0 = points.arm[k, 0] * m[0] + points.arm[k, 1] * w[0]
+        a1 = points.arm[k, 0] * m[1] + points.arm[k, 1] * w[1]
+        a2 = points.arm[k, 0] * m[2] + points.arm[k, 1] * w[2]
+        u0 = tangent[0] + (last[0] - first[0]) / length
+        u1 = tangent[1] + (last[1] - first[1]) / length
+        u2 = tangent[2] + (last[2] - first[2]) / length
+        stretch = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
+        u0, u1, u2 = u0 / stretch, u1 / stretch, u2 / stretch
+        b0, b1, b2 = _carry(tangent[0], tangent[1], tangent[2], a0, a1, a2, t * turn[e], u0, u1, u2)
+        v0, v1, v2 = last[3] - first[3], last[4] - first[4], last[5] - first[5]
+        along = (v0 * b0 + v1 * b1 + v2 * b2) / (length * stretch)
+        spin = v0 * (tangent[1] * u2 - tangent[2] * u1) + v1 * (tangent[2] * u0 - tangent[0] * u2)
+        spin += v2 * (tangent[0] * u1 - tangent[1] * u0)
+        spin /= (1.0 + tangent[0] * u0 + tangent[1] * u1 + tangent[2] * u2) * length * stretch
+        spin = turn[e] - spin
+        moved_out[0], moved_out[1] = moved_out[0] + 0.5 * (b0 - a0), moved_out[1] + 0.5 * (b1 - a1)
+        moved_out[2] += 0.5 * (b2 - a2)
+        rate_out[0] += 0.5 * (spin * (u1 * b2 - u2 * b1) - along * u0)
+        rate_out[1] += 0.5 * (spin * (u2 * b0 - u0 * b2) - along * u1)
+        rate_out[2] += 0.5 * (spin * (u0 * b1 - u1 * b0) - along * u2)
+
+
+@kernel
+def step_bound(surfaces, strands, system, at, closing):
     """Largest α ≤ 1 such that all gaps keep `KEPT_FRACTION` of themselves along β step, 0 ≤ β ≤ α.
 
     Parameters
@@ -93,6 +221,7 @@ def step_bound(surfaces, system, at, closing):
     """
     node_step, motion, position = system.node_step, system.motion, at.pose_position
     alpha, blocking = 1.0, -1
+    moved, rate_of_point = stack_vector(3), stack_vector(3)
     for k in range(surfaces.near_count[0]):
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
         x0, x1, x2 = at.contact_point[i, 0], at.contact_point[i, 1], at.contact_point[i, 2]
@@ -102,14 +231,20 @@ def step_bound(surfaces, system, at, closing):
             continue
         a, b = surfaces.moved_by[i], surfaces.body[s]
         r0 = r1 = r2 = turn_a = 0.0  # rotation of the contact point's body
-        a0 = a1 = a2 = arm = 0.0  # arm on it
+        a0 = a1 = a2 = arm = slope = change = of_node = own = 0.0  # arm on it
+        place = i - surfaces.rod_points.first if surfaces.rod_points.exists else -1
         if a >= 0:
             u0, u1, u2 = motion[a, 0], motion[a, 1], motion[a, 2]
             r0, r1, r2 = motion[a, 3], motion[a, 4], motion[a, 5]
             a0, a1, a2 = x0 - position[a, 0], x1 - position[a, 1], x2 - position[a, 2]
             arm, turn_a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-        else:
+        elif place < 0:
             u0, u1, u2 = node_step[i, 0], node_step[i, 1], node_step[i, 2]
+        else:
+            n, along, u0, u1, u2 = surfaces.rod_points.node[place], surfaces.rod_points.arm, 0.0, 0.0, 0.0
+            of_node, own = _speed_of_node(surfaces, system, at, n)
+            slope, angle, change = _turn_at_node(surfaces, strands, system, at, n)
+            turn_a, arm = 2.6 * slope + angle, math.sqrt(along[place, 0] ** 2 + along[place, 1] ** 2)
         u0, u1, u2 = u0 - motion[b, 0], u1 - motion[b, 1], u2 - motion[b, 2]
         f0, f1, f2 = motion[b, 3], motion[b, 4], motion[b, 5]
         if surfaces.kind[s] == SPHERE:
@@ -118,10 +253,13 @@ def step_bound(surfaces, system, at, closing):
         lever = turn_b = 0.0
         if f0 != 0.0 or f1 != 0.0 or f2 != 0.0:
             lever, turn_b = math.sqrt(z0 * z0 + z1 * z1 + z2 * z2), math.sqrt(f0 * f0 + f1 * f1 + f2 * f2)
-        speed = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) + turn_a * arm
+        if alpha * slope > 0.5:  # the longest part for which the bounds of an arm's motion hold
+            alpha, blocking = 0.5 / slope, k
+        speed = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) + of_node + turn_a * arm
         if gap - (speed + turn_b * (lever + speed)) * alpha >= kept:
             continue
-        acceleration = turn_a * turn_a * arm + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)
+        own += (4.0 * turn_a * turn_a + 3.0 * change if place >= 0 else turn_a * turn_a) * arm
+        acceleration = own + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)
         # the contact point in a frame that moves and turns with the surface from where that is now
         t = 0.0
         d = gap
@@ -131,6 +269,9 @@ def step_bound(surfaces, system, at, closing):
             w0 = u0 + r1 * b2 - r2 * b1
             w1 = u1 + r2 * b0 - r0 * b2
             w2 = u2 + r0 * b1 - r1 * b0
+            if place >= 0:
+                _rod_point_at(surfaces, strands, system, at, place, t, moved, rate_of_point)
+                w0, w1, w2 = u0 + rate_of_point[0], u1 + rate_of_point[1], u2 + rate_of_point[2]
             if turn_b > 0.0:
                 w0, w1, w2 = _turned(w0, w1, w2, -t, f0, f1, f2)
                 w0, w1, w2 = w0 - (f1 * z2 - f2 * z1), w1 - (f2 * z0 - f0 * z2), w2 - (f0 * z1 - f1 * z0)
@@ -147,6 +288,9 @@ def step_bound(surfaces, system, at, closing):
             if t >= alpha:
                 break
             b0, b1, b2 = _turned(a0, a1, a2, t, r0, r1, r2)
+            if place >= 0:
+                _rod_point_at(surfaces, strands, system, at, place, t, moved, rate_of_point)
+                b0, b1, b2 = moved[0], moved[1], moved[2]
             z0 = x0 - a0 + t * u0 + b0 - position[b, 0]
             z1 = x1 - a1 + t * u1 + b1 - position[b, 1]
             z2 = x2 - a2 + t * u2 + b2 - position[b, 2]

@@ -26,6 +26,7 @@ from ..model.records.parts import (
     PointForces,
     RodContact,
     RodContactList,
+    RodPoints,
     Sliding,
     Slips,
     Strands,
@@ -141,7 +142,10 @@ def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
         node_free=contact_points.moved_by[: model.node_count] < 0,
         group=contact_points.group,
         point_position=contact_points.position,
-        point_body=contact_points.body[model.node_count :],
+        point_body=contact_points.body[model.node_count :][: sizes["point"]],
+        node_edges=contact_points.node_edges,
+        rod_points=_rod_points(model, sizes),
+        reach=_reach(model),
         kind=surfaces.kind,
         size=surfaces.size,
         rounding=surfaces.rounding,
@@ -154,6 +158,28 @@ def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
     )
 
 
+def _rod_points(model: Model, sizes: dict[str, int]) -> RodPoints:
+    points = model.contact_points
+    if not len(points.rod_point_node):
+        return RodPoints.absent()
+    first = sizes["node"] + sizes["point"]
+    return RodPoints(first=first, node=points.rod_point_node, arm=points.rod_point_arm)
+
+
+def _reach(model: Model) -> float:
+    """How many times farther than nodes, and borders of edges by a turn, a contact point of a rod moves at most.
+
+    Its arm turns with edges, by at most the motion of one end against the other over their length, of which half is
+    left at least.
+    """
+    points = model.contact_points
+    edges = points.node_edges[points.rod_point_node]
+    arm = np.linalg.norm(points.rod_point_arm, axis=1)
+    slope = arm / model.rest_length[edges].min(axis=1)
+    turn = arm / model.half_width[edges].min(axis=1)
+    return float(np.max(1.0 + 4.0 * slope + turn, initial=1.0))
+
+
 def sliding_of(model: Model, sizes: dict[str, int]) -> Sliding:
     """Without contacts."""
     contact_points, law = model.contact_points, model.scene.contact.friction
@@ -162,7 +188,6 @@ def sliding_of(model: Model, sizes: dict[str, int]) -> Sliding:
         acts=law is not None and law.acts,
         threshold=law.speed_threshold if law is not None else 0.0,
         coefficient=contact_points.friction,
-        node_edges=contact_points.node_edges,
         node_axis=contact_points.node_axis,
     )
 

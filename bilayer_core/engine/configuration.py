@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..forces.rod_arms import place_rod_points
 from ..jit import call, kernel, piece
 from ..kinematics.copying import copy, copy_matrix, copy_row
 from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
@@ -119,9 +120,12 @@ def update_attached(p, at):
 
 @piece(int, Problem, Configuration, Configuration)
 def transport_frames(p, base, at):
-    """Frames of `base`, carried to the positions of `at` and turned by its angles; in a plane those of positions."""
+    """Frames of `base`, carried to the positions of `at` and turned by its angles; in a plane those of positions. Contact
+    points of rods follow them.
+    """
     _transport_in_space(p.space, p.strands, base, at, at.angle)
     _frames_in_plane(p.plane, p.strands, at)
+    place_rod_points(p.surfaces, at)
     return READY
 
 
@@ -261,4 +265,5 @@ def take_state(p, state, at):
     call(p.calls.update_attached, (p, at))
     edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
     second_director(at.tangent, at.director1, at.director2)
+    place_rod_points(p.surfaces, at)
     return READY

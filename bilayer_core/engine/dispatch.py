@@ -12,7 +12,7 @@ IN_SPACE = {"assemble_in_space"}
 IN_PLANE = {"assemble_in_plane", "gradient_in_plane", "step_in_plane"}
 OF_BODIES = {"assemble_bodies", "restrict_bodies"}
 OF_BORDER = {"factor_border", "count_border", "solve_bordered"}
-OF_SURFACES = {"bound_at_surfaces", "list_surface_pairs", "add_contact_to_bodies"}
+OF_SURFACES = {"bound_at_surfaces", "list_surface_pairs", "add_contact_to_bodies", "assemble_arms"}
 OF_RODS = {
     *("bound_between_rods", "find_rod_contacts", "list_near_rods", "near_pairs"),
     *("take_rod_contacts", "move_to_border"),

@@ -218,7 +218,7 @@ def new_inputs(model: Model, ends: int) -> StageInputs:
 def error_norm_of(model: Model) -> ErrorNorm:
     """What the defect of a model's steps is measured on."""
     ends = [strand.first_node for strand in model.strands] + [model.node_count]
-    shares = np.array(model.contact_points.weight[: model.node_count])
+    shares = np.array(model.node_length)
     return ErrorNorm(
         length=float(max(rod.path.length for rod in model.scene.rods)),
         first_node=np.array(ends, dtype=np.int64),

@@ -89,7 +89,7 @@ def add_forces(p, at, stage, with_hessian, again):
         sums.gradients[:] = 0.0
         if with_hessian:
             sums.hessians[:] = 0.0
-            sums.links[0] = 0
+            sums.links[0] = sums.arms[0] = 0
         clear_contact(p.has_contact, sums)
     for k in range(forces.lasting if again else 0, count):
         if k == forces.lasting and not again:

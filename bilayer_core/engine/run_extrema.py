@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ..forces.rod_arms import node_of
 from ..jit import call, kernel, piece
 from ..model.records.problem import Problem
 from ..model.records.status import READY
@@ -44,19 +45,22 @@ def count_end(p, state, at, stage, gap, time, extrema):
         height += extrema.mass_moment[k] * state.director1[k, 2]
     figures[0], figures[1] = max(figures[0], height / extrema.mass), min(figures[1], gap)
     figures[2] = max(figures[2], math.sqrt(largest))
-    _count_contacts(p.surfaces, nodes, time, extrema)
+    _count_contacts(p.surfaces, time, extrema)
     return call(p.calls.count_shape, (p, state, at, stage, extrema))
 
 
 @kernel
-def _count_contacts(surfaces, nodes, time, extrema):
+def _count_contacts(surfaces, time, extrema):
+    """Nodes that touch surfaces, themselves or with a border; near pairs are in the order of surfaces."""
     if not surfaces.exists:
         return
-    count = extrema.nodes
-    count[:] = 0
+    count, last = extrema.nodes, extrema.last_surface
+    count[:], last[:] = 0, -1
     for c in range(surfaces.near_count[0]):
-        if surfaces.near_gap[c] < surfaces.d_hat and surfaces.near_contact_point[c] < nodes:
-            count[surfaces.near_surface[c]] += 1
+        i, s = node_of(surfaces, surfaces.near_contact_point[c]), surfaces.near_surface[c]
+        if surfaces.near_gap[c] < surfaces.d_hat and i < last.shape[0] and last[i] != s:
+            count[s] += 1
+            last[i] = s
     for s in range(count.shape[0]):
         extrema.most_nodes[s] = max(extrema.most_nodes[s], count[s])
         if count[s] > 0 and math.isnan(extrema.first_contact[s]):

@@ -102,6 +102,7 @@ class Storage:
         sizes = self._sizes | {
             "near": capacity.near,
             "link": 2 * capacity.near,
+            "arm": 2 * capacity.near + 1,
             "column": capacity.columns,
             "slip": capacity.near + capacity.sliding,
             "path": PATH_SIZE,
@@ -121,7 +122,9 @@ class Storage:
         )
         if rods:
             records["contact_columns"] = contact_columns_of(model, sizes, capacity.contacts + capacity.sliding)
-        self._sums = {name: getattr(records["sums"], name) for name in Sums.names if "link" not in name}
+        self._sums = {
+            name: getattr(records["sums"], name) for name in Sums.names if not name.startswith(("link", "arm"))
+        }
         return Problem(**records, calls=calls_of(model), outcome=self.outcome, forces=force_table(model, records))
 
     def _sliding(self, before: Problem | None, sizes: dict[str, int]) -> Sliding:
@@ -174,11 +177,13 @@ def new_configuration(model: Model) -> Configuration:
     """Arrays of a configuration, of which everything that does not move is in place."""
     sizes, surfaces = sizes_of(model), model.surfaces
     contact_point, edges = np.zeros((sizes["contact_point"], 3)), sizes["edge+clamp"]
+    nodes, of_rods = model.node_count, model.node_count + sizes["point"]
     at = Configuration.zeros(
         sizes,
         contact_point=contact_point,
-        position=contact_point[: model.node_count],
-        point=contact_point[model.node_count :],
+        position=contact_point[:nodes],
+        point=contact_point[nodes:of_rods],
+        rod_point=contact_point[of_rods:],
         length=np.ones(edges),
         rotation=np.tile(np.eye(3), (sizes["body+world"], 1, 1)),
     )

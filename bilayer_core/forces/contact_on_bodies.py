@@ -8,7 +8,8 @@ positions, and J = (1, −[a]×, −1, [ρ]×) the motion's derivative with resp
 
 (arms turn to second order, as in `engine.linear.attachments`). Where the normal turns with the surface (barrier) T_B
 counts + and the cross terms are −[g]×, −[a]× [g]× and [g]× with φ_B; where it is frozen (friction) T_B counts − and
-there are none. Blocks between a node and a free body ("links") are listed: the node, the body, and ∂²/∂x ∂(X, φ).
+there are none. Blocks between a node and a free body ("links") are listed: the node, the body, and ∂²/∂x ∂(X, φ). Where
+a rod has an arm from the node, x is the contact point at its end, and what it depends on is `forces.rod_arms`'.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def add_force(gradient_out, body, sign, arm, g):
 
 
 @kernel
-def add_second_derivative(p, m, g, arm, lever, turning, i, a, b):
+def add_second_derivative(p, m, g, arm, lever, turning, i, r, a, b):
     """Add the second derivative of one contact to `Sums`.
 
     Parameters
@@ -67,16 +68,20 @@ def add_second_derivative(p, m, g, arm, lever, turning, i, a, b):
         a and ρ [m]; a counts only where the contact point is on a free body.
     turning : float
         1 if g turns with the surface's body, −1 if it is frozen.
-    i, a, b : int
-        The contact point; the body that it is on, −1 if it is a node with unknowns of its own; the surface's body.
+    i, r, a, b : int
+        The node; its arm's place in the list, −1 without one; the body that the contact point is on, −1 for a rod's;
+        the surface's body.
     """
     if a < 0:
         for c in range(3):
             for d in range(c, 3):
-                p.sums.node_hessian[i, c, d] += m[c, d]
+                if r < 0:
+                    p.sums.node_hessian[i, c, d] += m[c, d]
+                else:
+                    p.sums.arm_matrix[r, c, d] = m[c, d]
     free = p.surfaces.free_index
     if free.shape[0] > 0 and (free[b] >= 0 or (a >= 0 and free[a] >= 0)):
-        call(p.calls.add_contact_to_bodies, (p, m, g, arm, lever, turning, i, a, b))
+        call(p.calls.add_contact_to_bodies, (p, m, g, arm, lever, turning, i, r, a, b))
 
 
 @kernel
@@ -87,8 +92,8 @@ def _skew(a, out):
     out[1, 0], out[2, 0], out[2, 1] = a[2], -a[1], a[0]
 
 
-@piece(int, Problem, Matrix, Vector, Vector, Vector, float, int, int, int)
-def add_contact_to_bodies(p, m, g, arm, lever, turning, i, a, b):
+@piece(int, Problem, Matrix, Vector, Vector, Vector, float, int, int, int, int)
+def add_contact_to_bodies(p, m, g, arm, lever, turning, i, r, a, b):
     """The part of `add_second_derivative` that free bodies have; at least one of the two is free."""
     sums, free = p.sums, p.surfaces.free_index
     jacobian, upper = stack_matrix(3, 12), stack_matrix(12, 12)  # by (x or X_A, φ_A, X_B, φ_B)
@@ -137,7 +142,7 @@ def add_contact_to_bodies(p, m, g, arm, lever, turning, i, a, b):
                 sums.body_hessian[column, row] += upper[k, n]
     if a < 0:
         link = sums.links[0]
-        sums.link_node[link], sums.link_body[link] = i, free[b]
+        sums.link_node[link], sums.link_arm[link], sums.link_body[link] = i, r, free[b]
         for k in range(3):
             for n in range(6):
                 sums.link_hessian[link, k, n] = upper[k, 6 + n]

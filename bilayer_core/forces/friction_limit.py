@@ -89,7 +89,7 @@ def limit_by_friction(p, at, stage, slope, bound):
     slips, sliding, system, count = p.slips, p.sliding, p.system, 0
     if sliding.exists:
         count = sliding.count[0]
-        slip_paths(sliding, p.surfaces, at, stage, system, slips.path)
+        slip_paths(sliding, p.surfaces, p.strands, at, stage, system, slips.path)
     if p.rod_contact.exists:
         count = rod_slip_along(p.rod_contact, stage, at.position, system.node_step, count, slips.path)
     return friction_limit(count, slips.path, slips.threshold, slope, bound) if count > 0 else bound

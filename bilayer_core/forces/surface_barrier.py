@@ -14,7 +14,8 @@ To second order p moves with y = ρ + δ − φ × (ρ + δ) + ½ φ × (φ × �
     d → d + n·w + ½ wᵀ H w − δ·(n × φ) + ½ ((n·φ)(ρ·φ) − (n·ρ) φ·φ)
 
 and, with g = K_c Δl b′ n and M = K_c Δl (b″ n nᵀ + b′ H), C has the gradient (g, −g, −ρ × g) and a second derivative
-whose blocks `forces.contact_on_bodies` hands to nodes and bodies.
+whose blocks `forces.contact_on_bodies` hands to nodes and bodies, `forces.rod_arms` to what holds a contact point off
+its node.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from ..model.records.parts import Surfaces
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative
+from .rod_arms import add_to_edges, has_arm, new_arm, node_of, write_curvature, write_material_rate
 
 BARRIER = slot_of("barrier")
 
@@ -76,10 +78,16 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
         stiffness = surfaces.stiffness * surfaces.weight[i]
         energy += stiffness * barrier(d, d_hat)
         slope = stiffness * barrier_gradient(d, d_hat)
+        node = node_of(surfaces, i)
         for c in range(3):
             g[c] = slope * n[c]
             lever[c] = at.contact_point[i, c] - at.pose_position[b, c]
-            sums.contact_point[i, c] += g[c]
+            sums.contact_point[node, c] += g[c]
+        r = -1
+        if has_arm(surfaces, i):
+            r = sums.arms[0]
+            write_material_rate(surfaces, p.strands, at, i, r, sums.arm_rate)
+            add_to_edges(surfaces, p.strands, node, g, r, sums.arm_rate, sums.edge)
         if a >= 0:
             for c in range(3):
                 arm[c] = at.contact_point[i, c] - at.pose_position[a, c]
@@ -92,7 +100,10 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
             for c in range(3):
                 for e in range(c, 3):
                     m[c, e] += curvature * n[c] * n[e]
-            add_second_derivative(p, m, g, arm, lever, 1.0, i, a, b)
+            if r >= 0:
+                r = new_arm(sums, node)
+                write_curvature(surfaces, p.strands, at, i, g, r, sums)
+            add_second_derivative(p, m, g, arm, lever, 1.0, node, r, a, b)
     sums.energy[BARRIER] = energy
     return min_gap
 

@@ -16,9 +16,10 @@ continuously differentiable:
 
 A contact point on a body moves with it: y = X + a, where the arm a from the body's position turns with the body,
 δa = δφ × a + ½ δφ × (δφ × a). So u, the motion of the contact point relative to that of the surface below it, depends
-on the motion of both (`forces.contact_on_bodies`), and the force on one side is opposite to that on the other. Between
-two bodies both points are one, on the first one's face, x − r n, and so the moments cancel as well. A node takes no
-moment: it slips with its centreline over the point of the surface below it. F is positive semidefinite.
+on the motion of both (`forces.contact_on_bodies`), and the force on one side is opposite to that on the other. Both points
+are one, on the face of the body or rod, x − r n, and so the moments cancel as well. That of a rod moves with its node
+and turns with the edges there, by a rate that is frozen with the contact (`forces.rod_arms`). F is positive
+semidefinite.
 """
 
 from __future__ import annotations
@@ -38,20 +39,21 @@ from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative
+from .rod_arms import add_motion_of_arm, add_step_of_arm, add_to_edges, copy_rate, new_arm, node_of, write_rate
 
 FRICTION = slot_of("friction")
 
 
 @kernel
-def _forward(sliding, start, i, n0, n1, n2):
+def _forward(sliding, edges, start, on_rod, i, n0, n1, n2):
     """Forward direction of a contact in its tangent plane, a unit vector.
 
     That of the rod at a node (mean of its edges), any direction for a body. A rod whose direction is along the normal
     has no forward direction there: what rounding leaves of the projection decides.
     """
     x, y, z = 1.0, 0.0, 0.0
-    if i < sliding.node_axis.shape[0]:
-        e, f, axis = sliding.node_edges[i, 0], sliding.node_edges[i, 1], sliding.node_axis[i]
+    if on_rod:
+        e, f, axis = edges[i, 0], edges[i, 1], sliding.node_axis[i]
         t, m = start.tangent, start.director1
         t0, t1, t2 = t[e, 0] + t[f, 0], t[e, 1] + t[f, 1], t[e, 2] + t[f, 2]
         m0, m1, m2 = m[e, 0] + m[f, 0], m[e, 1] + m[f, 1], m[e, 2] + m[f, 2]
@@ -81,12 +83,11 @@ def _across(sliding, k, across_out):
 
 
 @kernel
-def _slip(sliding, surfaces, at, stage, k, arm_out, lever_out, slip_out):
+def _slip(sliding, surfaces, strands, at, stage, k, arm_out, lever_out, slip_out):
     """Slip of a contact since the origin of the stage [m], and its arms now on the body that the contact point is on
-    (not written for a node) and on that of the surface [m].
+    (not written for a rod) and on that of the surface [m].
     """
-    i = sliding.first[k]
-    a, b = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
+    a, b, i = surfaces.contact_point_body[sliding.first[k]], surfaces.body[sliding.surface[k]], sliding.node[k]
     rotation, origin_rotation = sliding.rotation, sliding.origin_rotation
     position, origin = at.pose_position, stage.origin_pose_position
     for c in range(3):
@@ -104,6 +105,9 @@ def _slip(sliding, surfaces, at, stage, k, arm_out, lever_out, slip_out):
             before += origin_rotation[b, c, d] * sliding.lever[k, d]
         lever_out[c] = now
         slip_out[c] -= position[b, c] - origin[b, c] + (now - before)
+    if a < 0:
+        start, start_angle, rate = stage.origin_position, stage.origin_angle, sliding.arm_rate
+        add_motion_of_arm(surfaces, strands, i, k, rate, at.position, start, at.total_angle, start_angle, slip_out)
 
 
 @kernel
@@ -116,18 +120,20 @@ def _add_motion(motion, body, arm, sign, rate):
 
 
 @kernel
-def slip_paths(sliding, surfaces, at, stage, system, path_out):
+def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
     """Write the slip paths of the lagged contacts in the present step, see `forces.friction_limit`."""
     arm, lever, slip, rate, s = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
     a, coefficient, step_length = sliding.axis, sliding.coefficient, stage.lengths[0]
     for k in range(sliding.count[0]):
-        i = sliding.first[k]
+        i, node = sliding.first[k], sliding.node[k]
         body, under = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
-        _slip(sliding, surfaces, at, stage, k, arm, lever, slip)
+        _slip(sliding, surfaces, strands, at, stage, k, arm, lever, slip)
         for c in range(3):
-            rate[c] = 0.0 if body >= 0 else system.node_step[i, c]
+            rate[c] = 0.0 if body >= 0 else system.node_step[node, c]
         if body >= 0:
             _add_motion(system.motion, body, arm, 1.0, rate)
+        else:
+            add_step_of_arm(surfaces, strands, node, k, sliding.arm_rate, system.node_step, system.turn, rate)
         _add_motion(system.motion, under, lever, -1.0, rate)
         _across(sliding, k, s)
         path_out[k, 0] = slip[0] * a[k, 0] + slip[1] * a[k, 1] + slip[2] * a[k, 2]
@@ -156,12 +162,12 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
     arm[0] = arm[1] = arm[2] = 0.0
     energy = 0.0
     for k in range(sliding.count[0]):
-        i, normal_force = sliding.first[k], sliding.load[k]
+        i, node, normal_force = sliding.first[k], sliding.node[k], sliding.load[k]
         largest = max(coefficient[i, 0], coefficient[i, 1], coefficient[i, 2])
         if largest == 0.0:
             continue
         a, b = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
-        _slip(sliding, surfaces, at, stage, k, arm, lever, u)
+        _slip(sliding, surfaces, p.strands, at, stage, k, arm, lever, u)
         _across(sliding, k, across)
         forward = u[0] * axis[k, 0] + u[1] * axis[k, 1] + u[2] * axis[k, 2]
         sideways = u[0] * across[0] + u[1] * across[1] + u[2] * across[2]
@@ -174,9 +180,11 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         for c in range(3):
             q[c] = ca * forward * axis[k, c] + cs * sideways * across[c]
             g[c] = ratio * q[c]
-            sums.contact_point[i, c] += g[c]
+            sums.contact_point[node, c] += g[c]
         if a >= 0:
             add_force(sums.contact, a, 1.0, arm, g)
+        else:
+            add_to_edges(surfaces, p.strands, node, g, k, sliding.arm_rate, sums.edge)
         add_force(sums.contact, b, -1.0, lever, g)
         if with_hessian:
             excess = 0.0
@@ -187,7 +195,11 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
                 for d in range(c, 3):
                     tensor = ca * axis[k, c] * axis[k, d] + cs * across[c] * across[d]
                     hessian[c, d] = excess * q[c] * q[d] + ratio * tensor
-            add_second_derivative(p, hessian, g, arm, lever, -1.0, i, a, b)
+            r = -1
+            if a < 0:
+                r = new_arm(sums, node)
+                copy_rate(sliding.arm_rate, k, sums.arm_rate, r)
+            add_second_derivative(p, hessian, g, arm, lever, -1.0, node, r, a, b)
     sums.energy[FRICTION] = energy
     return math.inf
 
@@ -204,23 +216,24 @@ def start_surface_friction(sliding, p, start, stage):
     for b in range(start.rotation.shape[0]):
         copy_matrix(start.rotation, b, sliding.back, b)
         product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_rotation, b)
-    n, count = stack_vector(3), 0
+    n, arm, count = stack_vector(3), stack_vector(3), 0
     for k in range(surfaces.near_count[0]):
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
         x0, x1, x2 = start.contact_point[i, 0], start.contact_point[i, 1], start.contact_point[i, 2]
         d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, start, i, s, x0, x1, x2)
         if not 0.0 < d < surfaces.d_hat:
             continue
-        a, b = surfaces.contact_point_body[i], surfaces.body[s]
-        sliding.first[count], sliding.surface[count] = i, s
+        a, b, node = surfaces.contact_point_body[i], surfaces.body[s], node_of(surfaces, i)
+        sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
         sliding.load[count] = -surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
-        below = surfaces.radius[i] if a >= 0 else surfaces.radius[i] + d
         for c in range(3):
-            touched = start.contact_point[i, c] - below * n[c]
-            sliding.normal[count, c] = n[c]
-            sliding.arm[count, c] = touched - start.pose_position[a, c] if a >= 0 else 0.0
+            touched = start.contact_point[i, c] - surfaces.radius[i] * n[c]
+            arm[c] = touched - (start.pose_position[a, c] if a >= 0 else start.position[node, c])
+            sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
             sliding.lever[count, c] = touched - start.pose_position[b, c]
-        axis = _forward(sliding, start, i, n[0], n[1], n[2])
+        if a < 0:
+            write_rate(surfaces, p.strands, start, node, arm, count, sliding.arm_rate)
+        axis = _forward(sliding, surfaces.node_edges, start, a < 0, node, n[0], n[1], n[2])
         sliding.axis[count, 0], sliding.axis[count, 1], sliding.axis[count, 2] = axis
         count += 1
     sliding.count[0] = count

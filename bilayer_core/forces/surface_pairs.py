@@ -43,11 +43,11 @@ def bound_at_surfaces(p, at):
     a status are left in `Outcome`.
     """
     surfaces, counts = p.surfaces, p.outcome.counts
-    of_points = motion_of_points(surfaces, p.bodies, p.system)
+    of_points = motion_of_points(surfaces, p.bodies, p.strands, p.system, at)
     closing = of_points + motion_of_surfaces(surfaces, p.system)
     counts[PAIR], counts[STATUS] = -1, call(p.calls.list_surface_pairs, (surfaces, at, closing))
     if counts[STATUS] != READY:
         return 0.0
     closing = of_points + motion_of_surfaces(surfaces, p.system)  # extents of surfaces are those of the list
-    fraction, counts[PAIR] = step_bound(surfaces, p.system, at, closing)
+    fraction, counts[PAIR] = step_bound(surfaces, p.strands, p.system, at, closing)
     return fraction

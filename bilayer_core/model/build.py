@@ -42,7 +42,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found, plane)
-    contact_points, surfaces = build_contact(scene, found, bodies)
+    contact_points, surfaces = build_contact(scene, found, bodies, plane is not None)
     clamp_edges = found.column("clamp_edge_tangent", width=3)
     clamp_a = _resolve_clamp_edges(found.column("joint_a", np.int64), edge_count)
     clamp_b = _resolve_clamp_edges(found.column("joint_b", np.int64), edge_count)
@@ -90,6 +90,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         drag_edge=found.column("drag_edge", np.int64, 2),
         drag_coefficient=found.column("drag_coefficient", width=3),
         fluid_mass=found.column("fluid_mass", width=3),
+        node_length=found.column("node_length"),
         node_mass=found.column("node_mass"),
         mass_moment=mass_moment if mass_moment.any() else mass_moment[:0],
         spin_inertia=found.column("spin_inertia"),

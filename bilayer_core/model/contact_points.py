@@ -1,4 +1,4 @@
-"""ContactPoints and surfaces of a scene: what may touch what, and whether it does at the start."""
+"""Contact points and surfaces of a scene: what may touch what, and whether it does at the start."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from ..errors import PenetrationError
 from ..scene.config import SceneConfig
 from .colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
 from .model import Bodies, ContactPoints, Model, Surfaces
+from .rod_points import RodPoints, rod_points
 from .shapes import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
 from .strand_arrays import StrandArrays
 from .strands import Collected
@@ -28,7 +29,7 @@ class _Owned:
 
 @dataclass(frozen=True)
 class _Point:
-    """A contact point that is no node: its body or the world, and the surfaces that it meets."""
+    """A contact point of a body or of the world, and the surfaces that it meets."""
 
     position: np.ndarray
     radius: float
@@ -37,8 +38,10 @@ class _Point:
     can_collide: list[bool]
 
 
-def build_contact(scene: SceneConfig, found: Collected, bodies: Bodies) -> tuple[ContactPoints, Surfaces]:
-    """ContactPoints, and the surfaces that they can meet."""
+def build_contact(
+    scene: SceneConfig, found: Collected, bodies: Bodies, in_plane: bool
+) -> tuple[ContactPoints, Surfaces]:
+    """Contact points, and the surfaces that they can meet."""
     of_bodies, _ = colliders(scene)
     owned = _shapes(scene, bodies)
     surfaces = owned if scene.contact is not None else []
@@ -56,29 +59,30 @@ def build_contact(scene: SceneConfig, found: Collected, bodies: Bodies) -> tuple
     hidden = [p for p in generated if p.body == world or not p.position.any()]  # obstacles and centres of balls
     others = shown + hidden
 
-    nodes = found.node_count
-    moved_by = np.full(nodes + len(others), -1, dtype=np.int64)
-    moved_by[found.column("attached_node", np.int64)] = found.column("attached_body", np.int64)
-    moved_by[nodes:] = [p.body for p in others]
-    body = moved_by.copy()
-    body[:nodes] = -1
-    rows = np.zeros((nodes + len(others), len(surfaces)), dtype=bool)
+    nodes, of_rods = found.node_count, rod_points(found, in_plane)
+    held_by = np.full(nodes, -1, dtype=np.int64)
+    held_by[found.column("attached_node", np.int64)] = found.column("attached_body", np.int64)
+    own, free = np.array([p.body for p in others], dtype=np.int64), np.full(len(of_rods.node), -1)
     clear = scene.contact.barrier_distance if scene.contact is not None else 0.0
-    rows[:nodes] = _nodes_can_collide(found, bodies, of_bodies, surfaces, moved_by, clear)
-    rows[nodes:] = np.array([p.can_collide for p in others], dtype=bool).reshape(len(others), len(surfaces))
+    of_nodes = _nodes_can_collide(found, of_rods, bodies, of_bodies, surfaces, held_by, clear)
+    of_others = np.array([p.can_collide for p in others], dtype=bool).reshape(len(others), len(surfaces))
+    rows = np.concatenate([of_nodes & (of_rods.node_weight > 0.0)[:, None], of_others, of_nodes[of_rods.node]])
     used = rows.any(axis=0)
     surfaces = [surface for surface, is_used in zip(surfaces, used, strict=True) if is_used]
     groups, group = np.unique(rows[:, used], axis=0, return_inverse=True)
 
     contact_points = ContactPoints(
-        weight=np.concatenate([found.column("node_weight"), [p.length for p in others]]),
-        radius=np.concatenate([found.column("node_radius"), [p.radius for p in others]]),
-        friction=_friction_of_contact_points(scene, nodes, len(moved_by)),
+        weight=np.concatenate([of_rods.node_weight, [p.length for p in others], of_rods.weight]),
+        radius=np.concatenate([of_rods.node_radius, [p.radius for p in others], of_rods.radius]),
+        friction=_friction_of_contact_points(scene, nodes, len(others), len(of_rods.node)),
         node_edges=found.column("node_edges", np.int64, 2),
         node_axis=found.column("node_axis", np.int64),
-        body=body,
-        moved_by=moved_by,
+        body=np.concatenate([np.full(nodes, -1), own, free]).astype(np.int64),
+        moved_by=np.concatenate([held_by, own, free]).astype(np.int64),
         position=np.array([p.position for p in others], dtype=float).reshape(-1, 3),
+        rod_point_node=of_rods.node,
+        rod_point_arm=of_rods.arm,
+        rod_point_start=of_rods.position,
         point_count=len(shown),
         group=group.reshape(-1).astype(np.int64),
     )
@@ -121,29 +125,32 @@ def _points_of(part: _Owned, owners: list[Collider]) -> list[_Point]:
 
 def _nodes_can_collide(
     found: Collected,
+    points: RodPoints,
     bodies: Bodies,
     of_bodies: list[Collider],
     surfaces: list[_Owned],
-    moved_by: np.ndarray,
+    held_by: np.ndarray,
     clear: float,
 ) -> np.ndarray:
-    """Which nodes meet which surfaces, shape (n_node, n_surface).
+    """Which nodes meet which surfaces, shape (n_node, n_surface); their points with arms meet the same.
 
     A node that a body holds does not meet the body's own surface, nor do its neighbours along the strand up to the
     first that is clear of the barrier: a rod may grow out of a body.
     """
     nodes = found.node_count
     rows = np.zeros((nodes, len(surfaces)), dtype=bool)
-    position, radius = found.column("position", width=3), found.column("node_radius")
+    position = found.column("position", width=3)
     for column, surface in enumerate(surfaces):
         rows[:, column] = points_can_collide(RODS, surface.collider)
-        for node in np.flatnonzero(moved_by[:nodes] >= 0):
-            rows[node, column] = points_can_collide(of_bodies[moved_by[node]], surface.collider)
+        for node in np.flatnonzero(held_by >= 0):
+            rows[node, column] = points_can_collide(of_bodies[held_by[node]], surface.collider)
         if surface.body == len(bodies.names):
             continue
         base, rotation = bodies.start_position[surface.body], bodies.start_rotation[surface.body]
-        gap = signed_distance(surface.shape, (position - base) @ rotation) - radius
-        for node in np.flatnonzero(moved_by[:nodes] == surface.body):
+        gap = signed_distance(surface.shape, (position - base) @ rotation) - points.node_radius
+        of_points = signed_distance(surface.shape, (points.position - base) @ rotation) - points.radius
+        np.minimum.at(gap, points.node, of_points)
+        for node in np.flatnonzero(held_by == surface.body):
             strand = next(s for s in found.strands if s.first_node <= node < s.first_node + s.node_count)
             rows[_from_clamp(node, strand, gap, clear), column] = False
     return rows
@@ -161,11 +168,11 @@ def _from_clamp(node: int, strand: StrandArrays, gap: np.ndarray, clear: float) 
     return held
 
 
-def _friction_of_contact_points(scene: SceneConfig, nodes: int, contact_points: int) -> np.ndarray:
+def _friction_of_contact_points(scene: SceneConfig, nodes: int, others: int, of_rods: int) -> np.ndarray:
     """Friction coefficients forward, backward and sideways of each contact point, shape (n_contact_point, 3)."""
     law = scene.contact.friction if scene.contact else None
-    coefficients = np.full((contact_points, 3), law.coefficient if law else 0.0)
-    coefficients[:nodes] = law.of_rods if law else 0.0
+    coefficients = np.full((nodes + others + of_rods, 3), law.of_rods if law else 0.0)
+    coefficients[nodes : nodes + others] = law.coefficient if law else 0.0
     return coefficients
 
 
@@ -174,20 +181,25 @@ def contact_point_names(model: Model) -> list[str]:
     names = [f"node {k} of {s.name}" for s in model.strands for k in range(s.node_count)]
     parts = [*model.bodies.names, "an obstacle"]
     contact_points = model.contact_points
-    for k, body in enumerate(contact_points.body[model.node_count :]):
-        centre = k >= contact_points.point_count and not contact_points.position[k].any()
+    of_rods = [
+        f"the border of {names[node]}" if across else names[node]
+        for node, (_, across) in zip(contact_points.rod_point_node, contact_points.rod_point_arm, strict=True)
+    ]
+    for k, position in enumerate(contact_points.position):
+        body = contact_points.body[model.node_count + k]
+        centre = k >= contact_points.point_count and not position.any()
         names.append(f"body {parts[body]}" if centre else f"contact point {k} ({parts[body]})")
-    return names
+    return names + of_rods
 
 
 def start_contact_points(model: Model) -> np.ndarray:
     """Positions of all contact points at the start [m], shape (n_contact_point, 3)."""
-    bodies, body = model.bodies, model.contact_points.body[model.node_count :]
+    bodies, contact_points = model.bodies, model.contact_points
+    body = contact_points.body[model.node_count :][: len(contact_points.position)]
     base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[body]
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[body]
-    return np.concatenate(
-        [model.start_position, base + np.einsum("kij,kj->ki", rotation, model.contact_points.position)]
-    )
+    of_bodies = base + np.einsum("kij,kj->ki", rotation, contact_points.position)
+    return np.concatenate([model.start_position, of_bodies, contact_points.rod_point_start])
 
 
 def refuse_penetration(model: Model) -> None:

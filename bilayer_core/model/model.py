@@ -47,17 +47,21 @@ class Bodies(ReadOnlyArrays):
 @dataclass(frozen=True)
 class ContactPoints(ReadOnlyArrays):
     """Points with a radius that feel surfaces: all nodes, then *points* of bodies (contact points of the scene; corners
-    and rims of surfaces), then *centres* of balls and points of obstacles.
+    and rims of surfaces), then *centres* of balls and points of obstacles, and *rod points*, which have an arm from a
+    node (`model.rod_points`).
     """
 
-    weight: Array  # Δl of the barrier [m], shape (n_contact_point,)
-    radius: Array  # distance of the farther face, offset, or radius [m], shape (n_contact_point,)
+    weight: Array  # Δl of the barrier [m], 0 of a node that its rod points stand for, shape (n_contact_point,)
+    radius: Array  # half the thickness, offset, or radius [m], shape (n_contact_point,)
     friction: Array  # coefficients forward, backward and sideways, shape (n_contact_point, 3)
     node_edges: Array  # edges before and after each node, the same at an end, shape (n_node, 2)
     node_axis: Array  # which direction counts as forward: 0 t, 1 m1, 2 m2, shape (n_node,)
-    body: Array  # body that takes the force, −1 for nodes, shape (n_contact_point,)
-    moved_by: Array  # body that moves it, −1 for nodes that none holds, shape (n_contact_point,)
-    position: Array  # of points and centres in the body's frame [m], shape (n_contact_point − n_node, 3)
+    body: Array  # body that takes the force, −1 for those of rods, shape (n_contact_point,)
+    moved_by: Array  # body that moves it, −1 for those of rods that none holds, shape (n_contact_point,)
+    position: Array  # of points and centres in the body's frame [m], shape (n_point, 3)
+    rod_point_node: Array  # ascending, shape (n_rod_point,)
+    rod_point_arm: Array  # along m1 and m2, means of the node's edges [m], shape (n_rod_point, 2)
+    rod_point_start: Array  # position at the start [m], shape (n_rod_point, 3)
     point_count: int
     group: Array  # contact points of a group meet the same surfaces, shape (n_contact_point,)
 
@@ -147,6 +151,7 @@ class Model(ReadOnlyArrays):
 
     fluid_mass: Array  # added along m1, m2 [kg] and against spin [kg m²], shape (n_edge, 3); (0, 3) without
 
+    node_length: Array  # half the lengths of its edges at the start [m], shape (n_node,)
     node_mass: Array  # with point masses [kg], shape (n_node,)
     mass_moment: Array  # mass × its height along m1 of each edge [kg m], shape (n_edge,); (0,) if all of it is at nodes
     spin_inertia: Array  # of edges about their tangent [kg m²], shape (n_edge,)

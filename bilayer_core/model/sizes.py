@@ -15,7 +15,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         model.plane is not None,
         len(model.fluid_mass) > 0,
     )
-    contact_points, joints, pairs = len(model.contact_points.weight), len(model.joint_a), len(model.pair_top)
+    points, joints, pairs = model.contact_points, len(model.joint_a), len(model.pair_top)
     return {
         "node": model.node_count,
         "edge": model.edge_count,
@@ -24,8 +24,9 @@ def sizes_of(model: Model) -> dict[str, int]:
         "pair": pairs,
         "strand": len(model.strands),
         "attached": len(model.attached_node),
-        "contact_point": contact_points,
-        "point": contact_points - model.node_count,
+        "contact_point": len(points.weight),
+        "point": len(points.position),
+        "rod point": len(points.rod_point_node),
         "surface": len(model.surfaces.names),
         "body": bodies,
         "body+world": bodies + 1,

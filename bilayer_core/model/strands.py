@@ -179,7 +179,7 @@ def add_strand(
         tangent=shape.tangents,
         director1=shape.normals,
         node_mass=halves_to_nodes(elements.edge_mass),
-        node_weight=voronoi,
+        node_length=voronoi,
         node_radius=elements.node_radius,
         node_edges=first_edge + np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1),
         node_axis=np.full(nodes, ["path", "normal", "across"].index(rod.friction_axis)),

@@ -63,7 +63,7 @@ def summarise(simulator: Any) -> dict:
         "com_end": simulator.com.tolist(),
         "com_max_height": statistics.com_max_height,
         "max_curvature": statistics.max_curvature,
-        "mean_curvature": float(np.average(curvature, weights=model.contact_points.weight[: model.node_count])),
+        "mean_curvature": float(np.average(curvature, weights=model.node_length)),
         "tip_positions": {s.name: positions[s.first_node + s.node_count - 1].tolist() for s in model.strands},
         "max_strain": statistics.max_strain,
         "min_gap": min_gap if np.isfinite(min_gap) else None,

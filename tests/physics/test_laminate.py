@@ -10,6 +10,7 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.beam2d.scene import beam_of, set_stimuli
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.model.build import build_model
+from bilayer_core.model.contact_points import start_contact_points
 from bilayer_core.model.plan import make_plan, simplest_model
 from bilayer_core.simulation.surroundings import Surroundings
 from bilayer_core.validate.bending import PAIRS, THICKNESS, strip
@@ -195,12 +196,19 @@ def test_a_saved_state_goes_on_bit_for_bit_and_is_not_that_of_two_rods():
         Simulator(config).load_state(snapshot)
 
 
-def test_contact_counts_from_the_outer_face():
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_contact_counts_from_both_faces(dimension):
     content = scene([rod([layer("bottom"), layer("top", thickness=3e-3, interval=[0.02, 0.1])], stations=21)])
-    model = build_model(load_scene(content), "laminate")
+    model = build_model(load_scene(content), "laminate", dimension)
     (strand,) = model.strands
     low, high = (strand.offset + side * strand.thickness for side in (-0.5, 0.5))
-    assert model.contact_points.radius == pytest.approx(np.maximum(high, -low))
+    points, start = model.contact_points, start_contact_points(model)
+    touching = points.weight > 0.0
+    node = np.concatenate([np.arange(21), points.rod_point_node])[touching]
+    height, radius = start[touching, 2] - model.start_position[node, 2], points.radius[touching]
+    assert np.bincount(node, minlength=21).tolist() == [1 if dimension == 2 else 3] * 21
+    assert height - radius == pytest.approx(low[node]) and height + radius == pytest.approx(high[node])
+    assert np.bincount(node, points.weight[touching]) == pytest.approx(model.node_length)
     faces = model.start_position[:, 2] + np.array([low, high])
     assert faces[0] == pytest.approx(np.full(21, -1e-3))
     assert faces[1] == pytest.approx(np.where(np.arange(21) < 4, 0.0, 3e-3))

@@ -84,7 +84,16 @@ def test_the_section_is_drawn_and_touches_as_it_is():
     (drawn,) = simulator.description.strands
     assert drawn.width == pytest.approx(np.linspace(10e-3, 2e-3, 21))
     assert drawn.thickness == pytest.approx(np.linspace(1e-3, 3e-3, 21))
-    assert simulator.model.contact_points.radius == pytest.approx(0.5 * drawn.thickness)
+    points, nodes = simulator.model.contact_points, simulator.model.node_count
+    assert points.radius[:nodes] == pytest.approx(0.5 * drawn.thickness)
+    border = 0.5 * (drawn.width - drawn.thickness)
+    wide = border > 1e-12
+    assert 10 < wide.sum() < 21
+    assert np.unique(points.rod_point_node).tolist() == np.flatnonzero(wide).tolist()
+    assert np.abs(points.rod_point_arm[:, 1]) == pytest.approx(np.repeat(border[wide], 2))
+    assert points.radius[nodes:] == pytest.approx(np.repeat(0.5 * drawn.thickness[wide], 2))
+    weight = points.weight[:nodes] + np.bincount(points.rod_point_node, points.weight[nodes:], nodes)
+    assert weight == pytest.approx(simulator.model.node_length)
 
 
 def test_the_warnings_are_about_the_worst_section():

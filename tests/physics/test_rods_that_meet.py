@@ -23,7 +23,7 @@ def test_parallel_ribbons_rest_at_the_gap_that_the_barrier_demands_on_any_meshes
     simulator = Simulator(load_scene(stacked(*stations)))
     simulator.run(0.3)
     upper = simulator.model.strands[1].first_node
-    heights, weights = simulator.positions[:, 2], simulator.model.contact_points.weight
+    heights, weights = simulator.positions[:, 2], simulator.model.node_length
     gap = np.average(heights[upper:], weights=weights[upper:])
     gap -= np.average(heights[:upper], weights=weights[:upper]) + 1.5e-3
     s = gap - D_HAT

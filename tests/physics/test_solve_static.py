@@ -61,8 +61,8 @@ def test_the_equilibrium_is_where_time_would_lead_and_nothing_moves_there():
     assert np.abs(found.positions - shape).max() < 1e-9
 
 
-def ribbon_on_the_ground(layers, height):
-    strip = rod(layers, start=(0, 0, height))
+def ribbon_on_the_ground(layers, height, **section):
+    strip = rod(layers, start=(0, 0, height), **section)
     surroundings = {"gravity": [0, 0, -9.81], "obstacles": [GROUND], "contact": contact(coefficient=0.5)}
     return Simulator(load_scene(scene([strip], **surroundings)))
 
@@ -74,10 +74,11 @@ def test_a_strip_on_the_ground_comes_to_rest_on_it_with_its_weight():
     assert simulator.contact_forces.sum(axis=0) == pytest.approx([0, 0, weight], rel=1e-5, abs=1e-12)
 
 
-def test_two_layers_on_the_ground_balance_on_the_line_of_their_contact():
-    # Contact is felt along centrelines: what has its mass above that of the lower layer can roll over.
-    report = ribbon_on_the_ground([layer("bottom"), layer("top")], 5e-3).solve_static()
-    assert report.unstable_directions == 1
+def test_two_layers_stand_on_the_width_of_the_lower_and_a_narrow_blade_falls():
+    layers = [layer("bottom"), layer("top")]
+    assert ribbon_on_the_ground(layers, 5e-3).solve_static().stable
+    # as wide as its lower layer is thick, it stands on a line
+    assert ribbon_on_the_ground(layers, 5e-3, width=1e-3).solve_static().unstable_directions == 1
 
 
 def test_a_free_bilayer_finds_its_shape_although_nothing_holds_it():

@@ -7,10 +7,10 @@ import pytest
 
 from bilayer_core.contact.near import gap_normal, list_near
 from bilayer_core.contact.shapes import shape_curvature, shape_distance
-from bilayer_core.contact.step_bound import KEPT_FRACTION, step_bound
+from bilayer_core.contact.step_bound import KEPT_FRACTION, motion_of_points, step_bound
 from bilayer_core.jit import kernel, record_at
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.model.records.parts import Surfaces
+from bilayer_core.model.records.parts import Bodies, RodPoints, Strands, Surfaces
 from bilayer_core.model.records.problem import System
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.shapes import NUMBER, Shape, axis_frame, signed_distance
@@ -22,7 +22,8 @@ HALF = {
     "cylinder": (0.25, 0.25, 0.2),
 }
 
-surfaces_at, configuration_at, system_at = record_at(Surfaces), record_at(Configuration), record_at(System)
+surfaces_at, strands_at, bodies_at = record_at(Surfaces), record_at(Strands), record_at(Bodies)
+configuration_at, system_at = record_at(Configuration), record_at(System)
 
 
 def record_of(declared, **values):
@@ -38,8 +39,15 @@ def gap_between(surfaces, at, i, s):
 
 
 @kernel
-def bound_of(surfaces, system, at, closing):
-    return step_bound(surfaces_at(surfaces), system_at(system), configuration_at(at), closing)
+def bound_of(surfaces, strands, system, at, closing):
+    return step_bound(surfaces_at(surfaces), strands_at(strands), system_at(system), configuration_at(at), closing)
+
+
+@kernel
+def motion_of(surfaces, bodies, strands, system, at):
+    return motion_of_points(
+        surfaces_at(surfaces), bodies_at(bodies), strands_at(strands), system_at(system), configuration_at(at)
+    )
 
 
 @kernel
@@ -161,7 +169,95 @@ class Pair:
 
     def bound(self):
         at, system = self.at(0.0), record_of(System, node_step=self.step, motion=self.motion)
-        return bound_of(self.surfaces.address, system.address, at.address, np.inf)
+        strands = Strands.absent()
+        return bound_of(self.surfaces.address, strands.address, system.address, at.address, np.inf)
+
+
+class Border:
+    """A contact point at an arm from the middle one of three nodes, of which a body that moves may hold some, and a
+    surface at rest.
+    """
+
+    def __init__(self, kind, rng, fast, held=()):
+        self.position, self.edges = rng.uniform(-0.8, 0.8, 3) + np.zeros((3, 3)), np.array([[0, 0], [0, 1], [1, 1]])
+        self.position[[0, 2]] += [[-0.2, 0.0, 0.05], [0.2, 0.02, 0.0]]
+        self.tangent = np.diff(self.position, axis=0)
+        self.length = np.linalg.norm(self.tangent, axis=1)
+        self.tangent /= self.length[:, None]
+        m1 = np.cross(self.tangent, rng.standard_normal(3))
+        self.m1 = m1 / np.linalg.norm(m1, axis=1, keepdims=True)
+        self.arm = rng.uniform(-0.1, 0.1, (1, 2))
+        self.place = rng.uniform(-0.1, 0.1, (1, 3))
+        self.step = rng.uniform(0.5, 2.0) * (self.place - self.position[1]) + fast * rng.standard_normal((3, 3))
+        self.motion, self.base = np.zeros((2, 6)), np.zeros((2, 3))  # of the body and the world
+        self.base[0], self.held = self.position[1] + rng.uniform(-0.2, 0.2, 3), list(held)
+        self.motion[0] = [*self.step[1], *(10.0 * fast * rng.standard_normal(3))]
+        arms = self.position[self.held] - self.base[0]
+        self.step[self.held] = self.motion[0, :3] + np.cross(self.motion[0, 3:], arms)
+        self.turn = 10.0 * fast * rng.standard_normal(2)
+        self.rotation = rotation_matrix(rng.standard_normal(3))[None]
+        self.points = RodPoints(first=3, node=np.array([1]), arm=self.arm)
+        one, moved_by = np.zeros(1, dtype=np.int64), np.full(4, -1)
+        moved_by[self.held] = 0
+        self.surfaces = record_of(
+            Surfaces,
+            kind=np.array([NUMBER[kind]]),
+            size=np.array([HALF[kind]]),
+            rounding=np.full(1, 0.05 if kind == "sphere" else 0.0),
+            radius=np.full(4, 0.01),
+            moved_by=moved_by,
+            node_free=moved_by[:3] < 0,
+            node_edges=self.edges,
+            rod_points=self.points,
+            body=one + 1,
+            near_contact_point=one + 3,
+            near_surface=one,
+            near_count=one + 1,
+        )
+        self.strands = record_of(Strands, edge_node=np.array([0, 1]))
+        self.system = record_of(System, node_step=self.step, turn=self.turn, motion=self.motion)
+
+    def at(self, t):
+        """Configuration at a part of the step: directors are turned with the shortest arc of their edges, then about
+        these.
+        """
+        position, turned = self.position + t * self.step, rotation_matrix(t * self.motion[0, 3:])
+        arms = self.position[self.held] - self.base[0]
+        position[self.held] = self.base[0] + t * self.motion[0, :3] + arms @ turned.T
+        edge = np.diff(position, axis=0)
+        length = np.linalg.norm(edge, axis=1)
+        tangent, m1 = edge / length[:, None], np.zeros((2, 3))
+        for e in range(2):
+            axis = np.cross(self.tangent[e], tangent[e])
+            sine = np.linalg.norm(axis)
+            arc = axis * (np.arctan2(sine, self.tangent[e] @ tangent[e]) / sine if sine else 0.0)
+            m1[e] = rotation_matrix(t * self.turn[e] * tangent[e]) @ rotation_matrix(arc) @ self.m1[e]
+        m2 = np.cross(tangent, m1)
+        point = position[1] + 0.5 * (self.arm[0, 0] * m1 + self.arm[0, 1] * m2).sum(axis=0)
+        return record_of(
+            Configuration,
+            contact_point=np.concatenate([position, point[None]]),
+            position=position,
+            length=length,
+            tangent=tangent,
+            director1=m1,
+            director2=m2,
+            surface_position=self.place,
+            surface_rotation=self.rotation,
+            pose_position=self.base,
+        )
+
+    def gap(self, t):
+        at = self.at(t)
+        return gap_between(self.surfaces.address, at.address, 3, 0)
+
+    def bound(self):
+        records = self.surfaces, self.strands, self.system, self.at(0.0)
+        return bound_of(*(record.address for record in records), np.inf)
+
+    def largest_motion(self):
+        records = self.surfaces, Bodies.absent(), self.strands, self.system, self.at(0.0)
+        return motion_of(*(record.address for record in records))
 
 
 @pytest.mark.parametrize("turning", [False, True], ids=["straight", "turning"])
@@ -182,6 +278,40 @@ def test_step_bound_is_the_first_moment_at_which_a_gap_shrinks_to_the_kept_fract
             limited += 1
             assert pair.gap(alpha) == pytest.approx(KEPT_FRACTION * start, abs=1e-5 * start)
     assert limited > 10
+
+
+@pytest.mark.parametrize("held", [[], [0], [0, 2], [1]], ids=["free", "beside one", "between two", "held"])
+@pytest.mark.parametrize("fast", [0.01, 0.1, 0.5], ids=["slow", "fast", "turned over"])
+@pytest.mark.parametrize("kind", HALF)
+def test_the_step_bound_of_a_point_with_an_arm_keeps_the_kept_fraction_of_its_gap(kind, fast, held):
+    rng = np.random.default_rng(6)
+    limited = sharp = 0
+    for _ in range(25):
+        pair = Border(kind, rng, fast, held)
+        start = pair.gap(0.0)
+        if start <= 0.0:
+            continue
+        alpha, blocking = pair.bound()
+        assert (blocking >= 0) == (alpha < 1.0)
+        before = np.array([pair.gap(t) for t in np.linspace(0.0, alpha, 30)])
+        assert before.min() >= KEPT_FRACTION * start * (1.0 - 1e-9)
+        limited += alpha < 1.0
+        sharp += alpha < 1.0 and pair.gap(alpha) < (KEPT_FRACTION + 1e-5) * start
+    assert limited > 5 and (sharp > 0.5 * limited or fast > 0.01)
+
+
+@pytest.mark.parametrize("held", [[], [0], [0, 2], [1]])
+@pytest.mark.parametrize("fast", [0.01, 0.1, 0.5])
+def test_no_point_with_an_arm_moves_farther_than_the_motion_that_lists_are_made_for(fast, held):
+    rng, nearest = np.random.default_rng(7), np.inf
+    for _ in range(25):
+        pair = Border("plane", rng, fast, held)
+        motion, start = pair.largest_motion(), pair.at(0.0).contact_point[3]
+        for t in np.linspace(0.1, 1.0, 10):
+            moved = np.linalg.norm(pair.at(t).contact_point[3] - start)
+            assert moved <= t * motion * (1.0 + 1e-12)
+            nearest = min(nearest, t * motion / moved)
+    assert nearest < 4.0
 
 
 def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from ...jit import kernel, piece
+from ...jit.stack import stack_matrix
 from ...kinematics.copying import copy
 from ...model.records.problem import Problem
 from ...model.records.status import READY
 from ...model.records.step import Configuration
+from .arms import stencil_jacobian, stencil_rows
 from .attachments import condense_clamp_edges, condense_clamp_edges_in_plane, condense_nodes
 from .contact_columns import condense_contacts_to_bodies
 from .dense import count_negative_dense, factor_dense, solve_dense
@@ -20,7 +22,7 @@ def assemble_bodies(p, at):
     copy(sums.body_hessian, border.corner)
     if sums.links[0] > 0:
         coupled[0] = 1
-        _add_links(strands, sums, border.border)
+        _add_links(p.surfaces, strands, sums, border.border)
     if attachments.holding > 0:
         coupled[0] = 1
         condense_contacts_to_bodies(p.contact_columns, attachments, strands, at, border)
@@ -33,16 +35,25 @@ def assemble_bodies(p, at):
 
 
 @kernel
-def _add_links(strands, sums, border):
+def _add_links(surfaces, strands, sums, border):
     """Add the blocks between nodes, whose unknowns are along `axes`, and free bodies to the border."""
-    axes = strands.axes
+    axes, rows, jacobian = strands.axes, sums.stencil, stack_matrix(3, 11)
     for k in range(sums.links[0]):
-        row, column = strands.row[sums.link_node[k]], 6 * sums.link_body[k]
-        for m in range(axes.shape[0]):
+        row, column, r = strands.row[sums.link_node[k]], 6 * sums.link_body[k], sums.link_arm[k]
+        if r >= 0:
+            size = stencil_rows(surfaces, strands, sums.link_node[k], rows)
+            stencil_jacobian(axes, sums.arm_rate, r, jacobian)
+        else:
+            size = axes.shape[0]
+            for m in range(size):
+                rows[m] = row + m
+                for c in range(3):
+                    jacobian[c, m] = axes[m, c]
+        for m in range(size):
             for c in range(3):
-                if axes[m, c] != 0.0:
+                if rows[m] >= 0 and jacobian[c, m] != 0.0:
                     for n in range(6):
-                        border[row + m, column + n] += axes[m, c] * sums.link_hessian[k, c, n]
+                        border[rows[m], column + n] += jacobian[c, m] * sums.link_hessian[k, c, n]
 
 
 @piece(int, Problem, float)

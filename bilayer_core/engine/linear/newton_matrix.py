@@ -24,7 +24,7 @@ from ...model.records.problem import BorderedSystem, Problem
 from ...model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
 from ...model.records.step import Configuration, Stage
 from ..modes import SLOWEST_GROWTH
-from . import bordered_system, planar_assembly  # noqa: F401 (declare pieces)
+from . import arms, bordered_system, planar_assembly  # noqa: F401 (declare pieces)
 from .assembly import hold_unknowns
 from .contact_columns import gather_columns, scatter_columns
 
@@ -53,6 +53,8 @@ def assemble(p, at, factor, simplified):
         call(p.calls.assemble_in_space, (p, factor))
     else:
         call(p.calls.assemble_in_plane, (p, at, factor))
+    if p.surfaces.exists and p.sums.arms[0] > 0:
+        call(p.calls.assemble_arms, (p,))
     if p.rod_contact.exists:
         call(p.calls.take_rod_contacts, (p, simplified))
     if p.bordered.exists:

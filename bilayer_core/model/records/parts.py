@@ -142,8 +142,17 @@ class Attachments:
 
 
 @record
+class RodPoints:
+    """Contact points with arms from nodes, the last of all contact points; see `model.rod_points`."""
+
+    first: int  # of them among contact points
+    node: Indices
+    arm: Matrix  # along m1 and m2 [m]
+
+
+@record
 class Surfaces:
-    """ContactPoints, surfaces, and the list of near pairs with what it was made for; see `contact.near`."""
+    """Contact points, surfaces, and the list of near pairs with what it was made for; see `contact.near`."""
 
     d_hat: float
     stiffness: float
@@ -156,6 +165,9 @@ class Surfaces:
     group: Indices
     point_position: Matrix  # of points and centres in their bodies' frames
     point_body: Indices
+    node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
+    rod_points: RodPoints
+    reach: float  # how many times farther than nodes and borders of edges a contact point of a rod moves at most
     kind: Indices
     size: Matrix
     rounding: Vector
@@ -182,15 +194,16 @@ class Sliding:
     acts: bool
     threshold: float
     coefficient: Matrix
-    node_edges: IndexTable
     node_axis: Indices
     count: Indices = (1,)
     first: Indices = ("near",)
+    node: Indices = ("near",)  # of contacts of rods
     surface: Indices = ("near",)
     load: Vector = ("near",)
     normal: Matrix = ("near", 3)
     axis: Matrix = ("near", 3)
-    arm: Matrix = ("near", 3)
+    arm: Matrix = ("near", 3)  # of bodies
+    arm_rate: Stack = ("near", 3, 8)  # of rods, as in `forces.rod_arms`
     lever: Matrix = ("near", 3)
     back: Stack = ("body+world", 3, 3)
     rotation: Stack = ("body+world", 3, 3)

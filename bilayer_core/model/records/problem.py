@@ -41,14 +41,22 @@ class Sums:
     contact: Matrix = ("body+world", 6)  # ∂/∂(X, φ) of all bodies by contact alone, of which free ones take theirs
     gradient: Vector = ("unknown",)  # of the unknowns, zero where nodes are held
     attached: Matrix = ("attached", 3)  # of held nodes before that
-    hessians: Vector  # all second derivatives but links in one piece
+    hessians: Vector  # all second derivatives but those of arms and links in one piece
     edge_hessian: Stack = ("edge with hessian", 4, 4)
     cross_hessian: Stack = ("joint in space", 4, 4)
     pair_hessian: Stack = ("pair in space", 3, 3)
     node_hessian: Stack = ("node with hessian", 3, 3)
     body_hessian: Matrix = ("body unknown", "body unknown")
+    arms: Indices = (1,)  # number of contacts with an arm from a node; see `forces.rod_arms`
+    stencil: Indices = (11,)  # scratch
+    arm_node: Indices = ("arm",)
+    arm_rate: Stack = ("arm", 3, 8)
+    arm_matrix: Stack = ("arm", 3, 3)
+    arm_curved: Flags = ("arm",)
+    arm_curvature: Stack = ("arm", 8, 4)
     links: Indices = (1,)  # number of links
     link_node: Indices = ("link",)
+    link_arm: Indices = ("link",)  # among contacts with an arm, −1 without one
     link_body: Indices = ("link",)
     link_hessian: Stack = ("link", 3, 6)
 
@@ -62,6 +70,7 @@ class System:
     step: Vector = ("unknown",)
     body_step: Matrix = ("free", 6)
     node_step: Matrix = ("node", 3)
+    turn: Vector = ("edge",)
     motion: Matrix = ("body+world", 6)
     negative: Indices = (1,)  # number of negative eigenvalues, where they were counted
 
@@ -132,6 +141,7 @@ class Calls:
     bound: Address
     assemble_in_space: Address
     assemble_in_plane: Address
+    assemble_arms: Address
     take_rod_contacts: Address
     assemble_bodies: Address
     restrict_bodies: Address

@@ -12,9 +12,10 @@ class Configuration:
     Sizes in shapes are those of `model.sizes`.
     """
 
-    contact_point: Matrix = ("contact_point", 3)  # all [m]: the first are nodes, the others on bodies
+    contact_point: Matrix = ("contact_point", 3)  # all [m]: nodes, points of bodies, and those of rods with an arm
     position: Matrix = ("node", 3)  # of nodes [m]
-    point: Matrix = ("point", 3)  # of the other contact points [m]
+    point: Matrix = ("point", 3)  # of contact points on bodies [m]
+    rod_point: Matrix = ("rod point", 3)  # and of those with an arm from a node [m]
     length: Vector = ("edge+clamp",)  # of edges and clamp edges [m]
     tangent: Matrix = ("edge+clamp", 3)  # of edges and clamp edges, unit
     director1: Matrix = ("edge+clamp", 3)  # likewise
@@ -131,6 +132,7 @@ class RunExtrema:
     figures: Vector = (5,)  # highest mass centre, smallest gap [m], largest contact force [N], curvature [1/m], strain
     body_top: Vector = ("body",)  # greatest height of each body's position [m]
     nodes: Indices = ("surface",)  # that touch each surface now
+    last_surface: Indices = ("node",)  # scratch
     most_nodes: Indices = ("surface",)
     first_contact: Vector = ("surface",)  # [s], NaN before
 
