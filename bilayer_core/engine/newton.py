@@ -233,6 +233,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     call(p.calls.update_lagged, (p, at, stage))
     swapped, fresh, bounded, short, task = False, True, False, False, FACTORISE
     settled = False  # whether what is left to do is the last correction
+    checked, rounds = False, 0  # whether forces were settled at `at`
     found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
     iterations = factorisations = backtracks = halvings = 0
     residual = previous = gap = math.inf
@@ -269,7 +270,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             energy, gap = value, new_gap
             backtracks += halvings + bounded
             iterations += not fresh
-            fresh, previous = False, residual
+            fresh, checked, previous = False, False, residual
             at, trial, swapped = trial, at, not swapped
             if call(p.calls.update_lagged, (p, at, stage)):
                 curved, task = False, UPDATE_LAGGED
@@ -297,6 +298,12 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             status = NOT_FINITE
             break
         settled = residual <= tolerance or residual <= rounding_speed(at, stage.lengths[0])
+        if settled and not checked:
+            checked = True
+            if call(p.calls.settle_forces, (p, at, stage)):
+                rounds += 1
+                curved, task = False, UPDATE_LAGGED
+                continue
         if not settled and iterations >= max_iterations:
             status = MAX_ITERATIONS
             break

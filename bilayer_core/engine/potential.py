@@ -6,7 +6,7 @@ import math
 
 from numba import types
 
-from ..forces.contact_on_bodies import clear_contact, condense_contact
+from ..forces.contact_on_bodies import condense_contact
 from ..jit import call, caller, kernel, piece
 from ..kinematics.copying import copy
 from ..model.records.problem import Problem
@@ -38,6 +38,16 @@ def _call_each(addresses, p, at, stage):
     return READY
 
 
+@kernel
+def _call_all(p, addresses, at, stage):
+    """Call what forces have at their addresses; whether any has changed."""
+    changed = False
+    for k in range(p.forces.lasting, addresses.shape[0]):
+        if addresses[k] != 0:
+            changed |= call_update_lagged(addresses[k], (p.forces.own[k], p, at, stage))
+    return changed
+
+
 @piece(int, Problem, Configuration, Stage)
 def start_stage(p, start, stage):
     """Freeze what a stage depends on: near pairs, friction's contacts, loads. Returns whether it can go on."""
@@ -47,10 +57,13 @@ def start_stage(p, start, stage):
 @piece(bool, Problem, Configuration, Stage)
 def update_lagged(p, at, stage):
     """Let forces take from a configuration what they hold fixed between moves; whether any does."""
-    forces, moved = p.forces, False
-    for k in range(forces.lasting, forces.update_lagged.shape[0]):
-        moved |= call_update_lagged(forces.update_lagged[k], (forces.own[k], p, at, stage))
-    return moved
+    return _call_all(p, p.forces.update_lagged, at, stage)
+
+
+@piece(bool, Problem, Configuration, Stage)
+def settle_forces(p, at, stage):
+    """Let forces take from a minimum of the potential what they froze at the start of the stage; whether any does."""
+    return _call_all(p, p.forces.settle, at, stage)
 
 
 @piece(int, Problem, Configuration, Stage)
@@ -90,21 +103,12 @@ def add_forces(p, at, stage, with_hessian, again):
         if with_hessian:
             sums.hessians[:] = 0.0
             sums.links[0] = sums.arms[0] = 0
-        clear_contact(p.has_contact, sums)
     for k in range(forces.lasting if again else 0, count):
         if k == forces.lasting and not again:
-            _keep_lasting(p)
+            copy(sums.gradients, sums.lasting)
         gap = min(gap, call_add(forces.add[k], (forces.own[k], p, at, stage, with_hessian)))
-    if forces.lasting == count and not again:
-        condense_contact(p.has_contact, p.bodies, sums)
+    condense_contact(p.has_contact, p.bodies, sums)
     return gap
-
-
-@kernel
-def _keep_lasting(p):
-    """Keep what stays as it is when other parts follow the configuration."""
-    condense_contact(p.has_contact, p.bodies, p.sums)
-    copy(p.sums.gradients, p.sums.lasting)
 
 
 @piece(int, Problem, Configuration)

@@ -23,7 +23,7 @@ from .dispatch import calls_of
 Array = np.ndarray
 PAIRS_PER_POINT = 8
 """Of rods near each other: for how many there is capacity at first."""
-FIRST = ("node", "edge", "pair", "body")
+FIRST = ("node", "edge", "pair", "body", "contact_point", "contact")
 """Parts of `Sums.gradients`."""
 SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
 """Parts of `Sums.hessians`, with those of the dimension."""

@@ -21,15 +21,6 @@ from ..model.records.problem import Problem
 
 
 @kernel
-def clear_contact(has_contact, sums):
-    """Contact sums apart from other forces."""
-    if not has_contact:
-        return
-    sums.contact_point[:] = 0.0
-    sums.contact[:] = 0.0
-
-
-@kernel
 def condense_contact(has_contact, bodies, sums):
     """Nodes and free bodies take their share of contact."""
     if not has_contact:

@@ -23,10 +23,16 @@ from .drag import add_drag, update_directions_of_drag
 from .inertia import add_inertial_forces
 from .loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
 from .planar import add_elasticity_in_plane
-from .rod_contact import add_rod_contact, start_rod_contact
+from .rod_contact import (
+    add_rod_barrier,
+    add_rod_friction,
+    settle_rod_friction,
+    start_rod_barrier,
+    start_rod_friction,
+)
 from .stretch import add_stretching
 from .surface_barrier import add_surface_barrier, start_surface_barrier
-from .surface_friction import add_surface_friction, start_surface_friction
+from .surface_friction import add_surface_friction, settle_surface_friction, start_surface_friction
 
 
 @dataclass(frozen=True)
@@ -45,9 +51,12 @@ class Term:
         whether second derivatives are asked for. Returns the smallest gap that it knows [m], or infinity.
     start : Piece or None
         Freezes what a stage depends on: of the own record, Problem, Configuration and Stage. Returns a status.
-    follow : Piece or None
+    update_lagged : Piece or None
         Takes from a configuration what is held fixed between the moves of Newton's method, by the same arguments.
         Returns whether there is anything.
+    settle : Piece or None
+        Takes from a minimum of the potential what a stage froze at its start, by the same arguments. Returns whether
+        there is anything: then the potential is minimised again, until that is no more.
     end : Piece or None
         At the end of an accepted step, by the same arguments: writes its values of `Problem.memory`, and its energy
         there where that is not what `add` found. Returns a status.
@@ -62,8 +71,14 @@ class Term:
     add: Piece
     start: Piece | None = None
     update_lagged: Piece | None = None
+    settle: Piece | None = None
     end: Piece | None = None
     memory: Callable[[Model], int] | None = None
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it stays as it is while others are made anew."""
+        return self.update_lagged is None and self.settle is None
 
 
 TERMS: tuple[Term, ...] = (
@@ -74,14 +89,27 @@ TERMS: tuple[Term, ...] = (
     Term(("inertia", "damping", "gravity"), lambda model, of: None, add_inertial_forces),
     Term(("loads",), lambda model, of: of["loads"], add_point_forces, start_dead_loads),
     Term(("barrier",), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),
-    Term(("friction",), lambda model, of: of["sliding"], add_surface_friction, start_surface_friction),
-    Term(("rod barrier", "rod friction"), lambda model, of: of["rod_contact"], add_rod_contact, start_rod_contact),
+    Term(("rod barrier",), lambda model, of: of["rod_contact"], add_rod_barrier, start_rod_barrier),
     Term(("followers",), lambda model, of: of["followers"], add_point_forces, update_lagged=update_followers),
     Term(("moments",), lambda model, of: of["moments"], add_moments, update_lagged=update_moments),
     Term(("drag",), lambda model, of: of["flow"], add_drag, update_lagged=update_directions_of_drag),
     Term(("added mass",), lambda model, of: of["fluid"], add_added_mass, update_lagged=update_fluid),
+    Term(
+        ("friction",),
+        lambda model, of: of["sliding"],
+        add_surface_friction,
+        start_surface_friction,
+        settle=settle_surface_friction,
+    ),
+    Term(
+        ("rod friction",),
+        lambda model, of: of["rod_contact"],
+        add_rod_friction,
+        start_rod_friction,
+        settle=settle_rod_friction,
+    ),
 )
-"""In the order of the sum; those that follow the configuration come last."""
+"""In the order of the sum; those that are made anew at a configuration come last."""
 
 
 def require_computed(forces: Iterable[str]) -> None:
@@ -124,7 +152,7 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
         if set(term.names) & set(model.forces) and (own is None or own.exists):
             chosen.append((term, own))
         carried += _carried(term, model)
-    chosen.sort(key=lambda pair: pair[0].update_lagged is not None)
+    chosen.sort(key=lambda pair: not pair[0].lasts)
 
     def column(value: Callable) -> np.ndarray:
         return np.array([value(*pair) for pair in chosen], dtype=np.int64)
@@ -135,7 +163,8 @@ def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
         start=column(lambda term, own: term.start.address if term.start else 0),
         update_lagged=column(lambda term, own: term.update_lagged.address if term.update_lagged else 0),
         end=column(lambda term, own: term.end.address if term.end else 0),
-        lasting=sum(term.update_lagged is None for term, _ in chosen),
+        settle=column(lambda term, own: term.settle.address if term.settle else 0),
+        lasting=sum(term.lasts for term, _ in chosen),
     )
     table.holds = [own for _, own in chosen]  # whose addresses are in it
     return table

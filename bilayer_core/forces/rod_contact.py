@@ -96,10 +96,14 @@ def bound_between_rods(p, at):
 
 
 @piece(int, RodContact, Problem, Configuration, Stage)
-def start_rod_contact(rods, p, start, stage):
-    """Freeze the contacts of friction."""
-    if not call(p.calls.find_rod_contacts, (p, start)):
-        return ROD_CAPACITY_EXCEEDED
+def start_rod_barrier(rods, p, start, stage):
+    """Find the contacts at the start of a stage."""
+    return READY if call(p.calls.find_rod_contacts, (p, start)) else ROD_CAPACITY_EXCEEDED
+
+
+@kernel
+def _freeze(rods):
+    """Freeze the contacts found last for friction."""
     found, sliding = rods.contacts, rods.sliding
     sliding.count[0] = found.count[0] if rods.slides else 0
     for c in range(sliding.count[0]):
@@ -110,18 +114,40 @@ def start_rod_contact(rods, p, start, stage):
             sliding.normal[c, m] = found.normal[c, m]
         for m in range(4):
             sliding.weight[c, m] = found.weight[c, m]
+
+
+@piece(int, RodContact, Problem, Configuration, Stage)
+def start_rod_friction(rods, p, start, stage):
+    """Freeze the contacts of friction at the start of a stage, which were found before."""
+    _freeze(rods)
     return READY
 
 
+@piece(bool, RodContact, Problem, Configuration, Stage)
+def settle_rod_friction(rods, p, at, stage):
+    """Freeze the contacts of friction at a minimum; whether there are any, now or before."""
+    before = rods.sliding.count[0]
+    _freeze(rods)
+    return before + rods.sliding.count[0] > 0
+
+
 @piece(float, RodContact, Problem, Configuration, Stage, bool)
-def add_rod_contact(rods, p, at, stage, with_hessian):
-    """Barrier and friction at the contacts found last; returns the smallest gap below the barrier distance [m]."""
+def add_rod_barrier(rods, p, at, stage, with_hessian):
+    """Barrier at the contacts found last; returns the smallest gap below the barrier distance [m]."""
     sums = p.sums
     if rods.contacts.count[0] > 0 and sums.selected[ROD_BARRIER]:
         sums.energy[ROD_BARRIER] = _add_barrier(rods, at.position, sums.contact_point)
-    if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
-        sums.energy[ROD_FRICTION] = _add_friction(rods, stage, at.position, sums.contact_point)
     return rods.gap[0]
+
+
+@piece(float, RodContact, Problem, Configuration, Stage, bool)
+def add_rod_friction(rods, p, at, stage, with_hessian):
+    """Friction at the contacts frozen last; returns infinity, as it knows no gap."""
+    sums, energy = p.sums, 0.0
+    if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
+        energy = _add_friction(rods, stage, at.position, sums.contact_point)
+    sums.energy[ROD_FRICTION] = energy
+    return math.inf
 
 
 @kernel

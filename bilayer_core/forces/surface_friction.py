@@ -204,15 +204,11 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
     return math.inf
 
 
-@piece(int, Sliding, Problem, Configuration, Stage)
-def start_surface_friction(sliding, p, start, stage):
-    """List the contacts at the start of a stage, with their normal forces, directions and arms; returns a status.
-
-    Near pairs are those of the barrier, which starts before.
+@kernel
+def _freeze(sliding, p, surfaces, start, stage):
+    """List the contacts at a configuration, with their normal forces, directions and arms; near pairs are those that
+    the barrier listed.
     """
-    surfaces = p.surfaces
-    if not sliding.acts:
-        return READY
     for b in range(start.rotation.shape[0]):
         copy_matrix(start.rotation, b, sliding.back, b)
         product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_rotation, b)
@@ -237,4 +233,21 @@ def start_surface_friction(sliding, p, start, stage):
         sliding.axis[count, 0], sliding.axis[count, 1], sliding.axis[count, 2] = axis
         count += 1
     sliding.count[0] = count
+
+
+@piece(int, Sliding, Problem, Configuration, Stage)
+def start_surface_friction(sliding, p, start, stage):
+    """Freeze the contacts at the start of a stage; returns a status."""
+    if sliding.acts:
+        _freeze(sliding, p, p.surfaces, start, stage)
     return READY
+
+
+@piece(bool, Sliding, Problem, Configuration, Stage)
+def settle_surface_friction(sliding, p, at, stage):
+    """Freeze the contacts at a minimum of the potential; whether there are any, now or before."""
+    if not sliding.acts:
+        return False
+    before = sliding.count[0]
+    _freeze(sliding, p, p.surfaces, at, stage)
+    return before + sliding.count[0] > 0

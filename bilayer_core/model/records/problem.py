@@ -31,7 +31,7 @@ class Sums:
 
     energy: Vector = ("force",)  # of each, in the order of `model.force_slots` [J]
     selected: Flags = ("force",)  # whether a force is computed, in that order; in steps all are
-    gradients: Vector  # node, edge, pair and body in one piece, for clearing
+    gradients: Vector  # node, edge, pair, body, contact_point and contact in one piece, for clearing
     lasting: Vector  # the part of it that stays as it is when other parts follow the configuration
     node: Matrix = ("node", 3)  # ∂/∂x of nodes [N]
     edge: Matrix = ("edge+clamp", 4)  # ∂/∂(e, θ) of edges and clamp edges
@@ -102,13 +102,14 @@ class BorderedSystem:
 class ForceTable:
     """Forces that act, a row each: the address of its own record, and those of its pieces, 0 where it has none.
 
-    The first `lasting` of them stay as they are while others follow the configuration; see `forces.register`.
+    The first `lasting` of them stay as they are while others are made anew; see `forces.register`.
     """
 
     own: Indices
     add: Indices
     start: Indices
     update_lagged: Indices
+    settle: Indices
     end: Indices
     lasting: int
 
@@ -132,6 +133,7 @@ class Calls:
     first_guess_of: Address
     start_stage: Address
     update_lagged: Address
+    settle_forces: Address
     add_forces: Address
     end_forces: Address
     expand_to_unknowns: Address
