@@ -12,7 +12,7 @@ from ..model.contact_points import contact_point_names
 from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES
 from ..model.model import Model
-from ..model.records.outcome import BACKTRACKS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
+from ..model.records.outcome import SETTLINGS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
 from ..model.records.problem import Sums
 from ..model.records.step import RunExtrema, StageInputs, StateArrays
 from ..model.rest_strains import RestStrains
@@ -100,14 +100,14 @@ class Engine:
         status, pair = int(outcome.counts[STATUS]), int(outcome.counts[PAIR])
         if done > 0 or status in FAILURES:
             self._take_end()
-        iterations, factorisations, backtracks, rejected, inaccurate, restarts = counts.numbers.tolist()
+        iterations, factorisations, settlings, rejected, inaccurate, restarts = counts.numbers.tolist()
         shortest, longest, length = counts.lengths.tolist()
         residual, largest_residual = counts.residuals.tolist()
         error = 0.0
         if status in FAILURES:
             length, residual, error, iterations = counts.failure.tolist()
         return IntegrationReport(
-            *(done, status, pair, int(iterations), factorisations, backtracks, residual, largest_residual),
+            *(done, status, pair, int(iterations), factorisations, settlings, residual, largest_residual),
             *(shortest, longest, length, rejected, inaccurate, restarts, error),
         )
 
@@ -120,7 +120,7 @@ class Engine:
                 break
         counts, figures = self._outcome.counts.tolist(), self._outcome.figures
         self._take_end()
-        numbers = counts[ITERATIONS], counts[FACTORISATIONS], counts[BACKTRACKS]
+        numbers = counts[ITERATIONS], counts[FACTORISATIONS], counts[SETTLINGS]
         return IntegrationReport(1, status, counts[PAIR], *numbers, float(figures[RESIDUAL]))
 
     def _parts_for(self, state: State) -> Integration:

@@ -15,7 +15,7 @@ import numpy as np
 from ..jit import call, kernel, piece, record_at
 from ..jit.record import Flags, Indices, Vector, record
 from ..kinematics.copying import copy
-from ..model.records.outcome import BACKTRACKS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
+from ..model.records.outcome import SETTLINGS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
 from ..model.records.problem import Problem
 from ..model.records.status import CONVERGED, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
 from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
@@ -56,7 +56,7 @@ class StepControl:
 class Counts:
     """What came of steps, added up until they are cleared."""
 
-    numbers: Indices  # iterations, factorisations, backtracks, attempts refused, those for their error, restarts
+    numbers: Indices  # iterations, factorisations, settlings, attempts refused, those for their error, restarts
     lengths: Vector  # shortest, longest, and last step [s]
     residuals: Vector  # of the last step, and the largest [m/s]
     failure: Vector  # length [s], residual [m/s], error, in tolerances, and iterations of the last attempt
@@ -225,7 +225,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                 return _leave(run, k, status, pair, end, gap)
             numbers[0] += iterations
             numbers[1] += found[FACTORISATIONS]
-            numbers[2] += found[BACKTRACKS]
+            numbers[2] += found[SETTLINGS]
             error = math.inf
             if status == CONVERGED:
                 error = 0.0

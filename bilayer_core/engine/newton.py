@@ -15,7 +15,7 @@ from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack
 from ..kinematics.copying import copy
 from ..kinematics.rotating import compose_quaternion, rotate_by, rotation_vector_between
-from ..model.records.outcome import BACKTRACKS, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS, SWAPPED
+from ..model.records.outcome import FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS, SWAPPED
 from ..model.records.problem import Problem
 from ..model.records.status import (
     BLOCKED,
@@ -25,6 +25,7 @@ from ..model.records.status import (
     NOT_FINITE,
     READY,
     ROD_CAPACITY_EXCEEDED,
+    UNSETTLED,
 )
 from ..model.records.step import Configuration, Stage
 from .configuration import copy_prescribed, departure_of_constrained
@@ -36,6 +37,8 @@ KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
 BACKTRACKING = 0.5
 MAX_BACKTRACKS = 30
 SAFE_PART = 0.5  # of the smallest gap, which a last correction may close without a look at each pair
+MAX_SETTLINGS = 8
+SETTLED_WITHIN = 10.0  # times the tolerance: the first correction after forces were settled, which then is the last one
 ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the potential below it mean nothing
 
 
@@ -226,16 +229,16 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     Returns
     -------
     status : int
-        In `Outcome`: whether the minimum is `trial` and not `at`, numbers of iterations, factorisations and backtracks,
+        In `Outcome`: whether the minimum is `trial` and not `at`, numbers of iterations, factorisations and settlings of forces,
         the speed of the last correction [m/s], and the smallest gap to a surface or another rod [m].
     """
     counts, figures = p.outcome.counts, p.outcome.figures
     call(p.calls.update_lagged, (p, at, stage))
-    swapped, fresh, bounded, short, task = False, True, False, False, FACTORISE
+    swapped, fresh, short, task = False, True, False, FACTORISE
     settled = False  # whether what is left to do is the last correction
-    checked, rounds = False, 0  # whether forces were settled at `at`
+    checked = False  # whether forces were settled at `at`
     found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
-    iterations = factorisations = backtracks = halvings = 0
+    iterations = factorisations = settlings = halvings = 0
     residual = previous = gap = math.inf
     energy = alpha = slope = noise = 0.0
     while True:
@@ -268,7 +271,6 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
                 found, curved, task = False, False, FACTORISE  # a direction of an old matrix: try that of a new one
                 continue
             energy, gap = value, new_gap
-            backtracks += halvings + bounded
             iterations += not fresh
             fresh, checked, previous = False, False, residual
             at, trial, swapped = trial, at, not swapped
@@ -297,12 +299,16 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         if not math.isfinite(residual):
             status = NOT_FINITE
             break
-        settled = residual <= tolerance or residual <= rounding_speed(at, stage.lengths[0])
+        enough = SETTLED_WITHIN * tolerance if checked else tolerance
+        settled = residual <= enough or residual <= rounding_speed(at, stage.lengths[0])
         if settled and not checked:
             checked = True
             if call(p.calls.settle_forces, (p, at, stage)):
-                rounds += 1
-                curved, task = False, UPDATE_LAGGED
+                settlings += 1
+                if settlings > MAX_SETTLINGS:
+                    status = UNSETTLED
+                    break
+                curved, task, previous = False, UPDATE_LAGGED, math.inf
                 continue
         if not settled and iterations >= max_iterations:
             status = MAX_ITERATIONS
@@ -312,19 +318,19 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             continue
         farthest = residual * stage.lengths[0] * max(1.0, p.surfaces.reach if p.surfaces.exists else 1.0)
         if settled and 2.0 * farthest <= SAFE_PART * min(gap, _least_gap_of_rods(p.rod_contact)):
-            alpha, bounded, halvings, task = 1.0, False, 0, SEARCH  # two points that move towards each other keep a gap
+            alpha, halvings, task = 1.0, 0, SEARCH  # two points that move towards each other keep a gap
             continue
         slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
         alpha = call(p.calls.bound, (p, at))
         status = counts[STATUS]
         if status != READY:
             break
-        bounded, halvings, task = alpha < 1.0, 0, SEARCH
+        halvings, task = 0, SEARCH
         if fresh and not settled and p.slips.exists:
             alpha = call(p.calls.limit_by_friction, (p, at, stage, slope, alpha))
         short = alpha < 1.0
     counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
-    counts[BACKTRACKS], figures[RESIDUAL], figures[GAP] = backtracks, residual, gap
+    counts[SETTLINGS], figures[RESIDUAL], figures[GAP] = settlings, residual, gap
     return status
 
 

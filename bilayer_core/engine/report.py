@@ -13,6 +13,7 @@ from ..model.records.status import (
     MAX_ITERATIONS,
     NOT_FINITE,
     TOO_INACCURATE,
+    UNSETTLED,
 )
 
 FAILURES = {
@@ -22,6 +23,7 @@ FAILURES = {
     NOT_FINITE: "the potential or its gradient is not finite",
     BLOCKED: "prescribed motion would push a surface through another one",
     BEYOND: "the end of the step, beyond its last stage, lies behind a surface",
+    UNSETTLED: "normal forces and friction do not settle on each other",
     TOO_INACCURATE: "the error of the step stays above the tolerance",
 }
 """Statuses of a step that failed, with the message."""
@@ -39,9 +41,9 @@ class IntegrationReport:
         Why it ended, from `model.records.status`.
     pair : int
         Near pair that blocks prescribed motion, −1 if none.
-    iterations, factorisations, backtracks : int
-        Exact Hessians factorised and further corrections taken with a kept one; the former alone; halvings of the line
-        search. Failed attempts are included.
+    iterations, factorisations, settlings : int
+        Exact Hessians factorised and further corrections taken with a kept one; the former alone; how often friction
+        was frozen anew. Failed attempts are included.
     residual, largest_residual : float
         Speed of Newton's last correction in the last step, or in the attempt that failed, and the largest of all
         steps made [m/s].
@@ -60,7 +62,7 @@ class IntegrationReport:
     pair: int
     iterations: int
     factorisations: int
-    backtracks: int
+    settlings: int
     residual: float
     largest_residual: float = 0.0
     shortest: float = 0.0
@@ -94,5 +96,5 @@ class IntegrationReport:
         return self.status in FAILURES
 
 
-SUMS = ("done", "iterations", "factorisations", "backtracks", "rejected", "inaccurate", "restarts")
+SUMS = ("done", "iterations", "factorisations", "settlings", "rejected", "inaccurate", "restarts")
 """Figures of which those of several reports add up."""

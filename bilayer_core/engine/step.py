@@ -7,7 +7,7 @@ import math
 from ..jit import call, kernel, piece, record_at
 from ..kinematics.copying import copy
 from ..model.records.outcome import (
-    BACKTRACKS,
+    SETTLINGS,
     CONFIGURATION,
     FACTORISATIONS,
     GAP,
@@ -70,7 +70,7 @@ def drive_stage(p, state, inputs, n, work):
 def _clear(outcome):
     """Begin to count what Newton's method needs."""
     counts, figures = outcome.counts, outcome.figures
-    counts[ITERATIONS] = counts[FACTORISATIONS] = counts[BACKTRACKS] = 0
+    counts[ITERATIONS] = counts[FACTORISATIONS] = counts[SETTLINGS] = 0
     figures[RESIDUAL], figures[GAP] = 0.0, math.inf
 
 
@@ -80,13 +80,13 @@ def _solve(p, work, at, scratch, tolerance, max_iterations, wanted):
     configuration where it ended and of the other one. What it needed is added to `Outcome`.
     """
     counts = p.outcome.counts
-    before = counts[ITERATIONS], counts[FACTORISATIONS], counts[BACKTRACKS]
+    before = counts[ITERATIONS], counts[FACTORISATIONS], counts[SETTLINGS]
     first, second = configuration_at(work.configurations[at]), configuration_at(work.configurations[scratch])
     arguments = p, first, second, work.stage, tolerance, max_iterations, wanted
     status = call(p.calls.minimise_potential, arguments)
     counts[ITERATIONS] += before[0]
     counts[FACTORISATIONS] += before[1]
-    counts[BACKTRACKS] += before[2]
+    counts[SETTLINGS] += before[2]
     if counts[SWAPPED]:
         return status, scratch, at
     return status, at, scratch
@@ -126,7 +126,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     -------
     status : int
         In `Outcome`: the blocking pair, −1 if none, the number in `work.configurations` of the last configuration,
-        numbers of iterations, factorisations and backtracks, the largest residual and the gap.
+        numbers of iterations, factorisations and settlings, the largest residual and the gap.
     """
     stage, previous, figures = work.stage, work.first, p.outcome.figures
     s, e, t = 0, 1, 2

@@ -42,6 +42,7 @@ from .contact_on_bodies import add_force, add_second_derivative
 from .rod_arms import add_motion_of_arm, add_step_of_arm, add_to_edges, copy_rate, new_arm, node_of, write_rate
 
 FRICTION = slot_of("friction")
+LEAST_RELAXATION, LARGEST_RELAXATION = 0.3, 3.0
 
 
 @kernel
@@ -205,41 +206,66 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
 
 
 @kernel
-def _freeze(sliding, p, surfaces, start, stage):
+def _freeze(sliding, p, at, stage):
     """List the contacts at a configuration, with their normal forces, directions and arms; near pairs are those that
-    the barrier listed.
+    the barrier listed. Returns whether they are the same as before.
     """
-    for b in range(start.rotation.shape[0]):
-        copy_matrix(start.rotation, b, sliding.back, b)
+    surfaces = p.surfaces
+    for b in range(at.rotation.shape[0]):
+        copy_matrix(at.rotation, b, sliding.back, b)
         product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_rotation, b)
-    n, arm, count = stack_vector(3), stack_vector(3), 0
+    n, arm, count, same = stack_vector(3), stack_vector(3), 0, True
     for k in range(surfaces.near_count[0]):
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
-        x0, x1, x2 = start.contact_point[i, 0], start.contact_point[i, 1], start.contact_point[i, 2]
-        d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, start, i, s, x0, x1, x2)
+        x0, x1, x2 = at.contact_point[i, 0], at.contact_point[i, 1], at.contact_point[i, 2]
+        d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, at, i, s, x0, x1, x2)
         if not 0.0 < d < surfaces.d_hat:
             continue
         a, b, node = surfaces.contact_point_body[i], surfaces.body[s], node_of(surfaces, i)
+        same &= count < sliding.count[0] and sliding.first[count] == i and sliding.surface[count] == s
         sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
+        sliding.last_load[count] = sliding.load[count]
         sliding.load[count] = -surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
         for c in range(3):
-            touched = start.contact_point[i, c] - surfaces.radius[i] * n[c]
-            arm[c] = touched - (start.pose_position[a, c] if a >= 0 else start.position[node, c])
+            touched = at.contact_point[i, c] - surfaces.radius[i] * n[c]
+            arm[c] = touched - (at.pose_position[a, c] if a >= 0 else at.position[node, c])
             sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
-            sliding.lever[count, c] = touched - start.pose_position[b, c]
+            sliding.lever[count, c] = touched - at.pose_position[b, c]
         if a < 0:
-            write_rate(surfaces, p.strands, start, node, arm, count, sliding.arm_rate)
-        axis = _forward(sliding, surfaces.node_edges, start, a < 0, node, n[0], n[1], n[2])
+            write_rate(surfaces, p.strands, at, node, arm, count, sliding.arm_rate)
+        axis = _forward(sliding, surfaces.node_edges, at, a < 0, node, n[0], n[1], n[2])
         sliding.axis[count, 0], sliding.axis[count, 1], sliding.axis[count, 2] = axis
         count += 1
+    same &= count == sliding.count[0]
     sliding.count[0] = count
+    return same
+
+
+@kernel
+def _relax(sliding, same):
+    """Aitken's acceleration of normal forces that were frozen anew."""
+    before, relaxation, product, square = sliding.relaxation[0], 1.0, 0.0, 0.0
+    count, load, last, change = sliding.count[0], sliding.load, sliding.last_load, sliding.change
+    if same and before > 0.0:
+        for k in range(count):
+            difference = load[k] - last[k] - change[k]
+            product += change[k] * difference
+            square += difference * difference
+        if square > 0.0:
+            relaxation = min(max(-before * product / square, LEAST_RELAXATION), LARGEST_RELAXATION)
+    for k in range(count):
+        change[k] = load[k] - last[k]
+        if same and relaxation != 1.0:
+            load[k] = max(last[k] + relaxation * change[k], 0.0)
+    sliding.relaxation[0] = relaxation if same else 0.0
 
 
 @piece(int, Sliding, Problem, Configuration, Stage)
 def start_surface_friction(sliding, p, start, stage):
     """Freeze the contacts at the start of a stage; returns a status."""
     if sliding.acts:
-        _freeze(sliding, p, p.surfaces, start, stage)
+        _freeze(sliding, p, start, stage)
+        sliding.relaxation[0] = 0.0
     return READY
 
 
@@ -249,5 +275,5 @@ def settle_surface_friction(sliding, p, at, stage):
     if not sliding.acts:
         return False
     before = sliding.count[0]
-    _freeze(sliding, p, p.surfaces, at, stage)
+    _relax(sliding, _freeze(sliding, p, at, stage))
     return before + sliding.count[0] > 0

@@ -47,6 +47,7 @@ class RunStatistics:
     longest: float = 0.0
     iterations: int = 0
     factorisations: int = 0
+    settlings: int = 0
     largest_residual: float = 0.0
     last_residual: float = 0.0
     min_gap: float = math.inf
@@ -71,6 +72,7 @@ class RunStatistics:
         self.shortest, self.longest = min(self.shortest, report.shortest), max(self.longest, report.longest)
         self.iterations += report.iterations
         self.factorisations += report.factorisations
+        self.settlings += report.settlings
         self.last_residual = report.largest_residual if report.failed else report.residual
         self.largest_residual = max(self.largest_residual, report.largest_residual)
         self._take_extrema(stepper)

@@ -51,6 +51,7 @@ def summarise(simulator: Any) -> dict:
         },
         "newton_iterations": statistics.iterations,
         "factorisations": statistics.factorisations,
+        "friction_updates": statistics.settlings,
         "cpu_time": cpu,
         "wall_time": simulator.wall_time,
         "compile_time": simulator.compile(),

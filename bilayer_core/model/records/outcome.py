@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-STATUS, PAIR, CONFIGURATION, SWAPPED, ITERATIONS, FACTORISATIONS, BACKTRACKS = range(7)
+STATUS, PAIR, CONFIGURATION, SWAPPED, ITERATIONS, FACTORISATIONS, SETTLINGS = range(7)
 """Of counts: how it ended, the blocking pair, the configuration that is the last, whether the scratch is
 the minimum, and what Newton's method needed."""
 RESIDUAL, GAP, SHIFT, FRACTION, FRICTION_FRACTION, ENERGY, SIMPLIFIED = range(7)

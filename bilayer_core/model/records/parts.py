@@ -200,6 +200,9 @@ class Sliding:
     node: Indices = ("near",)  # of contacts of rods
     surface: Indices = ("near",)
     load: Vector = ("near",)
+    last_load: Vector = ("near",)  # before contacts were frozen anew
+    change: Vector = ("near",)  # of normal forces then, before relaxation
+    relaxation: Vector = (1,)  # with which they were, 0 at the start of a stage
     normal: Matrix = ("near", 3)
     axis: Matrix = ("near", 3)
     arm: Matrix = ("near", 3)  # of bodies
