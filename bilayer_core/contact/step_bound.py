@@ -6,9 +6,10 @@ So from a moment t of the step on
     d(t + τ) ≥ d + d′ τ − ½ C τ²,   |p″| ≤ C = |φ_A|² |a| + 2 |φ_B| V + |φ_B|² (|ρ| + V),
     V = |δX_A − δX_B| + |φ_A| |a|
 
-for a contact point of body A at the arm a, a surface of body B and ρ between them; C is zero where nothing turns. A contact
-point of a rod at an arm A from its node (`model.rod_points`) turns with edges e, whose ends move along straight lines,
-or on arcs of bodies that hold them. Its tangent t = e/|e| is reached from t₀ by the shortest arc: its frame turns by
+for a contact point of body A at the arm a, a surface of body B and ρ between them; C is zero where nothing turns. A
+contact point of a rod at an arm A from its node (`model.rod_points`) turns with edges e, whose ends move along straight
+lines, or on arcs of bodies that hold them. Its tangent t = e/|e| is reached from t₀ by the shortest arc: its frame
+turns by
 
     ω = t × ṫ + (θ̇ − (t₀ × t)·ṫ/(1 + t₀·t)) t,   ω × A = ω·t (t × A) − (ṫ·A) t
 
@@ -61,18 +62,25 @@ def _fastest(motion, b, extent):
 
 
 @kernel
-def _speed_of_node(surfaces, system, at, i):
-    """Bounds of the speed and the acceleration of a node during a step, in units of its length [m]: one that a body
-    holds moves on an arc.
+def _acceleration_of_node(surfaces, system, at, i):
+    """Bound of the acceleration of a node during a step, in units of its length [m]: one that a body holds moves on an
+    arc.
     """
-    step, b = system.node_step, surfaces.moved_by[i]
+    motion, b = system.motion, surfaces.moved_by[i]
     if b < 0:
-        return math.sqrt(step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2), 0.0
-    motion, square = system.motion, 0.0
+        return 0.0
+    square = 0.0
     for c in range(3):
         square += (at.position[i, c] - at.pose_position[b, c]) ** 2
-    turn = math.sqrt(motion[b, 3] ** 2 + motion[b, 4] ** 2 + motion[b, 5] ** 2)
-    return _fastest(motion, b, math.sqrt(square)), turn * turn * math.sqrt(square)
+    return (motion[b, 3] ** 2 + motion[b, 4] ** 2 + motion[b, 5] ** 2) * math.sqrt(square)
+
+
+@kernel
+def _speed_of_node(surfaces, system, at, i):
+    """Bound of its speed likewise [m]."""
+    step = system.node_step
+    start = math.sqrt(step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2)
+    return start + _acceleration_of_node(surfaces, system, at, i)
 
 
 @kernel
@@ -81,10 +89,8 @@ def _turn_of_edge(surfaces, strands, system, at, e):
     n, step, square = strands.edge_node[e], system.node_step, 0.0
     for c in range(3):
         square += (step[n + 1, c] - step[n, c]) ** 2
-    _, first = _speed_of_node(surfaces, system, at, n)
-    _, second = _speed_of_node(surfaces, system, at, n + 1)
-    acceleration = (first + second) / at.length[e]
-    return math.sqrt(square) / at.length[e] + acceleration, abs(system.turn[e]), acceleration
+    change = _acceleration_of_node(surfaces, system, at, n) + _acceleration_of_node(surfaces, system, at, n + 1)
+    return (math.sqrt(square) + change) / at.length[e], abs(system.turn[e]), change / at.length[e]
 
 
 @kernel
@@ -98,20 +104,20 @@ def _turn_at_node(surfaces, strands, system, at, i):
 
 @kernel
 def _motion_of_rod_points(surfaces, strands, system, at):
-    """Largest motion in a step of a contact point with an arm from its node [m].
+    """A bound of the motion in a step of all contact points with an arm from their node [m].
 
     The angle between an edge and where it is by a part α of a step is at most π/2 α |ė|/l, or π if |ė|/l is above 1.
     """
-    points, largest = surfaces.rod_points, 0.0
-    if not points.exists:
-        return largest
-    for k in range(points.node.shape[0]):
-        i = points.node[k]
-        slope, angle, _ = _turn_at_node(surfaces, strands, system, at, i)
-        turn = (0.5 * math.pi if slope <= 1.0 else math.pi) * slope + angle
-        arm = math.sqrt(points.arm[k, 0] ** 2 + points.arm[k, 1] ** 2)
-        largest = max(largest, _speed_of_node(surfaces, system, at, i)[0] + arm * turn)
-    return largest
+    if not surfaces.rod_points.exists:
+        return 0.0
+    steepest = sharpest = speed = 0.0
+    for e in range(strands.edge_node.shape[0]):
+        slope, angle, _ = _turn_of_edge(surfaces, strands, system, at, e)
+        steepest, sharpest = max(steepest, slope), max(sharpest, angle)
+    for i in range(surfaces.node_free.shape[0]):
+        speed = max(speed, _speed_of_node(surfaces, system, at, i))
+    turn = (0.5 * math.pi if steepest <= 1.0 else math.pi) * steepest + sharpest
+    return speed + surfaces.rod_points.longest * turn
 
 
 @kernel
@@ -242,7 +248,7 @@ def step_bound(surfaces, strands, system, at, closing):
             u0, u1, u2 = node_step[i, 0], node_step[i, 1], node_step[i, 2]
         else:
             n, along, u0, u1, u2 = surfaces.rod_points.node[place], surfaces.rod_points.arm, 0.0, 0.0, 0.0
-            of_node, own = _speed_of_node(surfaces, system, at, n)
+            of_node, own = _speed_of_node(surfaces, system, at, n), _acceleration_of_node(surfaces, system, at, n)
             slope, angle, change = _turn_at_node(surfaces, strands, system, at, n)
             turn_a, arm = 2.6 * slope + angle, math.sqrt(along[place, 0] ** 2 + along[place, 1] ** 2)
         u0, u1, u2 = u0 - motion[b, 0], u1 - motion[b, 1], u2 - motion[b, 2]

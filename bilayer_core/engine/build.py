@@ -163,7 +163,8 @@ def _rod_points(model: Model, sizes: dict[str, int]) -> RodPoints:
     if not len(points.rod_point_node):
         return RodPoints.absent()
     first = sizes["node"] + sizes["point"]
-    return RodPoints(first=first, node=points.rod_point_node, arm=points.rod_point_arm)
+    longest = float(np.linalg.norm(points.rod_point_arm, axis=1).max())
+    return RodPoints(first=first, node=points.rod_point_node, arm=points.rod_point_arm, longest=longest)
 
 
 def _reach(model: Model) -> float:

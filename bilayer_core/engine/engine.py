@@ -12,7 +12,7 @@ from ..model.contact_points import contact_point_names
 from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES
 from ..model.model import Model
-from ..model.records.outcome import SETTLINGS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
+from ..model.records.outcome import CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS
 from ..model.records.problem import Sums
 from ..model.records.step import RunExtrema, StageInputs, StateArrays
 from ..model.rest_strains import RestStrains

@@ -15,7 +15,7 @@ import numpy as np
 from ..jit import call, kernel, piece, record_at
 from ..jit.record import Flags, Indices, Vector, record
 from ..kinematics.copying import copy
-from ..model.records.outcome import SETTLINGS, CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, STATUS
+from ..model.records.outcome import CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS
 from ..model.records.problem import Problem
 from ..model.records.status import CONVERGED, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
 from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work

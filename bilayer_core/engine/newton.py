@@ -94,8 +94,8 @@ LAST_DIGITS = 4.0 * 2.0**-52
 
 @piece(float, Problem, Configuration)
 def bound(p, at):
-    """Largest fraction of `System.node_step`, `System.turn` and `System.motion` that keeps all gaps open; the near pair that sets it
-    (−1: none), and whether that could be found, are left in `Outcome`.
+    """Largest fraction of `System.node_step`, `System.turn` and `System.motion` that keeps all gaps open; the near pair
+    that sets it (−1: none), and whether that could be found, are left in `Outcome`.
     """
     _move_constrained(p.constrained, p.system, at)
     counts = p.outcome.counts
@@ -226,10 +226,14 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     solved exactly, however slow the motion. The potential is not evaluated again after it. Energies, forces and gaps
     are those of the configuration before it, which is nearer than the tolerance times the length of the stage.
 
+    Before that, what forces froze at the start of the stage is taken anew from the minimum (`potential.settle_forces`),
+    and the potential minimised again from there, with the matrix at hand, until the first correction is small enough.
+    `max_iterations` counts anew each time.
+
     Returns
     -------
     status : int
-        In `Outcome`: whether the minimum is `trial` and not `at`, numbers of iterations, factorisations and settlings of forces,
+        In `Outcome`: whether the minimum is `trial` and not `at`, numbers of iterations, factorisations and settlings,
         the speed of the last correction [m/s], and the smallest gap to a surface or another rod [m].
     """
     counts, figures = p.outcome.counts, p.outcome.figures
@@ -238,7 +242,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     settled = False  # whether what is left to do is the last correction
     checked = False  # whether forces were settled at `at`
     found, curved = False, False  # whether contacts of rods, and second derivatives, are those of `at`
-    iterations = factorisations = settlings = halvings = 0
+    iterations = factorisations = settlings = halvings = begun = 0
     residual = previous = gap = math.inf
     energy = alpha = slope = noise = 0.0
     while True:
@@ -308,9 +312,9 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
                 if settlings > MAX_SETTLINGS:
                     status = UNSETTLED
                     break
-                curved, task, previous = False, UPDATE_LAGGED, math.inf
+                curved, task, previous, begun = False, UPDATE_LAGGED, math.inf, iterations
                 continue
-        if not settled and iterations >= max_iterations:
+        if not settled and iterations - begun >= max_iterations:
             status = MAX_ITERATIONS
             break
         if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:

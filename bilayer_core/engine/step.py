@@ -7,13 +7,13 @@ import math
 from ..jit import call, kernel, piece, record_at
 from ..kinematics.copying import copy
 from ..model.records.outcome import (
-    SETTLINGS,
     CONFIGURATION,
     FACTORISATIONS,
     GAP,
     ITERATIONS,
     PAIR,
     RESIDUAL,
+    SETTLINGS,
     SWAPPED,
 )
 from ..model.records.problem import Problem

@@ -22,7 +22,7 @@ Second derivatives are listed: `engine.linear.arms` hands them to the unknowns.
 from __future__ import annotations
 
 from ..jit import kernel
-from ..kinematics.vector import cross, dot, row
+from ..kinematics.vector import combine, cross, dot, row
 
 
 @kernel
@@ -50,13 +50,17 @@ def place_rod_points(surfaces, at):
     """Write the positions of contact points with arms [m]."""
     if not (surfaces.exists and surfaces.rod_points.exists):
         return
-    points, edges = surfaces.rod_points, surfaces.node_edges
+    points, edges, last = surfaces.rod_points, surfaces.node_edges, -1
+    m1 = m2 = (0.0, 0.0, 0.0)
     for k in range(points.node.shape[0]):
         i = points.node[k]
-        before = material_arm(at, edges[i, 0], points.arm[k, 0], points.arm[k, 1])
-        after = material_arm(at, edges[i, 1], points.arm[k, 0], points.arm[k, 1])
+        if i != last:
+            m1 = combine(0.5, row(at.director1, edges[i, 0]), 0.5, row(at.director1, edges[i, 1]))
+            m2 = combine(0.5, row(at.director2, edges[i, 0]), 0.5, row(at.director2, edges[i, 1]))
+            last = i
+        arm = combine(points.arm[k, 0], m1, points.arm[k, 1], m2)
         for c in range(3):
-            at.rod_point[k, c] = at.position[i, c] + 0.5 * (before[c] + after[c])
+            at.rod_point[k, c] = at.position[i, c] + arm[c]
 
 
 @kernel

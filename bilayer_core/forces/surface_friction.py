@@ -1,8 +1,8 @@
-"""Smoothed Coulomb friction, lagged once per step, that may differ with the direction of sliding.
+"""Smoothed Coulomb friction that may differ with the direction of sliding.
 
-With normal force λ, normal n and contact points taken at the start of the step, the slip u of the contact points over
-the step of length h gives a dissipation potential (Li et al. 2020, eq. 14; paper, eqs. 25 and 26, f₁ and u_t put
-right). Let a be the forward direction in the tangent plane, s = n × a, and
+With normal force λ, normal n and contact points frozen, the slip u of the contact points over a stage of length h gives
+a dissipation potential (Li et al. 2020, eq. 14; paper, eqs. 25 and 26, f₁ and u_t put right). Let a be the forward
+direction in the tangent plane, s = n × a, and
 
     ψ(u)² = (μ± u·a)² + (μ_s u·s)²,   μ± = μ₊ where u·a ≥ 0, μ₋ elsewhere,   μ = max(μ₊, μ₋, μ_s),   w = ψ/(μ h)
 
@@ -16,10 +16,17 @@ continuously differentiable:
 
 A contact point on a body moves with it: y = X + a, where the arm a from the body's position turns with the body,
 δa = δφ × a + ½ δφ × (δφ × a). So u, the motion of the contact point relative to that of the surface below it, depends
-on the motion of both (`forces.contact_on_bodies`), and the force on one side is opposite to that on the other. Both points
-are one, on the face of the body or rod, x − r n, and so the moments cancel as well. That of a rod moves with its node
-and turns with the edges there, by a rate that is frozen with the contact (`forces.rod_arms`). F is positive
+on the motion of both (`forces.contact_on_bodies`), and the force on one side is opposite to that on the other. Both
+points are one, on the face of the body or rod, x − r n, and so the moments cancel as well. That of a rod moves with its
+node and turns with the edges there, by a rate that is frozen with the contact (`forces.rod_arms`). F is positive
 semidefinite.
+
+Contacts are frozen at the start of a stage, and anew at each minimum of the potential, until that minimum stays: so λ,
+n and a are those of the stage's own end, without which integrators lose their order. The normal force that λ makes
+differs from it by a factor of about μ |A_nt|/A_nn, with A the compliance of what touches: where that is near 1 or
+above, as for a leg within its cone of friction, Aitken's relaxation keeps λ from swinging:
+
+    λ ← λ + ω r,   r the change,   ω ← −ω r₋·(r − r₋)/|r − r₋|²
 """
 
 from __future__ import annotations

@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+import numpy as np
+
 from ..scene.body import Body, Prescribed
 from ..scene.config import SceneConfig
+from ..scene.profile import values_at
+from ..scene.rod import Rod
+from .section import outline
 
 
 class Mobility(IntEnum):
@@ -76,12 +81,16 @@ def shapes_can_collide(point: Collider, surface: Collider) -> bool:
     return surface.kind != "sphere" or (point.kind == "sphere" and point.order < surface.order)
 
 
-def contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
-    """Which parts of a scene can meet, each with how it is resolved."""
+def contact_pairs(scene: SceneConfig, dimension: int = 3) -> tuple[str, ...]:
+    """Which parts of a scene can meet, each with how it is resolved in a dimension."""
     if scene.contact is None:
         return ()
     bodies, obstacles = colliders(scene)
-    pairs = [f"rods – {s.name} (nodes against {s.kind})" for s in (*obstacles, *bodies) if points_can_collide(RODS, s)]
+    pairs = [
+        f"rods – {s.name} ({_points_of_rods(scene, dimension, s.kind)})"
+        for s in (*obstacles, *bodies)
+        if points_can_collide(RODS, s)
+    ]
     for point in (*bodies, *obstacles):
         for surface in (*obstacles, *bodies):
             how = []
@@ -92,3 +101,23 @@ def contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
             if how:
                 pairs.append(f"{point.name} – {surface.name} ({' and '.join(how)} against {surface.kind})")
     return tuple(pairs)
+
+
+def is_ribbon(rod: Rod) -> bool:
+    """Whether a rod is wider than thick somewhere."""
+    stations = np.arange(rod.stations)
+    _, thickness = outline(rod, stations)
+    return bool(np.any(values_at(rod.width, rod.edge_length * stations) > thickness.sum(axis=0) * (1.0 + 1e-9)))
+
+
+def _points_of_rods(scene: SceneConfig, dimension: int, kind: str) -> str:
+    """Which points of rods meet a surface, and what a plane leaves out."""
+    if not any(is_ribbon(rod) for rod in scene.rods):
+        return f"nodes against {kind}"
+    if dimension == 3:
+        return f"nodes and borders of ribbons against {kind}"
+    if kind == "plane":
+        return f"nodes against {kind}; borders of ribbons touch as they do"
+    return (
+        f"nodes against {kind}; where it is not the same across, a plane leaves out that borders of ribbons touch later"
+    )

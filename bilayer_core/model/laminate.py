@@ -158,21 +158,20 @@ def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandAr
     return tuple(layers)
 
 
-def uneven_faces(scene: SceneConfig) -> Iterator[Figure]:
-    """Rods whose contact counts from a face that is not where the nearer one is."""
-    for rod in scene.rods:
-        low, high = _faces(rod, _axis(_placed(scene, rod)))
-        difference = np.abs(high + low)
-        if np.any(difference > UNEVEN * np.maximum(high, -low)):
-            near, far = np.minimum(high, -low).min(), np.maximum(high, -low).max()
-            yield Figure(
-                f"rods.{rod.name}",
-                "faces are",
-                f"{1e3 * near:.3g} to {1e3 * far:.3g} mm from the laminate's curve",
-                f"equal within {100 * UNEVEN:g} %",
-                "contact counts from the farther one on both sides: the nearer feels surfaces up to "
-                f"{1e3 * difference.max():.3g} mm too early",
-            )
+def uneven_faces(rod: Rod, scene: SceneConfig) -> Iterator[Figure]:
+    """Where contact of a rod with rods counts from a face that is not where the nearer one is."""
+    low, high = _faces(rod, _axis(_placed(scene, rod)))
+    difference = np.abs(high + low)
+    if np.any(difference > UNEVEN * np.maximum(high, -low)):
+        near, far = np.minimum(high, -low).min(), np.maximum(high, -low).max()
+        yield Figure(
+            f"rods.{rod.name}",
+            "faces are",
+            f"{1e3 * near:.3g} to {1e3 * far:.3g} mm from the laminate's curve",
+            f"equal within {100 * UNEVEN:g} %",
+            "contact with rods counts from the farther one on both sides: the nearer feels them up to "
+            f"{1e3 * difference.max():.3g} mm too early",
+        )
 
 
 def _add_eigenstrain(

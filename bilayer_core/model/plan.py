@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from ..errors import SceneError
 from ..scene.config import Coupling, SceneConfig
 from ..scene.profile import extremes
-from .colliders import contact_pairs
+from .colliders import contact_pairs, is_ribbon
 from .force_list import planned
 from .laminate import uneven_faces
 from .planarity import find_plane, require_plane
-from .rod_pairs import passing_warnings, rod_pairs
+from .rod_pairs import RodPair, passing_warnings, rod_pairs
 from .validity import validity_warnings
 
 MODELS = ("two_rod", "laminate")
@@ -73,14 +73,19 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         chosen_integrator,
         reasons,
         planned(scene, chosen_model, chosen_dimension),
-        _contact_pairs(scene),
+        _contact_pairs(scene, chosen_dimension),
         (*validity_warnings(scene), *passing_warnings(scene), *_warnings_of(chosen_model, scene)),
     )
 
 
 def _warnings_of(model: str, scene: SceneConfig) -> tuple[str, ...]:
     """Warnings of one model alone."""
-    return tuple(map(str, uneven_faces(scene))) if model == "laminate" and scene.contact is not None else ()
+    meeting = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
+    return (
+        tuple(str(figure) for rod in sorted(meeting) for figure in uneven_faces(scene.rods[rod], scene))
+        if model == "laminate"
+        else ()
+    )
 
 
 def simplest_model(scene: SceneConfig) -> tuple[str, str]:
@@ -112,5 +117,14 @@ def _choose(key: str, asked, of_scene, allowed: tuple) -> tuple | None:
     return next(candidate for candidate in allowed if str(candidate) == str(value)), origin
 
 
-def _contact_pairs(scene: SceneConfig) -> tuple[str, ...]:
-    return (*contact_pairs(scene), *(rod_pair.what for rod_pair in rod_pairs(scene) if rod_pair.active))
+def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[str, ...]:
+    between = [pair for pair in rod_pairs(scene) if pair.active]
+    return (
+        *contact_pairs(scene, dimension),
+        *(f"{pair.what} (round the curves of their nodes{_left_out(scene, pair)})" for pair in between),
+    )
+
+
+def _left_out(scene: SceneConfig, pair: RodPair) -> str:
+    ribbons = is_ribbon(scene.rods[pair.first]) or is_ribbon(scene.rods[pair.second])
+    return ", without borders of ribbons" if ribbons else ""

@@ -2,8 +2,8 @@
 
 A section touches with the middle between its faces, half its thickness away from both. Where the node is not there, as
 in a laminate whose layers differ, the contact point has an arm along m1. In space a section that is wider than thick
-touches with its borders, too: points at ± (width − thickness)/2 along m2 with a quarter of the weight each, and half of
-it in the middle, so that a ribbon that lies flat rests where it would with its middle alone, and a ball sinks no deeper.
+touches with its borders, too: points at ± (width − thickness)/2 along m2 with a quarter of the weight each, and half
+of it in the middle. So a ribbon that lies flat rests where it would with its middle alone, and a ball sinks no deeper.
 """
 
 from __future__ import annotations

@@ -107,6 +107,21 @@ def _oblique() -> tuple[np.ndarray, np.ndarray]:
     return simulator.velocities.mean(axis=0)[:2], oblique_slide((1.5, 6.0), (along, across), GRAVITY, time)
 
 
+WIDTH, THICKNESS = 3e-3, 2e-3
+"""Of a strip that stands on a slope across it, on its lower border: up to the slope (w − h)/h."""
+
+
+def upright(part: float) -> float:
+    """Cosine of the roll of a strip after half a second on a slope that is a part of the steepest."""
+    angle = math.atan(part * (WIDTH - THICKNESS) / THICKNESS)
+    strip = rod([layer(thickness=THICKNESS)], length=0.02, stations=5, start=(0, 0, 1.99e-3), width=WIDTH)
+    gravity = [0.0, GRAVITY * math.sin(angle), -GRAVITY * math.cos(angle)]
+    content = scene([strip], gravity=gravity, obstacles=[GROUND], contact=contact(coefficient=2.0))
+    simulator = Simulator(load_scene(content))
+    simulator.run(0.5)
+    return float(simulator.frame().directors[:, 2].mean())
+
+
 BALLS = {"solid": (False, 5.0 / 7.0), "hollow": (True, 3.0 / 5.0)}
 
 
@@ -154,6 +169,12 @@ CASES = [
         for edges in MESHES
     ),
     Case("contact/slide", "g (sin α − μ cos α)", 0.005, slide, "m/s²"),
+    Case(
+        "contact/stands on its width",
+        "level while the slope across is below (w − h)/h, here 0.95 of it: cosine of the roll",
+        1e-4,
+        lambda: (upright(0.95), 1.0),
+    ),
     Case("contact/creep", "ε_v (1 − √(1 − tan α/μ))", 0.01, creep, "µm/s"),
     *(
         Case(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -171,3 +172,47 @@ def kirchhoff_plate(velocity: tuple[float, float], own: float, whole: float, mom
         return [whole * omega * v / own, -own * omega * u / whole, -(whole - own) * u * v / moment, omega]
 
     return float(solve_ivp(rate, (0.0, time), [*velocity, 0.0, 0.0], rtol=1e-10, atol=1e-12).y[3, -1])
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """A mass on a belt that goes its `way` and stops (cubic smoothstep), held by a spring from rest on.
+
+    Attributes
+    ----------
+    mass, stiffness : float
+        [kg], [N/m]
+    coefficient, threshold : float
+        μ and ε_v [m/s].
+    normal_force, amplitude, period : float
+        N = normal_force + amplitude sin(2π t/period) [N], [s].
+    way, duration : float
+        Of the belt [m], [s].
+    """
+
+    mass: float
+    stiffness: float
+    coefficient: float
+    threshold: float
+    normal_force: float
+    amplitude: float
+    period: float
+    way: float
+    duration: float
+
+
+def stick_slip(p: StickSlip, times: np.ndarray) -> np.ndarray:
+    """Displacements of the mass [m] at some times [s]."""
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        part = t / p.duration
+        slip = 6.0 * p.way * part * (1.0 - part) / p.duration - y[1]
+        w = min(abs(slip) / p.threshold, 1.0)
+        force = p.normal_force + p.amplitude * math.sin(2.0 * math.pi * t / p.period)
+        friction = p.coefficient * force * math.copysign(w * (2.0 - w), slip)
+        return [y[1], (friction - p.stiffness * y[0]) / p.mass]
+
+    solved = solve_ivp(
+        rate, (0.0, p.duration), [0.0, 0.0], "Radau", t_eval=times, rtol=1e-10, atol=1e-13, max_step=1e-3 * p.duration
+    )
+    return solved.y[0]

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable
 from fnmatch import fnmatch
 
 from ..errors import InputError
-from . import beams, bending, contacts, fluid, helix, laminate, loads, motion, plane, profiles, torsion
+from . import beams, bending, contacts, fluid, friction, helix, laminate, loads, motion, plane, profiles, torsion
 from .case import Case, Result
 
-FAMILIES = (bending, helix, torsion, laminate, beams, plane, loads, profiles, contacts, motion, fluid)
+FAMILIES = (bending, helix, torsion, laminate, beams, plane, loads, profiles, contacts, friction, motion, fluid)
 CASES = tuple(case for family in FAMILIES for case in family.CASES)
 
 

@@ -230,14 +230,14 @@ def test_the_plan_says_that_there_is_no_bond():
     assert (plan.model, plan.terms["bond"]) == ("laminate", "skipped: one curve carries both layers")
 
 
-def test_uneven_faces_are_told_where_something_can_touch():
-    content = scene(
-        [rod([layer("bottom"), layer("top", interval=[0.02, 0.1])], start=(0, 0, 0.01))],
-        obstacles=[GROUND],
-        contact=contact(),
-    )
+def test_uneven_faces_are_told_where_rods_can_meet():
+    uneven = rod([layer("bottom"), layer("top", interval=[0.02, 0.1])], start=(0, 0, 0.01))
+    other = rod([layer()], start=(0, 0, 0.05), name="other")
+    content = scene([uneven, other], obstacles=[GROUND], contact=contact())
     told = " ".join(make_plan(load_scene(content), model="laminate").warnings)
     assert "rods.rod: faces are 0 to 1 mm from the laminate's curve" in told
+    assert "rods.other: faces" not in told
     assert "too early" not in " ".join(make_plan(load_scene(content)).warnings)
-    even = content | {"rods": [rod([layer("bottom"), layer("top")], start=(0, 0, 0.01))]}
-    assert "too early" not in " ".join(make_plan(load_scene(even), model="laminate").warnings)
+    for rods in ([uneven], [rod([layer("bottom"), layer("top")], start=(0, 0, 0.01)), other]):
+        plan = make_plan(load_scene(content | {"rods": rods}), model="laminate")
+        assert "too early" not in " ".join(plan.warnings)

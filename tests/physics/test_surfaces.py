@@ -196,7 +196,7 @@ class Border:
         self.step[self.held] = self.motion[0, :3] + np.cross(self.motion[0, 3:], arms)
         self.turn = 10.0 * fast * rng.standard_normal(2)
         self.rotation = rotation_matrix(rng.standard_normal(3))[None]
-        self.points = RodPoints(first=3, node=np.array([1]), arm=self.arm)
+        self.points = RodPoints(first=3, node=np.array([1]), arm=self.arm, longest=float(np.linalg.norm(self.arm)))
         one, moved_by = np.zeros(1, dtype=np.int64), np.full(4, -1)
         moved_by[self.held] = 0
         self.surfaces = record_of(
@@ -311,7 +311,7 @@ def test_no_point_with_an_arm_moves_farther_than_the_motion_that_lists_are_made_
             moved = np.linalg.norm(pair.at(t).contact_point[3] - start)
             assert moved <= t * motion * (1.0 + 1e-12)
             nearest = min(nearest, t * motion / moved)
-    assert nearest < 4.0
+    assert nearest < 10.0
 
 
 def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():

@@ -148,6 +148,7 @@ class RodPoints:
     first: int  # of them among contact points
     node: Indices
     arm: Matrix  # along m1 and m2 [m]
+    longest: float  # of the arms [m]
 
 
 @record
