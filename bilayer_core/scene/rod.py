@@ -290,7 +290,10 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             demand = f"must span two edges or more; an edge is {rod.edge_length:g} m long"
             faults.append((("layers", index, "interval"), layer.interval, demand))
     if not faults and not any(rod.covered_stations(layer) == (0, rod.stations - 1) for layer in rod.layers):
-        faults.append((("layers",), [layer.interval for layer in rod.layers], "one layer must cover the whole path"))
+        demand = (
+            "one layer must cover the whole path; layers that each cover a part of it are two rods, joined by a body"
+        )
+        faults.append((("layers",), [layer.interval for layer in rod.layers], demand))
     return faults
 
 

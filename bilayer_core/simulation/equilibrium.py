@@ -10,6 +10,7 @@ Forces that turn with what they act on, and moments on bodies, are taken at q_k 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -43,9 +44,11 @@ class StaticReport:
     Attributes
     ----------
     stable : bool
-        Whether every small disturbance decays or stays as it is.
+        Whether every small disturbance decays or stays as it is, in all of space, whatever the dimension of the model.
     unstable_directions : int
         Dimension of the space of those that grow: negative eigenvalues of the Hessian.
+    leaving_plane : int
+        How many of these leave the plane of a model of dimension 2, which therefore cannot follow them; 0 in space.
     residual : float
         Largest displacement that Newton would still make [m].
     rounds, iterations, factorisations : int
@@ -54,13 +57,16 @@ class StaticReport:
 
     stable: bool
     unstable_directions: int
+    leaving_plane: int
     residual: float
     rounds: int
     iterations: int
     factorisations: int
 
 
-def solve_static(stepper: Stepper, state: State, tolerance: float | None = None) -> StaticReport:
+def solve_static(
+    stepper: Stepper, state: State, tolerance: float | None = None, in_space: Callable[[], Stepper] | None = None
+) -> StaticReport:
     """Bring a state to rest in an equilibrium under its present stimuli and loads; its time stays.
 
     Lagging layers are taken as settled, prescribed bodies stay where they are. From an unstable equilibrium nothing
@@ -73,6 +79,8 @@ def solve_static(stepper: Stepper, state: State, tolerance: float | None = None)
         Changed in place on success.
     tolerance : float, optional
         Displacement that counts as rest [m]; default: `RELATIVE_TOLERANCE` of the longest rod.
+    in_space : callable, optional
+        Makes the stepper of the same scene in dimension 3, for stability, where `stepper` is one of dimension 2.
 
     Raises
     ------
@@ -83,7 +91,7 @@ def solve_static(stepper: Stepper, state: State, tolerance: float | None = None)
         raise InputError(f"tolerance: {tolerance} is not allowed; it must be a positive number of metres")
     with ExitStack() as undo:
         undo.callback(state.take, state.copy())
-        report = _Search(stepper, state, tolerance).run()
+        report = _Search(stepper, state, tolerance, in_space).run()
         undo.pop_all()
     return report
 
@@ -91,9 +99,9 @@ def solve_static(stepper: Stepper, state: State, tolerance: float | None = None)
 class _Search:
     """Rounds of the compiled step's modes for statics, and what to make of them."""
 
-    def __init__(self, stepper: Stepper, state: State, tolerance: float | None):
+    def __init__(self, stepper: Stepper, state: State, tolerance: float | None, in_space: Callable[[], Stepper] | None):
         model = stepper.model
-        self.stepper, self.state = stepper, state
+        self.stepper, self.state, self.in_space = stepper, state, in_space
         self.time = float(state.time[0])
         self.size = max(rod.path.length for rod in model.scene.rods)
         self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
@@ -101,9 +109,13 @@ class _Search:
             state.transduction[:] = stepper.surroundings.stimulus_at(state, self.time)[model.law_channel]
         for still in (state.velocity, state.spin, state.body_velocity, state.body_angular_velocity, state.has_history):
             still.fill(0.0)
-        rest = stepper.surroundings.rest_strains_of(state.transduction)
-        stepper.engine.set_drive(rest, stepper.surroundings.load_factor(self.time))
+        self._drive(stepper)
         self.rounds = self.iterations = self.factorisations = 0
+
+    def _drive(self, stepper: Stepper) -> None:
+        """Have the rest strains and the loads of now in a stepper."""
+        rest = self.stepper.surroundings.rest_strains_of(self.state.transduction)
+        stepper.engine.set_drive(rest, self.stepper.surroundings.load_factor(self.time))
 
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine
@@ -135,13 +147,23 @@ class _Search:
         raise self._failure("the shape does not come to rest", moved)
 
     def _report(self, residual: float) -> StaticReport:
-        counted = self.stepper.engine.do_once(self.state, COUNT)
+        unstable, leaving = self._unstable(self.stepper), 0
+        if self.in_space is not None:
+            space = self.in_space()
+            self._drive(space)
+            in_plane, unstable = unstable, self._unstable(space)
+            leaving = unstable - in_plane
+        self.stepper.restart(self.state)
+        counts = self.rounds, self.iterations, self.factorisations
+        return StaticReport(unstable == 0, unstable, leaving, residual, *counts)
+
+    def _unstable(self, stepper: Stepper) -> int:
+        """Number of negative eigenvalues of the Hessian of a model at the equilibrium."""
+        counted = stepper.engine.do_once(self.state, COUNT)
         if not counted.converged:
             reason = FAILURES[counted.status]
             raise SimulationError(f"the stability of the equilibrium cannot be told: {reason}", self.time)
-        self.stepper.restart(self.state)
-        unstable = self.stepper.engine.unstable
-        return StaticReport(unstable == 0, unstable, residual, self.rounds, self.iterations, self.factorisations)
+        return stepper.engine.unstable
 
     def _failure(self, reason: str, moved: float) -> SimulationError:
         near = f"the last round moved it by {moved:.3g} m, allowed {self.tolerance:.3g} m"

@@ -14,6 +14,7 @@ from ..forces.register import memory_size
 from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
 from ..model.build import build_model
+from ..model.model import Model
 from ..model.fingerprint import fingerprint_of
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
@@ -79,12 +80,20 @@ class Simulator:
         self.model = build_model(scene, self.plan.model, self.plan.dimension)
         self._keeps_history = method.history is not None
         self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
-        self._stepper = Stepper(self.model, method, self.steps, scene.solver.max_newton_iterations)
+        self._method = method
+        self._stepper = self._stepper_of(self.model)
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = self._initial_state()
         self._compile_time: float | None = None
         self._start_over()
+
+    def _stepper_of(self, model: Model) -> Stepper:
+        return Stepper(model, self._method, self.steps, self.scene.solver.max_newton_iterations)
+
+    def _in_space(self) -> Stepper:
+        """The stepper of the same scene in dimension 3."""
+        return self._stepper_of(build_model(self.scene, self.plan.model, 3))
 
     def _initial_state(self) -> State:
         return initial_state(self.model, self._keeps_history, self._fingerprint, memory_size(self.model))
@@ -362,7 +371,7 @@ class Simulator:
         Returns
         -------
         StaticReport
-            How it went, and whether the equilibrium is stable.
+            How it went, and whether the equilibrium is stable, in all of space whatever the dimension.
 
         Raises
         ------
@@ -372,7 +381,8 @@ class Simulator:
         self.compile()
         begin, wall = clock.thread_time(), clock.perf_counter()
         try:
-            return solve_static(self._stepper, self._state, tolerance)
+            in_space = self._in_space if self.plan.dimension == 2 else None
+            return solve_static(self._stepper, self._state, tolerance, in_space)
         finally:
             self._stepper.evaluate(self._state)
             self.statistics.take_shape(self._stepper, self._state)
