@@ -14,8 +14,8 @@ from ..forces.register import memory_size
 from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
 from ..model.build import build_model
-from ..model.model import Model
 from ..model.fingerprint import fingerprint_of
+from ..model.model import Model
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
 from ..scene.config import SceneConfig
