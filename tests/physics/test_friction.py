@@ -1,4 +1,4 @@
-"""Friction under a normal force that comes and goes: orders of integrators, and what is counted."""
+"""Friction under normal forces that change: orders of integrators, what is counted, and very rough ground."""
 
 import numpy as np
 import pytest
@@ -55,3 +55,16 @@ def test_what_friction_is_frozen_anew_for_is_counted():
     free = Simulator(load_scene(content))
     free.run(0.01)
     assert free.summary()["friction_updates"] == 0
+
+
+@pytest.mark.parametrize("threshold", ["0.1 mm/s", "0.001 mm/s"])
+@pytest.mark.parametrize("solver", [[], ["solver.integrator=sdirk2", "solver.dt=2 ms"]], ids=["default", "fixed"])
+def test_ground_so_rough_that_feet_jam_stops_no_run(solver, threshold):
+    # within the cone of friction what a foot presses with depends on what holds it by a factor above one
+    rough = [f"contact.friction.{key}=5" for key in ("coefficient", "forward", "backward", "sideways")]
+    changes = [*rough, f"contact.friction.speed_threshold={threshold}", *solver]
+    simulator = Simulator(load_scene("crawling_inchworm", changes))
+    simulator.run(2.4)
+    summary = simulator.summary()
+    assert summary["converged"] is True and summary["friction_updates"] > 2 * summary["steps"]
+    assert simulator.frame().min_gap > 0.0
