@@ -90,7 +90,7 @@ def _turn_of_edge(surfaces, strands, system, at, e):
     for c in range(3):
         square += (step[n + 1, c] - step[n, c]) ** 2
     change = _acceleration_of_node(surfaces, system, at, n) + _acceleration_of_node(surfaces, system, at, n + 1)
-    return (math.sqrt(square) + change) / at.length[e], abs(system.turn[e]), change / at.length[e]
+    return (math.sqrt(square) + change) / at.length[e], abs(system.angle_step[e]), change / at.length[e]
 
 
 @kernel
@@ -174,7 +174,7 @@ def _node_at(surfaces, system, at, i, t):
 @kernel
 def _rod_point_at(surfaces, strands, system, at, k, t, moved_out, rate_out):
     """Write the displacement of a contact point with an arm at a part t of a step, and its rate."""
-    points, turn = surfaces.rod_points, system.turn
+    points, angle_step = surfaces.rod_points, system.angle_step
     moved = _node_at(surfaces, system, at, points.node[k], t)
     for c in range(3):
         moved_out[c], rate_out[c] = moved[c], moved[3 + c]
@@ -191,13 +191,13 @@ def _rod_point_at(surfaces, strands, system, at, k, t, moved_out, rate_out):
         u2 = tangent[2] + (last[2] - first[2]) / length
         stretch = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
         u0, u1, u2 = u0 / stretch, u1 / stretch, u2 / stretch
-        b0, b1, b2 = _carry(tangent[0], tangent[1], tangent[2], a0, a1, a2, t * turn[e], u0, u1, u2)
+        b0, b1, b2 = _carry(tangent[0], tangent[1], tangent[2], a0, a1, a2, t * angle_step[e], u0, u1, u2)
         v0, v1, v2 = last[3] - first[3], last[4] - first[4], last[5] - first[5]
         along = (v0 * b0 + v1 * b1 + v2 * b2) / (length * stretch)
         spin = v0 * (tangent[1] * u2 - tangent[2] * u1) + v1 * (tangent[2] * u0 - tangent[0] * u2)
         spin += v2 * (tangent[0] * u1 - tangent[1] * u0)
         spin /= (1.0 + tangent[0] * u0 + tangent[1] * u1 + tangent[2] * u2) * length * stretch
-        spin = turn[e] - spin
+        spin = angle_step[e] - spin
         moved_out[0], moved_out[1] = moved_out[0] + 0.5 * (b0 - a0), moved_out[1] + 0.5 * (b1 - a1)
         moved_out[2] += 0.5 * (b2 - a2)
         rate_out[0] += 0.5 * (spin * (u1 * b2 - u2 * b1) - along * u0)
@@ -238,19 +238,19 @@ def step_bound(surfaces, strands, system, at, closing):
         a, b = surfaces.moved_by[i], surfaces.body[s]
         r0 = r1 = r2 = turn_a = 0.0  # rotation of the contact point's body
         a0 = a1 = a2 = arm = slope = change = of_node = own = 0.0  # arm on it
-        place = i - surfaces.rod_points.first if surfaces.rod_points.exists else -1
+        slot = i - surfaces.rod_points.first if surfaces.rod_points.exists else -1
         if a >= 0:
             u0, u1, u2 = motion[a, 0], motion[a, 1], motion[a, 2]
             r0, r1, r2 = motion[a, 3], motion[a, 4], motion[a, 5]
             a0, a1, a2 = x0 - position[a, 0], x1 - position[a, 1], x2 - position[a, 2]
             arm, turn_a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-        elif place < 0:
+        elif slot < 0:
             u0, u1, u2 = node_step[i, 0], node_step[i, 1], node_step[i, 2]
         else:
-            n, along, u0, u1, u2 = surfaces.rod_points.node[place], surfaces.rod_points.arm, 0.0, 0.0, 0.0
+            n, along, u0, u1, u2 = surfaces.rod_points.node[slot], surfaces.rod_points.arm, 0.0, 0.0, 0.0
             of_node, own = _speed_of_node(surfaces, system, at, n), _acceleration_of_node(surfaces, system, at, n)
             slope, angle, change = _turn_at_node(surfaces, strands, system, at, n)
-            turn_a, arm = 2.6 * slope + angle, math.sqrt(along[place, 0] ** 2 + along[place, 1] ** 2)
+            turn_a, arm = 2.6 * slope + angle, math.sqrt(along[slot, 0] ** 2 + along[slot, 1] ** 2)
         u0, u1, u2 = u0 - motion[b, 0], u1 - motion[b, 1], u2 - motion[b, 2]
         f0, f1, f2 = motion[b, 3], motion[b, 4], motion[b, 5]
         if surfaces.kind[s] == SPHERE:
@@ -264,7 +264,7 @@ def step_bound(surfaces, strands, system, at, closing):
         speed = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) + of_node + turn_a * arm
         if gap - (speed + turn_b * (lever + speed)) * alpha >= kept:
             continue
-        own += (4.0 * turn_a * turn_a + 3.0 * change if place >= 0 else turn_a * turn_a) * arm
+        own += (4.0 * turn_a * turn_a + 3.0 * change if slot >= 0 else turn_a * turn_a) * arm
         acceleration = own + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)
         # the contact point in a frame that moves and turns with the surface from where that is now
         t = 0.0
@@ -275,8 +275,8 @@ def step_bound(surfaces, strands, system, at, closing):
             w0 = u0 + r1 * b2 - r2 * b1
             w1 = u1 + r2 * b0 - r0 * b2
             w2 = u2 + r0 * b1 - r1 * b0
-            if place >= 0:
-                _rod_point_at(surfaces, strands, system, at, place, t, moved, rate_of_point)
+            if slot >= 0:
+                _rod_point_at(surfaces, strands, system, at, slot, t, moved, rate_of_point)
                 w0, w1, w2 = u0 + rate_of_point[0], u1 + rate_of_point[1], u2 + rate_of_point[2]
             if turn_b > 0.0:
                 w0, w1, w2 = _turned(w0, w1, w2, -t, f0, f1, f2)
@@ -294,8 +294,8 @@ def step_bound(surfaces, strands, system, at, closing):
             if t >= alpha:
                 break
             b0, b1, b2 = _turned(a0, a1, a2, t, r0, r1, r2)
-            if place >= 0:
-                _rod_point_at(surfaces, strands, system, at, place, t, moved, rate_of_point)
+            if slot >= 0:
+                _rod_point_at(surfaces, strands, system, at, slot, t, moved, rate_of_point)
                 b0, b1, b2 = moved[0], moved[1], moved[2]
             z0 = x0 - a0 + t * u0 + b0 - position[b, 0]
             z1 = x1 - a1 + t * u1 + b1 - position[b, 1]

@@ -145,7 +145,7 @@ def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
         point_body=contact_points.body[model.node_count :][: sizes["point"]],
         node_edges=contact_points.node_edges,
         rod_points=_rod_points(model, sizes),
-        reach=_reach(model),
+        arm_factor=_arm_factor(model),
         kind=surfaces.kind,
         size=surfaces.size,
         rounding=surfaces.rounding,
@@ -167,7 +167,7 @@ def _rod_points(model: Model, sizes: dict[str, int]) -> RodPoints:
     return RodPoints(first=first, node=points.rod_point_node, arm=points.rod_point_arm, longest=longest)
 
 
-def _reach(model: Model) -> float:
+def _arm_factor(model: Model) -> float:
     """How many times farther than nodes, and borders of edges by a turn, a contact point of a rod moves at most.
 
     Its arm turns with edges, by at most the motion of one end against the other over their length, of which half is

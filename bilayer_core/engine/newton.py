@@ -94,8 +94,8 @@ LAST_DIGITS = 4.0 * 2.0**-52
 
 @piece(float, Problem, Configuration)
 def bound(p, at):
-    """Largest fraction of `System.node_step`, `System.turn` and `System.motion` that keeps all gaps open; the near pair
-    that sets it (−1: none), and whether that could be found, are left in `Outcome`.
+    """Largest fraction of `System.node_step`, `System.angle_step` and `System.motion` that keeps all gaps open; the
+    near pair that sets it (−1: none), and whether that could be found, are left in `Outcome`.
     """
     _move_constrained(p.constrained, p.system, at)
     counts = p.outcome.counts
@@ -160,7 +160,7 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
             for c in range(3):
                 system.node_step[i, c] = fraction * stage.predicted_shift[i, c]
         for k in range(p.strands.edge_count):
-            system.turn[k] = fraction * stage.predicted_angle[k]
+            system.angle_step[k] = fraction * stage.predicted_angle[k]
         alpha = call(p.calls.bound, (p, start))
         if counts[STATUS] != READY:
             counts[PAIR] = -1
@@ -320,7 +320,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:
             task = FACTORISE
             continue
-        farthest = residual * stage.lengths[0] * max(1.0, p.surfaces.reach if p.surfaces.exists else 1.0)
+        farthest = residual * stage.lengths[0] * (p.surfaces.arm_factor if p.surfaces.exists else 1.0)
         if settled and 2.0 * farthest <= SAFE_PART * min(gap, _least_gap_of_rods(p.rod_contact)):
             alpha, halvings, task = 1.0, 0, SEARCH  # two points that move towards each other keep a gap
             continue
@@ -365,5 +365,5 @@ def predicted_decrease(strands, bodies, sums, system):
         for c in range(3):
             system.node_step[i, c] = system.step[strands.node_unknown[i] + c]
     for k in range(strands.edge_unknown.shape[0]):
-        system.turn[k] = system.step[strands.edge_unknown[k]]
+        system.angle_step[k] = system.step[strands.edge_unknown[k]]
     return slope, ROUNDING * noise

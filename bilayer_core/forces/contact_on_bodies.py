@@ -60,7 +60,7 @@ def add_second_derivative(p, m, g, arm, lever, turning, i, r, a, b):
     turning : float
         1 if g turns with the surface's body, −1 if it is frozen.
     i, r, a, b : int
-        The node; its arm's place in the list, −1 without one; the body that the contact point is on, −1 for a rod's;
+        The node; its arm's slot in the list, −1 without one; the body that the contact point is on, −1 for a rod's;
         the surface's body.
     """
     if a < 0:

@@ -127,7 +127,7 @@ def _moved(rate, k, first, c, x, y, z, angle):
 
 
 @kernel
-def add_motion_of_arm(surfaces, strands, i, k, rate, position, origin, turn, origin_turn, out):
+def add_motion_of_arm(surfaces, strands, i, k, rate, position, origin, angle, origin_angle, out):
     """Add to `out` what an arm has moved by since edges had other positions and angles."""
     before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
     for side in range(1 if before == after else 2):
@@ -137,11 +137,11 @@ def add_motion_of_arm(surfaces, strands, i, k, rate, position, origin, turn, ori
         y = (position[n + 1, 1] - origin[n + 1, 1]) - (position[n, 1] - origin[n, 1])
         z = (position[n + 1, 2] - origin[n + 1, 2]) - (position[n, 2] - origin[n, 2])
         for c in range(3):
-            out[c] += _moved(rate, k, first, c, x, y, z, turn[e] - origin_turn[e])
+            out[c] += _moved(rate, k, first, c, x, y, z, angle[e] - origin_angle[e])
 
 
 @kernel
-def add_step_of_arm(surfaces, strands, i, k, rate, node_step, turn, out):
+def add_step_of_arm(surfaces, strands, i, k, rate, node_step, angle_step, out):
     """Add to `out` what an arm moves by in a step of nodes and angles, at first order."""
     before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
     for side in range(1 if before == after else 2):
@@ -150,7 +150,7 @@ def add_step_of_arm(surfaces, strands, i, k, rate, node_step, turn, out):
         x, y = node_step[n + 1, 0] - node_step[n, 0], node_step[n + 1, 1] - node_step[n, 1]
         z = node_step[n + 1, 2] - node_step[n, 2]
         for c in range(3):
-            out[c] += _moved(rate, k, first, c, x, y, z, turn[e])
+            out[c] += _moved(rate, k, first, c, x, y, z, angle_step[e])
 
 
 @kernel
@@ -163,7 +163,7 @@ def copy_rate(rate, k, rate_out, r):
 
 @kernel
 def new_arm(sums, i):
-    """A place in the list of contacts with an arm, for one at node i."""
+    """A slot in the list of contacts with an arm, for one at node i."""
     r = sums.arms[0]
     sums.arm_node[r], sums.arm_curved[r] = i, False
     sums.arms[0] = r + 1

@@ -248,7 +248,7 @@ def _add_friction(rods, stage, position, gradient):
 
 @kernel
 def rod_slip_along(rods, stage, position, node_step, begin, path_out):
-    """Write the way of every lagged contact in a Newton step (`forces.friction_limit`): a is the direction of the slip.
+    """Write the slip path of every lagged contact in a Newton step (`forces.friction_limit`); a is along the slip.
 
     Parameters
     ----------

@@ -141,7 +141,7 @@ def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
         if body >= 0:
             _add_motion(system.motion, body, arm, 1.0, rate)
         else:
-            add_step_of_arm(surfaces, strands, node, k, sliding.arm_rate, system.node_step, system.turn, rate)
+            add_step_of_arm(surfaces, strands, node, k, sliding.arm_rate, system.node_step, system.angle_step, rate)
         _add_motion(system.motion, under, lever, -1.0, rate)
         _across(sliding, k, s)
         path_out[k, 0] = slip[0] * a[k, 0] + slip[1] * a[k, 1] + slip[2] * a[k, 2]

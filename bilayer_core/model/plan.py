@@ -80,9 +80,9 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
 
 def _warnings_of(model: str, scene: SceneConfig) -> tuple[str, ...]:
     """Warnings of one model alone."""
-    meeting = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
+    in_contact = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
     return (
-        tuple(str(figure) for rod in sorted(meeting) for figure in uneven_faces(scene.rods[rod], scene))
+        tuple(str(figure) for rod in sorted(in_contact) for figure in uneven_faces(scene.rods[rod], scene))
         if model == "laminate"
         else ()
     )

@@ -47,7 +47,7 @@ class StaticReport:
         Whether every small disturbance decays or stays as it is, in all of space, whatever the dimension of the model.
     unstable_directions : int
         Dimension of the space of those that grow: negative eigenvalues of the Hessian.
-    leaving_plane : int
+    out_of_plane : int
         How many of these leave the plane of a model of dimension 2, which therefore cannot follow them; 0 in space.
     residual : float
         Largest displacement that Newton would still make [m].
@@ -57,7 +57,7 @@ class StaticReport:
 
     stable: bool
     unstable_directions: int
-    leaving_plane: int
+    out_of_plane: int
     residual: float
     rounds: int
     iterations: int
@@ -147,15 +147,15 @@ class _Search:
         raise self._failure("the shape does not come to rest", moved)
 
     def _report(self, residual: float) -> StaticReport:
-        unstable, leaving = self._unstable(self.stepper), 0
+        unstable, out_of_plane = self._unstable(self.stepper), 0
         if self.in_space is not None:
             space = self.in_space()
             self._drive(space)
             in_plane, unstable = unstable, self._unstable(space)
-            leaving = unstable - in_plane
+            out_of_plane = unstable - in_plane
         self.stepper.restart(self.state)
         counts = self.rounds, self.iterations, self.factorisations
-        return StaticReport(unstable == 0, unstable, leaving, residual, *counts)
+        return StaticReport(unstable == 0, unstable, out_of_plane, residual, *counts)
 
     def _unstable(self, stepper: Stepper) -> int:
         """Number of negative eigenvalues of the Hessian of a model at the equilibrium."""

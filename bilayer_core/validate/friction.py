@@ -28,7 +28,7 @@ BELT = StickSlip(
     normal_force=MASS * GRAVITY,
     amplitude=0.5 * MASS * GRAVITY,
     period=0.13,
-    way=0.2,
+    travel=0.2,
     duration=1.0,
 )
 SAMPLES = 250
@@ -102,7 +102,7 @@ def on_a_belt(solver: dict) -> np.ndarray:
         clamp_end="block",
     )
     press = {"type": "sine", "mean": 0, "amplitude": 1, "period": BELT.period}
-    motion = {"type": "prescribed", "times": [0, BELT.duration], "displacements": [[0, 0, 0], [BELT.way, 0, 0]]}
+    motion = {"type": "prescribed", "times": [0, BELT.duration], "displacements": [[0, 0, 0], [BELT.travel, 0, 0]]}
     content = scene(
         [ribbon],
         gravity=[0, 0, -GRAVITY],

@@ -176,7 +176,7 @@ def kirchhoff_plate(velocity: tuple[float, float], own: float, whole: float, mom
 
 @dataclass(frozen=True)
 class StickSlip:
-    """A mass on a belt that goes its `way` and stops (cubic smoothstep), held by a spring from rest on.
+    """A mass on a belt that travels a given distance and stops (cubic smoothstep), held by a spring from rest on.
 
     Attributes
     ----------
@@ -186,7 +186,7 @@ class StickSlip:
         μ and ε_v [m/s].
     normal_force, amplitude, period : float
         N = normal_force + amplitude sin(2π t/period) [N], [s].
-    way, duration : float
+    travel, duration : float
         Of the belt [m], [s].
     """
 
@@ -197,7 +197,7 @@ class StickSlip:
     normal_force: float
     amplitude: float
     period: float
-    way: float
+    travel: float
     duration: float
 
 
@@ -206,7 +206,7 @@ def stick_slip(p: StickSlip, times: np.ndarray) -> np.ndarray:
 
     def rate(t: float, y: np.ndarray) -> list[float]:
         part = t / p.duration
-        slip = 6.0 * p.way * part * (1.0 - part) / p.duration - y[1]
+        slip = 6.0 * p.travel * part * (1.0 - part) / p.duration - y[1]
         w = min(abs(slip) / p.threshold, 1.0)
         force = p.normal_force + p.amplitude * math.sin(2.0 * math.pi * t / p.period)
         friction = p.coefficient * force * math.copysign(w * (2.0 - w), slip)

@@ -85,16 +85,16 @@ def strut(width, thickness):
 
 def test_stability_is_that_in_space_whatever_the_dimension():
     # critical load π² E I/(4 L²): 8 mN about the weak axis of 4 mm × 1 mm, 130 mN about the other
-    for width, thickness, leaving in ((4e-3, 1e-3, 0), (1e-3, 4e-3, 1)):
+    for width, thickness, outward in ((4e-3, 1e-3, 0), (1e-3, 4e-3, 1)):
         space, plane = (simulator.solve_static() for simulator in pair(strut(width, thickness)))
-        assert (space.unstable_directions, space.leaving_plane) == (1, 0)
-        assert (plane.unstable_directions, plane.leaving_plane) == (1, leaving)
+        assert (space.unstable_directions, space.out_of_plane) == (1, 0)
+        assert (plane.unstable_directions, plane.out_of_plane) == (1, outward)
         assert not (space.stable or plane.stable)
 
 
 @pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize(("part", "leaving"), [(0.97, 0), (1.03, 1), (1.5, 1)])
-def test_a_blade_in_a_plane_is_told_where_it_would_turn_over(model, part, leaving):
+@pytest.mark.parametrize(("part", "outward"), [(0.97, 0), (1.03, 1), (1.5, 1)])
+def test_a_blade_in_a_plane_is_told_where_it_would_turn_over(model, part, outward):
     # lateral-torsional buckling of a cantilever under a force at its tip: 4.013 √(E I₂ G J)/L² (Prandtl, Michell)
     length, width, thickness, modulus = 0.1, 0.6e-3, 12e-3, 1e8
     bending, shear = modulus * thickness * width**3 / 12.0, modulus / 3.0
@@ -104,7 +104,7 @@ def test_a_blade_in_a_plane_is_told_where_it_would_turn_over(model, part, leavin
     load = {"name": "tip", "rod": "rod", "position": length, "force": [0, 0, -force]}
     content = scene([blade], bodies=[fixed()], loads=[load])
     report = Simulator(load_scene(content), model=model, dimension=2).solve_static()
-    assert (report.stable, report.leaving_plane) == (leaving == 0, leaving)
+    assert (report.stable, report.out_of_plane) == (outward == 0, outward)
 
 
 def test_a_saved_state_continues_bit_for_bit():

@@ -215,7 +215,7 @@ class Border:
             near_count=one + 1,
         )
         self.strands = record_of(Strands, edge_node=np.array([0, 1]))
-        self.system = record_of(System, node_step=self.step, turn=self.turn, motion=self.motion)
+        self.system = record_of(System, node_step=self.step, angle_step=self.turn, motion=self.motion)
 
     def at(self, t):
         """Configuration at a part of the step: directors are turned with the shortest arc of their edges, then about
@@ -260,6 +260,15 @@ class Border:
         return motion_of(*(record.address for record in records))
 
 
+def bound_that_keeps_the_gap(pair, start, samples):
+    """The step bound of a pair, along which the gap keeps what it must of its start."""
+    alpha, blocking = pair.bound()
+    assert (blocking >= 0) == (alpha < 1.0)
+    before = np.array([pair.gap(t) for t in np.linspace(0.0, alpha, samples)])
+    assert before.min() >= KEPT_FRACTION * start * (1.0 - 1e-9)
+    return alpha
+
+
 @pytest.mark.parametrize("turning", [False, True], ids=["straight", "turning"])
 @pytest.mark.parametrize("kind", HALF)
 def test_step_bound_is_the_first_moment_at_which_a_gap_shrinks_to_the_kept_fraction(kind, turning):
@@ -270,10 +279,7 @@ def test_step_bound_is_the_first_moment_at_which_a_gap_shrinks_to_the_kept_fract
         start = pair.gap(0.0)
         if start <= 0.0:
             continue
-        alpha, blocking = pair.bound()
-        assert (blocking >= 0) == (alpha < 1.0)
-        before = np.array([pair.gap(t) for t in np.linspace(0.0, alpha, 150)])
-        assert before.min() >= KEPT_FRACTION * start * (1.0 - 1e-9)
+        alpha = bound_that_keeps_the_gap(pair, start, 150)
         if alpha < 1.0:
             limited += 1
             assert pair.gap(alpha) == pytest.approx(KEPT_FRACTION * start, abs=1e-5 * start)
@@ -291,10 +297,7 @@ def test_the_step_bound_of_a_point_with_an_arm_keeps_the_kept_fraction_of_its_ga
         start = pair.gap(0.0)
         if start <= 0.0:
             continue
-        alpha, blocking = pair.bound()
-        assert (blocking >= 0) == (alpha < 1.0)
-        before = np.array([pair.gap(t) for t in np.linspace(0.0, alpha, 30)])
-        assert before.min() >= KEPT_FRACTION * start * (1.0 - 1e-9)
+        alpha = bound_that_keeps_the_gap(pair, start, 30)
         limited += alpha < 1.0
         sharp += alpha < 1.0 and pair.gap(alpha) < (KEPT_FRACTION + 1e-5) * start
     assert limited > 5 and (sharp > 0.5 * limited or fast > 0.01)

@@ -168,7 +168,7 @@ class Surfaces:
     point_body: Indices
     node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
     rod_points: RodPoints
-    reach: float  # how many times farther than nodes and borders of edges a contact point of a rod moves at most
+    arm_factor: float  # how many times farther than nodes and borders of edges a contact point of a rod moves at most
     kind: Indices
     size: Matrix
     rounding: Vector

@@ -70,7 +70,7 @@ class System:
     step: Vector = ("unknown",)
     body_step: Matrix = ("free", 6)
     node_step: Matrix = ("node", 3)
-    turn: Vector = ("edge",)
+    angle_step: Vector = ("edge",)
     motion: Matrix = ("body+world", 6)
     negative: Indices = (1,)  # number of negative eigenvalues, where they were counted
 
