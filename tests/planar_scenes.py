@@ -1,7 +1,7 @@
 """Scenes that stay in a vertical plane, along an axis or not."""
 
 import numpy as np
-from sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
+from sample_scenes import GEL, GROUND, ball, contact, fixed, layer, rod, scene
 
 AHEAD = {"y = 0": (1.0, 0.0, 0.0), "oblique": (0.8, 0.6, 0.0)}
 FREE = {"type": "free", "mass": 1e-3, "inertia": [2e-8, 3e-8, 4e-8]}
@@ -52,6 +52,7 @@ def everything_in_plane(ahead, hub="prescribed", stations=6):
         obstacles=[GROUND],
         contact=law,
         damping={"mass": 2.0},
+        materials={"gel": {**GEL, "retardation_time": 1e-3}},
         fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": in_plane(ahead, 0.1, 0.05), "added_mass": True},
         masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
         loads=[

@@ -40,6 +40,7 @@ def everything(stations=6):
         obstacles=[GROUND],
         contact=uneven,
         damping={"mass": 2.0},
+        materials={"gel": {**GEL, "retardation_time": 1e-3}},
         fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05], "added_mass": True},
         masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
         loads=loads,

@@ -94,6 +94,9 @@ def _only_rod(scene: SceneConfig) -> Rod:
         "rods[0].layers: natural curvature and twist must be zero": not any(
             layer.natural_curvature or layer.natural_twist for layer in layers
         ),
+        "materials: retardation_time must be zero": not any(
+            scene.materials[layer.material].retardation_time for layer in layers
+        ),
         "rods[0].clamp_end: must be free": rod.clamp_end is None,
         "rods[0].clamp_start: must be a body at rest, or none": rod.clamp_start is None
         or (isinstance(held.motion, Prescribed) and not held.motion.times),

@@ -31,6 +31,7 @@ from ..model.records.parts import (
     Slips,
     Strands,
     Surfaces,
+    Viscosity,
 )
 from ..model.records.problem import Border, System
 
@@ -56,6 +57,11 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             node_unknown=model.layout.node,
             edge_unknown=model.layout.edge,
             **{name: getattr(model, name) for name in Strands.names[9:]},
+        ),
+        viscosity=(
+            Viscosity(edge_time=model.edge_time, joint_time=model.joint_time)
+            if "viscosity" in model.forces
+            else Viscosity.absent()
         ),
         drives=Drives(**{name: getattr(model, name) for name in Drives.names}),
         off_axis=OffAxis.absent() if len(model.pair_top) else _off_axis(model, sizes),

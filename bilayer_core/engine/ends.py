@@ -10,6 +10,7 @@ import math
 
 from ..forces.added_mass import momentum_at
 from ..forces.inertia import moment_of_rotation
+from ..forces.viscosity import measure_strains
 from ..jit import kernel, piece
 from ..jit.flat import flat
 from ..jit.stack import stack_matrix
@@ -56,6 +57,9 @@ def end_stage(p, state, work, inputs, n, end):
     for k in range(point.angle.shape[0]):
         point.angle[k] = work.start_angle[k] + end.total_angle[k]
         point.spin[k] = (end.total_angle[k] - stage.origin_angle[k]) / length
+    measure_strains(p, end, point.strain)
+    for k in range(point.strain.shape[0]):
+        point.strain_rate[k] = (point.strain[k] - stage.origin_strain[k]) / length
     momentum_at(p.fluid, end, point.velocity, point.fluid_momentum)
     return READY
 
@@ -71,6 +75,7 @@ def write_end(p, state, last, end, inputs, n):
         for c in range(3):
             state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]
     copy(last.spin, state.spin)
+    copy(last.strain_rate, state.strain_rate)
     _move_positions(state.position, state.position_low, last.displacement)
     for k in range(constrained.node.shape[0]):
         i = constrained.node[k]
@@ -171,6 +176,7 @@ def keep_stage_derivatives(state, origin, end, momentum_length, carry):
     _keep_derivative(state.spin_acceleration, end.spin, origin.spin, momentum_length, carry)
     _keep_derivative(state.body_acceleration, end.body_velocity, origin.body_velocity, momentum_length, carry)
     _keep_derivative(state.body_moment, end.angular_momentum, origin.angular_momentum, momentum_length, carry)
+    _keep_derivative(state.strain_acceleration, end.strain_rate, origin.strain_rate, momentum_length, carry)
     _keep_derivative(state.fluid_force, end.fluid_momentum, origin.fluid_momentum, momentum_length, carry)
     state.has_history[0] = 1.0
     return READY

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..forces.register import memory_size
+from ..forces.viscosity import start_elements
 from ..model.force_slots import NAMES
 from ..model.model import Model
 from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, PAIR, SHIFT, SIMPLIFIED
@@ -64,9 +65,7 @@ class Evaluator:
 
     def __init__(self, model: Model):
         self.model = model
-        # a stiffness of its own, whose columns are set to zero where bending or twisting is left out
-        self._stiffness = model.joint_stiffness.copy()
-        self._storage = Storage(replace(model, joint_stiffness=self._stiffness.view()))
+        self._storage = Storage(model)
         self._state = initial_state(model, memory=memory_size(model))
         self._arrays = StateArrays(**{name: getattr(self._state, name) for name in StateArrays.names})
         self._work, self._inputs = new_work(model, [], 1), new_inputs(model, 1)
@@ -189,7 +188,7 @@ class Evaluator:
 
     # forces
 
-    def select(self, forces: Iterable[str] | None) -> None:
+    def _select(self, at: Configuration, forces: Iterable[str] | None) -> None:
         """Which forces are computed, all that the scene has or some by name.
 
         Raises
@@ -202,12 +201,7 @@ class Evaluator:
             if name not in self.model.forces:
                 raise LookupError(f"force {name!r}: does not act in the scene, but: {', '.join(self.model.forces)}")
         self.sums.selected[:] = [name in forces for name in NAMES]
-        bends = slice(self.model.bend_count)
-        self._stiffness[bends] = self.model.joint_stiffness[bends]
-        if "bending" not in forces:
-            self._stiffness[bends, :2] = 0.0
-        if "twisting" not in forces:
-            self._stiffness[bends, 2] = 0.0
+        start_elements(0, self.problem, at, self.stage)
 
     def forces(self, at: Configuration, forces: Iterable[str] | None = None) -> dict[str, float]:
         """Energies [J] of all forces or of some by name; `sums` holds their derivatives by nodes, edges, pairs, and
@@ -226,7 +220,7 @@ class Evaluator:
     def _evaluate(
         self, at: Configuration, forces: Iterable[str] | None, *, second: bool, expands: bool
     ) -> dict[str, float]:
-        self.select(forces)
+        self._select(at, forces)
         while (status := evaluate_at(self.problem, at, self.stage, second, expands)) != READY:
             self._grow(status)
         figures, sums = self._storage.outcome.figures, self.sums

@@ -16,6 +16,7 @@ Positions and momenta advance as `integrators.method` says. What is no vector ne
 from __future__ import annotations
 
 from ..forces.added_mass import momentum_at
+from ..forces.viscosity import measure_strains
 from ..jit import kernel, piece
 from ..jit.stack import stack_matrix
 from ..kinematics.copying import add_scaled, copy, copy_matrix, copy_row
@@ -59,6 +60,8 @@ def start_step_point(p, state, start, first):
         momentum = _tensor_times(bodies.second_moment, f, start.body_rotation, f, w0, w1, w2, scratch)
         for c in range(3):
             first.angular_momentum[f, c] = momentum[c]
+    measure_strains(p, start, first.strain)
+    copy(state.strain_rate, first.strain_rate)
     momentum_at(p.fluid, start, state.velocity, first.fluid_momentum)
     add_scaled(first.fluid_momentum, 1.0, state.fluid_excess)
     return READY
@@ -107,6 +110,10 @@ def add_history_to_origin(p, state, work, method, n, h):
     add_scaled(point.body_velocity, momenta * h, state.body_acceleration)
     add_scaled(point.angular_momentum, momenta * h, state.body_moment)
     add_scaled(point.fluid_momentum, momenta * h, state.fluid_force)
+    add_scaled(point.strain, along * h, state.strain_rate)
+    if bend != 0.0:
+        add_scaled(point.strain, bend * h * h, state.strain_acceleration)
+    add_scaled(point.strain_rate, momenta * h, state.strain_acceleration)
     tensor = stack_matrix(3, 3)
     copy(point.rotation, scratch)
     for b in range(point.rotation.shape[0]):
@@ -202,6 +209,7 @@ def predict_stage(p, state, work, inputs, n, previous, start):
     for i in range(origin.fluid_momentum.shape[0]):
         for c in range(3):
             stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
+    copy(origin.strain, stage.origin_strain)
     _take_twist(start, stage)
     return READY
 
@@ -270,6 +278,8 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     stage.predicted_angle[:] = 0.0
     stage.origin_angle[:] = 0.0
     add_scaled(stage.origin_angle, -length, state.spin)
+    measure_strains(p, start, stage.origin_strain)
+    add_scaled(stage.origin_strain, -length, state.strain_rate)
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:
         momentum_at(p.fluid, start, state.velocity, stage.origin_fluid_momentum)

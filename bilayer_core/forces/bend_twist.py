@@ -87,6 +87,7 @@ from ..model.force_slots import slot_of
 from ..model.records.parts import Space
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
+from .viscosity import acts_viscously
 
 BENDING, TWISTING, BOND = map(slot_of, ("bending", "twisting", "bond"))
 TWO_PI = 2.0 * math.pi
@@ -94,12 +95,12 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def bend_by_strains(off_axis, strands, at, stage):
-    """Write κ̄₁ κ̄₂ ψ̄ of joints at the present strains of edges [rad] into `OffAxis.rest`."""
+    """Write κ̄₁ κ̄₂ ψ̄ of joints over a stage, at the present strains of edges [rad] into `OffAxis.rest`."""
     joint, slope, rest = off_axis.joint, off_axis.slope, off_axis.rest
     length, rest_length = at.length, strands.rest_length
     for k in range(rest.shape[0]):
         for c in range(3):
-            rest[k, c] = stage.rest_joint[k, c]
+            rest[k, c] = stage.neutral_joint[k, c]
     for i in range(joint.shape[0]):
         k = joint[i]
         a, b = strands.joint_a[k], strands.joint_b[k]
@@ -112,10 +113,10 @@ def bend_by_strains(off_axis, strands, at, stage):
 
 
 @kernel
-def stretch_bend(off_axis, strands, at, sums, with_hessian):
+def stretch_bend(off_axis, strands, stage, at, sums, with_hessian):
     """Add the derivatives of bending through κ̄₁, which `bend_by_strains` has left, to those of edges."""
     joint, slope, rest = off_axis.joint, off_axis.slope, off_axis.rest
-    edge_a, edge_b, stiffness, strain = strands.joint_a, strands.joint_b, strands.joint_stiffness, at.joint_strain
+    edge_a, edge_b, stiffness, strain = strands.joint_a, strands.joint_b, stage.joint_stiffness, at.joint_strain
     length, tangent = at.length, at.tangent
     director1, director2, gradient_out = at.director1, at.director2, sums.edge
     hessian_out, cross_out = sums.edge_hessian, sums.cross_hessian
@@ -160,12 +161,13 @@ def add_bending(_, p, at, stage, with_hessian):
 
     ψ is unwrapped from the twist at the start of the stage.
     """
-    strands, sums, off_axis, rest = p.strands, p.sums, p.off_axis, stage.rest_joint
-    edge_a, edge_b, stiffness, previous_twist = strands.joint_a, strands.joint_b, strands.joint_stiffness, stage.twist
+    strands, sums, off_axis, rest = p.strands, p.sums, p.off_axis, stage.neutral_joint
+    edge_a, edge_b, stiffness, previous_twist = strands.joint_a, strands.joint_b, stage.joint_stiffness, stage.twist
     length, tangent, director1, director2 = at.length, at.tangent, at.director1, at.director2
     strain_out, gradient_out, hessian_out, cross_out = at.joint_strain, sums.edge, sums.edge_hessian, sums.cross_hessian
-    bends, bend_count = sums.selected[BENDING] or sums.selected[TWISTING], strands.bend_count
-    first, last = 0 if bends else bend_count, edge_a.shape[0] if sums.selected[BOND] else bend_count
+    viscous, bend_count = acts_viscously(p), strands.bend_count
+    bends, ties = sums.selected[BENDING] or sums.selected[TWISTING] or viscous, sums.selected[BOND] or viscous
+    first, last = 0 if bends else bend_count, edge_a.shape[0] if ties else bend_count
     if off_axis.exists and bends:
         bend_by_strains(off_axis, strands, at, stage)
         rest = off_axis.rest
@@ -266,7 +268,7 @@ def add_bending(_, p, at, stage, with_hessian):
         cross_out[k, 3, 2] += ilb * theta_row[2]
         cross_out[k, 3, 3] += k1 * h1 * j1 + k2 * h2 * j2 - k3
     if off_axis.exists and bends:
-        stretch_bend(off_axis, strands, at, sums, with_hessian)
+        stretch_bend(off_axis, strands, stage, at, sums, with_hessian)
     sums.energy[BENDING], sums.energy[TWISTING] = bending, twisting
     sums.energy[BOND] += bond
     return math.inf

@@ -32,6 +32,7 @@ from ..model.records.parts import Plane
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
 from .bend_twist import bend_by_strains
+from .viscosity import acts_viscously
 
 STRETCHING, BENDING, BOND = map(slot_of, ("stretching", "bending", "bond"))
 
@@ -53,12 +54,12 @@ def measure_in_plane(plane, strands, at):
 @kernel
 def planar_stretch(plane, strands, at, stage, with_hessian):
     """Add ½ EA (ε − η)² |ē| of every edge to N and ∂²/∂l², and return it [J]."""
-    stiffness, rest_length, eigenstrain = strands.axial_stiffness, strands.rest_length, stage.rest_edge
+    stiffness, rest_length, neutral = stage.axial_stiffness, strands.rest_length, stage.neutral_edge
     length = at.length
     gradient, hessian = plane.polar_gradient, plane.polar_hessian
     energy = 0.0
     for k in range(stiffness.shape[0]):
-        strain = length[k] / rest_length[k] - 1.0 - eigenstrain[k]
+        strain = length[k] / rest_length[k] - 1.0 - neutral[k]
         force = stiffness[k] * strain
         energy += 0.5 * force * strain * rest_length[k]
         gradient[k, 0] += force
@@ -68,12 +69,12 @@ def planar_stretch(plane, strands, at, stage, with_hessian):
 
 
 @kernel
-def planar_bend(first, last, rest, plane, strands, at, with_hessian):
+def planar_bend(first, last, rest, plane, strands, stage, at, with_hessian):
     """Add ½ k (κ − κ̄)² of joints first … last − 1 and return it, of bends and of bonds [J].
 
     `rest` has κ̄ [rad] in its first column. Of the strains in `at` κ alone is written; the others vanish in the plane.
     """
-    edge_a, edge_b, stiffness, strain_out = strands.joint_a, strands.joint_b, strands.joint_stiffness, at.joint_strain
+    edge_a, edge_b, stiffness, strain_out = strands.joint_a, strands.joint_b, stage.joint_stiffness, at.joint_strain
     side, frame, gradient = plane.side, plane.frame, plane.polar_gradient
     hessian, cross_hessian = plane.polar_hessian, plane.cross_hessian
     bending = bond = 0.0
@@ -102,10 +103,10 @@ def planar_bend(first, last, rest, plane, strands, at, with_hessian):
 
 
 @kernel
-def planar_stretch_bend(off_axis, plane, strands, at, with_hessian):
+def planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian):
     """Add the derivatives of bending through κ̄ where stretching bends."""
     joint, slope, rest = off_axis.joint, off_axis.slope, off_axis.rest
-    edge_a, edge_b, stiffness, strain = strands.joint_a, strands.joint_b, strands.joint_stiffness, at.joint_strain
+    edge_a, edge_b, stiffness, strain = strands.joint_a, strands.joint_b, stage.joint_stiffness, at.joint_strain
     side, frame, gradient = plane.side, plane.frame, plane.polar_gradient
     hessian, cross_hessian = plane.polar_hessian, plane.cross_hessian
     for i in range(joint.shape[0]):
@@ -182,16 +183,17 @@ def add_elasticity_in_plane(plane, p, at, stage, with_hessian):
     gradient, frame, axes, edge_gradient = plane.polar_gradient, plane.frame, strands.axes, sums.edge
     gradient[:] = 0.0
     measure_in_plane(plane, strands, at)
-    if sums.selected[STRETCHING]:
+    viscous = acts_viscously(p)
+    if sums.selected[STRETCHING] or viscous:
         sums.energy[STRETCHING] = planar_stretch(plane, strands, at, stage, with_hessian)
-    bends, ties, rest = sums.selected[BENDING], bonds.exists and sums.selected[BOND], stage.rest_joint
+    bends, ties, rest = sums.selected[BENDING] or viscous, bonds.exists and sums.selected[BOND], stage.neutral_joint
     if bends and off_axis.exists:
         bend_by_strains(off_axis, strands, at, stage)
         rest = off_axis.rest
     first, last = 0 if bends else strands.bend_count, strands.joint_a.shape[0] if ties else strands.bend_count
-    sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, strands, at, with_hessian)
+    sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, strands, stage, at, with_hessian)
     if bends and off_axis.exists:
-        planar_stretch_bend(off_axis, plane, strands, at, with_hessian)
+        planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian)
     if ties:
         sums.energy[BOND] = rotation + planar_bond(bonds, plane, strands, at, sums, with_hessian)
     for k in range(frame.shape[0]):  # N t + T m

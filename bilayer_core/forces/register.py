@@ -33,6 +33,7 @@ from .rod_contact import (
 from .stretch import add_stretching
 from .surface_barrier import add_surface_barrier, start_surface_barrier
 from .surface_friction import add_surface_friction, settle_surface_friction, start_surface_friction
+from .viscosity import add_viscosity, start_elements
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,7 @@ TERMS: tuple[Term, ...] = (
     Term(("bending", "twisting"), lambda model, of: of["space"], add_bending),
     Term(("bond",), lambda model, of: of["space"], add_bonds),
     Term(("stretching", "bending", "bond"), lambda model, of: of["plane"], add_elasticity_in_plane),
+    Term(("stretching", "viscosity"), lambda model, of: None, add_viscosity, start_elements),
     Term(("inertia", "damping", "gravity"), lambda model, of: None, add_inertial_forces),
     Term(("loads",), lambda model, of: of["loads"], add_point_forces, start_dead_loads),
     Term(("barrier",), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),

@@ -17,6 +17,7 @@ from ..model.force_slots import slot_of
 from ..model.records.parts import Space
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
+from .viscosity import acts_viscously
 
 STRETCHING = slot_of("stretching")
 
@@ -25,13 +26,13 @@ STRETCHING = slot_of("stretching")
 def add_stretching(_, p, at, stage, with_hessian):
     """Add the stretching of every edge and its derivatives by edge vectors."""
     strands, sums = p.strands, p.sums
-    if not sums.selected[STRETCHING]:
+    if not (sums.selected[STRETCHING] or acts_viscously(p)):
         return math.inf
-    stiffness, rest_length, eigenstrain = strands.axial_stiffness, strands.rest_length, stage.rest_edge
+    stiffness, rest_length, neutral = stage.axial_stiffness, strands.rest_length, stage.neutral_edge
     length, tangent, gradient, hessian = at.length, at.tangent, sums.edge, sums.edge_hessian
     energy = 0.0
     for k in range(strands.edge_count):
-        strain = length[k] / rest_length[k] - 1.0 - eigenstrain[k]
+        strain = length[k] / rest_length[k] - 1.0 - neutral[k]
         force = stiffness[k] * strain
         energy += 0.5 * force * strain * rest_length[k]
         t = row(tangent, k)

@@ -119,6 +119,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         voronoi_length=found.column("voronoi_length"),
         coupled_joint=found.column("coupled_joint", np.int64),
         strain_coupling=found.column("strain_coupling", width=2),
+        edge_time=found.column("edge_time"),
+        joint_time=joined("joint_time", width=3),
         pair_top=found.column("bond_joint_a", np.int64),
         pair_bottom=found.column("bond_joint_b", np.int64),
         pair_stiffness=found.column("pair_stiffness"),

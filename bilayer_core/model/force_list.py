@@ -99,6 +99,11 @@ def _eigenstrain(q: Question) -> str | None:
     return _unless(driven, "no layer follows a stimulus")
 
 
+def _viscosity(q: Question) -> str | None:
+    viscous = any(q.scene.materials[layer.material].retardation_time for rod in q.scene.rods for layer in rod.layers)
+    return _unless(viscous, "no retardation_time of a material is above zero")
+
+
 def _bodies(q: Question) -> str | None:
     return _unless(any(not isinstance(body.motion, Prescribed) for body in q.scene.bodies), "no free body")
 
@@ -139,6 +144,7 @@ FORCES: tuple[Force, ...] = (
     Force("twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")),
     Force("bond", CONSERVATIVE, "bond.py", _bond),
     Force("eigenstrain", None, "stretch.py", _eigenstrain),
+    Force("viscosity", DISSIPATIVE, "viscosity.py", _viscosity),
     Force("inertia", INERTIAL, "inertia.py", _always),
     Force("bodies", None, "inertia.py", _bodies),
     Force("damping", DISSIPATIVE, "inertia.py", lambda q: _unless(q.scene.damping.mass > 0.0, "damping.mass is zero")),

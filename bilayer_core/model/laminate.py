@@ -80,6 +80,7 @@ def add_laminate(
         joint_stiffness=whole.joint_stiffness,
         joint_rest=whole.joint_rest,
         node_radius=np.maximum(high, -low),
+        retardation_time=scene.materials[rod.layers[0].material].retardation_time,
     )
     found.add(mass_moment=sum(layer.mass * (layer.height - axis) for layer in layers))
     found.rods.append([(0, rod.stations - 1, strand.first_node, strand.first_edge)])

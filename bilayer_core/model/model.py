@@ -183,6 +183,9 @@ class Model(ReadOnlyArrays):
     coupled_joint: Array  # joints whose κ̄₁ depends on the strains of their edges, shape (n_coupled,)
     strain_coupling: Array  # b of either edge, 0 for a clamp edge [rad], shape (n_coupled, 2)
 
+    edge_time: Array  # retardation times of edges [s], shape (n_edge,)
+    joint_time: Array  # and of κ₁ κ₂ ψ of joints [s], shape (n_joint, 3)
+
     pair_top: Array  # paired edges, shape (n_pair,)
     pair_bottom: Array
     pair_stiffness: Array  # k_T l [N/m], shape (n_pair,)

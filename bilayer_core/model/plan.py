@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ..errors import SceneError
 from ..scene.config import Coupling, SceneConfig
 from ..scene.profile import extremes
+from ..scene.rod import Rod
 from .colliders import contact_pairs, is_ribbon
 from .force_list import planned
 from .laminate import uneven_faces
@@ -19,6 +20,8 @@ DIMENSIONS = (3, 2)
 INTEGRATORS = ("implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint")
 RECOMMENDED = "sdirk2", "second order, L-stable; least CPU time to an error of 1 % in `bilayer bench --quick`"
 """The integrator that `auto` takes, and why."""
+WITH_VISCOSITY = "tr_bdf2", "second order where viscosity makes motions stiff, too: its stages are of order 2"
+"""The same for scenes with viscosity."""
 
 
 @dataclass(frozen=True)
@@ -56,17 +59,24 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
     Raises
     ------
     SceneError
-        If a choice does not exist.
+        If a choice does not exist, or the model cannot be the scene.
     """
     solver, reasons = scene.solver, {}
     chosen_model, reasons["model"] = _choose("model", model, solver.model, MODELS) or simplest_model(scene)
+    if chosen_model == "laminate":
+        _refuse_laminate(scene)
     asked = _choose("dimension", dimension, solver.dimension, DIMENSIONS)
     if asked is not None and asked[0] == 2:
         asked = 2, f"{asked[1]}: all stays in {require_plane(scene)}"
     chosen_dimension, reasons["dimension"] = asked or best_dimension(scene)
-    chosen_integrator, reasons["integrator"] = (
-        _choose("integrator", integrator, solver.integrator, INTEGRATORS) or RECOMMENDED
-    )
+    chosen_integrator, reasons["integrator"] = _choose(
+        "integrator", integrator, solver.integrator, INTEGRATORS
+    ) or _recommended(scene)
+    if _is_viscous(scene) and chosen_integrator == "implicit_midpoint":
+        raise SceneError(
+            "integrator: implicit_midpoint does not follow viscosity (retardation_time of a material): the rates of "
+            f"strains at its ends are of first order; allowed: {', '.join(INTEGRATORS[:-1])}"
+        )
     return Plan(
         chosen_model,
         chosen_dimension,
@@ -93,12 +103,35 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     if scene.coupling != Coupling():
         return "two_rod", "`coupling` is set: only two rods have a bond that gives"
     for rod in scene.rods:
+        if len(_retardation_times(rod, scene)) > 1:
+            return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"
         twisted = any(extremes(layer.natural_twist) != (0.0, 0.0) for layer in rod.layers)
         if len(rod.layers) == 2 and rod.torsion == "layers" and twisted:
             return "two_rod", (
                 f"rods.{rod.name}: natural twist with `torsion: layers`, whose large strains a curve misses by 2 to 6 %"
             )
     return "laminate", "one curve carries both layers: half the unknowns, no stiff bond"
+
+
+def _retardation_times(rod: Rod, scene: SceneConfig) -> set[float]:
+    return {scene.materials[layer.material].retardation_time for layer in rod.layers}
+
+
+def _refuse_laminate(scene: SceneConfig) -> None:
+    for rod in scene.rods:
+        if len(times := _retardation_times(rod, scene)) > 1:
+            raise SceneError(
+                f"model: laminate has one retardation time along a rod, the layers of rods.{rod.name} have "
+                f"{' and '.join(f'{time:g} s' for time in sorted(times))}; allowed: two_rod, or equal times"
+            )
+
+
+def _is_viscous(scene: SceneConfig) -> bool:
+    return any(time for rod in scene.rods for time in _retardation_times(rod, scene))
+
+
+def _recommended(scene: SceneConfig) -> tuple[str, str]:
+    return WITH_VISCOSITY if _is_viscous(scene) else RECOMMENDED
 
 
 def best_dimension(scene: SceneConfig) -> tuple[int, str]:

@@ -41,7 +41,9 @@ def add_bonded_rods(
             curvature=shape.curvature,
         )
         _add_eigenstrain(found, scene, rod, layer, strand)
-        add_strand(found, scene, rod, strand, shape, _elements(rod, layer, at_nodes, at_edges, shape), body_index)
+        time = scene.materials[layer.material].retardation_time
+        elements = _elements(rod, layer, at_nodes, at_edges, shape, time)
+        add_strand(found, scene, rod, strand, shape, elements, body_index)
     found.rods.append(spans)
     found.path_height.append(0.0)
     add_fluid(found, scene.fluid, rod, spans)
@@ -56,7 +58,9 @@ def _sections(scene: SceneConfig, rod: Rod, layer: Layer, first: int, last: int)
     return sections(rod, layer, material, stations), sections(rod, layer, material, stations[:-1] + 0.5)
 
 
-def _elements(rod: Rod, layer: Layer, at_nodes: Section, at_edges: Section, shape: StrandShape) -> StrandElements:
+def _elements(
+    rod: Rod, layer: Layer, at_nodes: Section, at_edges: Section, shape: StrandShape, retardation_time: float
+) -> StrandElements:
     stiffness = np.stack([*at_nodes.bending_stiffness, at_nodes.twisting_stiffness], axis=1)
     return StrandElements(
         edge_mass=at_edges.mass * shape.lengths,
@@ -67,6 +71,7 @@ def _elements(rod: Rod, layer: Layer, at_nodes: Section, at_edges: Section, shap
         joint_stiffness=stiffness / shape.voronoi[:, None],
         joint_rest=_rest(rod, layer, shape),
         node_radius=0.5 * at_nodes.thickness,
+        retardation_time=retardation_time,
     )
 
 
@@ -106,10 +111,15 @@ def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, spans: list[Span])
     across = 0.5 * (np.cross(*frames[0]) + np.cross(*frames[1]))
     length = found.column("rest_length")
     weight = 0.5 * (length[edges[0]] + length[edges[1]])
+    times = [scene.materials[layer.material].retardation_time for layer in rod.layers]
+    shear_time = (times[0] * above.shear_thickness + times[1] * below.shear_thickness) / (
+        below.shear_thickness + above.shear_thickness
+    )
     found.add(
         bond_joint_a=edges[0],
         bond_joint_b=edges[1],
         bond_joint_stiffness=weight[:, None] * np.stack([law.bending, law.tilt, law.twist], axis=1),
+        bond_joint_time=np.stack([0.0 * weight, shear_time, 0.0 * weight], axis=1),
         bond_joint_rest=rest_strains(*frames[0], *frames[1]),
         bond_joint_node=np.full(last - first, -1),
         pair_stiffness=weight * law.translation,

@@ -15,6 +15,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         model.plane is not None,
         len(model.fluid_mass) > 0,
     )
+    edges_of_rods = model.edge_count
     points, joints, pairs = model.contact_points, len(model.joint_a), len(model.pair_top)
     return {
         "node": model.node_count,
@@ -22,6 +23,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         "edge+clamp": edges,
         "joint": joints,
         "pair": pairs,
+        "strain": edges_of_rods + 3 * joints if "viscosity" in model.forces else 0,
         "strand": len(model.strands),
         "attached": len(model.attached_node),
         "contact_point": len(points.weight),

@@ -44,12 +44,16 @@ class State:
     body_velocity: Array  # [m/s], shape (n_body, 3)
     body_angular_velocity: Array  # [rad/s], shape (n_body, 3)
     memory: Array  # what forces carry from step to step (`forces.register`), shape (n_memory,)
-    has_history: Array  # 1 if the five parts below are those of the last step, shape (1,), or (0,) without a use
+    has_history: (
+        Array  # 1 if the accelerations and forces below are those of the last step, shape (1,), or (0,) without a use
+    )
     acceleration: Array  # of nodes [m/s²], shape (n_node, 3); like the others empty if the integrator has no history
     spin_acceleration: Array  # of edges [rad/s²], shape (n_edge,)
     body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
     body_moment: Array  # on free bodies [N m], shape (n_free, 3)
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
+    strain_rate: Array  # of all elements [1/s], shape (n_edge + 3 n_joint,) or (0,); see `forces.viscosity`
+    strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
@@ -142,6 +146,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
     `fingerprint` says what the state belongs to (`model.fingerprint`).
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
+    strains = model.edge_count + 3 * len(model.joint_a) if "viscosity" in model.forces else 0
     channels = list(model.scene.stimuli.values())
     before = np.array([channel.schedule.value_before(0.0, LAST_STEP) for channel in channels])
     return State(
@@ -168,6 +173,8 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         body_acceleration=np.zeros((with_history * model.free_count, 3)),
         body_moment=np.zeros((with_history * model.free_count, 3)),
         fluid_force=np.zeros((with_history * in_fluid, 3)),
+        strain_rate=np.zeros(strains),
+        strain_acceleration=np.zeros(with_history * strains),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels), np.nan),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),

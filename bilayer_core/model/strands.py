@@ -152,6 +152,7 @@ class StrandElements:
     joint_stiffness: Array  # k₁ k₂ k₃ [N m], shape (n_node, 3)
     joint_rest: Array  # κ̄₁ κ̄₂ ψ̄ [rad] without stimuli, shape (n_node, 3)
     node_radius: Array  # from which contact counts [m], shape (n_node,)
+    retardation_time: float  # [s]
 
 
 def add_strand(
@@ -189,6 +190,7 @@ def add_strand(
         rest_length=shape.lengths,
         axial_stiffness=elements.axial_stiffness,
         rest_strain=elements.rest_strain,
+        edge_time=np.full(edges, elements.retardation_time),
     )
     joints = np.full(nodes, -1)
     inner = np.arange(1, nodes - 1)
@@ -201,6 +203,7 @@ def add_strand(
             joint_b=second,
             joint_stiffness=elements.joint_stiffness[at],
             joint_rest=elements.joint_rest[at],
+            joint_time=np.full((len(at), 3), elements.retardation_time),
             joint_node=first_node + at,
             voronoi_length=voronoi[at],
         )

@@ -18,6 +18,7 @@ from bilayer_core.scene.units import (
     Acceleration,
     NonNegativeNumber,
     NonNegativeRate,
+    NonNegativeTime,
     PlainNumber,
     PositiveDensity,
     PositiveLength,
@@ -53,6 +54,8 @@ class Material(Part):
     """ν, from which the shear modulus E/(2(1 + ν)) of torsion follows."""
     density: PositiveDensity
     """Mass per volume."""
+    retardation_time: NonNegativeTime = 0.0
+    """Viscosity over stiffness (Kelvin–Voigt); a vibration ω loses energy at the damping ratio ω × this / 2."""
 
 
 class Stimulus(Part):

@@ -107,7 +107,14 @@ class _Search:
         self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
         if len(state.transduction):
             state.transduction[:] = stepper.surroundings.stimulus_at(state, self.time)[model.law_channel]
-        for still in (state.velocity, state.spin, state.body_velocity, state.body_angular_velocity, state.has_history):
+        for still in (
+            state.velocity,
+            state.spin,
+            state.strain_rate,
+            state.body_velocity,
+            state.body_angular_velocity,
+            state.has_history,
+        ):
             still.fill(0.0)
         self._drive(stepper)
         self.rounds = self.iterations = self.factorisations = 0

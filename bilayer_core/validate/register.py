@@ -6,10 +6,38 @@ from collections.abc import Callable, Iterable
 from fnmatch import fnmatch
 
 from ..errors import InputError
-from . import beams, bending, contacts, fluid, friction, helix, laminate, loads, motion, plane, profiles, torsion
+from . import (
+    beams,
+    bending,
+    contacts,
+    fluid,
+    friction,
+    helix,
+    laminate,
+    loads,
+    motion,
+    plane,
+    profiles,
+    torsion,
+    viscosity,
+)
 from .case import Case, Result
 
-FAMILIES = (bending, helix, torsion, laminate, beams, plane, loads, profiles, contacts, friction, motion, fluid)
+FAMILIES = (
+    bending,
+    helix,
+    torsion,
+    laminate,
+    beams,
+    plane,
+    loads,
+    profiles,
+    contacts,
+    friction,
+    motion,
+    viscosity,
+    fluid,
+)
 CASES = tuple(case for family in FAMILIES for case in family.CASES)
 
 

@@ -1,5 +1,7 @@
 """What a force carries from step to step is part of the state."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from budgets import driven
@@ -49,11 +51,9 @@ def with_diary(monkeypatch):
         end=end_diary,
         memory=lambda model: 1 + model.node_count,
     )
-    other = register.Term(
-        register.TERMS[4].names, lambda model, of: None, register.TERMS[4].add, memory=lambda model: 3
-    )
-    assert "inertia" in register.TERMS[4].names
-    monkeypatch.setattr(register, "TERMS", (*register.TERMS[:4], other, *register.TERMS[5:], diary))
+    place, inertia = next(pair for pair in enumerate(register.TERMS) if "inertia" in pair[1].names)
+    other = replace(inertia, memory=lambda model: 3)
+    monkeypatch.setattr(register, "TERMS", (*register.TERMS[:place], other, *register.TERMS[place + 1 :], diary))
 
 
 @pytest.mark.parametrize("steps", [{"dt": 1e-3}, {"dt": 1e-3, "integrator": "implicit_midpoint"}, {"tolerance": 1e-4}])

@@ -35,6 +35,14 @@ class Strands:
 
 
 @record
+class Viscosity:
+    """Retardation times of elements [s]; absent if no material has one. See `forces.viscosity`."""
+
+    edge_time: Vector
+    joint_time: Matrix
+
+
+@record
 class Drives:
     """What stimuli change: rest strains of edges and joints."""
 

@@ -22,6 +22,7 @@ from .parts import (
     Space,
     Strands,
     Surfaces,
+    Viscosity,
 )
 
 
@@ -194,6 +195,7 @@ class Problem:
     gravity: Vector
     damping: float
     strands: Strands
+    viscosity: Viscosity
     drives: Drives
     space: Space
     plane: Plane

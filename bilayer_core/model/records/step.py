@@ -61,8 +61,13 @@ class Stage:
     predicted_body_position: Matrix = ("free", 3)  # X̃ of free bodies [m]
     predicted_body_rotation: Stack = ("free", 3, 3)  # R̃ of free bodies
     twist: Vector = ("joint",)  # of joints at the start of the stage
+    origin_strain: Vector = ("strain",)  # of all elements; see `forces.viscosity`
     rest_edge: Vector = ("edge",)  # strains without stress
     rest_joint: Matrix = ("joint", 3)  # of joints; what strains off the axis add is not in it
+    axial_stiffness: Vector = ("edge",)  # of elasticity and viscosity together [N]
+    neutral_edge: Vector = ("edge",)  # and the strain at which these balance
+    joint_stiffness: Matrix = ("joint", 3)  # likewise of joints [N m]
+    neutral_joint: Matrix = ("joint", 3)
     load_factor: Vector = ("load",)
     predicted_body_rotation_vector: Matrix = ("free", 3)  # rotation vector to where inertia takes free bodies
     predicted_shift: Matrix = ("node", 3)  # of nodes, from the start of the stage to where inertia takes them [m]
@@ -89,6 +94,8 @@ class Point:
     body_velocity: Matrix = ("free", 3)  # of free bodies [m/s]
     angular_momentum: Matrix = ("free", 3)  # of free bodies about their mass centres [N m s]
     fluid_momentum: Matrix = ("wet", 3)  # of the fluid at nodes [N s]
+    strain: Vector = ("strain",)  # of all elements; none without viscosity
+    strain_rate: Vector = ("strain",)  # [1/s]
     rotation: Stack = ("body", 3, 3)  # of all bodies
 
 
@@ -180,4 +187,6 @@ class StateArrays:
     body_acceleration: Matrix
     body_moment: Matrix
     fluid_force: Matrix
+    strain_rate: Vector
+    strain_acceleration: Vector
     transduction: Vector
