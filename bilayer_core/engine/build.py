@@ -37,6 +37,10 @@ from ..model.records.problem import Border, System
 
 Array = np.ndarray
 NONE = np.zeros(0, dtype=np.int64)
+LEAST_FALL = 0.01
+"""Of the longest rod: motions of less energy than a fall of everything by so much are not watched for theirs."""
+ROUNDING_STRAIN = 1e-11
+"""Strain of an edge that may be rounding, at any length of edges."""
 
 
 def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
@@ -46,6 +50,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
     return dict(
         gravity=np.array(scene.gravity, dtype=float),
         damping=float(scene.damping.mass),
+        least_energy=_least_energy(model),
         strands=Strands(
             size=layout.size,
             dimension=layout.dimension,
@@ -95,6 +100,13 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
         has_contact=model.has_surface_contact or model.rod_surfaces is not None,
         system=System.zeros(sizes),
     )
+
+
+def _least_energy(model: Model) -> float:
+    """That of a small fall of everything, and of strains that are rounding [J]."""
+    fall = LEAST_FALL * max(rod.path.length for rod in model.scene.rods)
+    weight = (model.node_mass.sum() + model.bodies.mass.sum()) * np.linalg.norm(model.scene.gravity)
+    return float(fall * weight + ROUNDING_STRAIN**2 * (model.axial_stiffness @ model.rest_length))
 
 
 def plane_of(model: Model, sizes: dict[str, int], hessians: dict[str, Array]) -> Plane:

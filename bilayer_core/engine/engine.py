@@ -19,6 +19,7 @@ from ..model.rest_strains import RestStrains
 from ..model.sizes import sizes_of
 from ..model.state import State
 from .actuation import Actuation
+from .energy_account import open_account
 from .error_norm import ErrorNorm
 from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
 from .report import FAILURES, IntegrationReport
@@ -100,7 +101,7 @@ class Engine:
         status, pair = int(outcome.counts[STATUS]), int(outcome.counts[PAIR])
         if done > 0 or status in FAILURES:
             self._take_end()
-        iterations, factorisations, settlings, rejected, inaccurate, restarts = counts.numbers.tolist()
+        iterations, factorisations, settlings, rejected, inaccurate, restarts, gaining = counts.numbers.tolist()
         shortest, longest, length = counts.lengths.tolist()
         residual, largest_residual = counts.residuals.tolist()
         error = 0.0
@@ -108,7 +109,7 @@ class Engine:
             length, residual, error, iterations = counts.failure.tolist()
         return IntegrationReport(
             *(done, status, pair, int(iterations), factorisations, settlings, residual, largest_residual),
-            *(shortest, longest, length, rejected, inaccurate, restarts, error),
+            *(shortest, longest, length, rejected, inaccurate, gaining, restarts, error),
         )
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
@@ -200,6 +201,11 @@ class Engine:
         """What acts on the state in modes other than steps."""
         stage = self._work.stage
         stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
+
+    def open_account(self, state: State) -> None:
+        """Begin with the energy of a state that was evaluated, unless its account is its own."""
+        run = self._parts_for(state)
+        open_account(run.problem, run.state, self.end)
 
     def count_shape(self, state: State) -> None:
         """Take the shape of a state that was evaluated, and to which no step has led, into the extrema."""

@@ -19,6 +19,7 @@ stiff the surface. What rests on a barrier has no speed and costs nothing.
 The error of a strand is the root mean square along it, with that of its edges' borders by their turn, so that it does
 not depend on the mesh and one node that trembles on a surface weighs little; that of a free body is the displacement of
 its outermost point. The largest of all, over the length of the longest rod, is the error of the step.
+(The energy of contacts has an error of its own, see `engine.energy_account`.)
 """
 
 from __future__ import annotations

@@ -15,17 +15,33 @@ import numpy as np
 from ..jit import call, kernel, piece, record_at
 from ..jit.record import Flags, Indices, Vector, record
 from ..kinematics.copying import copy
-from ..model.records.outcome import CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS
+from ..model.records.outcome import (
+    CONFIGURATION,
+    CONTACT_ERROR,
+    FACTORISATIONS,
+    GAINS,
+    GAP,
+    ITERATIONS,
+    PAIR,
+    RESIDUAL,
+    SETTLINGS,
+    STATUS,
+)
 from ..model.records.problem import Problem
-from ..model.records.status import CONVERGED, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
+from ..model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
 from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
 from .actuation import Actuation, stimulus_has_jumped, take_first_stimuli
+from .energy_account import LARGEST
 from .error_norm import ErrorNorm
 from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, after_rejection, after_success, fit, next_end
 
 configuration_at = record_at(Configuration)
 TIME_ROUNDING = 1e-9
 """Part of a step, or of an output period, by which two times are the same."""
+CONTACT_SHARE = 30.0
+"""Part of the energy of the run by which the energy of contacts may err in a step, over the tolerance: by default an
+impact of ten steps ends with its speed right to 1 or 2 %.
+"""
 
 
 @record
@@ -56,7 +72,9 @@ class StepControl:
 class Counts:
     """What came of steps, added up until they are cleared."""
 
-    numbers: Indices  # iterations, factorisations, settlings, attempts refused, those for their error, restarts
+    numbers: (
+        Indices  # iterations, factorisations, settlings, attempts refused, of these for errors, restarts, for energy
+    )
     lengths: Vector  # shortest, longest, and last step [s]
     residuals: Vector  # of the last step, and the largest [m/s]
     failure: Vector  # length [s], residual [m/s], error, in tolerances, and iterations of the last attempt
@@ -84,7 +102,7 @@ class Integration:
 
 def empty_counts() -> Counts:
     """Counts of no steps."""
-    return Counts(numbers=np.zeros(6, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
+    return Counts(numbers=np.zeros(7, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
 
 
 def clear(counts: Counts) -> None:
@@ -231,18 +249,21 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                 error = 0.0
                 if not fixed:
                     defect = call(p.calls.step_defect, (run.error_norm, start_state, state, h))
-                    error = method.estimate * defect / control.tolerance
-                if error <= 1.0:
+                    of_contact = figures[CONTACT_ERROR] / (CONTACT_SHARE * state.account[LARGEST])
+                    error = max(method.estimate * defect, of_contact) / control.tolerance
+                gains = found[GAINS] != 0
+                if error <= 1.0 and (not gains or h <= GROWTH_LIMIT * control.shortest):
                     break
                 copy(start_state.values, state.values)
                 copy(run.start_touched, work.touched)
-                status = TOO_INACCURATE
+                status = TOO_INACCURATE if error > 1.0 else GAINS_ENERGY
             if h <= GROWTH_LIMIT * control.shortest:
                 counts.failure[0], counts.failure[1], counts.failure[2] = h, residual, error
                 counts.failure[3] = iterations
                 return _leave(run, k, status, pair, end, gap)
             rejected += 1
             numbers[3] += 1
+            numbers[6] += status == GAINS_ENERGY
             if status == TOO_INACCURATE:
                 numbers[4] += 1
                 h = after_rejection(control.order, h, error)

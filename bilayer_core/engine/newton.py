@@ -15,7 +15,17 @@ from ..jit import call, kernel, piece
 from ..jit.record import Matrix, Stack
 from ..kinematics.copying import copy
 from ..kinematics.rotating import compose_quaternion, rotate_by, rotation_vector_between
-from ..model.records.outcome import FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS, SWAPPED
+from ..model.records.outcome import (
+    FACTORISATIONS,
+    FRACTION,
+    GAP,
+    ITERATIONS,
+    PAIR,
+    RESIDUAL,
+    SETTLINGS,
+    STATUS,
+    SWAPPED,
+)
 from ..model.records.problem import Problem
 from ..model.records.status import (
     BLOCKED,
@@ -334,7 +344,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             alpha = call(p.calls.limit_by_friction, (p, at, stage, slope, alpha))
         short = alpha < 1.0
     counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
-    counts[SETTLINGS], figures[RESIDUAL], figures[GAP] = settlings, residual, gap
+    counts[SETTLINGS], figures[RESIDUAL], figures[GAP], figures[FRACTION] = settlings, residual, gap, alpha
     return status
 
 

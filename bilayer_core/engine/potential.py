@@ -99,6 +99,8 @@ def add_forces(p, at, stage, with_hessian, again):
         copy(sums.lasting, sums.gradients)
     else:
         sums.energy[:] = 0.0
+        sums.supplied[:] = 0.0
+        sums.lost[:] = 0.0
         sums.gradients[:] = 0.0
         if with_hessian:
             sums.hessians[:] = 0.0

@@ -49,8 +49,8 @@ class IntegrationReport:
         steps made [m/s].
     shortest, longest, length : float
         Lengths of the steps made, and that of the last one, or of the attempt that failed [s].
-    rejected, inaccurate : int
-        Attempts that were made again, shorter, and those of them whose error was too large.
+    rejected, inaccurate, gaining : int
+        Attempts that were made again, shorter, those of them whose error was too large, and those that made energy.
     restarts : int
         Steps of the method that stands in for one with a history.
     error : float
@@ -70,6 +70,7 @@ class IntegrationReport:
     length: float = 0.0
     rejected: int = 0
     inaccurate: int = 0
+    gaining: int = 0
     restarts: int = 0
     error: float = 0.0
 
@@ -96,5 +97,5 @@ class IntegrationReport:
         return self.status in FAILURES
 
 
-SUMS = ("done", "iterations", "factorisations", "settlings", "rejected", "inaccurate", "restarts")
+SUMS = ("done", "iterations", "factorisations", "settlings", "rejected", "inaccurate", "gaining", "restarts")
 """Figures of which those of several reports add up."""

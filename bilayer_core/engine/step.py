@@ -9,6 +9,7 @@ from ..kinematics.copying import copy
 from ..model.records.outcome import (
     CONFIGURATION,
     FACTORISATIONS,
+    GAINS,
     GAP,
     ITERATIONS,
     PAIR,
@@ -134,6 +135,8 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     _clear(p.outcome)
     call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
     call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), work.first))
+    first = configuration_at(work.configurations[s])
+    call(p.calls.begin_step_account, (p, state, work, method.works[0] * h, first))
     stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
     work.start_angle[:] = 0.0
     worst = 0.0
@@ -155,7 +158,9 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         if status != CONVERGED:
             return _leave(p, status, -1, e)
         worst = max(worst, figures[RESIDUAL])
-        call(p.calls.end_stage, (p, state, work, inputs, n, configuration_at(work.configurations[e])))
+        solved = configuration_at(work.configurations[e])
+        call(p.calls.end_stage, (p, state, work, inputs, n, solved))
+        call(p.calls.add_powers, (p, work, inputs, n, method.works[1 + n] * h, solved))
         if n + 1 < ends:
             previous = work.end
             copy(work.end.angle, work.start_angle)
@@ -179,6 +184,8 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         copy(start_state.values, state.values)
         return _leave(p, status, -1, e)
     figures[RESIDUAL] = worst
+    last = configuration_at(work.configurations[e])
+    p.outcome.counts[GAINS] = call(p.calls.close_step_account, (p, state, work, ends > stages, last))
     return _leave(p, CONVERGED, -1, e)
 
 

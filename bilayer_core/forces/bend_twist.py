@@ -94,13 +94,13 @@ TWO_PI = 2.0 * math.pi
 
 
 @kernel
-def bend_by_strains(off_axis, strands, at, stage):
-    """Write κ̄₁ κ̄₂ ψ̄ of joints over a stage, at the present strains of edges [rad] into `OffAxis.rest`."""
+def bend_by_strains(off_axis, strands, at, neutral):
+    """Write κ̄₁ κ̄₂ ψ̄ of joints at the present strains of edges [rad], from those without any, into `OffAxis.rest`."""
     joint, slope, rest = off_axis.joint, off_axis.slope, off_axis.rest
     length, rest_length = at.length, strands.rest_length
     for k in range(rest.shape[0]):
         for c in range(3):
-            rest[k, c] = stage.neutral_joint[k, c]
+            rest[k, c] = neutral[k, c]
     for i in range(joint.shape[0]):
         k = joint[i]
         a, b = strands.joint_a[k], strands.joint_b[k]
@@ -169,7 +169,7 @@ def add_bending(_, p, at, stage, with_hessian):
     bends, ties = sums.selected[BENDING] or sums.selected[TWISTING] or viscous, sums.selected[BOND] or viscous
     first, last = 0 if bends else bend_count, edge_a.shape[0] if ties else bend_count
     if off_axis.exists and bends:
-        bend_by_strains(off_axis, strands, at, stage)
+        bend_by_strains(off_axis, strands, at, rest)
         rest = off_axis.rest
     bending = twisting = bond = 0.0
     for k in range(first, last):

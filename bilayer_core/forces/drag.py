@@ -49,7 +49,8 @@ def add_drag(flow, p, at, stage, with_hessian):
         return math.inf
     node, coefficient, direction, flow_velocity = flow.node, flow.coefficient, flow.direction, flow.velocity
     position, origin, gradient, hessian = at.position, stage.origin_position, sums.node, sums.node_hessian
-    energy = 0.0
+    energy = lost = supplied = 0.0
+    u = flow_velocity[0], flow_velocity[1], flow_velocity[2]
     for k in range(node.shape[0]):
         i = node[k]
         v = (
@@ -61,11 +62,14 @@ def add_drag(flow, p, at, stage, with_hessian):
         vt, vm, vn = dot(v, t), dot(v, m), dot(v, n)
         ct, cm, cn = coefficient[k, 0] * abs(vt), coefficient[k, 1] * abs(vm), coefficient[k, 2] * abs(vn)
         energy += h * (ct * vt * vt + cm * vm * vm + cn * vn * vn) / 6.0
-        add_row(gradient, i, 0.5, combine3(ct * vt, t, cm * vm, m, cn * vn, n))
+        resistance = combine3(ct * vt, t, cm * vm, m, cn * vn, n)
+        lost += 0.5 * dot(resistance, v)
+        supplied -= 0.5 * dot(resistance, u)
+        add_row(gradient, i, 0.5, resistance)
         if with_hessian:
             t_, m_, n_ = scaled(ct, t), scaled(cm, m), scaled(cn, n)
             add_upper_outer_sum(hessian, i, 1.0 / h, t_, t, m_, m, n_, n)
-    sums.energy[DRAG] = energy
+    sums.energy[DRAG], sums.lost[DRAG], sums.supplied[DRAG] = energy, lost, supplied
     return math.inf
 
 

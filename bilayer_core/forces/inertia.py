@@ -146,9 +146,8 @@ def add_inertial_forces(_, p, at, stage, with_hessian):
                 moved = position[i, c] - origin[i, c]
                 gradient[i, c] += weight * moved
                 energy += 0.5 * weight * moved * moved
-        sums.energy[DAMPING] = energy + angle_spring(
-            spin_inertia, factor, at.total_angle, stage.origin_angle, sums.edge
-        )
+        energy += angle_spring(spin_inertia, factor, at.total_angle, stage.origin_angle, sums.edge)
+        sums.energy[DAMPING], sums.lost[DAMPING] = energy, 2.0 * energy / h
     g = p.gravity
     if (g[0] != 0.0 or g[1] != 0.0 or g[2] != 0.0) and sums.selected[GRAVITY]:
         energy = gravity(mass, g, position, gradient)

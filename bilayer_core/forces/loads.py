@@ -36,15 +36,18 @@ MOMENTS = slot_of("moments")
 
 
 @kernel
-def point_force(index, force, position, gradient_out):
-    """Add −Σ F·x [J] of forces [N], shape (n_force, 3), on nodes or free bodies, shape (n_force,), and return it."""
-    energy = 0.0
+def point_force(index, force, position, origin, length, gradient_out):
+    """Add −Σ F·x of forces [N], shape (n_force, 3), on nodes or free bodies, shape (n_force,); return it [J] and the
+    power [W] over a stage of that length [s] from an origin.
+    """
+    energy = power = 0.0
     for k in range(index.shape[0]):
         i = index[k]
         for c in range(3):
             gradient_out[i, c] -= force[k, c]
             energy -= force[k, c] * position[i, c]
-    return energy
+            power += force[k, c] * (position[i, c] - origin[i, c]) / length
+    return energy, power
 
 
 @kernel
@@ -59,10 +62,12 @@ def in_axes_of_body(vector, k, factor, rotation, f, vector_out):
 @piece(float, PointForces, Problem, Configuration, Stage, bool)
 def add_point_forces(loads, p, at, stage, with_hessian):
     """Add the potential of forces and its gradient by nodes and free bodies."""
-    sums = p.sums
-    if sums.selected[loads.energy_slot]:
-        energy = point_force(loads.node, loads.on_nodes, at.position, sums.node)
-        sums.energy[loads.energy_slot] = energy + point_force(loads.body, loads.on_bodies, at.body_position, sums.body)
+    sums, slot, h = p.sums, loads.energy_slot, stage.lengths[0]
+    if sums.selected[slot]:
+        found = point_force(loads.node, loads.on_nodes, at.position, stage.origin_position, h, sums.node)
+        origin = stage.origin_body_position
+        more = point_force(loads.body, loads.on_bodies, at.body_position, origin, h, sums.body)
+        sums.energy[slot], sums.supplied[slot] = found[0] + more[0], found[1] + more[1]
     return math.inf
 
 
@@ -94,6 +99,20 @@ def update_followers(loads, p, at, stage):
     return node.shape[0] + body.shape[0] > 0
 
 
+@kernel
+def _power_of_moment(moment, k, rotation, stage, body, b):
+    """M·ω [W] with [ω]× = (R − R̄) Rᵀ/(γ h), its antisymmetric part."""
+    power = 0.0
+    for c in range(3):
+        i, j = (c + 1) % 3, (c + 2) % 3
+        for m in range(3):
+            origin = stage.origin_rotation
+            power -= (
+                0.5 * moment[k, c] * (origin[body, j, m] * rotation[b, i, m] - origin[body, i, m] * rotation[b, j, m])
+            )
+    return power / stage.lengths[0]
+
+
 @piece(float, Moments, Problem, Configuration, Stage, bool)
 def add_moments(moments, p, at, stage, with_hessian):
     """Add −½ Σ M·ax(R R̃ᵀ) and its derivatives by the turns φ of free bodies."""
@@ -102,9 +121,10 @@ def add_moments(moments, p, at, stage, with_hessian):
         return math.inf
     body, moment, gradient, hessian = moments.body, moments.present, sums.body, sums.body_hessian
     rotation, predicted_rotation = at.body_rotation, stage.predicted_body_rotation
-    energy = 0.0
+    energy = power = 0.0
     for k in range(body.shape[0]):
         b = body[k]
+        power += _power_of_moment(moment, k, rotation, stage, p.bodies.body_of_free[b], b)
         # row i of [M]× R̃ is that of the cross products of M with the columns of R̃
         a = stack_matrix(3, 3)
         for j in range(3):
@@ -126,7 +146,7 @@ def add_moments(moments, p, at, stage, with_hessian):
                 hessian[base + i, base + i] += trace
                 for j in range(3):
                     hessian[base + i, base + j] -= 0.5 * (a[i, j] + a[j, i])
-    sums.energy[MOMENTS] = energy
+    sums.energy[MOMENTS], sums.supplied[MOMENTS] = energy, power
     return math.inf
 
 

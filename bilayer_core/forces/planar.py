@@ -188,7 +188,7 @@ def add_elasticity_in_plane(plane, p, at, stage, with_hessian):
         sums.energy[STRETCHING] = planar_stretch(plane, strands, at, stage, with_hessian)
     bends, ties, rest = sums.selected[BENDING] or viscous, bonds.exists and sums.selected[BOND], stage.neutral_joint
     if bends and off_axis.exists:
-        bend_by_strains(off_axis, strands, at, stage)
+        bend_by_strains(off_axis, strands, at, rest)
         rest = off_axis.rest
     first, last = 0 if bends else strands.bend_count, strands.joint_a.shape[0] if ties else strands.bend_count
     sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, strands, stage, at, with_hessian)

@@ -143,10 +143,10 @@ def add_rod_barrier(rods, p, at, stage, with_hessian):
 @piece(float, RodContact, Problem, Configuration, Stage, bool)
 def add_rod_friction(rods, p, at, stage, with_hessian):
     """Friction at the contacts frozen last; returns infinity, as it knows no gap."""
-    sums, energy = p.sums, 0.0
+    sums, energy, lost = p.sums, 0.0, 0.0
     if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
-        energy = _add_friction(rods, stage, at.position, sums.contact_point)
-    sums.energy[ROD_FRICTION] = energy
+        energy, lost = _add_friction(rods, stage, at.position, sums.contact_point)
+    sums.energy[ROD_FRICTION], sums.lost[ROD_FRICTION] = energy, lost
     return math.inf
 
 
@@ -214,9 +214,9 @@ def _moved(vectors, origin, contacts, c, m):
 @kernel
 def _add_friction(rods, stage, position, gradient):
     """Add the gradient of the dissipation potential of lagged contacts, write its second derivatives, and return it
-    [J].
+    [J] and the power that is lost [W].
     """
-    contacts, h, threshold, energy = rods.sliding, stage.lengths[0], rods.threshold, 0.0
+    contacts, h, threshold, energy, lost = rods.sliding, stage.lengths[0], rods.threshold, 0.0, 0.0
     origin, weight, normal, matrix = stage.origin_position, contacts.weight, contacts.normal, contacts.matrix
     slip = stack_vector(3)
     for c in range(contacts.count[0]):
@@ -233,6 +233,7 @@ def _add_friction(rods, stage, position, gradient):
         energy += limit * h * friction_potential(speed, threshold)
         over_speed = friction_over_speed(speed, threshold)
         ratio, excess = limit * over_speed / h, 0.0
+        lost += ratio * square / h
         if speed > 0.0:
             excess = limit * (friction_slope(speed, threshold) - over_speed) / (speed * speed * h**3)
         for m in range(3):
@@ -243,7 +244,7 @@ def _add_friction(rods, stage, position, gradient):
             for n in range(3):
                 matrix[c, m, n] = excess * slip[m] * slip[n] - ratio * normal[c, m] * normal[c, n]
             matrix[c, m, m] += ratio
-    return energy
+    return energy, lost
 
 
 @kernel

@@ -168,7 +168,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
     arm, lever, u = stack_vector(3), stack_vector(3), stack_vector(3)
     g, q, across, hessian = stack_vector(3), stack_vector(3), stack_vector(3), stack_matrix(3, 3)
     arm[0] = arm[1] = arm[2] = 0.0
-    energy = 0.0
+    energy = lost = 0.0
     for k in range(sliding.count[0]):
         i, node, normal_force = sliding.first[k], sliding.node[k], sliding.load[k]
         largest = max(coefficient[i, 0], coefficient[i, 1], coefficient[i, 2])
@@ -185,6 +185,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         speed = math.sqrt(ca * forward * forward + cs * sideways * sideways) / scale
         energy += normal_force * scale * friction_potential(speed, threshold)
         ratio = normal_force * friction_over_speed(speed, threshold) / scale
+        lost += ratio * (speed * scale) ** 2 / stage.lengths[0]
         for c in range(3):
             q[c] = ca * forward * axis[k, c] + cs * sideways * across[c]
             g[c] = ratio * q[c]
@@ -208,7 +209,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
                 r = new_arm(sums, node)
                 copy_rate(sliding.arm_rate, k, sums.arm_rate, r)
             add_second_derivative(p, hessian, g, arm, lever, -1.0, node, r, a, b)
-    sums.energy[FRICTION] = energy
+    sums.energy[FRICTION], sums.lost[FRICTION] = energy, lost
     return math.inf
 
 

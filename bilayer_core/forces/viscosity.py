@@ -153,5 +153,5 @@ def add_viscosity(_, p, at, stage, with_hessian):
             )
             sums.energy[BOND if tied else TWISTING if c == 2 else BENDING] += of_elasticity
             lost += of_viscosity
-    sums.energy[VISCOSITY] = lost
+    sums.energy[VISCOSITY], sums.lost[VISCOSITY] = lost, 2.0 * lost / length
     return math.inf

@@ -33,5 +33,6 @@ METHOD = Method(
     about="second order with one solution a step; damps what is too fast for the step over a few steps",
     momentum_diagonal=OF_MOMENTA,
     history=History(positions=(1.0 - GAMMA,), momenta=(1.0 - OF_MOMENTA,), bend=0.5 - GAMMA, carry=ALPHA),
+    works=(0.5, 0.5),
     estimate=estimate_of(0.5 * ALPHA + BETA - 1.0 / 6.0),
 )

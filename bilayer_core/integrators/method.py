@@ -71,6 +71,9 @@ class Method:
         None if a step starts from positions and velocities alone.
     estimate : float or None
         Local error of positions over |Δq − ½ h (vₙ + vₙ₊₁)| (`engine.error_norm`); None if that does not tell it.
+    works : tuple of float or None
+        Weights of the powers at the start of a step and at its stages in the work of forces; None if they are those of
+        the stage derivatives.
     """
 
     name: str
@@ -83,6 +86,7 @@ class Method:
     momentum_diagonal: float | None = None
     history: History | None = None
     estimate: float | None = None
+    works: tuple[float, ...] | None = None
 
     def __post_init__(self):
         if self.weights is not None and self.history is not None:
@@ -94,6 +98,13 @@ class Method:
     def points(self) -> tuple[float, ...]:
         """cᵢ of each stage, and 1 if the end lies beyond the last one: where it has to be known what acts."""
         return self.nodes if self.weights is None else (*self.nodes, 1.0)
+
+    def _weights_of_powers(self) -> tuple[float, ...]:
+        if self.works is not None:
+            return self.works
+        if self.weights is not None:
+            return (0.0, *self.weights)
+        return (self.history.momenta[-1] if self.history else 0.0, *self.couplings[-1], self.diagonal)
 
     def arrays(self) -> MethodArrays:
         """The coefficients as the engine takes them; couplings are over γ, and `weights` are a row more of them."""
@@ -112,6 +123,7 @@ class Method:
             bend=history.bend if history else 0.0,
             carry=history.carry if history else 0.0,
             nodes=np.array(self.points),
+            works=np.array(self._weights_of_powers()),
             estimate=np.nan if self.estimate is None else float(self.estimate),
         )
 

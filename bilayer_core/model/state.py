@@ -54,6 +54,7 @@ class State:
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
     strain_rate: Array  # of all elements [1/s], shape (n_edge + 3 n_joint,) or (0,); see `forces.viscosity`
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
+    account: Array  # of energy; see `engine.energy_account`, shape (11,)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
@@ -175,6 +176,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         fluid_force=np.zeros((with_history * in_fluid, 3)),
         strain_rate=np.zeros(strains),
         strain_acceleration=np.zeros(with_history * strains),
+        account=np.zeros(11),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels), np.nan),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),

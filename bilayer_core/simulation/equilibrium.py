@@ -114,6 +114,7 @@ class _Search:
             state.body_velocity,
             state.body_angular_velocity,
             state.has_history,
+            state.account,
         ):
             still.fill(0.0)
         self._drive(stepper)

@@ -171,6 +171,11 @@ class Simulator:
         self.compile()
         return observe.energies(self._stepper, self._state)
 
+    @property
+    def energy_account(self) -> Array:
+        """What steps supplied, lost and made of energy; places in `engine.energy_account`."""
+        return self._state.account.copy()
+
     def budget(self) -> dict:
         """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
 
@@ -395,6 +400,7 @@ class Simulator:
 
         Its last values are a fingerprint of the scene (`model.fingerprint`), so that no other scene takes it.
         """
+        self.compile()
         return self._state.flat()
 
     def load_state(self, snapshot: Array) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..engine.energy_account import NUMERICAL
 from ..engine.report import IntegrationReport
 from ..model.model import Model
 from ..model.state import State
@@ -36,13 +37,15 @@ class RunStatistics:
 
     Times in s, lengths in m, forces in N, residuals in m/s, curvatures in 1/m. `max_strain` is the largest magnitude of
     the strain of an edge without its eigenstrain, `body_tops` the greatest height of each body; these two and
-    `max_curvature` count the state at the start too.
+    `max_curvature` count the state at the start too. `numerical_before` is the numerical energy of the
+    state where the run began [J].
     """
 
     steps: int = 0
     substeps: int = 0
     rejected: int = 0
     inaccurate: int = 0
+    gaining: int = 0
     shortest: float = math.inf
     longest: float = 0.0
     iterations: int = 0
@@ -55,12 +58,15 @@ class RunStatistics:
     com_max_height: float = -math.inf
     max_curvature: float = 0.0
     max_strain: float = 0.0
+    numerical_before: float = 0.0
     body_tops: dict[str, float] = field(default_factory=dict)
     bodies: dict[str, BodyContact] = field(default_factory=dict)
 
     def take_shape(self, stepper: Stepper, state: State) -> None:
         """Take in the shape of a state to which no step has led, evaluated in `stepper`."""
         stepper.engine.count_shape(state)
+        stepper.engine.open_account(state)
+        self.numerical_before = float(state.account[NUMERICAL])
         self._take_extrema(stepper)
 
     def update(self, report: IntegrationReport, whole: int, stepper: Stepper) -> None:
@@ -69,6 +75,7 @@ class RunStatistics:
         self.substeps += report.done
         self.rejected += report.rejected
         self.inaccurate += report.inaccurate
+        self.gaining += report.gaining
         self.shortest, self.longest = min(self.shortest, report.shortest), max(self.longest, report.longest)
         self.iterations += report.iterations
         self.factorisations += report.factorisations

@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ..engine.energy_account import LARGEST, NUMERICAL
 from ..model.validity import LARGE_STRAIN
 from . import observation as observe
 from .result import Termination
+
+LARGE_NUMERICAL = 0.1
+"""Part of the largest energy of a run that its steps may make or lose without a warning."""
 
 
 def summarise(simulator: Any) -> dict:
@@ -19,7 +23,10 @@ def summarise(simulator: Any) -> dict:
     ``max_strain`` (of an edge, without its eigenstrain), ``com_max_height``, ``min_gap``, ``max_contact_force``, and of
     bodies ``lift``, the greatest height over that at the start, ``first_contact`` and ``most_contact_nodes``. Of the
     end: ``com_end``, ``mean_curvature``, ``tip_positions``, ``energy``, and of bodies ``end``, ``lift_end`` and
-    ``contact_nodes``. ``warnings`` tell where the run left the range in which the model is meant to be used.
+    ``contact_nodes``. ``largest_energy`` is that of motion, elasticity and contact together, with the potential of
+    gravity from its value at the start, and ``numerical_energy`` what steps have made or, below zero, lost of it beyond
+    all forces (`engine.energy_account`). ``warnings`` tell where the run left the range in which the model is meant to
+    be used.
     """
     model, statistics, plan = simulator.model, simulator.statistics, simulator.plan
     positions = simulator.positions
@@ -27,6 +34,8 @@ def summarise(simulator: Any) -> dict:
     simulated = simulator.time - simulator.start_time
     cpu = simulator.cpu_time
     min_gap = statistics.min_gap
+    account = simulator.energy_account
+    largest, numerical = float(account[LARGEST]), float(account[NUMERICAL]) - statistics.numerical_before
     return {
         "scene": simulator.scene.name,
         "model": plan.model,
@@ -44,6 +53,7 @@ def summarise(simulator: Any) -> dict:
         "substeps": statistics.substeps,
         "rejected_steps": statistics.rejected,
         "inaccurate_steps": statistics.inaccurate,
+        "gaining_steps": statistics.gaining,
         "step_length": {
             "shortest": statistics.shortest if statistics.steps else None,
             "longest": statistics.longest if statistics.steps else None,
@@ -70,18 +80,26 @@ def summarise(simulator: Any) -> dict:
         "min_gap": min_gap if np.isfinite(min_gap) else None,
         "max_contact_force": statistics.max_contact_force,
         "energy": simulator.energy(),
+        "largest_energy": largest,
+        "numerical_energy": numerical,
         **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
-        "warnings": list(_warnings(statistics.max_strain)),
+        "warnings": list(_warnings(statistics.max_strain, numerical, largest)),
         "versions": observe.versions(),
     }
 
 
-def _warnings(strain: float) -> Iterator[str]:
+def _warnings(strain: float, numerical: float, largest: float) -> Iterator[str]:
     if strain > LARGE_STRAIN:
         yield (
             f"largest strain of an edge {100 * strain:.3g} % (at most {100 * LARGE_STRAIN:g} %): "
             "the law of the material is linear"
+        )
+    if abs(numerical) > LARGE_NUMERICAL * largest:
+        yield (
+            f"numerical energy {100 * numerical / largest:+.3g} % of the largest of the run (at most "
+            f"{100 * LARGE_NUMERICAL:g} %): what vibrates or meets is too fast for the steps; a smaller tolerance or "
+            "dt resolves it, `retardation_time` of a material damps it"
         )
 
 

@@ -13,6 +13,7 @@ from . import (
     fluid,
     friction,
     helix,
+    impacts,
     laminate,
     loads,
     motion,
@@ -26,6 +27,7 @@ from .case import Case, Result
 FAMILIES = (
     bending,
     helix,
+    impacts,
     torsion,
     laminate,
     beams,

@@ -202,6 +202,9 @@ def test_steps_made_one_by_one_and_many_at_once_are_the_same(kind, steps):
         description["stimuli"]["heat"]["schedule"] = WAVES["square"]
     else:
         description["solver"] = {}
+    if "midpoint" in steps:  # which does not follow viscosity
+        for material in description["materials"].values():
+            material.pop("retardation_time", None)
     runs = [Simulator(load_scene(description), **STEPS[steps]) for _ in range(2)]
     runs[0].run(0.04)
     while runs[1].time < 0.04 - 1e-9:

@@ -31,6 +31,8 @@ class Sums:
     """First and second derivatives to which forces add, and what becomes of them for the unknowns."""
 
     energy: Vector = ("force",)  # of each, in the order of `model.force_slots` [J]
+    supplied: Vector = ("force",)  # power of each that supplies energy [W]
+    lost: Vector = ("force",)  # and of each that takes some
     selected: Flags = ("force",)  # whether a force is computed, in that order; in steps all are
     gradients: Vector  # node, edge, pair, body, contact_point and contact in one piece, for clearing
     lasting: Vector  # the part of it that stays as it is when other parts follow the configuration
@@ -167,6 +169,10 @@ class Calls:
     write_shape: Address
     distance: Address
     keep_stage_derivatives: Address
+    open_account: Address
+    begin_step_account: Address
+    add_powers: Address
+    close_step_account: Address
     make_step: Address
     jumps_at: Address
     corner_after: Address
@@ -194,6 +200,7 @@ class Problem:
 
     gravity: Vector
     damping: float
+    least_energy: float  # what energies of a run are measured by at least [J]
     strands: Strands
     viscosity: Viscosity
     drives: Drives

@@ -24,3 +24,5 @@ CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND,
 """How a step ended; from `MAX_ITERATIONS` on it failed."""
 TOO_INACCURATE = 20
 """The error of a step exceeds its tolerance, however short it is."""
+GAINS_ENERGY = 21
+"""A step makes energy."""

@@ -112,6 +112,7 @@ class Method:
     bend: float
     carry: float
     nodes: Vector  # of stages, and of an end beyond them, as parts of a step, shape (n_point,)
+    works: Vector  # weights of powers at the start of a step and at its stages, as parts of it, shape (n_stage + 1,)
     estimate: float  # of the error of a step, see `engine.error_norm`; NaN without
 
 
@@ -160,6 +161,11 @@ class Work:
     rotation: Stack = ("body", 3, 3)  # scratch
     transduction: Vector = ("law",)  # at a stage
     strain: Vector = ("law",)  # of laws at a stage
+    start_strain: Vector = ("law",)  # and at the start of the step
+    start_force: Vector = ("law",)  # −∂V/∂η of laws there [J]
+    end_force: Vector = ("law",)  # and at its end
+    rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
+    account: Vector = (8,)  # of the energy of a step; see `engine.energy_account`
     touched: Flags = ("contact_point",)  # contact points that something pushed at the end of the last step
 
 
@@ -189,4 +195,5 @@ class StateArrays:
     fluid_force: Matrix
     strain_rate: Vector
     strain_acceleration: Vector
+    account: Vector
     transduction: Vector

@@ -1,0 +1,380 @@
+"""The energy account of a run: what each step supplied, lost, and gained from nothing.
+
+Over an accepted step, with the kinetic energy T and the energy V of the conservative forces,
+
+    numerical = Δ(T + V) − supplied + lost
+
+is what no force accounts for: negative where the integrator damps, positive where it makes energy. `lost` is the work
+of friction, drag, damping and viscosity, `supplied` that of loads, of a flow and of prescribed bodies: both are
+h Σ bᵢ Pᵢ with the powers Pᵢ at the ends of the stages, which the last evaluation of each has left, and the integrator's
+own weights b (`Method.works`). What a stimulus supplies is ∫ s·dη, s = −∂V/∂η, by the trapezoidal rule.
+
+A step is not accepted that makes energy: without driving, T + V less the work of constant loads can only fall. Where it
+has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
+again, shorter, unless its own part is less than `SMALL` of that. Driving ends this: a stimulus that changes, a
+prescribed body that moves, a flow, forces that follow.
+
+Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
+itself. Its change beyond the work that the motion has done on them by the powers at the stages is an error of the step
+beside that of positions (`engine.integrate`), over the largest energy of the run, and at most the energy that barriers
+have held in the step. It is of the same order, says what of an impact's energy a step makes or loses, and nothing where
+contacts rest. (An error relative to the present gap would not see a step that crosses the barrier forth and back: its
+gaps are large at both ends.)
+
+The account is part of the state, so that a run that is continued makes the same steps.
+"""
+
+from __future__ import annotations
+
+from ..contact.barrier import barrier_gradient
+from ..contact.near import gap_normal
+from ..forces.bend_twist import bend_by_strains
+from ..forces.inertia import second_moment_beyond
+from ..forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
+from ..jit import call, kernel, piece
+from ..jit.stack import stack_matrix, stack_vector
+from ..kinematics.copying import copy, copy_row
+from ..kinematics.rotating import inertia_tensor, solve_three
+from ..kinematics.vector import cross, dot, row
+from ..model.force_list import Kind, kinds
+from ..model.force_slots import NAMES, slot_of
+from ..model.records.outcome import CONTACT_ERROR, FRACTION
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Configuration, StageInputs, StateArrays, Work
+from ..scene.transduction import eigenstrain_of
+from .step import grow
+
+ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER = range(5)
+FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN = range(5, 11)
+"""Places in `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
+barriers take up [W]; T + V less all that was supplied, and the lowest that was since driving ended; the largest energy
+of the run; what steps have made or, below zero, lost; the potential of gravity at the start [J]; 1 if all these are of
+the state.
+"""
+LARGEST_GAIN = 9e-4
+SMALL = 1e-3
+ROUNDING = 1e-11
+"""Part of the energies that may be rounding."""
+SAME = 1e-6
+"""Part of the energies by which a state's may differ from those in its account."""
+SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, HIGHEST = range(8)
+"""Places in `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
+[W], whether anything drives it, and the highest energy in barriers at its ends and stages [J].
+"""
+CONSERVATIVE = tuple(NAMES.index(name) for name, kind in kinds().items() if kind is Kind.CONSERVATIVE)
+BARRIER, GRAVITY, INERTIA, ROD_BARRIER = map(slot_of, ("barrier", "gravity", "inertia", "rod barrier"))
+
+
+@kernel
+def _kinetic(p, state, at):
+    """Kinetic energy of nodes, edges, free bodies and the fluid [J]."""
+    strands, bodies, fluid, energy = p.strands, p.bodies, p.fluid, 0.0
+    for i in range(strands.node_mass.shape[0]):
+        v0, v1, v2 = row(state.velocity, i)
+        energy += 0.5 * strands.node_mass[i] * (v0 * v0 + v1 * v1 + v2 * v2)
+    for e in range(strands.spin_inertia.shape[0]):
+        energy += 0.5 * strands.spin_inertia[e] * state.spin[e] ** 2
+    tensor = stack_matrix(3, 3)
+    for f in range(bodies.mass.shape[0]):
+        b = bodies.body_of_free[f]
+        inertia_tensor(bodies.second_moment, f, state.body_rotation, b, tensor)
+        for c in range(3):
+            energy += 0.5 * bodies.mass[f] * state.body_velocity[b, c] ** 2
+            for k in range(3):
+                w = state.body_angular_velocity
+                energy += 0.5 * tensor[c, k] * w[b, c] * w[b, k]
+    if fluid.exists:
+        copy(state.velocity, fluid.node_velocity)
+        copy(state.spin, fluid.spin)
+        energy += call(fluid.fluid_momentum, (fluid, at))
+        for i in range(fluid.momentum.shape[0]):
+            for c in range(3):
+                energy += fluid.momentum[i, c] * fluid.velocity[c]
+    return energy
+
+
+@kernel
+def _in_barriers(sums):
+    return sums.energy[BARRIER] + sums.energy[ROD_BARRIER]
+
+
+@kernel
+def _energies(p, state, at):
+    """T + V, that in barriers, and what the largest energy of a run is measured by, with the potential of gravity from
+    its value at the start [J].
+    """
+    kinetic = _kinetic(p, state, at)
+    potential = size = rounding = 0.0
+    for k in CONSERVATIVE:
+        energy = p.sums.energy[k]
+        potential += energy
+        rounding += abs(energy)
+        size += abs(energy - state.account[GRAVITY_AT_START]) if k == GRAVITY else energy
+    barriers = _in_barriers(p.sums)
+    measure = kinetic + size + ROUNDING / LARGEST_GAIN * rounding + p.least_energy
+    return kinetic + potential, barriers, measure
+
+
+@piece(int, Problem, StateArrays, Configuration)
+def open_account(p, state, at):
+    """Begin with a state whose potential has been evaluated at `at`, unless the account is its own."""
+    account = state.account
+    energy, _, scale = _energies(p, state, at)
+    if account[OPEN] == 1.0 and abs(account[ENERGY] - energy) <= SAME * scale:
+        return READY
+    account[:] = 0.0
+    account[GRAVITY_AT_START] = p.sums.energy[GRAVITY]
+    account[ENERGY], account[IN_BARRIERS], account[LARGEST] = _energies(p, state, at)
+    account[OPEN] = 1.0
+    return READY
+
+
+@kernel
+def _write_forces_of_laws(p, at, stage, force_out):
+    """Write −∂V/∂η of each law [J] at a configuration, with the rest strains of the stage."""
+    strands, drives, off_axis = p.strands, p.drives, p.off_axis
+    force_out[:] = 0.0
+    for k in range(drives.driven_edge.shape[0]):
+        e, weight = drives.driven_edge[k], drives.driven_weight[k]
+        strain = at.length[e] / strands.rest_length[e] - 1.0 - stage.rest_edge[e]
+        force_out[drives.driven_law[k]] += weight * strands.axial_stiffness[e] * strain * strands.rest_length[e]
+    bends = drives.driven_joint.shape[0] > 0 and off_axis.exists
+    if bends:
+        bend_by_strains(off_axis, strands, at, stage.rest_joint)
+    for k in range(drives.driven_joint.shape[0]):
+        j = drives.driven_joint[k]
+        a, b = strands.joint_a[j], strands.joint_b[j]
+        t, u = row(at.tangent, a), row(at.tangent, b)
+        bend = (dot(u, row(at.director1, a)) - dot(t, row(at.director1, b))) / (1.0 + dot(t, u))
+        bend -= off_axis.rest[j, 0] if bends else stage.rest_joint[j, 0]
+        moment = drives.driven_joint_weight[k] * strands.joint_stiffness[j, 0] * bend
+        force_out[drives.driven_joint_law[k]] += moment
+    return READY
+
+
+@piece(int, Problem, StateArrays, Work, float, Configuration)
+def begin_step_account(p, state, work, weight, start):
+    """Begin with a step from a state, at the configuration `start`; `weight` is that of the powers there [s]."""
+    drives, work_done = p.drives, work.account
+    work_done[SUPPLIED], work_done[LOST] = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
+    work_done[TAKEN_UP] = weight * state.account[POWER_BARRIER]
+    work_done[DRIVEN], work_done[HIGHEST] = 0.0, state.account[IN_BARRIERS]
+    for i in range(work.start_strain.shape[0]):
+        law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
+        work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
+    if work.start_strain.shape[0] > 0:
+        grow(drives, work.start_strain, work.stage.rest_edge, work.stage.rest_joint)
+        _write_forces_of_laws(p, start, work.stage, work.start_force)
+    return READY
+
+
+@kernel
+def _turning_power(gradient, b, rates):
+    """∂Φ/∂(X, φ)·(V, ω)"""
+    power = 0.0
+    for c in range(6):
+        power += gradient[b, c] * rates[b, c]
+    return power
+
+
+@kernel
+def _power_of_prescribed(p, at, rates):
+    """What prescribed bodies supply [W]: forces and moments that they take, ∂Φ/∂(X, φ), times their velocities."""
+    sums, constrained, power = p.sums, p.constrained, 0.0
+    for i in range(p.bodies.prescribed.shape[0]):
+        b = p.bodies.prescribed[i]
+        power += _turning_power(sums.contact, b, rates)
+    for k in range(constrained.node.shape[0]):
+        if constrained.free[k] >= 0:
+            continue
+        b = constrained.body[k]
+        r, g = row(at.arm, k), row(sums.attached, k)
+        w = rates[b, 3], rates[b, 4], rates[b, 5]
+        power += dot(g, (rates[b, 0], rates[b, 1], rates[b, 2])) + dot(g, cross(w, r))
+    for k in range(constrained.clamp_edge_free.shape[0]):
+        if constrained.clamp_edge_free[k] >= 0:
+            continue
+        b, e = constrained.clamp_edge_body[k], p.strands.edge_count + k
+        t, w = row(at.tangent, e), (rates[b, 3], rates[b, 4], rates[b, 5])
+        power += dot(row(sums.edge, e), cross(w, t)) + sums.edge[e, 3] * dot(w, t)
+    return power
+
+
+@kernel
+def _write_rates(bodies, inputs, n, at, point, rates):
+    """Write (V, ω) of bodies at the end of stage n; the world, which is the last, rests."""
+    tensor = stack_matrix(3, 3)
+    for b in range(inputs.rates.shape[1]):
+        f = bodies.free_index[b]
+        if f < 0:
+            copy_row(inputs.rates[n], b, rates, b)
+            continue
+        inertia_tensor(bodies.second_moment, f, at.body_rotation, f, tensor)
+        momentum = point.angular_momentum
+        spin = solve_three(tensor, momentum[f, 0], momentum[f, 1], momentum[f, 2])
+        for c in range(3):
+            rates[b, c], rates[b, 3 + c] = point.body_velocity[f, c], spin[c]
+
+
+@kernel
+def _add_velocity(rates, b, x, at, sign, velocity_out):
+    """Add ± V + ω × (x − X) of a body."""
+    w = rates[b, 3], rates[b, 4], rates[b, 5]
+    turned = cross(w, (x[0] - at.pose_position[b, 0], x[1] - at.pose_position[b, 1], x[2] - at.pose_position[b, 2]))
+    for c in range(3):
+        velocity_out[c] += sign * (rates[b, c] + turned[c])
+
+
+@kernel
+def _power_of_barriers(p, at, point, rates):
+    """What barriers take up at the velocities of a stage's end [W]: ∂V/∂d times the rates of gaps."""
+    surfaces, rods, sums, power = p.surfaces, p.rod_contact, p.sums, 0.0
+    velocity = stack_vector(3)
+    if surfaces.exists:
+        scratch = sums.arm_rate.shape[0] - 1
+        for k in range(surfaces.near_count[0]):
+            if surfaces.near_gap[k] >= surfaces.d_hat:
+                continue
+            i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
+            x = row(at.contact_point, i)
+            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, x[0], x[1], x[2])
+            if not 0.0 < d < surfaces.d_hat:
+                continue
+            body, node = surfaces.contact_point_body[i], node_of(surfaces, i)
+            velocity[0] = velocity[1] = velocity[2] = 0.0
+            if body >= 0:
+                _add_velocity(rates, body, x, at, 1.0, velocity)
+            else:
+                for c in range(3):
+                    velocity[c] = point.velocity[node, c]
+                if has_arm(surfaces, i):
+                    write_material_rate(surfaces, p.strands, at, i, scratch, sums.arm_rate)
+                    add_step_of_arm(
+                        surfaces, p.strands, node, scratch, sums.arm_rate, point.velocity, point.spin, velocity
+                    )
+            _add_velocity(rates, surfaces.body[s], x, at, -1.0, velocity)
+            slope = surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
+            power += slope * (velocity[0] * n0 + velocity[1] * n1 + velocity[2] * n2)
+    if rods.exists:
+        contacts = rods.contacts
+        for c in range(contacts.count[0]):
+            i, j = contacts.node[c, 0], contacts.node[c, 1]
+            scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]
+            rate = 0.0
+            for m in range(3):
+                v = point.velocity
+                moved = contacts.weight[c, 0] * v[i, m] + contacts.weight[c, 1] * v[i + 1, m]
+                moved += contacts.weight[c, 2] * v[j, m] + contacts.weight[c, 3] * v[j + 1, m]
+                rate += contacts.normal[c, m] * moved
+            if contacts.gap[c] > 0.0:
+                power += scale * barrier_gradient(contacts.gap[c], rods.d_hat) * rate
+    return power
+
+
+@kernel
+def _moves(prescribed, rates):
+    for i in range(prescribed.shape[0]):
+        for c in range(6):
+            if rates[prescribed[i], c] != 0.0:
+                return True
+    return False
+
+
+@piece(int, Problem, Work, StageInputs, int, float, Configuration)
+def add_powers(p, work, inputs, n, weight, at):
+    """Add what is supplied and lost at the end of stage n, at `at` and in `Work.end`, times `weight` [s], to the
+    account of a step.
+    """
+    sums, flow, done = p.sums, p.flow, work.account
+    supplied = lost = 0.0
+    for k in range(sums.supplied.shape[0]):
+        supplied += sums.supplied[k]
+        lost += sums.lost[k]
+    _write_rates(p.bodies, inputs, n, at, work.end, work.rates)
+    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if p.has_contact else 0.0
+    done[TAKEN_UP] += weight * done[TAKING_UP]
+    done[HIGHEST] = max(done[HIGHEST], _in_barriers(sums))
+    driven = p.followers.exists or p.moments.exists
+    if flow.exists:
+        driven |= flow.velocity[0] != 0.0 or flow.velocity[1] != 0.0 or flow.velocity[2] != 0.0
+    if _moves(p.bodies.prescribed, work.rates):
+        driven = True
+        supplied += _power_of_prescribed(p, at, work.rates)
+    done[SUPPLYING], done[LOSING] = supplied, lost
+    done[SUPPLIED] += weight * supplied
+    done[LOST] += weight * lost
+    if driven:
+        done[DRIVEN] = 1.0
+    return READY
+
+
+@kernel
+def _inertial(p, stage, at):
+    """The potential of inertia at a configuration [J]; see `forces.inertia`."""
+    strands, bodies, energy = p.strands, p.bodies, 0.0
+    for i in range(strands.node_mass.shape[0]):
+        x, y, z = row(at.departure, i)
+        energy += strands.node_mass[i] * (x * x + y * y + z * z)
+    for e in range(strands.spin_inertia.shape[0]):
+        energy += strands.spin_inertia[e] * (at.total_angle[e] - stage.predicted_angle[e]) ** 2
+    s, n, a = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
+    for f in range(bodies.mass.shape[0]):
+        turned = at.body_departure_quaternion
+        second_moment_beyond(bodies.second_moment, f, stage.predicted_body_rotation, turned, s, n, a)
+        for i in range(3):
+            energy += bodies.mass[f] * at.body_departure[f, i] ** 2
+            for j in range(3):
+                energy += n[i, j] * a[j, i]
+    return 0.5 * energy / (stage.lengths[0] * stage.lengths[1])
+
+
+@kernel
+def _after_last_correction(p, stage, at):
+    """What V has more at the minimum, `at`, than where it was evaluated, before Newton's last correction δ [J].
+
+    With the gradient g there, Hδ = −g: the potential falls by −(1 − α/2) α g·δ if the part α of δ was gone, and what
+    inertia does not have of that, V has, or forces of friction do.
+    """
+    system, sums, part, slope = p.system, p.sums, p.outcome.figures[FRACTION], 0.0
+    for j in range(system.step.shape[0]):
+        slope += sums.gradient[j] * system.step[j]
+    for f in range(p.bodies.mass.shape[0]):
+        for c in range(6):
+            slope += sums.body[f, c] * system.body_step[f, c]
+    return (1.0 - 0.5 * part) * part * slope + sums.energy[INERTIA] - _inertial(p, stage, at)
+
+
+@piece(bool, Problem, StateArrays, Work, bool, Configuration)
+def close_step_account(p, state, work, beyond, end):
+    """Take the account of a step into that of a state, which is its end, at `end`; whether it makes too much energy."""
+    account, done = state.account, work.account
+    changed = False
+    for i in range(work.start_strain.shape[0]):
+        changed |= work.strain[i] != work.start_strain[i]
+    if changed:
+        _write_forces_of_laws(p, end, work.stage, work.end_force)
+        for i in range(work.start_strain.shape[0]):
+            mean = 0.5 * (work.start_force[i] + work.end_force[i])
+            done[SUPPLIED] -= mean * (work.strain[i] - work.start_strain[i])
+    p.outcome.figures[CONTACT_ERROR] = 0.0
+    if account[OPEN] == 0.0:
+        call(p.calls.open_account, (p, state, end))
+        return False
+    energy, barriers, scale = _energies(p, state, end)
+    missed = min(abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP]), max(done[HIGHEST], barriers))
+    if not beyond:
+        energy += _after_last_correction(p, work.stage, end)
+    gain = energy - account[ENERGY] - done[SUPPLIED]
+    account[ENERGY], account[IN_BARRIERS] = energy, barriers
+    account[POWER_SUPPLIED], account[POWER_LOST] = done[SUPPLYING], done[LOSING]
+    account[POWER_BARRIER] = done[TAKING_UP]
+    account[NUMERICAL] += gain + done[LOST]
+    account[FREE] += gain
+    account[LARGEST] = max(account[LARGEST], scale)
+    p.outcome.figures[CONTACT_ERROR] = missed
+    if changed or done[DRIVEN] != 0.0:
+        account[LOWEST] = account[FREE]
+    account[LOWEST] = min(account[LOWEST], account[FREE])
+    allowed = LARGEST_GAIN * account[LARGEST]
+    return account[FREE] - account[LOWEST] > allowed and gain > SMALL * allowed

@@ -1,0 +1,113 @@
+"""The account that every step keeps of energy; impacts are cases of `bilayer validate`."""
+
+import numpy as np
+import pytest
+from budgets import driven
+from sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.engine.energy_account import ENERGY, FREE, LARGEST, LOWEST, NUMERICAL
+from bilayer_core.validate.impacts import thrown
+from bilayer_core.validate.motion import let_go
+
+METHODS = ["implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"]
+
+
+def falling_strip(speed=12.0, **solver):
+    """A strip that falls flat onto the ground."""
+    strip = rod([layer()], length=0.05, stations=11, start=(0, 0, 2e-3))
+    solver = {"model": "laminate", "dimension": 2, **solver}
+    simulator = Simulator(load_scene(scene([strip], solver=solver, obstacles=[GROUND], contact=contact(2e-4))))
+    let_go(simulator, np.tile([0.0, 0.0, -speed], (simulator.model.node_count, 1)))
+    return simulator
+
+
+@pytest.mark.parametrize("dt", [1e-4, 1e-5])
+@pytest.mark.parametrize("integrator", METHODS[:4])
+def test_a_strip_that_falls_never_rebounds_with_more_than_it_had(integrator, dt):
+    simulator = falling_strip(integrator=integrator, dt=dt)
+    start = largest = sum(simulator.energy().values())
+    while simulator.time < 1e-3:
+        simulator.step()
+        largest = max(largest, sum(simulator.energy().values()))
+    assert largest < 1.001 * start
+
+
+@pytest.mark.parametrize("integrator", METHODS[:4])
+def test_numerical_energy_is_that_of_the_energy_budget(integrator):
+    arm = rod([layer("bottom"), layer("top")], length=0.06, stations=11, clamp_start="wall")
+    solver = {"integrator": integrator, "dt": 5e-4, "newton_tolerance": 1e-10}
+    hanging = scene([arm], solver=solver, bodies=[fixed()], gravity=[0, 0, -9.81])
+    simulator = Simulator(load_scene(hanging), budget=True)
+    simulator.run(0.2)
+    budget, summary = simulator.budget(), simulator.summary()
+    assert summary["numerical_energy"] == pytest.approx(-budget["lost"]["numerical"], rel=2e-3)
+    assert summary["largest_energy"] >= budget["stored"]["kinetic"] + budget["stored"]["bending"]
+
+
+@pytest.mark.parametrize("model", ["two_rod", "laminate"])
+@pytest.mark.parametrize("integrator", ["sdirk2", "tr_bdf2"])
+def test_works_of_all_that_drives_and_damps_are_in_the_account(model, integrator):
+    """Everything at once: account and budget take works in two ways."""
+    content = everything()
+    content["stimuli"]["humidity"]["schedule"] = {"type": "ramp", "start": 0, "end": 0.02, "from": 0, "to": 0.1}
+    simulator = Simulator(load_scene(content), dt=1e-4, integrator=integrator, model=model, budget=True)
+    simulator.run(0.02)
+    budget = simulator.budget()
+    works = sum(abs(work) for rows in ("supplied", "lost") for work in budget[rows].values())
+    assert abs(simulator.energy_account[NUMERICAL] + budget["lost"]["numerical"]) < 1e-2 * works
+
+
+def test_what_a_stimulus_supplies_is_in_the_account():
+    simulator = Simulator(load_scene(driven(gain=0.1)), dt=2.5e-4, integrator="tr_bdf2", budget=True)
+    simulator.run(0.05)
+    budget, account = simulator.budget(), simulator.energy_account
+    assert abs(budget["supplied"]["stimulus"]) > 1e-6
+    assert -account[NUMERICAL] == pytest.approx(
+        budget["lost"]["numerical"], abs=0.01 * abs(budget["supplied"]["stimulus"])
+    )
+
+
+def test_a_run_that_is_continued_from_a_saved_state_has_the_same_account():
+    content = thrown(1e9, 2)
+    whole = Simulator(load_scene(content), tolerance=1e-4)
+    whole.run(1.05e-3)
+    saved = whole.save_state()
+    rest = Simulator(load_scene(content), tolerance=1e-4)
+    rest.load_state(saved)
+    for simulator in (whole, rest):
+        simulator.run(5e-4)
+    assert np.array_equal(whole.save_state(), rest.save_state(), equal_nan=True)
+
+
+def test_velocities_that_are_changed_begin_a_new_account():
+    simulator = falling_strip(speed=0.0, integrator="sdirk2", dt=1e-4)
+    simulator.run(1e-3)
+    let_go(simulator, np.tile([0.0, 0.0, 1.0], (simulator.model.node_count, 1)))
+    account = simulator.energy_account
+    assert account[ENERGY] == pytest.approx(0.5 * simulator.model.node_mass.sum(), rel=1e-9)
+    assert account[FREE] == account[LOWEST] == 0.0 < account[LARGEST]
+    simulator.run(1e-3)
+    assert simulator.statistics.gaining == 0
+
+
+def test_the_summary_says_what_steps_lost_and_warns_where_that_is_much():
+    arm = rod([layer("bottom"), layer("top")], length=0.06, stations=11, clamp_start="wall")
+    soft = {"gel": {**GEL, "youngs_modulus": 1e6}}
+    hanging = scene([arm], bodies=[fixed()], gravity=[0, 0, -9.81], materials=soft)
+    fine, coarse = (Simulator(load_scene(hanging), dt=5e-3, integrator=name) for name in ("sdirk2", "implicit_euler"))
+    for simulator in (fine, coarse):
+        simulator.run(0.3)
+    assert not fine.summary()["warnings"]
+    (warning,) = coarse.summary()["warnings"]
+    assert warning.startswith("numerical energy -") and "(at most 10 %)" in warning
+    assert coarse.summary()["numerical_energy"] < -0.1 * coarse.summary()["largest_energy"]
+
+
+def test_contact_at_rest_has_no_error_of_its_own():
+    """Steps of a strip that lies on the ground grow to their longest."""
+    strip = rod([layer()], length=0.05, stations=11, start=(0, 0, 1.49e-3))
+    content = scene([strip], obstacles=[GROUND], contact=contact(), gravity=[0, 0, -9.81], solver={"dimension": 2})
+    simulator = Simulator(load_scene(content), tolerance=1e-4, integrator="sdirk2")
+    simulator.run(2.0)
+    assert simulator.statistics.steps < 400
