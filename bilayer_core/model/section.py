@@ -13,6 +13,7 @@ import numpy as np
 from ..scene.config import Coupling, Material
 from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod
+from .torsion_section import bond_torsion, rectangle_torsion
 
 Array = np.ndarray
 
@@ -28,9 +29,9 @@ class Section:
     bending_stiffness : tuple of Array
         EI1 = E w h³/12 (curvature through the thickness) and EI2 = E h w³/12 (across the width) [N m²].
     twisting_stiffness : Array
-        GJ = G w h³/3 (1 − 0.63 h/w) for h ≤ w, and with h and w exchanged otherwise [N m²].
-    shear_thickness : Array
-        G h, what the section contributes to the bond's shear [N/m].
+        GJ of the layer by itself (see `torsion_section`) [N m²].
+    shear_modulus : Array
+        G [Pa].
     mass : Array
         ρ w h per length [kg/m].
     spin_inertia : Array
@@ -42,7 +43,7 @@ class Section:
     axial_stiffness: Array
     bending_stiffness: tuple[Array, Array]
     twisting_stiffness: Array
-    shear_thickness: Array
+    shear_modulus: Array
     mass: Array
     spin_inertia: Array
     width: Array
@@ -77,12 +78,11 @@ def rectangle(material: Material, width: Array, thickness: Array, stiffness: Arr
     e = stiffness * material.youngs_modulus
     g = e / (2.0 * (1.0 + material.poisson_ratio))
     area = width * thickness
-    small, large = np.minimum(width, thickness), np.maximum(width, thickness)
     return Section(
         axial_stiffness=e * area,
         bending_stiffness=(e * width * thickness**3 / 12.0, e * thickness * width**3 / 12.0),
-        twisting_stiffness=g * large * small**3 / 3.0 * (1.0 - 0.63 * small / large),
-        shear_thickness=g * thickness,
+        twisting_stiffness=rectangle_torsion(g, width, thickness),
+        shear_modulus=g,
         mass=material.density * area,
         spin_inertia=material.density * area * (width**2 + thickness**2) / 12.0,
         width=width,
@@ -112,17 +112,19 @@ def bond(bottom: Section, top: Section, multiples: Coupling, torsion: str) -> Bo
     """Bond of two sections whose centrelines are c = (h₁ + h₂)/2 apart.
 
     k_T = 10 EA_r/c², k_b = 10 EA_r, k_τ = 10 min(GJ)/c² with the default multiples, EA_r = EA₁EA₂/(EA₁ + EA₂): the
-    error of the penalty is
-    below 0.04 %, and curvature gradients do not lock. For ``torsion: laminate`` k_φ = 4 w G₁h₁G₂h₂/(G₁h₁ + G₂h₂): in
-    a strip of twist τ
-    the centrelines tilt by c τ, and ½ k_φ c² τ² is the missing part of GJ_lam = ΣGJ + k_φ c².
+    error of the penalty is below 0.04 %, and curvature gradients do not lock. For ``torsion: laminate``
+    k_φ = (GJ_lam − ΣGJ)/c² (`torsion_section`): in a strip of twist τ the centrelines tilt by c τ, and ½ k_φ c² τ² is
+    what the layers by themselves lack of the bonded section.
     """
     distance2 = 0.25 * (bottom.thickness + top.thickness) ** 2
     reduced = bottom.axial_stiffness * top.axial_stiffness / (bottom.axial_stiffness + top.axial_stiffness)
-    shear = bottom.shear_thickness * top.shear_thickness / (bottom.shear_thickness + top.shear_thickness)
+    tilt = np.zeros_like(distance2)
+    if torsion == "laminate":
+        moduli, thickness = ([getattr(s, key) for s in (bottom, top)] for key in ("shear_modulus", "thickness"))
+        tilt = bond_torsion(np.array(moduli), bottom.width, np.array(thickness)) / distance2
     return Bond(
         translation=multiples.translation * reduced / distance2,
         bending=multiples.bending * reduced,
-        tilt=4.0 * bottom.width * shear * (torsion == "laminate"),
+        tilt=tilt,
         twist=multiples.twist * np.minimum(bottom.twisting_stiffness, top.twisting_stiffness) / distance2,
     )

@@ -75,9 +75,9 @@ def bending_figure(path: Path) -> None:
 def helix_figure(path: Path) -> None:
     """Fig. 4: ribbons of a turn and a half as computed, and helices of least energy."""
     figure, axes = figure_of(2, 3, (9.0, 6.4), projection="3d")
-    for row, torsion in zip(axes, helix.TILT, strict=True):
+    for row, torsion in zip(axes, helix.TORSIONS, strict=True):
         for axis, natural in zip(row, helix.NATURAL, strict=True):
-            radius, pitch = bonded_helix(*natural, helix.TILT[torsion])
+            radius, pitch = bonded_helix(*natural, torsion)
             length = TURNS * math.hypot(2.0 * math.pi * radius, pitch)
             points, across = helix.equilibrium(torsion, *natural, TURN_STATIONS, length)
             axes_of_helix, origin = _axis(points)

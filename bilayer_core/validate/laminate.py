@@ -89,7 +89,7 @@ def _helix_case(kind: str, natural: tuple[float, float], index: int) -> list[Cas
         Case(name, "shares of stiffness, small strain", 1e-3, against(lambda: linear_helix(kind, *natural)), "mm"),
     ]
     if kind == "laminate":
-        name, answer = f"{name}/large strain", lambda: bonded_helix(*natural, helix.TILT[kind])
+        name, answer = f"{name}/large strain", lambda: bonded_helix(*natural, kind)
         cases.append(Case(name, "least energy per length of two bonded rods", 0.01, against(answer), "mm"))
     return cases
 
@@ -136,7 +136,7 @@ CASES = [
     ),
     *(
         case
-        for kind in helix.TILT
+        for kind in helix.TORSIONS
         for natural in helix.NATURAL
         for index in (0, 1)
         for case in _helix_case(kind, natural, index)

@@ -28,23 +28,62 @@ def timoshenko_as_printed(m: float, n: float) -> float:
     return timoshenko(n, m)
 
 
+def bending_of_layers(moduli: tuple[float, float], thickness: tuple[float, float], width: float) -> float:
+    """Σ EA z² of two layers about their common neutral axis [N m²]; bottom, then top."""
+    areas = [e * width * h for e, h in zip(moduli, thickness, strict=True)]
+    return areas[0] * areas[1] / (areas[0] + areas[1]) * (0.5 * sum(thickness)) ** 2
+
+
 def bonded_bending_stiffness(moduli: tuple[float, float], thickness: tuple[float, float], width: float) -> float:
     """EI of a bonded bilayer about its neutral axis [N m²]; bottom, then top."""
-    areas = [e * width * h for e, h in zip(moduli, thickness, strict=True)]
     own = sum(e * width * h**3 / 12.0 for e, h in zip(moduli, thickness, strict=True))
-    arm = 0.5 * sum(thickness)
-    return own + areas[0] * areas[1] / (areas[0] + areas[1]) * arm**2
+    return own + bending_of_layers(moduli, thickness, width)
 
 
+def clamped_twist(torque: float, stiffness: float, warping: float, length: float) -> float:
+    """Angle [rad] between the ends of a rod neither of which may warp: GJ τ − EC_w τ″ = T, τ = 0 there (Vlasov)."""
+    decay = math.sqrt(warping / stiffness)
+    return torque / stiffness * (length - 2.0 * decay * math.tanh(0.5 * length / decay))
+
+
+@cache
 def strip_torsion(shear_moduli: tuple[float, float], thickness: tuple[float, float], width: float) -> dict[str, float]:
-    """GJ [N m²] of two layers in a bonded strip: `layers`, the sum of their own (Roark's rectangle, h ≤ w), and
-    `laminate`, with Bredt's circulation through the bond.
+    """GJ [N m²] of two layers in a bonded strip: `layers`, the sum of their own, and `laminate`, of the section."""
+    own = sum(_warped_section((g,), (h,), width) for g, h in zip(shear_moduli, thickness, strict=True))
+    return {"layers": own, "laminate": _warped_section(shear_moduli, thickness, width)}
+
+
+def _warped_section(shear_moduli: tuple[float, ...], thickness: tuple[float, ...], width: float) -> float:
+    """GJ of layers bonded to each other [N m²], from St-Venant's warping ω = y z + Σ g_n(z) sin k_n y, k_n = (2n+1)π/w.
+
+    g″ = k² g in each layer; G (g′ + b) with 2 y = Σ b_n sin k_n y is zero at the faces; it and g are continuous between
+    layers: a linear system for each n with g = p e^{−k(z − z₀)} + q e^{−k(z₁ − z)} from z₀ to z₁. The sides are free by
+    cos(k_n w/2) = 0, and GJ = ∫∫ G [y (2 y + ∂g/∂z) − z ∂g/∂y].
     """
-    own = sum(g * width * h**3 / 3.0 * (1.0 - 0.63 * h / width) for g, h in zip(shear_moduli, thickness, strict=True))
-    shears = [g * h for g, h in zip(shear_moduli, thickness, strict=True)]
-    arm = 0.5 * sum(thickness)
-    bond = 4.0 * width * shears[0] * shears[1] / sum(shears) * arm**2
-    return {"layers": own, "laminate": own + bond}
+    count, faces, n = len(thickness), np.concatenate([[0.0], np.cumsum(thickness)]), np.arange(8000)
+    k, sign = (2 * n + 1) * math.pi / width, (-1.0) ** n
+    far = np.exp(-np.multiply.outer(k, thickness))
+    system, known = np.zeros((len(n), 2 * count, 2 * count)), np.zeros((len(n), 2 * count))
+    for layer, g in enumerate(shear_moduli):
+        p, q = 2 * layer, 2 * layer + 1
+        low, high = p, q if layer == count - 1 else q + 1  # rows of the stress at its two faces
+        for row, side, of_p, of_q in ((low, -1.0, 1.0, far[:, layer]), (high, 1.0, far[:, layer], 1.0)):
+            system[:, row, p] -= side * g * k * of_p
+            system[:, row, q] += side * g * k * of_q
+            known[:, row] -= side * g * 8.0 * sign / (width * k**2)
+        if layer > 0:
+            system[:, low - 1, p], system[:, low - 1, q] = -1.0, -far[:, layer]
+        if layer < count - 1:
+            system[:, low + 1, p], system[:, low + 1, q] = far[:, layer], 1.0
+    amplitudes = np.linalg.solve(system, known[..., None])[..., 0]
+    total = 0.0
+    for layer, (g, h, low, high) in enumerate(zip(shear_moduli, thickness, faces[:-1], faces[1:], strict=True)):
+        p, q, f = amplitudes[:, 2 * layer], amplitudes[:, 2 * layer + 1], far[:, layer]
+        rise = (q - p) * (1.0 - f)  # ∫ g′
+        moment = (p * (low - high * f) + q * (high - low * f) - rise / k) / k  # ∫ z g
+        # ∫ y sin ky = 2 (−1)ⁿ/k², ∫ k cos ky = 2 (−1)ⁿ
+        total += g * (h * width**3 / 6.0 + np.sum(2.0 * sign * (rise / k**2 - moment)))
+    return float(total)
 
 
 def heavy_cantilever(weight: float, bending: float, axial: float, length: float) -> np.ndarray:
@@ -79,33 +118,55 @@ def heavy_cantilever(weight: float, bending: float, axial: float, length: float)
 
 
 @cache
-def bonded_helix(curvature: float, twist: float, tilt: float) -> tuple[float, float]:
+def bonded_helix(
+    curvature: float,
+    twist: float,
+    torsion: str,
+    moduli: tuple[float, float] = (1e8, 1e8),
+    thickness: tuple[float, float] = (1e-3, 1e-3),
+) -> tuple[float, float]:
     """Radius and pitch [m] of a layer with natural curvature χ̄ and twist τ̄ [1/m] bonded on a straight one.
 
-    Least energy per length over strain ε, curvature χ and twist τ of the curve midway between the layers, whose own
-    centrelines stand z = ±c/2 over it: a = 1 + ε − z χ, b = z τ, ε_l = √(a² + b²) − 1, ψ = atan2(b, a),
+    Least energy per length over strain ε, curvature χ and twist τ of the layers' common neutral axis, over which their
+    own centrelines stand at z: a = 1 + ε − z χ, b = z τ, ε_l = √(a² + b²) − 1, ψ = atan2(b, a),
     χ_l = χ cos ψ − τ sin ψ, τ_l = τ cos ψ + χ sin ψ,
 
         Σ ½ EA ε_l² + ½ EI (χ_l − χ̄_l)² + ½ GJ (τ_l − τ̄_l)²  +  ½ k_φ (ψ₁ − ψ₂)²
 
-    Two layers of 10 mm × 1 mm, E 100 MPa, ν 0.5; `tilt` is k_φ [N].
+    k_φ = (GJ_lam − ΣGJ)/c² for the `torsion` of the section, c the distance of the centrelines; 0 for `layers`.
+
+    Parameters
+    ----------
+    moduli, thickness : tuple of float
+        E [Pa] and h [m], bottom, then top; ν = 0.5, 10 mm wide.
     """
-    e, g, w, h = 1e8, 1e8 / 3.0, 0.01, 1e-3
-    area, bending = e * w * h, e * w * h**3 / 12.0
-    torsion = g * w * h**3 / 3.0 * (1.0 - 0.63 * h / w)
+    width, shears = 0.01, tuple(e / 3.0 for e in moduli)
+    arm = 0.5 * sum(thickness)
+    gj = [_warped_section((g,), (h,), width) for g, h in zip(shears, thickness, strict=True)]
+    whole = strip_torsion(shears, thickness, width)
+    tilt = (whole[torsion] - whole["layers"]) / arm**2
+    axis = 0.5 * sum(e * h * y for e, h, y in zip(moduli, thickness, (-thickness[0], thickness[1]), strict=True))
+    axis /= sum(e * h for e, h in zip(moduli, thickness, strict=True))
+    layers = [  # z, EA, EI, GJ and natural shape
+        (0.5 * h * sign - axis, e * width * h, e * width * h**3 / 12.0, torsional, *natural)
+        for sign, e, h, torsional, natural in zip(
+            (-1.0, 1.0), moduli, thickness, gj, ((0.0, 0.0), (curvature, twist)), strict=True
+        )
+    ]
+    scale = gj[1] * twist**2
 
     def energy(unknowns):
         strain, chi, tau = unknowns[0] * 1e-3, unknowns[1] * abs(curvature), unknowns[2] * abs(twist)
         total, angles = 0.0, []
-        for z, own_curvature, own_twist in ((0.5 * h, curvature, twist), (-0.5 * h, 0.0, 0.0)):
+        for z, area, bending, torsional, own_curvature, own_twist in layers:
             a, b = 1.0 + strain - z * chi, z * tau
             angle = math.atan2(b, a)
             bent = chi * math.cos(angle) - tau * math.sin(angle) - own_curvature
             twisted = tau * math.cos(angle) + chi * math.sin(angle) - own_twist
-            total += 0.5 * (area * (math.hypot(a, b) - 1.0) ** 2 + bending * bent**2 + torsion * twisted**2)
+            total += 0.5 * (area * (math.hypot(a, b) - 1.0) ** 2 + bending * bent**2 + torsional * twisted**2)
             angles.append(angle)
         total += 0.5 * tilt * (angles[0] - angles[1]) ** 2
-        return total / (torsion * twist**2)
+        return total / scale
 
     best = minimize(
         energy,

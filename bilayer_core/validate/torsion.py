@@ -1,4 +1,6 @@
-"""What a bonded strip must not do: lock in twist, zigzag between its layers, lock where its curvature varies."""
+"""Torsion of bonded strips, and what they must not do: lock in twist, zigzag between their layers, lock where curvature
+varies.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,7 @@ from ..scene.loader import load_scene
 from ..simulation.simulator import Simulator
 from .case import Case
 from .parts import GEL, fixed, layer, rod, scene
-from .references import strip_torsion, timoshenko
+from .references import bending_of_layers, clamped_twist, strip_torsion, timoshenko
 
 LENGTH, THICKNESS = 0.1, (1e-3, 1.5e-3)
 SHEAR_MODULUS = GEL["youngs_modulus"] / (2.0 * (1.0 + GEL["poisson_ratio"]))
@@ -18,33 +20,65 @@ MESHES = (20, 40, 80)
 TWIST = 0.5
 """[rad/m]: so small that the stretch of the outer fibres does not count."""
 WAVE = 0.05
+SECTIONS = {
+    "0.7 + 1.6 mm, E 1 : 0.3": ((1.0, 0.3), (0.7e-3, 1.6e-3), 0.01),
+    "0.3 + 2 mm, E 1 : 0.001": ((1.0, 1e-3), (0.3e-3, 2e-3), 0.005),
+    "2 + 3 mm, 1 mm wide": ((1.0, 2.0), (2e-3, 3e-3), 0.001),
+}
+"""Multiples of the modulus and thicknesses [m], bottom and top, and width [m]."""
 
 
-def twisted_strip(torsion: str, edges: int, moment: float) -> dict:
+def twisted_strip(
+    torsion: str,
+    edges: int,
+    moment: float,
+    multiples: tuple[float, float] = (1.0, 1.0),
+    thickness: tuple[float, float] = THICKNESS,
+    width: float = 0.01,
+) -> dict:
     """A strip between a wall and a body on which a moment about the strip's axis acts [N m]."""
-    layers = [layer("bottom", thickness=THICKNESS[0]), layer("top", thickness=THICKNESS[1])]
+    layers = [
+        layer(name, thickness=h, stiffness=of_modulus)
+        for name, h, of_modulus in zip(("bottom", "top"), thickness, multiples, strict=True)
+    ]
     crank = {
         "name": "crank",
         "position": [LENGTH, 0, 0],
         "motion": {"type": "free", "mass": 1e-3, "inertia": [1e-7, 1e-7, 1e-7]},
     }
     return scene(
-        [rod(layers, LENGTH, edges + 1, torsion=torsion, clamp_start="wall", clamp_end="crank")],
+        [rod(layers, LENGTH, edges + 1, width=width, torsion=torsion, clamp_start="wall", clamp_end="crank")],
         bodies=[fixed(), crank],
         loads=[{"name": "torque", "body": "crank", "moment": [moment, 0, 0]}],
     )
 
 
-def torsional_stiffness(torsion: str, edges: int, model: str = "two_rod") -> tuple[float, float]:
+def torsional_stiffness(
+    torsion: str, edges: int, model: str = "two_rod", section: str | None = None
+) -> tuple[float, float]:
     """Moment over twist per length in the middle half of the strip, away from what clamps do, and GJ [N m²]."""
-    declared = strip_torsion((SHEAR_MODULUS, SHEAR_MODULUS), THICKNESS, 0.01)[torsion]
+    multiples, thickness, width = SECTIONS[section] if section else ((1.0, 1.0), THICKNESS, 0.01)
+    moduli = tuple(SHEAR_MODULUS * multiple for multiple in multiples)
+    declared = strip_torsion(moduli, thickness, width)[torsion]
     moment = TWIST * declared
-    simulator = Simulator(load_scene(twisted_strip(torsion, edges, moment)), model=model)
+    simulator = Simulator(load_scene(twisted_strip(torsion, edges, moment, multiples, thickness, width)), model=model)
     simulator.solve_static()
     directors = simulator.frame().directors[:edges]
     first, last = edges // 4, 3 * edges // 4
     angle = np.arctan2(-directors[[first, last], 1], directors[[first, last], 2])  # of m1, about +x from +z
     return moment / ((angle[1] - angle[0]) * edges / LENGTH / (last - first)), declared
+
+
+def clamped_ends(torsion: str, edges: int) -> tuple[float, float]:
+    """Angle of the crank of two rods whose centrelines may not tilt at their ends, and Vlasov's [rad]."""
+    stiffness = strip_torsion((SHEAR_MODULUS, SHEAR_MODULUS), THICKNESS, 0.01)[torsion]
+    moment = TWIST * stiffness
+    simulator = Simulator(load_scene(twisted_strip(torsion, edges, moment)), model="two_rod")
+    simulator.solve_static()
+    w, x = simulator.frame().body_quaternions[1, [3, 0]]
+    # EI₂ of a layer is w²/12 times its EA: both centrelines, z over their axis, bend across the width by z τ′
+    bending = bending_of_layers((GEL["youngs_modulus"],) * 2, THICKNESS, 0.01)
+    return 2.0 * np.arctan2(x, w), clamped_twist(moment, stiffness, 0.01**2 / 12.0 * bending, LENGTH)
 
 
 @cache
@@ -111,6 +145,28 @@ CASES = [
         )
         for torsion in ("layers", "laminate")
         for edges in MESHES
+    ),
+    *(
+        Case(
+            f"torsion/{section}/{model}",
+            "torque over twist rate: GJ of the layered section",
+            0.002,
+            lambda section=section, model=model: torsional_stiffness("laminate", 40, model, section),
+            "N m²",
+        )
+        for section in SECTIONS
+        for model in ("two_rod", "laminate")
+    ),
+    *(
+        Case(
+            f"torsion/clamped ends {torsion}/{edges} edges",
+            "angle by which two rods turn that hold back a part of their warping, Vlasov's equation",
+            limit,
+            lambda torsion=torsion, edges=edges: clamped_ends(torsion, edges),
+            "rad",
+        )
+        for torsion in ("layers", "laminate")
+        for edges, limit in ((40, 0.01), (160, 0.002))
     ),
     *(
         Case(

@@ -3,7 +3,7 @@
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.validate.helix import TILT, screw
+from bilayer_core.validate.helix import screw
 from bilayer_core.validate.references import bonded_helix
 
 
@@ -15,4 +15,4 @@ def test_the_helix_comes_to_rest_with_the_radius_and_pitch_of_least_energy():
     bottom, top = simulator.positions.reshape(2, -1, 3)
     middle = len(bottom) // 2
     found = screw(0.5 * (bottom + top)[middle - 8 : middle + 9 : 5])
-    assert found == pytest.approx(bonded_helix(100.0, 50.0, TILT["layers"]), rel=5e-3)
+    assert found == pytest.approx(bonded_helix(100.0, 50.0, "layers"), rel=5e-3)

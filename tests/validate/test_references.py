@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from oracles.strip_elasticity import section_torsion
 from scipy.optimize import brentq
 from scipy.special import jv
 
@@ -24,18 +25,20 @@ def test_timoshenkos_curvature_is_that_of_two_bonded_beams_in_balance(m, n, expe
 
 
 @pytest.mark.parametrize(
-    ("tilt", "curvature", "twist", "radius", "pitch"),
+    ("torsion", "curvature", "twist", "radius", "pitch"),
     [
-        (0.0, 40.0, 20.0, 40.9411, 506.054),
-        (0.0, 100.0, 50.0, 16.9434, 204.392),
-        (0.0, -80.0, 30.0, 29.5733, 287.481),
-        (2000 / 3, 40.0, 20.0, 163.059, 486.670),
-        (2000 / 3, 100.0, 50.0, 65.2266, 194.071),
-        (2000 / 3, -80.0, 30.0, 88.7018, 199.648),
+        ("layers", 40.0, 20.0, 40.9412, 506.054),
+        ("layers", 100.0, 50.0, 16.9434, 204.392),
+        ("layers", -80.0, 30.0, 29.5732, 287.481),
+        ("layers", 15.0, 150.0, 0.493473, 84.1206),
+        ("laminate", 40.0, 20.0, 155.410, 522.066),
+        ("laminate", 100.0, 50.0, 62.1965, 208.108),
+        ("laminate", -80.0, 30.0, 86.0590, 218.373),
+        ("laminate", 15.0, 150.0, 5.17140, 309.351),
     ],
 )
-def test_helices_of_least_energy_are_those_found_with_other_minimisers(tilt, curvature, twist, radius, pitch):
-    found = 1e3 * np.array(references.bonded_helix(curvature, twist, tilt))
+def test_helices_of_least_energy_are_those_found_with_other_minimisers(torsion, curvature, twist, radius, pitch):
+    found = 1e3 * np.array(references.bonded_helix(curvature, twist, torsion))
     assert found == pytest.approx([radius, pitch], rel=1e-5)
 
 
@@ -65,8 +68,14 @@ def test_the_bonded_stiffness_of_equal_layers_is_that_of_one_beam():
 
 
 def test_a_bonded_strip_is_four_times_as_stiff_in_torsion_as_its_thin_layers():
-    stiffness = references.strip_torsion((1e6, 1e6), (1e-4, 1e-4), 1.0)
-    assert stiffness["laminate"] / stiffness["layers"] == pytest.approx(4.0, rel=1e-3)
+    stiffness = references.strip_torsion((1e6, 1e6), (1e-3, 1e-3), 1.0)
+    assert stiffness["laminate"] / stiffness["layers"] == pytest.approx(4.0 * (1 - 0.00126) / (1 - 0.00063), rel=1e-5)
+
+
+def test_torsion_of_a_strip_in_layers_lies_between_bounds_of_finite_elements():
+    for moduli, thickness, width in (((1.0, 0.3), (0.7, 1.6), 10.0), ((1.0, 200.0), (2.0, 3.0), 1.0)):
+        low, high = section_torsion(moduli, thickness, width, 20)
+        assert low < references.strip_torsion(moduli, thickness, width)["laminate"] < high < 1.001 * low
 
 
 def test_the_resting_gap_is_known():
