@@ -35,10 +35,12 @@ def check(scene: str, overrides: tuple[str, ...], as_json: bool) -> None:
 
 def _report(simulator) -> dict[str, Any]:
     """What will be computed, as the content of ``check --json``."""
+    from bilayer_core.model.twisted import twist_figures
     from bilayer_core.model.validity import validity_figures
     from bilayer_core.record.topics import Rate, output_topics
 
     scene, plan, model = simulator.scene, simulator.plan, simulator.model
+    figures = (*validity_figures(scene), *twist_figures(scene, plan.model, plan.dimension))
     rates = {Rate.OUTPUT: scene.output.rate, Rate.DISPLAY: min(scene.output.rate, scene.output.marker_rate)}
     return {
         "scene": scene.name,
@@ -65,7 +67,7 @@ def _report(simulator) -> dict[str, Any]:
             {"topic": topic.full_name(), "type": topic.type, "rate": rates[topic.rate]}
             for topic in output_topics(simulator.description)
         ],
-        "within_validity": [str(figure) for figure in validity_figures(scene) if not figure.outside],
+        "within_validity": [str(figure) for figure in figures if not figure.outside],
         "warnings": list(plan.warnings),
     }
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from ..errors import SceneError
 from ..scene.config import Coupling, SceneConfig
-from ..scene.profile import extremes
 from ..scene.rod import Rod
 from .colliders import contact_pairs, is_ribbon
 from .force_list import planned
 from .laminate import uneven_faces
 from .planarity import find_plane, require_plane
 from .rod_pairs import RodPair, passing_warnings, rod_pairs
+from .twisted import HELIX, helix_error, twist_figures
 from .validity import validity_warnings
 
 MODELS = ("two_rod", "laminate")
@@ -84,18 +85,20 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         reasons,
         planned(scene, chosen_model, chosen_dimension),
         _contact_pairs(scene, chosen_dimension),
-        (*validity_warnings(scene), *passing_warnings(scene), *_warnings_of(chosen_model, scene)),
+        (
+            *validity_warnings(scene),
+            *passing_warnings(scene),
+            *_warnings_of(scene, chosen_model, chosen_dimension),
+        ),
     )
 
 
-def _warnings_of(model: str, scene: SceneConfig) -> tuple[str, ...]:
-    """Warnings of one model alone."""
-    in_contact = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
-    return (
-        tuple(str(figure) for rod in sorted(in_contact) for figure in uneven_faces(scene.rods[rod], scene))
-        if model == "laminate"
-        else ()
-    )
+def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[str]:
+    """Warnings that depend on the model."""
+    yield from (str(figure) for figure in twist_figures(scene, model, dimension) if figure.outside)
+    if model == "laminate":
+        in_contact = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
+        yield from (str(figure) for rod in sorted(in_contact) for figure in uneven_faces(scene.rods[rod], scene))
 
 
 def simplest_model(scene: SceneConfig) -> tuple[str, str]:
@@ -105,10 +108,10 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     for rod in scene.rods:
         if len(_retardation_times(rod, scene)) > 1:
             return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"
-        twisted = any(extremes(layer.natural_twist) != (0.0, 0.0) for layer in rod.layers)
-        if len(rod.layers) == 2 and rod.torsion == "layers" and twisted:
+        error = helix_error(scene, rod)
+        if error > HELIX:
             return "two_rod", (
-                f"rods.{rod.name}: natural twist with `torsion: layers`, whose large strains a curve misses by 2 to 6 %"
+                f"rods.{rod.name}: natural twist winds it to a helix, which one curve would miss by {100 * error:.2g} %"
             )
     return "laminate", "one curve carries both layers: half the unknowns, no stiff bond"
 

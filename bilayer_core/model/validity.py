@@ -142,6 +142,8 @@ class EdgeFigures:
         Of the whole section [m], shape (n_edge,).
     eigenstrain : ndarray
         Largest magnitude in each layer over its channels' ranges, shape (n_layer, n_edge).
+    eigenstrain_range : ndarray
+        Least and largest, likewise, shape (2, n_layer, n_edge).
     """
 
     def __init__(self, scene: SceneConfig, rod: Rod):
@@ -149,13 +151,16 @@ class EdgeFigures:
         self.width, self._layers = outline(rod, stations)
         self._moduli = np.zeros_like(self._layers)
         self.eigenstrain = np.zeros_like(self._layers)
+        self.eigenstrain_range = np.zeros((2, *self._layers.shape))
         for index, layer in enumerate(rod.layers):
             stiffness = values_at(layer.stiffness, rod.edge_length * stations)
             self._moduli[index] = stiffness * scene.materials[layer.material].youngs_modulus
             for law in layer.eigenstrain:
                 channel = scene.stimuli[law.stimulus]
-                strain = np.abs(law.strain_at(np.array([channel.minimum, channel.maximum]))).max()
-                self.eigenstrain[index, rod.driven_edges(layer, law)] += strain
+                strains = np.sort(law.strain_at(np.array([channel.minimum, channel.maximum])))
+                edges = rod.driven_edges(layer, law)
+                self.eigenstrain[index, edges] += np.abs(strains).max()
+                self.eigenstrain_range[:, index, edges] += strains[:, None]
         self.thickness = self._layers.sum(axis=0)
         along = rod.edge_length * stations
         self._path = rod.path.curvature_at(along)

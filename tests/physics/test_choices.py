@@ -25,7 +25,7 @@ def test_bundled_scenes_run_by_the_simplest_model_in_the_plane_where_they_stay_i
     assert simulator.plan.integrator == "sdirk2"
     assert (simulator.tolerance, simulator.dt) == (1e-4, 1e-3)
     reasons = simulator.reasons
-    assert "two_rod" not in chosen or "torsion: layers" in reasons["model"]
+    assert "two_rod" not in chosen or "which one curve would miss by 5.8 %" in reasons["model"]
     assert ("plane y = 0" in reasons["dimension"]) and ("all stays" in reasons["dimension"]) == (chosen[1] == 2)
     assert "order" in reasons["integrator"] and "neither `dt` nor `tolerance`" in reasons["stepping"]
 

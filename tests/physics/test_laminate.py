@@ -219,10 +219,6 @@ def test_the_simplest_model_is_the_laminate_unless_a_scene_needs_two_rods():
     assert simplest_model(load_scene(plain))[0] == "laminate"
     soft = simplest_model(load_scene(plain | {"coupling": {"bending": 3.0}}))
     assert soft[0] == "two_rod" and "coupling" in soft[1]
-    twisted = scene([rod([layer("bottom"), layer("top", natural_twist=3.0)], torsion="layers")])
-    assert simplest_model(load_scene(twisted))[0] == "two_rod"
-    twisted["rods"][0]["torsion"] = "laminate"
-    assert simplest_model(load_scene(twisted))[0] == "laminate"
 
 
 def test_the_plan_says_that_there_is_no_bond():

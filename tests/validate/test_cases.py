@@ -85,7 +85,7 @@ def test_a_limit_is_kept_by_equality():
 def test_cases_are_chosen_by_a_part_of_their_name_or_with_wildcards():
     assert {case.family for case in select("HELIX")} == {"helix", "laminate"}
     assert [case.name for case in select("beams/euler's load")] == ["beams/Euler's load"]
-    assert len(select("helix/*/radius")) == 6
+    assert len(select("helix/la*/radius")) == 6
     assert not any(case.long for case in select(quick=True))
     assert len(select()) == len(CASES)
     with pytest.raises(InputError, match="no case matches 'wrong'.*bending, helix"):
