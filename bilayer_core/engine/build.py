@@ -69,10 +69,10 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             else Viscosity.absent()
         ),
         drives=Drives(**{name: getattr(model, name) for name in Drives.names}),
-        off_axis=OffAxis.absent() if len(model.pair_top) else _off_axis(model, sizes),
+        off_axis=OffAxis.absent() if len(model.pair_joint) else _off_axis(model, sizes),
         bonds=(
-            Bonds(top=model.pair_top, bottom=model.pair_bottom, stiffness=model.pair_stiffness, rest=model.pair_rest)
-            if len(model.pair_top)
+            Bonds(**{name: getattr(model, f"pair_{name}") for name in Bonds.names})
+            if len(model.pair_joint)
             else Bonds.absent()
         ),
         bodies=Bodies(

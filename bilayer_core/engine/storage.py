@@ -27,7 +27,7 @@ FIRST = ("node", "edge", "pair", "body", "contact_point", "contact")
 """Parts of `Sums.gradients`."""
 SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
 """Parts of `Sums.hessians`, with those of the dimension."""
-IN_SPACE = ("top_hessian", "bottom_hessian")
+IN_SPACE = ("first_hessian", "second_hessian")
 IN_PLANE = ("polar_hessian", "cross_hessian", "pair_hessian", "mixed_hessian")
 
 
@@ -85,8 +85,7 @@ class Storage:
         sums["selected"] = np.ones(sizes["force"], dtype=bool)
         of_dimension = {name: parts["own", name] for name in names}
         if model.plane is None:
-            bonds = sums["cross_hessian"][model.bend_count :]
-            return sums, {"space": Space(**of_dimension, bond_hessian=bonds), "plane": Plane.absent()}
+            return sums, {"space": Space(**of_dimension), "plane": Plane.absent()}
         return sums, {"space": Space.absent(), "plane": plane_of(model, self._sizes, of_dimension)}
 
     @property

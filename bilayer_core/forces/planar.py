@@ -16,8 +16,9 @@ take them to edge vectors: the gradient is N t + T m; `engine.linear.planar_asse
 Bending, with c = 1 + a·b:   κ = 2 σ a×b/c,   ∂κ/∂Δ = 2 σ/c,   ∂²κ/∂Δ² = κ/c. Off the neutral axis κ̄ depends on
 lengths, ∂κ̄/∂l_i = s_i (`forces.bend_twist`): ½ k r² with r = κ − κ̄ has all second derivatives k ∂r ∂r + k r ∂²κ.
 
-Bond, translation: m̄₁ = ½ σ (n_t + n_b), m̄₃ = ½ (t_t + t_b), and for either edge ∂m̄₁/∂φ = −½ σ t, ∂m̄₃/∂φ = ½ n,
-∂²m̄₁/∂φ² = −½ σ n, ∂²m̄₃/∂φ² = −½ t. Its rotation is bending between the paired edges, with another stiffness.
+Bond, translation: m̄₁ = σ (w_a n_a + w_b n_b), m̄₃ = w_a t_a + w_b t_b, and for an edge of weight w ∂m̄₁/∂φ = −w σ t,
+∂m̄₃/∂φ = w n, ∂²m̄₁/∂φ² = −w σ n, ∂²m̄₃/∂φ² = −w t. Its rotation is bending between the paired edges, with another
+stiffness.
 
 The direction of a clamp ("wall") has a length of 1, and its angle is that of its body.
 """
@@ -130,50 +131,58 @@ def planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian):
 
 
 @kernel
-def planar_bond(bonds, plane, strands, at, sums, with_hessian):
-    """Add ½ k_T l (s₁² + s₃²) of every pair of edges and return it [J]."""
-    axes, position, edge_node, first_joint = strands.axes, at.position, strands.edge_node, strands.bend_count
-    edge_top, edge_bottom, stiffness, rest_offset = bonds.top, bonds.bottom, bonds.stiffness, bonds.rest
+def planar_bond(ties, bends, bonds, plane, strands, at, sums, with_hessian):
+    """Add ½ (k₁ s₁² + k₃ s₃²) of vectors between layers: translation of paired edges if it `ties` layers, bending of
+    ends if it `bends`. Returns both [J].
+    """
+    axes, position, joint, node, weight = strands.axes, at.position, bonds.joint, bonds.node, bonds.weight
+    stiffness, rest_offset = bonds.stiffness, bonds.rest
     side, frame, gradient, hessian = plane.side, plane.frame, plane.polar_gradient, plane.polar_hessian
     cross_hessian, pair_gradient, pair_hessian = plane.cross_hessian, sums.pair, plane.pair_hessian
     mixed_hessian = plane.mixed_hessian
-    energy = 0.0
-    for k in range(edge_top.shape[0]):
-        t, b = edge_top[k], edge_bottom[k]
-        i, j = edge_node[t], edge_node[b]
-        x0 = 0.5 * (position[i, 0] + position[i + 1, 0] - position[j, 0] - position[j + 1, 0])
-        x1 = 0.5 * (position[i, 1] + position[i + 1, 1] - position[j, 1] - position[j + 1, 1])
-        x2 = 0.5 * (position[i, 2] + position[i + 1, 2] - position[j, 2] - position[j + 1, 2])
+    paired = strands.joint_a.shape[0] - strands.bend_count
+    bond = bending = 0.0
+    for k in range(0 if ties else paired, joint.shape[0] if bends else paired):
+        x = joint[k]
+        a, b = strands.joint_a[x], strands.joint_b[x]
+        i0, i1, j0, j1 = node[k, 0], node[k, 1], node[k, 2], node[k, 3]
+        x0 = 0.5 * (position[i0, 0] + position[i1, 0] - position[j0, 0] - position[j1, 0])
+        x1 = 0.5 * (position[i0, 1] + position[i1, 1] - position[j0, 1] - position[j1, 1])
+        x2 = 0.5 * (position[i0, 2] + position[i1, 2] - position[j0, 2] - position[j1, 2])
         vp = axes[0, 0] * x0 + axes[0, 1] * x1 + axes[0, 2] * x2
         vq = axes[1, 0] * x0 + axes[1, 1] * x1 + axes[1, 2] * x2
-        sigma, c = side[t], stiffness[k]
-        tp, tq, bp, bq = frame[t, 0], frame[t, 1], frame[b, 0], frame[b, 1]
-        mean3p, mean3q = 0.5 * (tp + bp), 0.5 * (tq + bq)
+        sigma, c1, c3, wa, wb = side[a], stiffness[k, 0], stiffness[k, 2], weight[k, 0], weight[k, 1]
+        ap, aq, bp, bq = frame[a, 0], frame[a, 1], frame[b, 0], frame[b, 1]
+        mean3p, mean3q = wa * ap + wb * bp, wa * aq + wb * bq
         mean1p, mean1q = -sigma * mean3q, sigma * mean3p
         s1 = vp * mean1p + vq * mean1q - rest_offset[k, 0]
         s3 = vp * mean3p + vq * mean3q - rest_offset[k, 2]
-        energy += 0.5 * c * (s1 * s1 + s3 * s3)
-        gp, gq = c * (s1 * mean1p + s3 * mean3p), c * (s1 * mean1q + s3 * mean3q)
+        f1, f3 = c1 * s1, c3 * s3
+        if k < paired:
+            bond += 0.5 * (f1 * s1 + f3 * s3)
+        else:
+            bending += 0.5 * f3 * s3
+        gp, gq = f1 * mean1p + f3 * mean3p, f1 * mean1q + f3 * mean3q
         for d in range(3):
             pair_gradient[k, d] += gp * axes[0, d] + gq * axes[1, d]
-        along_t, along_b = 0.5 * (vp * tp + vq * tq), 0.5 * (vp * bp + vq * bq)
-        across_t, across_b = 0.5 * (vq * tp - vp * tq), 0.5 * (vq * bp - vp * bq)
-        t1, t3, b1, b3 = -sigma * along_t, across_t, -sigma * along_b, across_b  # ∂s/∂φ
-        gradient[t, 1] += c * (s1 * t1 + s3 * t3)
-        gradient[b, 1] += c * (s1 * b1 + s3 * b3)
+        along_a, along_b = wa * (vp * ap + vq * aq), wb * (vp * bp + vq * bq)
+        across_a, across_b = wa * (vq * ap - vp * aq), wb * (vq * bp - vp * bq)
+        a1, a3, b1, b3 = -sigma * along_a, across_a, -sigma * along_b, across_b  # ∂s/∂φ
+        gradient[a, 1] += f1 * a1 + f3 * a3
+        gradient[b, 1] += f1 * b1 + f3 * b3
         if with_hessian:
-            hessian[t, 2] += c * (t1 * t1 + t3 * t3 - s1 * sigma * across_t - s3 * along_t)
-            hessian[b, 2] += c * (b1 * b1 + b3 * b3 - s1 * sigma * across_b - s3 * along_b)
-            cross_hessian[first_joint + k, 3] += c * (t1 * b1 + t3 * b3)
-            pair_hessian[k, 0] += c * (mean1p * mean1p + mean3p * mean3p)
-            pair_hessian[k, 1] += c * (mean1p * mean1q + mean3p * mean3q)
-            pair_hessian[k, 2] += c * (mean1q * mean1q + mean3q * mean3q)
-            h1, h3 = -0.5 * sigma * s1, 0.5 * s3
-            mixed_hessian[k, 0] += c * (t1 * mean1p + t3 * mean3p + h1 * tp - h3 * tq)
-            mixed_hessian[k, 1] += c * (t1 * mean1q + t3 * mean3q + h1 * tq + h3 * tp)
-            mixed_hessian[k, 2] += c * (b1 * mean1p + b3 * mean3p + h1 * bp - h3 * bq)
-            mixed_hessian[k, 3] += c * (b1 * mean1q + b3 * mean3q + h1 * bq + h3 * bp)
-    return energy
+            hessian[a, 2] += c1 * a1 * a1 + c3 * a3 * a3 - f1 * sigma * across_a - f3 * along_a
+            hessian[b, 2] += c1 * b1 * b1 + c3 * b3 * b3 - f1 * sigma * across_b - f3 * along_b
+            cross_hessian[x, 3] += c1 * a1 * b1 + c3 * a3 * b3
+            pair_hessian[k, 0] += c1 * mean1p * mean1p + c3 * mean3p * mean3p
+            pair_hessian[k, 1] += c1 * mean1p * mean1q + c3 * mean3p * mean3q
+            pair_hessian[k, 2] += c1 * mean1q * mean1q + c3 * mean3q * mean3q
+            h1a, h3a, h1b, h3b = -wa * sigma * f1, wa * f3, -wb * sigma * f1, wb * f3
+            mixed_hessian[k, 0] += c1 * a1 * mean1p + c3 * a3 * mean3p + h1a * ap - h3a * aq
+            mixed_hessian[k, 1] += c1 * a1 * mean1q + c3 * a3 * mean3q + h1a * aq + h3a * ap
+            mixed_hessian[k, 2] += c1 * b1 * mean1p + c3 * b3 * mean3p + h1b * bp - h3b * bq
+            mixed_hessian[k, 3] += c1 * b1 * mean1q + c3 * b3 * mean3q + h1b * bq + h3b * bp
+    return bond, bending
 
 
 @piece(float, Plane, Problem, Configuration, Stage, bool)
@@ -194,8 +203,10 @@ def add_elasticity_in_plane(plane, p, at, stage, with_hessian):
     sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, strands, stage, at, with_hessian)
     if bends and off_axis.exists:
         planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian)
-    if ties:
-        sums.energy[BOND] = rotation + planar_bond(bonds, plane, strands, at, sums, with_hessian)
+    if bonds.exists:
+        translation, of_ends = planar_bond(ties, bends, bonds, plane, strands, at, sums, with_hessian)
+        sums.energy[BOND] = rotation + translation
+        sums.energy[BENDING] += of_ends
     for k in range(frame.shape[0]):  # N t + T m
         force, moment = gradient[k, 0], gradient[k, 1]
         gp, gq = force * frame[k, 0] + moment * frame[k, 2], force * frame[k, 1] + moment * frame[k, 3]

@@ -44,11 +44,14 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     bodies = build_bodies(scene, found, plane)
     contact_points, surfaces = build_contact(scene, found, bodies, plane is not None)
     clamp_edges = found.column("clamp_edge_tangent", width=3)
-    clamp_a = _resolve_clamp_edges(found.column("joint_a", np.int64), edge_count)
-    clamp_b = _resolve_clamp_edges(found.column("joint_b", np.int64), edge_count)
+    clamp_a = _resolve(found.column("joint_a", np.int64), edge_count)
+    clamp_b = _resolve(found.column("joint_b", np.int64), edge_count)
 
     def joined(name: str, dtype=float, width: int | None = None) -> np.ndarray:
         return np.concatenate([found.column(name, dtype, width), found.column(bond_joints + name, dtype, width)])
+
+    def pairs(name: str, dtype=float, width: int | None = None) -> np.ndarray:
+        return np.concatenate([found.column(kind + name, dtype, width) for kind in ("pair_", "end_")])
 
     attached = found.column("attached_node", np.int64)
     numbered = found.rods, found.node_count, edge_count, attached
@@ -121,10 +124,11 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         strain_coupling=found.column("strain_coupling", width=2),
         edge_time=found.column("edge_time"),
         joint_time=joined("joint_time", width=3),
-        pair_top=found.column("bond_joint_a", np.int64),
-        pair_bottom=found.column("bond_joint_b", np.int64),
-        pair_stiffness=found.column("pair_stiffness"),
-        pair_rest=found.column("pair_rest", width=3),
+        pair_joint=_resolve(pairs("joint", np.int64), len(clamp_a)),
+        pair_node=pairs("node", np.int64, 4),
+        pair_weight=pairs("weight", width=2),
+        pair_stiffness=pairs("stiffness", width=3),
+        pair_rest=pairs("rest", width=3),
     )
     refuse_penetration(arrays)
     refuse_meeting_rods(arrays)
@@ -151,9 +155,11 @@ def _joints_after(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int) -> 
     return joints
 
 
-def _resolve_clamp_edges(edges: np.ndarray, edge_count: int) -> np.ndarray:
-    """Edges of joints; clamp edges were entered as −1 − clamp edge because the number of edges was not known then."""
-    return np.where(edges < 0, edge_count - 1 - edges, edges)
+def _resolve(numbers: np.ndarray, count: int) -> np.ndarray:
+    """Edges or joints; those after the first `count`, clamp edges or bonds, were entered as −1 − their own number
+    because `count` was not known then.
+    """
+    return np.where(numbers < 0, count - 1 - numbers, numbers)
 
 
 def _joints_of_clamp_edges(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int, clamp_edges: int) -> np.ndarray:

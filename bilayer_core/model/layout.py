@@ -2,7 +2,8 @@
 
 Along each rod, station by station: positions of the layers present, then the angles of their edges that start there.
 Rods follow each other.
-Elements span three stations of one layer, or two stations of both, which bounds the half-bandwidth.
+Elements span three stations of one layer, and at most the middle one of the other with them, or two stations of both,
+which bounds the half-bandwidth.
 In a plane (`model.plane`) a node has two unknowns and an edge none.
 """
 

@@ -114,7 +114,8 @@ class Model(ReadOnlyArrays):
 
     Edges n_edge … n_edge + n_clamp_edge − 1 are *clamp edges*, the fixed directions of clamps. *Joints* are pairs of
     edges with a bending and twisting element: inner nodes and clamps first (`bend_count`), then the rotation bonds of
-    paired layers.
+    paired edges. *Pairs* are vectors between two layers: first those between paired edges, then those where a layer
+    ends (`forces.bond`).
     """
 
     scene: SceneConfig
@@ -186,10 +187,11 @@ class Model(ReadOnlyArrays):
     edge_time: Array  # retardation times of edges [s], shape (n_edge,)
     joint_time: Array  # and of κ₁ κ₂ ψ of joints [s], shape (n_joint, 3)
 
-    pair_top: Array  # paired edges, shape (n_pair,)
-    pair_bottom: Array
-    pair_stiffness: Array  # k_T l [N/m], shape (n_pair,)
-    pair_rest: Array  # offset of the midpoints along m1, m2, m3 [m], shape (n_pair, 3)
+    pair_joint: Array  # whose edges' frames a vector between layers is taken in, shape (n_pair,)
+    pair_node: Array  # it leads from the middle of the last two nodes to that of the first two, shape (n_pair, 4)
+    pair_weight: Array  # of the frames of the joint's two edges, shape (n_pair, 2)
+    pair_stiffness: Array  # along m1, m2, m3 [N/m], shape (n_pair, 3)
+    pair_rest: Array  # likewise [m]
 
     @property
     def strain_slope(self) -> Array:

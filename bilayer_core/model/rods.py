@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..kinematics.path import rest_strains
@@ -20,13 +22,12 @@ def add_bonded_rods(
     found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Turn, body_index: dict[str, int]
 ) -> None:
     """Add one copy of a rod: its strands, their drag, and the bond between them."""
-    spans = []
+    strands: list[_Bonded] = []
     for slot, layer in enumerate(rod.layers):
         first, last = rod.covered_stations(layer)
         at_nodes, at_edges = _sections(scene, rod, layer, first, last)
         side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
         shape = strand_shape(rod, side * at_nodes.thickness, first, last, turn)
-        spans.append((first, last, found.node_count, found.edge_count))
         strand = StrandArrays(
             name=f"{name}/{layer.name}",
             rod=name,
@@ -43,12 +44,34 @@ def add_bonded_rods(
         _add_eigenstrain(found, scene, rod, layer, strand)
         time = scene.materials[layer.material].retardation_time
         elements = _elements(rod, layer, at_nodes, at_edges, shape, time)
-        add_strand(found, scene, rod, strand, shape, elements, body_index)
-    found.rods.append(spans)
+        joints = add_strand(found, scene, rod, strand, shape, elements, body_index)
+        strands.append(_Bonded(first, strand.first_node, strand.first_edge, shape, elements, joints))
+    found.rods.append([strand.span for strand in strands])
     found.path_height.append(0.0)
-    add_fluid(found, scene.fluid, rod, spans)
-    if len(spans) == 2:
-        _add_bond(found, scene, rod, spans)
+    add_fluid(found, scene.fluid, rod, found.rods[-1])
+    if len(strands) == 2:
+        _add_bond(found, scene, rod, *strands)
+
+
+@dataclass(frozen=True)
+class _Bonded:
+    """A layer's strand: its first station, node and edge, and what `add_strand` was given and has returned."""
+
+    first: int
+    first_node: int
+    first_edge: int
+    shape: StrandShape
+    elements: StrandElements
+    joints: Array
+
+    @property
+    def last(self) -> int:
+        """Its last station."""
+        return self.first + len(self.joints) - 1
+
+    @property
+    def span(self) -> Span:
+        return self.first, self.last, self.first_node, self.first_edge
 
 
 def _sections(scene: SceneConfig, rod: Rod, layer: Layer, first: int, last: int) -> tuple[Section, Section]:
@@ -95,15 +118,14 @@ def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, layer: Laye
         found.add(driven_edge=edges, driven_law=np.full(len(edges), number), driven_weight=np.ones(len(edges)))
 
 
-def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, spans: list[Span]) -> None:
+def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, top: _Bonded) -> None:
     """Bonds of paired edges; the rest values are those of the initial shape."""
-    bottom, top = spans
-    first, last = max(bottom[0], top[0]), min(bottom[1], top[1])
+    first, last = max(bottom.first, top.first), min(bottom.last, top.last)
     (_, below), (_, above) = (_sections(scene, rod, layer, first, last) for layer in rod.layers)
     law = bond(below, above, scene.coupling, rod.torsion)
     position, tangent, m1 = (found.column(name, width=3) for name in ("position", "tangent", "director1"))
-    edges = [layer[3] + np.arange(first, last) - layer[0] for layer in (top, bottom)]
-    nodes = [layer[2] + np.arange(first, last) - layer[0] for layer in (top, bottom)]
+    edges = [layer.first_edge + np.arange(first, last) - layer.first for layer in (top, bottom)]
+    nodes = [layer.first_node + np.arange(first, last) - layer.first for layer in (top, bottom)]
     middles = [0.5 * (position[start] + position[start + 1]) for start in nodes]
     frames = [(tangent[edge], m1[edge]) for edge in edges]
     between = middles[0] - middles[1]
@@ -111,10 +133,11 @@ def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, spans: list[Span])
     across = 0.5 * (np.cross(*frames[0]) + np.cross(*frames[1]))
     length = found.column("rest_length")
     weight = 0.5 * (length[edges[0]] + length[edges[1]])
-    times = [scene.materials[layer.material].retardation_time for layer in rod.layers]
-    shear_time = (times[0] * above.shear_thickness + times[1] * below.shear_thickness) / (
-        below.shear_thickness + above.shear_thickness
-    )
+    times = [strand.elements.retardation_time for strand in (bottom, top)]
+    shear = [section.shear_modulus * section.thickness for section in (below, above)]
+    shear_time = (times[0] * shear[1] + times[1] * shear[0]) / (shear[0] + shear[1])
+    bonds = len(found.column("bond_joint_a")) + np.arange(last - first)
+    rest = np.stack([np.einsum("ij,ij->i", between, m) for m in (mean[0], across, mean[1])], axis=1)
     found.add(
         bond_joint_a=edges[0],
         bond_joint_b=edges[1],
@@ -122,6 +145,51 @@ def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, spans: list[Span])
         bond_joint_time=np.stack([0.0 * weight, shear_time, 0.0 * weight], axis=1),
         bond_joint_rest=rest_strains(*frames[0], *frames[1]),
         bond_joint_node=np.full(last - first, -1),
-        pair_stiffness=weight * law.translation,
-        pair_rest=np.stack([np.einsum("ij,ij->i", between, m) for m in (mean[0], across, mean[1])], axis=1),
+        pair_joint=-1 - bonds,
+        pair_node=np.stack([nodes[0], nodes[0] + 1, nodes[1], nodes[1] + 1], axis=1),
+        pair_weight=np.full((last - first, 2), 0.5),
+        pair_stiffness=np.repeat((weight * law.translation)[:, None], 3, axis=1),
+        pair_rest=rest,
+    )
+    for station, pair, side in ((first, 0, 1.0), (last, -1, -1.0)):
+        for slot in range(2):
+            _add_end(found, (top, bottom), slot, station, bonds[pair], rest[pair, 0], side)
+
+
+def _add_end(
+    found: Collected, pair: tuple[_Bonded, _Bonded], slot: int, station: int, bond: int, distance: float, side: float
+) -> None:
+    """Bending and twist of a layer in the half edges at a station where it or the other one ends (`forces.bond`).
+
+    Parameters
+    ----------
+    pair : tuple
+        Top and bottom layer, of which `slot` is meant.
+    bond : int
+        Of the paired edges there, which are `distance` [m] apart.
+    side : float
+        1 where the bonded part begins, −1 where it ends.
+    """
+    layer = pair[slot]
+    own, last_edge = station - layer.first, len(layer.joints) - 2
+    if 0 < own <= last_edge:
+        joint, edges, weight, natural = layer.joints[own], [own - 1, own], np.ones(2), np.zeros(3)
+    elif layer.joints[own] >= 0:
+        return  # clamped
+    else:
+        joint, edges, weight = -1 - bond, [min(own, last_edge)], np.eye(2)[slot]
+        natural = side * (layer.elements.joint_rest[own] - layer.shape.strains()[own])
+    tangent, m1 = layer.shape.tangents[edges], layer.shape.normals[edges]
+    top, bottom = (strand.first_node + station - strand.first for strand in pair)
+    position = found.column("position", width=3)
+    start = np.array(
+        [frame.sum(axis=0) @ (position[top] - position[bottom]) for frame in (m1, np.cross(tangent, m1), tangent)]
+    )
+    bend, _, twist = layer.elements.joint_stiffness[own] / distance**2
+    found.add(
+        end_joint=joint,
+        end_node=[[top, top, bottom, bottom]],
+        end_weight=weight[None],
+        end_stiffness=[[0.0, twist, bend]],
+        end_rest=[start + distance * np.array([0.0, -natural[2], natural[0]])],
     )

@@ -16,7 +16,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         len(model.fluid_mass) > 0,
     )
     edges_of_rods = model.edge_count
-    points, joints, pairs = model.contact_points, len(model.joint_a), len(model.pair_top)
+    points, joints, pairs = model.contact_points, len(model.joint_a), len(model.pair_joint)
     return {
         "node": model.node_count,
         "edge": model.edge_count,

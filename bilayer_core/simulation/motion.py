@@ -58,9 +58,9 @@ def compose(model: Model, node: Array, turn: Array, wall: Array, contact: Array)
     """A motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of all bodies."""
     i = model.edge_node
     edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), wall])
-    middle = 0.5 * (node[i] + node[i + 1])
+    top0, top1, bottom0, bottom1 = (node[of_pairs] for of_pairs in model.pair_node.T)
     body = contact[model.bodies.body_of_free]
-    return Motion(node, edge, middle[model.pair_top] - middle[model.pair_bottom], body, contact)
+    return Motion(node, edge, 0.5 * (top0 + top1 - bottom0 - bottom1), body, contact)
 
 
 def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:

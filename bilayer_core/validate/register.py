@@ -10,6 +10,7 @@ from . import (
     beams,
     bending,
     contacts,
+    ends,
     fluid,
     friction,
     helix,
@@ -27,6 +28,7 @@ from .case import Case, Result
 FAMILIES = (
     bending,
     helix,
+    ends,
     impacts,
     torsion,
     laminate,

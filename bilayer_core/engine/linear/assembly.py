@@ -1,8 +1,8 @@
 """From edge space to unknowns: gradient and band matrix.
 
-With e = x₁ − x₀ an edge vector and p = ½ (x_t0 + x_t1) − ½ (x_b0 + x_b1) the vector between paired edges, a
-derivative with respect to e or p is handed to the nodes with the factors −1, +1 and ±½. This is the only file that
-joins second derivatives in space to the numbers of unknowns.
+With e = x₁ − x₀ an edge vector and p = ½ (x_t0 + x_t1) − ½ (x_b0 + x_b1) the vector between paired edges, or
+x_t − x_b that of a section where a layer ends, a derivative with respect to e or p is handed to the nodes with the
+factors −1, +1 and ±½ or ±1. This is the only file that joins second derivatives in space to the numbers of unknowns.
 """
 
 from __future__ import annotations
@@ -23,14 +23,13 @@ def expand_gradient(bonds, strands, sums):
             of_nodes[i, c] -= sums.edge[k, c]
             of_nodes[i + 1, c] += sums.edge[k, c]
         gradient[strands.edge_unknown[k]] = sums.edge[k, 3]
-    for k in range(bonds.top.shape[0]):
-        i, j = edge_node[bonds.top[k]], edge_node[bonds.bottom[k]]
+    for k in range(bonds.joint.shape[0]):
         for c in range(3):
             half = 0.5 * sums.pair[k, c]
-            of_nodes[i, c] += half
-            of_nodes[i + 1, c] += half
-            of_nodes[j, c] -= half
-            of_nodes[j + 1, c] -= half
+            of_nodes[bonds.node[k, 0], c] += half
+            of_nodes[bonds.node[k, 1], c] += half
+            of_nodes[bonds.node[k, 2], c] -= half
+            of_nodes[bonds.node[k, 3], c] -= half
     for i in range(of_nodes.shape[0]):
         for c in range(3):
             gradient[strands.node_unknown[i] + c] = of_nodes[i, c]
@@ -44,7 +43,8 @@ def assemble_in_space(p, factor):
     _add_edges(strands, sums, factor, band)
     _add_bends(strands, sums.cross_hessian, band)
     if p.bonds.exists:
-        _add_bonds(p.bonds, p.space, strands, sums, band)
+        _add_bonds(p.space, strands, sums, band)
+        _add_ends(p.bonds, p.space, strands, sums, band)
     return READY
 
 
@@ -98,29 +98,29 @@ def _add_bends(strands, hessian, band):
                 band[d1 + m, d2 + n - d1 - m] += value
                 if n >= m:
                     band[d1 + m, n - m] -= value + hessian[k, n, m]
-            _add(band, tb, d0 + m, -hessian[k, m, 3])
-            _add(band, tb, d1 + m, hessian[k, m, 3])
-            _add(band, ta, d1 + m, -hessian[k, 3, m])
-            _add(band, ta, d2 + m, hessian[k, 3, m])
-        _add(band, tb, ta, hessian[k, 3, 3])
+            add(band, tb, d0 + m, -hessian[k, m, 3])
+            add(band, tb, d1 + m, hessian[k, m, 3])
+            add(band, ta, d1 + m, -hessian[k, 3, m])
+            add(band, ta, d2 + m, hessian[k, 3, m])
+        add(band, tb, ta, hessian[k, 3, 3])
 
 
 @kernel
-def _add(band, row, column, value):
+def add(band, row, column, value):
     """A[row, column] += value in either triangle."""
     band[min(row, column), abs(row - column)] += value
 
 
 @kernel
-def _add_bonds(bonds, space, strands, sums, band):
-    """Blocks of bonds.
+def _add_bonds(space, strands, sums, band):
+    """Blocks of bonds of paired edges.
 
     The unknowns of a bond are consecutive: x_b0, x_t0, θ_b, θ_t of one station and x_b1, x_t1 of the next
     (`model.layout`). Their local matrix is collected first, its lower triangle then added.
     """
     local, of_pairs, cross = stack_matrix(14, 14), sums.pair_hessian, sums.cross_hessian
-    top, bottom = space.top_hessian, space.bottom_hessian
-    for k in range(bonds.bottom.shape[0]):
+    top, bottom = space.first_hessian, space.second_hessian
+    for k in range(strands.joint_a.shape[0] - strands.bend_count):
         x = strands.bend_count + k
         for m in range(3):
             for n in range(3):
@@ -151,10 +151,50 @@ def _add_bonds(bonds, space, strands, sums, band):
         local[6, 6] = 0.0
         local[7, 6] = cross[x, 3, 3]
         local[7, 7] = 0.0
-        start = strands.row[strands.edge_node[bonds.bottom[k]]]
+        start = strands.row[strands.edge_node[strands.joint_b[x]]]
         for n in range(14):
             for m in range(n, 14):
                 band[start + n, m - n] += local[m, n]
+
+
+@kernel
+def add_twice(band, row, column, value):
+    """A[row, column] += value and A[column, row] += value."""
+    band[min(row, column), abs(row - column)] += value if row != column else 2.0 * value
+
+
+@kernel
+def _add_ends(bonds, space, strands, sums, band):
+    """Blocks of section vectors where a layer ends, x_t − x_b; `_add_bends` has those of two edges."""
+    of_pairs = sums.pair_hessian
+    for k in range(strands.joint_a.shape[0] - strands.bend_count, bonds.joint.shape[0]):
+        x = bonds.joint[k]
+        top, bottom = strands.row[bonds.node[k, 0]], strands.row[bonds.node[k, 2]]
+        for m in range(3):
+            for n in range(3):
+                value = of_pairs[k, m, n] if m <= n else of_pairs[k, n, m]
+                if m <= n:
+                    band[top + m, n - m] += value
+                    band[bottom + m, n - m] += value
+                add(band, top + m, bottom + n, -value)
+        _add_section_with_edge(strands, k, space.first_hessian, strands.joint_a[x], top, bottom, band)
+        _add_section_with_edge(strands, k, space.second_hessian, strands.joint_b[x], top, bottom, band)
+
+
+@kernel
+def _add_section_with_edge(strands, k, mixed, edge, top, bottom, band):
+    """Blocks of a section vector, by rows of its two nodes, and an edge."""
+    i, turn = strands.edge_node[edge], strands.edge_unknown[edge]
+    d0, d1 = strands.row[i], strands.row[i + 1]
+    for m in range(3):
+        for n in range(3):
+            value = mixed[k, m, n]
+            add_twice(band, top + m, d0 + n, -value)
+            add_twice(band, top + m, d1 + n, value)
+            add_twice(band, bottom + m, d0 + n, value)
+            add_twice(band, bottom + m, d1 + n, -value)
+        add(band, top + m, turn, mixed[k, m, 3])
+        add(band, bottom + m, turn, -mixed[k, m, 3])
 
 
 @kernel

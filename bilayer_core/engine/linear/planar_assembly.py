@@ -18,6 +18,7 @@ from ...kinematics.vector import dot, row
 from ...model.records.problem import Problem
 from ...model.records.status import READY
 from ...model.records.step import Configuration
+from .assembly import add, add_twice
 
 
 @piece(int, Problem, Configuration, float)
@@ -25,7 +26,8 @@ def assemble_in_plane(p, at, factor):
     """Write second derivatives in a plane, and `factor` times the masses, into a band of zeros."""
     _put_edges(p.plane, p.strands, at.length, p.sums.node_hessian, factor, p.system.band)
     if p.bonds.exists:
-        _add_bonds(p.plane, p.bonds, p.strands, p.system.band)
+        _add_bonds(p.plane, p.strands, p.system.band)
+        _add_ends(p.plane, p.bonds, p.strands, p.system.band)
     return READY
 
 
@@ -119,15 +121,16 @@ def _put_edges(plane, strands, length, node_hessian, factor, band):
 
 
 @kernel
-def _add_bonds(plane, bonds, strands, band):
-    """Add the blocks of bonds; the unknowns of a bond are consecutive: x_b0, x_t0 of one station and x_b1, x_t1 of the
+def _add_bonds(plane, strands, band):
+    """Add the blocks of paired edges; their unknowns are consecutive: x_b0, x_t0 of one station and x_b1, x_t1 of the
     next (`model.layout`).
     """
     frame, pair_hessian, mixed_hessian = plane.frame, plane.pair_hessian, plane.mixed_hessian
-    for k in range(bonds.bottom.shape[0]):
-        top, bottom = bonds.top[k], bonds.bottom[k]
+    for k in range(strands.joint_a.shape[0] - strands.bend_count):
+        x = strands.bend_count + k
+        top, bottom = strands.joint_a[x], strands.joint_b[x]
         start = strands.row[strands.edge_node[bottom]]
-        cross = plane.cross_hessian[strands.bend_count + k, 3]
+        cross = plane.cross_hessian[x, 3]
         for m in range(2):
             for n in range(2):
                 p = 0.25 * pair_hessian[k, m + n]
@@ -148,6 +151,32 @@ def _add_bonds(plane, bonds, strands, band):
                 band[column, r + 6] += -p - t_ - b - c  # t1 b0
                 band[column + 2, r + 4] += p - t + t_  # t1 t0
                 band[column + 4, r + 2] += -p - t_ + b + c  # t1 b1
+
+
+@kernel
+def _add_ends(plane, bonds, strands, band):
+    """Add the blocks of section vectors where a layer ends, x_t − x_b; those of two edges are in `_put_edges`."""
+    frame, pair_hessian, mixed_hessian = plane.frame, plane.pair_hessian, plane.mixed_hessian
+    for k in range(strands.joint_a.shape[0] - strands.bend_count, bonds.joint.shape[0]):
+        x = bonds.joint[k]
+        top, bottom = strands.row[bonds.node[k, 0]], strands.row[bonds.node[k, 2]]
+        for m in range(2):
+            for n in range(2):
+                value = pair_hessian[k, m + n]
+                if m <= n:
+                    band[top + m, n - m] += value
+                    band[bottom + m, n - m] += value
+                add(band, top + m, bottom + n, -value)
+        for side in range(2):
+            edge = strands.joint_a[x] if side == 0 else strands.joint_b[x]
+            d0, d1 = strands.row[strands.edge_node[edge]], strands.row[strands.edge_node[edge] + 1]
+            for m in range(2):
+                for n in range(2):
+                    value = mixed_hessian[k, 2 * side + m] * frame[edge, 2 + n]
+                    add_twice(band, top + m, d0 + n, -value)
+                    add_twice(band, top + m, d1 + n, value)
+                    add_twice(band, bottom + m, d0 + n, value)
+                    add_twice(band, bottom + m, d1 + n, -value)
 
 
 @piece(int, Problem)

@@ -66,9 +66,8 @@ class Drives:
 class Space:
     """What dimension 3 has: second derivatives of bonds. Absent in a plane."""
 
-    top_hessian: Stack = ("pair", 3, 4)
-    bottom_hessian: Stack = ("pair", 3, 4)
-    bond_hessian: Stack  # the part of cross_hessian that belongs to bonds
+    first_hessian: Stack = ("pair", 3, 4)  # of p and the first edge of its joint
+    second_hessian: Stack = ("pair", 3, 4)
 
 
 @record
@@ -97,11 +96,12 @@ class OffAxis:
 
 @record
 class Bonds:
-    """Paired edges of two layers."""
+    """Vectors between two layers, each in the frames of the two edges of a joint; see `forces.bond`."""
 
-    top: Indices
-    bottom: Indices
-    stiffness: Vector
+    joint: Indices  # that of `Strands` with number bend_count + k for paired edges k, then those of ends of layers
+    node: IndexTable
+    weight: Matrix
+    stiffness: Matrix
     rest: Matrix
 
 

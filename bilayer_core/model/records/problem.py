@@ -38,7 +38,7 @@ class Sums:
     lasting: Vector  # the part of it that stays as it is when other parts follow the configuration
     node: Matrix = ("node", 3)  # ∂/∂x of nodes [N]
     edge: Matrix = ("edge+clamp", 4)  # ∂/∂(e, θ) of edges and clamp edges
-    pair: Matrix = ("pair", 3)  # ∂/∂p of paired edges
+    pair: Matrix = ("pair", 3)  # ∂/∂p of vectors between layers
     body: Matrix = ("free", 6)  # ∂/∂(X, φ) of free bodies
     contact_point: Matrix = ("contact_point", 3)  # ∂/∂x of contact points by contact alone [N]; nodes take theirs
     contact: Matrix = ("body+world", 6)  # ∂/∂(X, φ) of all bodies by contact alone, of which free ones take theirs
