@@ -64,7 +64,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             **{name: getattr(model, name) for name in Strands.names[9:]},
         ),
         viscosity=(
-            Viscosity(edge_time=model.edge_time, joint_time=model.joint_time)
+            Viscosity(edge_time=model.edge_time, joint_time=model.joint_time, pair_time=model.pair_time)
             if "viscosity" in model.forces
             else Viscosity.absent()
         ),

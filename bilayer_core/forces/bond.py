@@ -73,6 +73,7 @@ from ..model.force_slots import slot_of
 from ..model.records.parts import Space
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
+from .viscosity import acts_viscously
 
 BENDING, TWISTING, BOND = map(slot_of, ("bending", "twisting", "bond"))
 
@@ -129,9 +130,9 @@ def add_bonds(space, p, at, stage, with_hessian):
     bends, twists = sums.selected[BENDING], sums.selected[TWISTING]
     paired = strands.joint_a.shape[0] - strands.bend_count
     first = 0 if sums.selected[BOND] else paired
-    last = bonds.joint.shape[0] if bends or twists else paired
+    last = bonds.joint.shape[0] if bends or twists or acts_viscously(p) else paired
     position, joint, node, weight = at.position, bonds.joint, bonds.node, bonds.weight
-    stiffness, rest_offset = bonds.stiffness, bonds.rest
+    stiffness, rest_offset = stage.pair_stiffness, stage.neutral_pair
     length, tangent, director1, director2 = at.length, at.tangent, at.director1, at.director2
     edge_gradient_out, edge_hessian_out = sums.edge, sums.edge_hessian
     pair_gradient_out, pair_hessian_out, cross_hessian_out = sums.pair, sums.pair_hessian, sums.cross_hessian
@@ -156,8 +157,6 @@ def add_bonds(space, p, at, stage, with_hessian):
         s2 = dot(p, mean2) - rest_offset[k, 1]
         s3 = dot(p, mean3) - rest_offset[k, 2]
         c1, c2, c3 = stiffness[k, 0], stiffness[k, 1], stiffness[k, 2]
-        if k >= paired:
-            c2, c3 = c2 if twists else 0.0, c3 if bends else 0.0
         f1, f2, f3 = c1 * s1, c2 * s2, c3 * s3
         if k < paired:
             bond += 0.5 * (f1 * s1 + f2 * s2 + f3 * s3)

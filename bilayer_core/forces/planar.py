@@ -131,12 +131,12 @@ def planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian):
 
 
 @kernel
-def planar_bond(ties, bends, bonds, plane, strands, at, sums, with_hessian):
+def planar_bond(ties, bends, bonds, plane, strands, stage, at, sums, with_hessian):
     """Add ½ (k₁ s₁² + k₃ s₃²) of vectors between layers: translation of paired edges if it `ties` layers, bending of
     ends if it `bends`. Returns both [J].
     """
     axes, position, joint, node, weight = strands.axes, at.position, bonds.joint, bonds.node, bonds.weight
-    stiffness, rest_offset = bonds.stiffness, bonds.rest
+    stiffness, rest_offset = stage.pair_stiffness, stage.neutral_pair
     side, frame, gradient, hessian = plane.side, plane.frame, plane.polar_gradient, plane.polar_hessian
     cross_hessian, pair_gradient, pair_hessian = plane.cross_hessian, sums.pair, plane.pair_hessian
     mixed_hessian = plane.mixed_hessian
@@ -204,7 +204,7 @@ def add_elasticity_in_plane(plane, p, at, stage, with_hessian):
     if bends and off_axis.exists:
         planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian)
     if bonds.exists:
-        translation, of_ends = planar_bond(ties, bends, bonds, plane, strands, at, sums, with_hessian)
+        translation, of_ends = planar_bond(ties, bends, bonds, plane, strands, stage, at, sums, with_hessian)
         sums.energy[BOND] = rotation + translation
         sums.energy[BENDING] += of_ends
     for k in range(frame.shape[0]):  # N t + T m

@@ -19,7 +19,7 @@ zero: so Σ bⱼ eⱼ = O(h²), momenta and positions get no more than O(h³) in
 
 Of a bond only the shear that the torsion of the strip needs, k_φ, is that of a material; as a series of two layers
 with the shear thicknesses a and b, k ∝ a b/(a + b), its retardation time is (τ_a b + τ_b a)/(a + b). The other springs
-of a bond hold the layers together, and have no viscosity.
+of a bond hold the layers together, and have no viscosity; the elements at the ends of layers have that of the layer.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel, piece
-from ..kinematics.vector import angle, dot, row
+from ..kinematics.vector import angle, combine, dot, row
 from ..model.force_slots import slot_of
 from ..model.records.problem import Problem
 from ..model.records.status import READY
@@ -46,10 +46,26 @@ def acts_viscously(p):
 
 
 @kernel
-def measure_strains(p, at, strain_out):
-    """Strains of all elements: ε of edges, then κ₁ − Σ b ε, κ₂ and ψ of joints; nothing without viscosity.
+def _of_pair(strands, bonds, at, k):
+    """Components of the vector between two layers along the frames of its two edges; see `forces.bond`."""
+    x, position, node = bonds.joint[k], at.position, bonds.node
+    a, b, wa, wb = strands.joint_a[x], strands.joint_b[x], bonds.weight[k, 0], bonds.weight[k, 1]
+    above = combine(0.5, row(position, node[k, 0]), 0.5, row(position, node[k, 1]))
+    below = combine(0.5, row(position, node[k, 2]), 0.5, row(position, node[k, 3]))
+    p = combine(1.0, above, -1.0, below)
+    return (
+        wa * dot(p, row(at.director1, a)) + wb * dot(p, row(at.director1, b)),
+        wa * dot(p, row(at.director2, a)) + wb * dot(p, row(at.director2, b)),
+        wa * dot(p, row(at.tangent, a)) + wb * dot(p, row(at.tangent, b)),
+    )
 
-    Shape (n_edge + 3 n_joint,) or (0,). Whole turns of ψ are those of `Configuration.joint_strain`.
+
+@kernel
+def measure_strains(p, at, strain_out):
+    """Strains of all elements: ε of edges, κ₁ − Σ b ε, κ₂ and ψ of joints, and p·m̄_α between layers; nothing without
+    viscosity.
+
+    Shape (n_edge + 3 n_joint + 3 n_pair,) or (0,). Whole turns of ψ are those of `Configuration.joint_strain`.
     """
     if not p.viscosity.exists:
         return
@@ -67,6 +83,12 @@ def measure_strains(p, at, strain_out):
         strain_out[edges + 3 * k] = (p1 - q1) * ic
         strain_out[edges + 3 * k + 1] = (p2 - dot(a, row(at.director2, j))) * ic
         strain_out[edges + 3 * k + 2] = psi
+    begin = edges + 3 * strands.joint_a.shape[0]
+    for k in range(p.bonds.joint.shape[0]):
+        first, second, third = _of_pair(strands, p.bonds, at, k)
+        strain_out[begin + 3 * k] = first
+        strain_out[begin + 3 * k + 1] = second
+        strain_out[begin + 3 * k + 2] = third
     for i in range(off_axis.joint.shape[0]):
         k = off_axis.joint[i]
         for side in range(2):
@@ -74,6 +96,12 @@ def measure_strains(p, at, strain_out):
             if slope != 0.0:
                 e = strands.joint_a[k] if side == 0 else strands.joint_b[k]
                 strain_out[edges + 3 * k] -= slope * (at.length[e] - strands.rest_length[e])
+
+
+@kernel
+def _slot_of_pair(strands, k, c):
+    """The force that component c of the vector between layers k belongs to."""
+    return BOND if k < strands.joint_a.shape[0] - strands.bend_count else TWISTING if c == 1 else BENDING
 
 
 @kernel
@@ -104,6 +132,14 @@ def start_elements(_, p, start, stage):
                 beta, origin = viscosity.joint_time[k, c] / length, stage.origin_strain[edges + 3 * k + c]
             weight, rest = _act_together(elastic, beta, stage.rest_joint[k, c], origin)
             stage.joint_stiffness[k, c], stage.neutral_joint[k, c] = weight * strands.joint_stiffness[k, c], rest
+    bonds, begin = p.bonds, edges + 3 * strands.joint_a.shape[0]
+    for k in range(bonds.joint.shape[0]):
+        for c in range(3):
+            if viscous:
+                beta, origin = viscosity.pair_time[k, c] / length, stage.origin_strain[begin + 3 * k + c]
+            elastic = 1.0 * selected[_slot_of_pair(strands, k, c)]
+            weight, rest = _act_together(elastic, beta, bonds.rest[k, c], origin)
+            stage.pair_stiffness[k, c], stage.neutral_pair[k, c] = weight * bonds.stiffness[k, c], rest
     return READY
 
 
@@ -152,6 +188,21 @@ def add_viscosity(_, p, at, stage, with_hessian):
                 stage.origin_strain[edges + 3 * k + c],
             )
             sums.energy[BOND if tied else TWISTING if c == 2 else BENDING] += of_elasticity
+            lost += of_viscosity
+    bonds, begin = p.bonds, edges + 3 * strands.joint_a.shape[0]
+    for k in range(bonds.joint.shape[0]):
+        strains = _of_pair(strands, bonds, at, k)
+        for c in range(3):
+            slot = _slot_of_pair(strands, k, c)
+            of_elasticity, of_viscosity = _energies(
+                bonds.stiffness[k, c],
+                1.0 * selected[slot],
+                viscosity.pair_time[k, c] / length,
+                strains[c],
+                bonds.rest[k, c],
+                stage.origin_strain[begin + 3 * k + c],
+            )
+            sums.energy[slot] += of_elasticity
             lost += of_viscosity
     sums.energy[VISCOSITY], sums.lost[VISCOSITY] = lost, 2.0 * lost / length
     return math.inf

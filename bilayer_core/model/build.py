@@ -124,6 +124,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         strain_coupling=found.column("strain_coupling", width=2),
         edge_time=found.column("edge_time"),
         joint_time=joined("joint_time", width=3),
+        pair_time=pairs("time", width=3),
         pair_joint=_resolve(pairs("joint", np.int64), len(clamp_a)),
         pair_node=pairs("node", np.int64, 4),
         pair_weight=pairs("weight", width=2),

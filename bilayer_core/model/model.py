@@ -186,6 +186,7 @@ class Model(ReadOnlyArrays):
 
     edge_time: Array  # retardation times of edges [s], shape (n_edge,)
     joint_time: Array  # and of κ₁ κ₂ ψ of joints [s], shape (n_joint, 3)
+    pair_time: Array  # and of vectors between layers [s], shape (n_pair, 3)
 
     pair_joint: Array  # whose edges' frames a vector between layers is taken in, shape (n_pair,)
     pair_node: Array  # it leads from the middle of the last two nodes to that of the first two, shape (n_pair, 4)

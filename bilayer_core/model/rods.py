@@ -150,6 +150,7 @@ def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, t
         pair_weight=np.full((last - first, 2), 0.5),
         pair_stiffness=np.repeat((weight * law.translation)[:, None], 3, axis=1),
         pair_rest=rest,
+        pair_time=np.zeros((last - first, 3)),
     )
     for station, pair, side in ((first, 0, 1.0), (last, -1, -1.0)):
         for slot in range(2):
@@ -191,5 +192,6 @@ def _add_end(
         end_node=[[top, top, bottom, bottom]],
         end_weight=weight[None],
         end_stiffness=[[0.0, twist, bend]],
+        end_time=np.full((1, 3), layer.elements.retardation_time),
         end_rest=[start + distance * np.array([0.0, -natural[2], natural[0]])],
     )

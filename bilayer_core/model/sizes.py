@@ -23,7 +23,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         "edge+clamp": edges,
         "joint": joints,
         "pair": pairs,
-        "strain": edges_of_rods + 3 * joints if "viscosity" in model.forces else 0,
+        "strain": edges_of_rods + 3 * (joints + pairs) if "viscosity" in model.forces else 0,
         "strand": len(model.strands),
         "attached": len(model.attached_node),
         "contact_point": len(points.weight),

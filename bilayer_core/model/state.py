@@ -52,7 +52,7 @@ class State:
     body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
     body_moment: Array  # on free bodies [N m], shape (n_free, 3)
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
-    strain_rate: Array  # of all elements [1/s], shape (n_edge + 3 n_joint,) or (0,); see `forces.viscosity`
+    strain_rate: Array  # of all elements [1/s], shape (n_edge + 3 n_joint + 3 n_pair,) or (0,); see `forces.viscosity`
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
     account: Array  # of energy; see `engine.energy_account`, shape (11,)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
@@ -147,7 +147,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
     `fingerprint` says what the state belongs to (`model.fingerprint`).
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
-    strains = model.edge_count + 3 * len(model.joint_a) if "viscosity" in model.forces else 0
+    strains = model.edge_count + 3 * (len(model.joint_a) + len(model.pair_joint)) if "viscosity" in model.forces else 0
     channels = list(model.scene.stimuli.values())
     before = np.array([channel.schedule.value_before(0.0, LAST_STEP) for channel in channels])
     return State(

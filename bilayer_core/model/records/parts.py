@@ -40,6 +40,7 @@ class Viscosity:
 
     edge_time: Vector
     joint_time: Matrix
+    pair_time: Matrix
 
 
 @record

@@ -68,6 +68,8 @@ class Stage:
     neutral_edge: Vector = ("edge",)  # and the strain at which these balance
     joint_stiffness: Matrix = ("joint", 3)  # likewise of joints [N m]
     neutral_joint: Matrix = ("joint", 3)
+    pair_stiffness: Matrix = ("pair", 3)  # and of vectors between layers [N/m]
+    neutral_pair: Matrix = ("pair", 3)
     load_factor: Vector = ("load",)
     predicted_body_rotation_vector: Matrix = ("free", 3)  # rotation vector to where inertia takes free bodies
     predicted_shift: Matrix = ("node", 3)  # of nodes, from the start of the stage to where inertia takes them [m]
