@@ -100,7 +100,7 @@ class Problem:
         evaluator.take_state(state, start)
         origin = evaluator.start_point(state, start)  # of a later stage: not where that is solved from
         origin.displacement[:] += origin_noise * draw(model.node_count)
-        origin.strain[:] += 1e-3 * rng.standard_normal(len(origin.strain))
+        origin.strain[:] += 1e-3 * np.random.default_rng(7).standard_normal(len(origin.strain))
         turned = 0.0
         if in_space:
             origin.body_displacement[:] += origin_noise * draw(len(origin.body_displacement))

@@ -55,7 +55,7 @@ def beam(m: float, n: float) -> tuple[float, float]:
 def last_turn(torsion: str, natural: tuple[float, float]) -> tuple[float, float]:
     """Pitch [m] of a bonded helix through its last four points, and that of least energy."""
     points = helix.middle_curve(torsion, *natural)
-    return helix.screw(points[-4:])[1], bonded_helix(*natural, helix.TILT[torsion])[1]
+    return helix.screw(points[-4:])[1], bonded_helix(*natural, torsion)[1]
 
 
 CASES = [
@@ -89,7 +89,7 @@ CASES = [
             lambda torsion=torsion, natural=natural: last_turn(torsion, natural),
             "m",
         )
-        for torsion in helix.TILT
+        for torsion in helix.TORSIONS
         for natural in helix.NATURAL
     ),
 ]
