@@ -70,6 +70,25 @@ def step_defect(norm, before, after, h):
 
 
 @kernel
+def fastest(norm, state):
+    """Largest speed of a node, or of the outermost point of a free body [m/s]."""
+    largest = 0.0
+    for i in range(state.velocity.shape[0]):
+        square = 0.0
+        for k in range(3):
+            square += state.velocity[i, k] ** 2
+        largest = max(largest, math.sqrt(square))
+    for f in range(norm.body_of_free.shape[0]):
+        b = norm.body_of_free[f]
+        moving = turning = 0.0
+        for k in range(3):
+            moving += state.body_velocity[b, k] ** 2
+            turning += state.body_angular_velocity[b, k] ** 2
+        largest = max(largest, math.sqrt(moving) + norm.bounding_radius[b] * math.sqrt(turning))
+    return largest
+
+
+@kernel
 def _of_nodes(weight, before, after, half, first, last):
     """Mean square of D along a strand [m²]."""
     total = 0.0

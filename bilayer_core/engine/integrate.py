@@ -32,8 +32,8 @@ from ..model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITER
 from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
 from .actuation import Actuation, stimulus_has_jumped, take_first_stimuli
 from .energy_account import LARGEST
-from .error_norm import ErrorNorm
-from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, after_rejection, after_success, fit, next_end
+from .error_norm import ErrorNorm, fastest
+from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, NUMBER_ROUNDING, after_rejection, after_success, fit, next_end
 
 configuration_at = record_at(Configuration)
 TIME_ROUNDING = 1e-9
@@ -63,6 +63,7 @@ class StepControl:
     tolerance: float  # largest local error of an adaptive step
     first: float  # length of the first step, and of the first after a jump [s]
     shortest: float  # [s]
+    least_travel: float  # of the fastest point in the shortest step, where that is shorter so [m]
     longest: float  # [s]
     output_rate: float  # adaptive steps end at multiples of its period [1/s]
     same: float  # two times that differ by less are the same [s]
@@ -151,6 +152,17 @@ def _has_to_start(run, h):
 
 
 @kernel
+def _shortest(run, begin):
+    """Length of the shortest step from `begin` [s], the less the faster something was or the last attempt made it."""
+    control, norm = run.control, run.error_norm
+    speed = max(fastest(norm, run.start_state), fastest(norm, run.state))
+    if control.least_travel >= control.shortest * speed:
+        return control.shortest
+    resolved = max(control.same, NUMBER_ROUNDING * abs(begin))
+    return min(control.shortest, max(control.least_travel / speed, resolved))
+
+
+@kernel
 def _plan(control, clock, h, planned, error, iterations, shortened):
     """Write the length of the next step; one cut short by what it had to end at says little."""
     following = 2.0 * h
@@ -214,7 +226,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             method = run.starter
         copy(state.values, start_state.values)
         copy(work.touched, run.start_touched)
-        h, time, error = planned, begin, math.inf
+        h, time, error, shortest = planned, begin, math.inf, control.shortest
         rejected = iterations = 0
         residual = 0.0
         while True:
@@ -252,12 +264,15 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                     of_contact = figures[CONTACT_ERROR] / (CONTACT_SHARE * state.account[LARGEST])
                     error = max(method.estimate * defect, of_contact) / control.tolerance
                 gains = found[GAINS] != 0
-                if error <= 1.0 and (not gains or h <= GROWTH_LIMIT * control.shortest):
+                if error <= 1.0 and (not gains or h <= GROWTH_LIMIT * shortest):
                     break
+                status = TOO_INACCURATE if error > 1.0 else GAINS_ENERGY
+            if h <= GROWTH_LIMIT * shortest:
+                shortest = _shortest(run, begin)
+            if status >= TOO_INACCURATE:
                 copy(start_state.values, state.values)
                 copy(run.start_touched, work.touched)
-                status = TOO_INACCURATE if error > 1.0 else GAINS_ENERGY
-            if h <= GROWTH_LIMIT * control.shortest:
+            if h <= GROWTH_LIMIT * shortest:
                 counts.failure[0], counts.failure[1], counts.failure[2] = h, residual, error
                 counts.failure[3] = iterations
                 return _leave(run, k, status, pair, end, gap)
@@ -269,7 +284,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                 h = after_rejection(control.order, h, error)
             else:
                 h = FAILURE_FACTOR * h
-            h = max(h, control.shortest)
+            h = max(h, shortest)
         numbers[5] += starts
         lengths[0], lengths[1], lengths[2] = min(lengths[0], h), max(lengths[1], h), h
         counts.residuals[0], counts.residuals[1] = residual, max(counts.residuals[1], residual)

@@ -201,7 +201,8 @@ class Solver(Part):
     """After which a step counts as failed and is shortened."""
     max_halvings: whole(0) | None = None
     """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why. By default 10;
-    adaptive steps may then be as short as a thousandth of the time in which sound passes an edge."""
+    adaptive steps may then be as short as a thousandth of the time in which sound passes an edge, or in which the
+    fastest point covers what `tolerance` allows."""
 
 
 class Output(Part):

@@ -27,6 +27,8 @@ class Steps:
         Length of the longest adaptive step [s].
     shortest : float
         Length of the shortest adaptive step, or part of a fixed one [s].
+    least_travel : float
+        What the fastest point covers in the shortest adaptive step, where it is so fast that this makes it shorter [m].
     newton_tolerance : float
         Speed of a material point below which Newton's correction is the last [m/s].
     reason : str
@@ -36,6 +38,7 @@ class Steps:
     tolerance: float | None
     longest: float
     shortest: float
+    least_travel: float
     newton_tolerance: float
     reason: str
 
@@ -85,17 +88,18 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
         else:
             tolerance = DEFAULT_TOLERANCE
             reason = f"neither `dt` nor `tolerance` is given; {WORTH_OF_DEFAULT}"
+    length = max(rod.path.length for rod in scene.rods)
     longest = 1.0 / scene.output.rate if solver.max_step is None else solver.max_step
     newton = solver.newton_tolerance
     if newton is None:
-        length = max(rod.path.length for rod in scene.rods)
         newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / longest
     dt, halvings = dt or DEFAULT_DT, solver.max_halvings
     first = dt if tolerance is None else min(dt, longest)
-    shortest = first / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings)
+    shortest, least_travel = first / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings), math.inf
     if halvings is None and tolerance is not None:
         shortest = min(shortest, SHORTEST_PART * _time_of_sound(scene))
-    return Steps(dt, tolerance, longest, shortest, newton, reason)
+        least_travel = SHORTEST_PART * tolerance * length
+    return Steps(dt, tolerance, longest, shortest, least_travel, newton, reason)
 
 
 def _time_of_sound(scene: SceneConfig) -> float:
@@ -109,8 +113,11 @@ def _time_of_sound(scene: SceneConfig) -> float:
 
 DEFAULT_HALVINGS = 10
 SHORTEST_PART = 1e-3
-"""Of the time in which sound passes an edge: in steps so short even the stiffest spring of a rod is soft, so where they
-do not help, none do."""
+"""Of two times: in the first sound passes an edge, in the second the fastest point covers what a step may be wrong by.
+
+In a step shorter than the first even the stiffest spring of a rod is soft, and an impact at speed u has an error of
+about u h (`engine.error_norm`). Where steps of a thousandth of both do not help, none do. Barriers need no time of
+their own: what rests on a stiff one has no speed, and what meets it has its error."""
 
 
 NEWTON_PART = 1e-2

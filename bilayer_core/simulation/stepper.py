@@ -18,6 +18,7 @@ from ..model.records.status import INPUTS_END, TOO_INACCURATE
 from ..model.records.step import Configuration
 from ..model.state import State
 from .energy_budget import EnergyLedger
+from .remedies import remedy
 from .step_choice import Steps
 from .surroundings import Surroundings
 
@@ -100,6 +101,7 @@ class Stepper:
             tolerance=steps.tolerance or math.inf,
             first=first,
             shortest=steps.shortest,
+            least_travel=steps.least_travel,
             longest=steps.longest if steps.adaptive else steps.dt,
             output_rate=float(model.scene.output.rate),
             same=self._same,
@@ -162,9 +164,10 @@ class Stepper:
             raise InputError(f"until: {until} is not allowed; it must be later than the present time, {begin} s")
         found = self._integrate(state, until, due, 1 if self.ledger is not None else most)
         if found.failed:
+            gap = self.engine.gap
             self.evaluate(state)  # what the last attempt left is not what the state is
             if not found.done:
-                raise SimulationError(self._why(found, begin), begin)
+                raise SimulationError(self._why(found, state, gap), begin)
         if self.ledger is not None:
             rest = self.surroundings.rest_strains_of(state.transduction)
             load_factor = self.surroundings.load_factor(float(state.time[0]), found.length)
@@ -182,17 +185,19 @@ class Stepper:
             if found.status != INPUTS_END and not self.engine.reserve(found.status):
                 return found
 
-    def _why(self, found: IntegrationReport, begin: float) -> str:
-        """Why a step could not be made."""
+    def _why(self, found: IntegrationReport, state: State, gap: float) -> str:
+        """Why a step could not be made, how close it came, and what to change."""
+        begin = float(state.time[0])
         end = f"the step to t = {begin + found.length:.6g} s, tried down to {found.length:.3g} s"
         if found.status == TOO_INACCURATE:
             tolerance = self.steps.tolerance
-            return (
-                f"the error of {end}, stays above the tolerance "
-                f"({found.error * tolerance:.3g} of the longest rod, allowed {tolerance:.3g})"
-            )
-        text = f"{FAILURES[found.status]} in {end}"
-        if math.isfinite(found.residual):
-            text += f" (correction left {found.residual:.3g} m/s, allowed {self.steps.newton_tolerance:.3g} m/s, "
-            text += f"{found.iterations} iterations)"
-        return text + (f": {self.engine.who_blocks(found.pair)}" if found.pair >= 0 else "")
+            text = f"the error of {end}, stays above the tolerance "
+            text += f"({found.error * tolerance:.3g} of the longest rod, allowed {tolerance:.3g})"
+        else:
+            text = f"{FAILURES[found.status]} in {end}"
+            if math.isfinite(found.residual):
+                text += f" (correction left {found.residual:.3g} m/s, allowed {self.steps.newton_tolerance:.3g} m/s, "
+                text += f"{found.iterations} iterations)"
+            text += f": {self.engine.who_blocks(found.pair)}" if found.pair >= 0 else ""
+        speed = float(np.linalg.norm(state.velocity, axis=1).max())
+        return f"{text}; remedy: {remedy(found, self.steps, self.model, gap, speed)}"

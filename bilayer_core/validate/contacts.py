@@ -107,6 +107,18 @@ def _oblique() -> tuple[np.ndarray, np.ndarray]:
     return simulator.velocities.mean(axis=0)[:2], oblique_slide((1.5, 6.0), (along, across), GRAVITY, time)
 
 
+def rebound() -> tuple[float, float]:
+    """Energy of a soft strip that has fallen flat on the ground from 10 m, over that before; the barrier is elastic."""
+    soft = {"gel": {"youngs_modulus": 1e4, "poisson_ratio": 0.5, "density": 1000.0}}
+    strip = rod([layer(thickness=2e-3)], length=0.05, start=(0, 0, 10))
+    law = {**contact(barrier_distance=1e-4), "stiffness": 1e9}
+    config = scene([strip], gravity=[0, 0, -GRAVITY], obstacles=[GROUND], contact=law, materials=soft)
+    simulator = Simulator(load_scene({**config, "solver": {"tolerance": 1e-7}}))
+    begin = GRAVITY * simulator.com[2]
+    simulator.run(1.6)
+    return (GRAVITY * simulator.com[2] + 0.5 * simulator.velocities[:, 2].mean() ** 2) / begin, 1.0
+
+
 WIDTH, THICKNESS = 3e-3, 2e-3
 """Of a strip that stands on a slope across it, on its lower border: up to the slope (w − h)/h."""
 
@@ -175,6 +187,7 @@ CASES = [
         1e-4,
         lambda: (upright(0.95), 1.0),
     ),
+    Case("contact/rebound at 14 m/s", "energy of a flat strip with sound at 3 m/s, over that before", 0.005, rebound),
     Case("contact/creep", "ε_v (1 − √(1 − tan α/μ))", 0.01, creep, "µm/s"),
     *(
         Case(

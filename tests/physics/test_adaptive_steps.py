@@ -1,6 +1,7 @@
 """Adaptive steps: their error, what refused ones leave, how they go on, and how long they are."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -170,6 +171,20 @@ def test_a_step_in_which_newton_fails_is_shortened_and_the_run_goes_on():
     assert simulator.statistics.largest_residual <= EXACT["newton_tolerance"]
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_an_impact_faster_than_any_wave_of_the_robot_stops_no_run(dimension):
+    """At 14 m/s a strip in which sound goes at 3 m/s meets a barrier of 1 µm, within a millionth of its length."""
+    strip = rod([layer(thickness=2e-3)], length=0.05, stations=21, start=(0, 0, 10))
+    law = {**contact(barrier_distance=1e-6), "stiffness": 1e9}
+    soft = {"gel": {"youngs_modulus": 1e4, "poisson_ratio": 0.5, "density": 1000.0}}
+    dropped = scene([strip], gravity=[0, 0, -9.81], obstacles=[GROUND], contact=law, materials=soft)
+    dropped["solver"] = {"tolerance": 1e-6, "dimension": dimension}
+    simulator = Simulator(load_scene(dropped))
+    simulator.run(1.5)
+    assert simulator.statistics.shortest < 0.2 * simulator.steps.shortest  # which is 1e-6 s or less
+    assert simulator.statistics.min_gap > 0.0 and simulator.velocities[:, 2].mean() > 1.0
+
+
 # refusals
 
 
@@ -192,6 +207,54 @@ def test_a_tolerance_that_no_step_meets_stops_the_run_and_is_named():
     with pytest.raises(SimulationError, match=told):
         simulator.run(0.05)
     np.testing.assert_array_equal(simulator.save_state(), before)
+
+
+def kicked(**solver):
+    """A strip that a force of 10 mN pushes at once."""
+    kick = {"name": "kick", "rod": "rod", "position": 0.03, "force": [0, 0, 1e-2]}
+    return {**driven(), "solver": solver, "loads": [kick]}
+
+
+def released(stiffness, barrier=1e7, coefficient=0.3, threshold=1e-4, **solver):
+    """A bilayer on the ground whose upper layer grows by a fifth at once; stiffness and barrier in Pa."""
+    growing = layer("top", eigenstrain={"stimulus": "heat", "gain": 0.2})
+    return scene(
+        [rod([layer(), growing], length=0.05, start=(0, 0, 1.2e-3))],
+        gravity=[0, 0, -9.81],
+        obstacles=[GROUND],
+        stimuli={"heat": {"schedule": {"type": "hold", "value": 1.0}}},
+        contact={**contact(1e-4, coefficient, threshold), "stiffness": barrier},
+        materials={"gel": {"youngs_modulus": stiffness, "poisson_ratio": 0.5, "density": 1000.0}},
+    ) | {"solver": solver}
+
+
+STOPPED = {
+    "too few halvings": kicked(max_halvings=0, dt=2e-2, tolerance=1e-4),
+    "too few iterations": kicked(max_newton_iterations=1),
+    "fixed steps": released(1e11, barrier=1e12, dt=1e-2),
+    "a barrier too soft": released(1e11),
+    "friction sharper than Newton": released(1e8, coefficient=50, threshold=1e-9, dimension=3),
+}
+
+
+@pytest.mark.parametrize("name", STOPPED)
+def test_a_stop_names_a_remedy_that_works(name):
+    simulator = Simulator(load_scene(STOPPED[name]))
+    with pytest.raises(SimulationError) as stop:
+        simulator.run(0.02)
+    key, value = re.search(r"remedy: (?:set|leave) `([\w.]+)` (?:to (\S+)|out)", str(stop.value)).groups()
+    simulator = Simulator(load_scene(STOPPED[name], [f"{key}={(value or 'null').rstrip(',')}"]))
+    simulator.run(0.02)
+    assert simulator.time == pytest.approx(0.02)
+
+
+def test_what_lies_too_far_from_the_origin_is_told_to_come_nearer():
+    far = released(1e8)
+    far["rods"][0]["path"]["start"] = [1e12, 0, 1.2e-3]
+    with pytest.raises(
+        SimulationError, match=r"nearer to the origin: 1e\+12 m from it positions are known to 0\.0009 m"
+    ):
+        Simulator(load_scene(far)).run(0.02)
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-4, 0.2, math.nan])

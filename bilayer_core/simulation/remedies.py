@@ -1,0 +1,90 @@
+"""What a user can change where steps cannot go on."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..contact.barrier import barrier
+from ..engine.newton import LAST_DIGITS
+from ..engine.report import IntegrationReport
+from ..model.model import Model
+from ..model.records.status import BEYOND, BLOCKED, LINE_SEARCH, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
+from ..scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
+from .step_choice import Steps
+
+NEARLY = 1e3
+"""Times Newton's tolerance: a last correction that is no larger may well be good enough."""
+MARGIN = 2.0
+"""By which a tolerance should exceed what a step could reach."""
+MUCH_SHORTER, MUCH_FASTER = 0.1, 10.0
+SPENT = 1e-3
+"""Part of the barrier distance: what comes so near is more than the barrier holds, 1e5 times stiffer than half way."""
+
+
+def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, speed: float) -> str:
+    """The setting to change, and to what, for a run to get past the step that failed.
+
+    Parameters
+    ----------
+    found : IntegrationReport
+        Of which the last attempt failed.
+    steps : Steps
+    model : Model
+    gap : float
+        The smallest in the last attempt [m].
+    speed : float
+        Of the fastest node before it [m/s].
+    """
+    scene = model.scene
+    solver, usual = scene.solver, Solver.model_fields["max_newton_iterations"].default
+    if found.status == BLOCKED:
+        return "a prescribed body must stop before nothing can give way: change its `motion`"
+    farthest, length = float(np.abs(model.start_position).max()), max(rod.path.length for rod in scene.rods)
+    if LAST_DIGITS * farthest > (steps.tolerance or DEFAULT_TOLERANCE) * length:
+        known = f"{farthest:.1g} m from it positions are known to {LAST_DIGITS * farthest:.1g} m"
+        return f"move the robot nearer to the origin: {known}"
+    if found.status == MAX_ITERATIONS and solver.max_newton_iterations < usual:
+        return f"set `solver.max_newton_iterations` to {usual}, or leave it out"
+    if solver.max_halvings is not None:
+        return f"leave `solver.max_halvings` out, or set it above {solver.max_halvings}"
+    if found.status == BEYOND:
+        return "set `solver.integrator` to sdirk2, which ends where it has looked"
+    if not steps.adaptive:
+        return f"leave `solver.dt` out for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s"
+    if found.status == TOO_INACCURATE:
+        needed = _rounded_up(MARGIN * found.error * steps.tolerance)
+        if needed <= LARGEST_TOLERANCE:
+            return f"set `solver.tolerance` to {needed:.1g}"
+        return "let what acts on the robot grow over a time instead of at once"
+    if scene.contact is not None and gap < SPENT * scene.contact.barrier_distance:
+        return f"set `contact.stiffness` to {_rounded_up(_stiffness_that_holds(model, speed)):.0e} Pa"
+    friction = scene.contact.friction if scene.contact is not None else None
+    if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
+        return f"set `contact.friction.speed_threshold` to {_rounded_up(MUCH_FASTER * steps.newton_tolerance):.1g} m/s"
+    stuck = found.status in (MAX_ITERATIONS, LINE_SEARCH)
+    if stuck and solver.newton_tolerance is not None:
+        return "leave `solver.newton_tolerance` out"
+    if stuck and found.residual <= NEARLY * steps.newton_tolerance:
+        return f"set `solver.newton_tolerance` to {_rounded_up(MARGIN * found.residual):.1g} m/s"
+    if found.status == UNSETTLED:
+        return f"set `contact.friction.speed_threshold` to {MUCH_FASTER * friction.speed_threshold:.1g} m/s"
+    return f"set `solver.tolerance` to {MUCH_SHORTER * steps.tolerance:.1g}"
+
+
+def _stiffness_that_holds(model: Model, speed: float) -> float:
+    """K_c [Pa] with which the barrier takes up the motion of the heaviest node before nine tenths of it are gone.
+
+    K_c b(d̂/10) = ½ (m/Δl) u²,    b(d̂/10) = 0.81 ln 10 d̂²
+    """
+    mass = float((model.node_mass / model.node_length).max())
+    reach = model.scene.contact.barrier_distance
+    needed = 0.5 * mass * speed**2 / barrier(0.1 * reach, reach)
+    return max(needed, MUCH_FASTER * model.scene.contact.stiffness)
+
+
+def _rounded_up(value: float) -> float:
+    """To one digit, not below."""
+    digit = 10.0 ** math.floor(math.log10(value))
+    return math.ceil(value / digit) * digit
