@@ -1,6 +1,7 @@
 """Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
 
-``load_scene``, ``Simulator`` and ``__version__`` are loaded at their first use: importing the package costs nothing.
+``load_scene``, ``Simulator``, ``estimate_error`` and ``__version__`` are loaded at their first use: importing the
+package costs nothing.
 """
 
 from __future__ import annotations
@@ -9,15 +10,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bilayer_core.converge.study import estimate_error
     from bilayer_core.scene.loader import load_scene
     from bilayer_core.simulation.simulator import Simulator
 
     __version__: str
 
 DISTRIBUTION = "bilayer_sim_ros"
-_HOME = {"Simulator": "bilayer_core.simulation.simulator", "load_scene": "bilayer_core.scene.loader"}
+_HOME = {
+    "Simulator": "bilayer_core.simulation.simulator",
+    "estimate_error": "bilayer_core.converge.study",
+    "load_scene": "bilayer_core.scene.loader",
+}
 
-__all__ = ["Simulator", "__version__", "load_scene"]
+__all__ = ["Simulator", "__version__", "estimate_error", "load_scene"]
 
 
 def __getattr__(name: str) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
 from bilayer_core.errors import InputError, SimulationError
 
 if TYPE_CHECKING:
+    from bilayer_core.converge.study import Study
     from bilayer_core.scene.config import SceneConfig
     from bilayer_core.simulation.simulator import Simulator
 
@@ -22,6 +24,7 @@ TOLERANCE_HELP = (
     "Adaptive steps: largest error per step, over the longest rod. The error of a whole run is larger; "
     "`bilayer converge` measures it."
 )
+ERROR_HELP = "Show the global error of the headline numbers, from runs at twice and half the step."
 OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 
 
@@ -43,6 +46,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
 @click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
 @click.option("--budget", is_flag=True, help="Show where the energy went (runs two to three times as long).")
+@click.option("--error-estimate", is_flag=True, help=ERROR_HELP)
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
 def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> int:
@@ -57,11 +61,51 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     observers = _open_outputs(config, options)
     simulator = _make_simulator(config, options["from_state"], options["budget"], quiet)
     duration = _duration(simulator, duration)
-    failure = _simulate(simulator, duration, observers, interrupt, quiet)
-    _finish(simulator, duration, failure, options, quiet)
+    judge = _Judge(simulator, duration, quiet) if options["error_estimate"] else None
+    failure = _simulate(simulator, duration, observers, interrupt, quiet, judge)
+    if judge is not None and failure is None and not interrupt.granted:
+        judge.estimate()
+    _finish(simulator, duration, failure, options, quiet, judge)
+    failure = failure or (judge and judge.failure)
     if failure is not None:
         raise failure
-    return INTERRUPTED if interrupt.granted else 0
+    return INTERRUPTED if interrupt.granted or (judge and judge.interrupted) else 0
+
+
+class _Judge:
+    """The runs at twice and half the step, beside the one that was asked for, and what comes of them."""
+
+    def __init__(self, simulator: Simulator, duration: float, quiet: bool):
+        from bilayer_core.converge.quantities import Watch
+
+        self._scene, self._duration, self._quiet = simulator.scene, duration, quiet
+        self._start, self._watch = simulator.save_state(), Watch(simulator)
+        self.look = self._watch.look
+        self.study: Study | None = None
+        self.failure: SimulationError | None = None
+        self.interrupted = False
+
+    def estimate(self) -> None:
+        """Make the runs. One that stops is this command's failure, and so is Ctrl-C, once the outputs are written."""
+        from bilayer_core.converge.study import estimate_error
+
+        def tell(name: str) -> None:
+            if not self._quiet:
+                click.echo(f"  run at {name} done", err=True)
+
+        try:
+            self.study = estimate_error(
+                self._scene,
+                self._duration,
+                workers=min(2, len(os.sched_getaffinity(0))),
+                progress=tell,
+                own=self._watch.figures(),
+                start=self._start,
+            )
+        except SimulationError as failure:
+            self.failure = failure
+        except KeyboardInterrupt:
+            self.interrupted = True
 
 
 def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
@@ -118,20 +162,31 @@ def _duration(simulator: Simulator, asked: float | None) -> float:
 
 
 def _simulate(
-    simulator: Simulator, duration: float, observers: list, interrupt: Interrupt, quiet: bool
+    simulator: Simulator,
+    duration: float,
+    observers: list,
+    interrupt: Interrupt,
+    quiet: bool,
+    judge: _Judge | None,
 ) -> SimulationError | None:
     """Run; what stopped the simulation, if anything did, is returned, for the outputs to be completed first."""
     begin = simulator.time
     try:
         with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
-            simulator.run(duration, observers=observers, stop=interrupt.grant, progress=show)
+            look = judge.look if judge is not None else None
+            simulator.run(duration, observers=observers, stop=interrupt.grant, progress=show, each_step=look)
     except SimulationError as failure:
         return failure
     return None
 
 
 def _finish(
-    simulator: Simulator, duration: float, failure: SimulationError | None, options: dict[str, Any], quiet: bool
+    simulator: Simulator,
+    duration: float,
+    failure: SimulationError | None,
+    options: dict[str, Any],
+    quiet: bool,
+    judge: _Judge | None,
 ) -> None:
     """Write the last state and the summary, and tell the user what happened."""
     from bilayer_core.simulation.result import Termination
@@ -139,6 +194,11 @@ def _finish(
     summary = {**simulator.summary(), "duration": duration}
     if failure is not None:
         summary |= {"termination": Termination.FAILED.value, "reason": failure.reason}
+    study = judge.study if judge is not None else None
+    if study is not None:
+        from bilayer_core.cli.error_table import errors_of
+
+        summary["global_error"] = errors_of(study)
     if options["save_state"]:
         from bilayer_core.record.state_file import write_state
 
@@ -160,3 +220,7 @@ def _finish(
         from bilayer_core.cli.budget_table import print_budget
 
         print_budget(summary["budget"])
+    if study is not None:
+        from bilayer_core.cli.error_table import print_errors
+
+        print_errors(study)

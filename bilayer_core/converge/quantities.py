@@ -14,7 +14,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -27,55 +27,66 @@ NEGLIGIBLE = 1e-3
 """Displacements below this part of the largest one are not among the headline numbers."""
 
 
-def measure(simulator: Simulator, duration: float, progress: Callable[[float], None] | None = None) -> dict[str, float]:
-    """Run a scene from its start and return every quantity that it has.
+class Watch:
+    """What has to be seen of a run at every step, for its figures.
 
     Parameters
     ----------
     simulator : Simulator
-        At its start; is run.
-    duration : float
-        Simulated time [s].
-    progress : callable, optional
-        Called after every step with the simulated time [s].
+        At the start of the run.
+    """
+
+    def __init__(self, simulator: Simulator):
+        self._simulator, self._tips = simulator, _tips(simulator)
+        self._com, self._tip_start = simulator.com, simulator.positions[list(self._tips.values())]
+        self._times, self._heights = [simulator.time], [self._com[2]]
+        self._touched, self._take_off = False, None
+
+    def look(self, time: float) -> None:
+        """To be called after each step with the simulated time [s]."""
+        self._times.append(time)
+        self._heights.append(self._simulator.com[2])
+        touches = bool(self._simulator.contact_forces.any())
+        if self._touched and not touches:
+            self._take_off = time
+        self._touched = touches
+
+    def figures(self) -> dict[str, float]:
+        """Every quantity that the run has."""
+        simulator, tips = self._simulator, self._tips
+        summary = simulator.summary()
+        found = _by_axis("com", simulator.com - self._com)
+        rise, when = peak(np.array(self._times), np.array(self._heights))
+        if rise > 0.0:
+            found |= {"com.rise": rise, "com.rise_time": when}
+        if self._take_off is not None and not self._touched:
+            found["take_off"] = self._take_off
+        for name, body in summary["bodies"].items():
+            found |= _by_axis(f"body.{name}", np.subtract(body["end"], body["start"]))
+            if body["first_contact"] is not None:
+                found[f"body.{name}.first_contact"] = body["first_contact"]
+        found |= {key: summary[key] for key in ("mean_curvature", "max_curvature")}
+        for name, moved in zip(tips, simulator.positions[list(tips.values())] - self._tip_start, strict=True):
+            found |= _by_axis(f"tip.{name}", moved)
+        return found
+
+
+def is_event(name: str) -> bool:
+    """Whether a quantity is the time of a contact, which is known to within a step."""
+    return name.endswith(("take_off", "first_contact"))
+
+
+def measure(simulator: Simulator, duration: float) -> dict[str, float]:
+    """Run a scene for so long [s] and return every quantity that it has.
 
     Raises
     ------
     SimulationError
         If a step cannot be made.
     """
-    tips = _tips(simulator)
-    com, tip_start = simulator.com, simulator.positions[list(tips.values())]
-    heights, touched, take_off = [com[2]], False, None
-    times = [simulator.time]
-
-    def look(time: float) -> None:
-        nonlocal touched, take_off
-        times.append(time)
-        heights.append(simulator.com[2])
-        touches = bool(simulator.contact_forces.any())
-        if touched and not touches:
-            take_off = time
-        touched = touches
-        if progress is not None:
-            progress(time)
-
-    simulator.run(duration, each_step=look)
-    summary = simulator.summary()
-    found = _by_axis("com", simulator.com - com)
-    rise, when = peak(np.array(times), np.array(heights))
-    if rise > 0.0:
-        found |= {"com.rise": rise, "com.rise_time": when}
-    if take_off is not None and not touched:
-        found["take_off"] = take_off
-    for name, body in summary["bodies"].items():
-        found |= _by_axis(f"body.{name}", np.subtract(body["end"], body["start"]))
-        if body["first_contact"] is not None:
-            found[f"body.{name}.first_contact"] = body["first_contact"]
-    found |= {key: summary[key] for key in ("mean_curvature", "max_curvature")}
-    for name, moved in zip(tips, simulator.positions[list(tips.values())] - tip_start, strict=True):
-        found |= _by_axis(f"tip.{name}", moved)
-    return found
+    watch = Watch(simulator)
+    simulator.run(duration, each_step=watch.look)
+    return watch.figures()
 
 
 def headline(found: dict[str, float], prescribed: Sequence[str]) -> list[str]:

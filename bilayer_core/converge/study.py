@@ -1,5 +1,7 @@
 """The runs of a convergence study: a scene as it is, at twice and half its time step, with half and twice its edges.
 
+The first three of them tell the global error of a run: what the errors of its steps have grown to at its end.
+
 Adaptive steps are halved and doubled by their tolerance: their length goes as its (p + 1)-th root at order p.
 """
 
@@ -7,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
+import numpy as np
+
 from bilayer_core.converge.order import Estimate, estimate
-from bilayer_core.converge.quantities import check_names, headline, measure
+from bilayer_core.converge.quantities import check_names, headline, is_event, measure
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.register import INTEGRATORS
 from bilayer_core.model.plan import make_plan
@@ -46,19 +50,21 @@ class Row:
     name : str
     values : dict of str to float
         By the name of the run.
-    time, mesh : Estimate
-        What the time step and the mesh do to the scene's own run.
+    time : Estimate
+        What the time step does to the scene's own run.
+    mesh : Estimate or None
+        Likewise the mesh, if it was varied.
     """
 
     name: str
     values: dict[str, float]
     time: Estimate
-    mesh: Estimate
+    mesh: Estimate | None
 
     @property
     def bar(self) -> float:
         """Half width of the error bar of the scene's own run: time step and mesh together."""
-        return self.time.bar + self.mesh.bar
+        return self.time.bar + (self.mesh.bar if self.mesh else 0.0)
 
 
 @dataclass(frozen=True)
@@ -71,14 +77,19 @@ class Study:
     missing: dict[str, str]
 
 
+def runs_over_steps(scene: SceneConfig) -> list[Run]:
+    """The scene's own run, and those at twice and half its time step."""
+    others = ((COARSER_STEP, 2.0), (FINER_STEP, 0.5))
+    return [Run(BASE, (), 1.0, 1.0), *(Run(name, _with_steps(scene, part), part, 1.0) for name, part in others)]
+
+
 def planned_runs(scene: SceneConfig) -> list[Run]:
     """The five runs; the edges of every rod are halved or doubled."""
     edges = {rod.name: rod.stations - 1 for rod in scene.rods}
     halved = {name: max(LEAST_EDGES, round(count / 2)) for name, count in edges.items()}
     doubled = {name: 2 * count for name, count in edges.items()}
     total = sum(edges.values())
-    runs = [Run(BASE, (), 1.0, 1.0)]
-    runs += [Run(name, _with_steps(scene, part), part, 1.0) for name, part in ((COARSER_STEP, 2.0), (FINER_STEP, 0.5))]
+    runs = runs_over_steps(scene)
     for name, counts in ((COARSER_MESH, halved), (FINER_MESH, doubled)):
         overrides = tuple(f"rods.{rod}.stations={count + 1}" for rod, count in counts.items())
         runs.append(Run(name, overrides, 1.0, sum(counts.values()) / total))
@@ -103,7 +114,7 @@ def converge(
     workers: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Study:
-    """Run a study.
+    """Run a study of time step and mesh.
 
     Parameters
     ----------
@@ -124,15 +135,77 @@ def converge(
     InputError
         If a quantity does not exist, or the run has none: nothing took off, a body was not touched.
     """
+    return _study(scene, planned_runs(scene), duration, quantities, workers, progress)
+
+
+def estimate_error(
+    scene: SceneConfig,
+    duration: float | None = None,
+    quantities: Sequence[str] = (),
+    workers: int = 1,
+    progress: Callable[[str], None] | None = None,
+    *,
+    own: dict[str, float] | None = None,
+    start: np.ndarray | None = None,
+) -> Study:
+    """Global error of the headline numbers of a run that its time steps make, from runs at half and twice the step.
+
+    Its rows have no `mesh`. Parameters and errors are those of `converge`, and:
+
+    Parameters
+    ----------
+    own : dict, optional
+        Figures of the scene's own run (`quantities.Watch`), if it was made already.
+    start : ndarray, optional
+        Saved state from which every run starts; default: that of the scene.
+    """
+    return _study(scene, runs_over_steps(scene), duration, quantities, workers, progress, own, start)
+
+
+def _study(
+    scene: SceneConfig,
+    runs: list[Run],
+    duration: float | None,
+    quantities: Sequence[str],
+    workers: int,
+    progress: Callable[[str], None] | None,
+    own: dict[str, float] | None = None,
+    start: np.ndarray | None = None,
+) -> Study:
     time = scene.duration if duration is None else duration
-    runs = planned_runs(scene)
     simulator = Simulator(scene)
     check_names(simulator, quantities)
     simulator.compile()  # once, before several processes would
-    text = scene_text(scene)
-    found, missing = {}, {}
+    needed = [run.name for run in runs if run.name in NEEDED]
+    found = {} if own is None else {BASE: own}
+    missing = _make(scene, [run for run in runs if run.name not in found], time, workers, progress, start, found)
+    prescribed = [body.name for body in scene.bodies if body.motion.type == "prescribed"]
+    names = list(quantities) or headline(found[BASE], prescribed)
+    for name in quantities:
+        absent = [run for run in needed if name not in found[run]]
+        if absent:
+            raise InputError(f"--quantity {name}: did not happen in one of the runs: {absent[0]}")
+    names = [name for name in names if all(name in found[run] for run in needed)]
+    by_name = {run.name: run for run in runs}
+    steps = simulator.steps
+    resolution = steps.longest if steps.adaptive else steps.dt
+    rows = [_row(name, found, by_name, resolution if is_event(name) else 0.0) for name in names]
+    return Study(simulator.plan.integrator, str(simulator.steps), rows, missing)
+
+
+def _make(
+    scene: SceneConfig,
+    runs: list[Run],
+    duration: float,
+    workers: int,
+    progress: Callable[[str], None] | None,
+    start: np.ndarray | None,
+    found: dict[str, dict[str, float]],
+) -> dict[str, str]:
+    """Add what runs find to `found`, by their names; why one that is not needed is missing is returned."""
+    text, missing = scene_text(scene), {}
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        jobs = {pool.submit(_run, text, run.overrides, time): run for run in runs}
+        jobs = {pool.submit(_run, text, run.overrides, duration, start): run for run in runs}
         try:
             for job in as_completed(jobs):
                 name = jobs[job].name
@@ -146,26 +219,21 @@ def converge(
                     progress(name)
         finally:
             pool.shutdown(wait=False, cancel_futures=True)  # nothing is left unless one of them ended the study
-    prescribed = [body.name for body in scene.bodies if body.motion.type == "prescribed"]
-    names = list(quantities) or headline(found[BASE], prescribed)
-    for name in quantities:
-        absent = [run for run in NEEDED if name not in found[run]]
-        if absent:
-            raise InputError(f"--quantity {name}: did not happen in one of the runs: {absent[0]}")
-    names = [name for name in names if all(name in found[run] for run in NEEDED)]
-    by_name = {run.name: run for run in runs}
-    rows = [_row(name, found, by_name) for name in names]
-    return Study(simulator.plan.integrator, str(simulator.steps), rows, missing)
+    return missing
 
 
-def _run(text: str, overrides: Sequence[str], duration: float) -> dict[str, float]:
+def _run(text: str, overrides: Sequence[str], duration: float, start: np.ndarray | None) -> dict[str, float]:
     """In a process of its own."""
     base = parse_scene(text, "scene")
     scene = load_scene(base.model_dump(mode="json", by_alias=True), overrides) if overrides else base
-    return measure(Simulator(scene), duration)
+    simulator = Simulator(scene)
+    if start is not None:
+        simulator.load_state(start)
+    return measure(simulator, duration)
 
 
-def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run]) -> Row:
+def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run], resolution: float) -> Row:
+    """What the runs say of a quantity that no single one of them knows better than to its `resolution`."""
     values = {run: figures[name] for run, figures in found.items() if name in figures}
 
     def judge(coarser: str, finer: str, size: Callable[[Run], float]) -> Estimate:
@@ -173,9 +241,10 @@ def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run]) ->
         sizes = tuple(size(runs[run]) if run in values else None for run in three)
         return estimate(sizes, tuple(values.get(run) for run in three))
 
+    over_steps = judge(COARSER_STEP, FINER_STEP, lambda run: run.step)
     return Row(
         name,
         values,
-        judge(COARSER_STEP, FINER_STEP, lambda run: run.step),
-        judge(COARSER_MESH, FINER_MESH, lambda run: 1.0 / run.edges),
+        replace(over_steps, bar=over_steps.bar + resolution),
+        judge(COARSER_MESH, FINER_MESH, lambda run: 1.0 / run.edges) if FINER_MESH in runs else None,
     )

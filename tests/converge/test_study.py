@@ -6,10 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bilayer_core import Simulator, load_scene
+from bilayer_core import Simulator, estimate_error, load_scene
 from bilayer_core.cli import main
+from bilayer_core.cli.error_table import print_errors
+from bilayer_core.converge import study
+from bilayer_core.converge.order import estimate
 from bilayer_core.converge.quantities import measure
 from bilayer_core.converge.study import BASE, COARSER_MESH, COARSER_STEP, FINER_STEP, planned_runs
+from bilayer_core.errors import SimulationError
 
 SMALL = ["--set", "rods.strip.stations=11", "--set", "solver.dt=4 ms", "--set", "solver.integrator=implicit_euler"]
 
@@ -93,3 +97,69 @@ def test_a_scene_that_cannot_go_on_ends_with_exit_code_3(capsys):
     ]
     assert main(["converge", "cantilever", "--duration", "8 ms", *hopeless, "--quiet"]) == 3
     assert "stopped at t = 0 s" in capsys.readouterr().err
+
+
+# the global error of one run
+
+
+def test_the_global_error_holds_a_much_finer_run():
+    changes = ["rods.strip.stations=11", "solver.dt=4 ms", "solver.integrator=implicit_euler"]
+    row = estimate_error(load_scene("cantilever", changes), 0.08, ["tip.strip/gel.z"], workers=2).rows[0]
+    fine = measure(Simulator(load_scene("cantilever", [*changes, "solver.dt=0.1 ms"])), 0.08)["tip.strip/gel.z"]
+    assert 0.8 < row.time.order < 1.2 and row.mesh is None
+    assert 0.5 < abs(fine - row.values[BASE]) / row.bar < 1.0
+
+
+def test_a_run_with_an_estimate_is_the_run_without_and_tells_its_error(tmp_path, capsys):
+    base = ["run", "gripping", "--duration", "0.3", "--set", "stimuli.humidity.schedule={type: hold, value: 1}"]
+    assert main([*base, "--save-state", str(tmp_path / "a.npz"), "--quiet"]) == 0
+    files = ["--save-state", str(tmp_path / "b.npz"), "--summary", str(tmp_path / "b.json")]
+    assert main([*base, *files, "--error-estimate"]) == 0
+    first, second = (np.load(tmp_path / name) for name in ("a.npz", "b.npz"))
+    for key in first:
+        np.testing.assert_array_equal(first[key], second[key])
+    summary = json.loads((tmp_path / "b.json").read_text())
+    moved = summary["com_end"][2] - summary["com_start"][2]
+    told = summary["global_error"]["figures"]["com.z"]
+    assert told["value"] == pytest.approx(moved, rel=1e-12)
+    assert abs(told["finer"] - told["value"]) < told["error"] < 0.1 * abs(moved)
+    shown = capsys.readouterr().out
+    assert "global error" in shown and "Of the time steps alone" in shown
+
+
+def test_runs_of_an_estimate_start_from_the_state_that_the_run_starts_from(tmp_path):
+    start, summary = str(tmp_path / "start.npz"), tmp_path / "s.json"
+    assert main(["run", "cantilever", "--duration", "0.04", "--save-state", start, "--quiet"]) == 0
+    again = ["run", "cantilever", "--from-state", start, "--duration", "0.04", "--summary", str(summary), "--quiet"]
+    assert main([*again, "--error-estimate"]) == 0
+    told = json.loads(summary.read_text())["global_error"]["figures"]["com.z"]
+    assert told["finer"] == pytest.approx(told["value"], rel=0.02)
+    from_rest = measure(Simulator(load_scene("cantilever")), 0.04)["com.z"]
+    assert abs(from_rest - told["value"]) > 0.3 * abs(told["value"])
+
+
+def test_an_estimate_that_cannot_be_made_leaves_the_run_and_its_outputs(tmp_path, monkeypatch, capsys):
+    def stop(*_, **__):
+        raise SimulationError("half the step: too hard", 0.01)
+
+    monkeypatch.setattr(study, "estimate_error", stop)
+    summary = tmp_path / "s.json"
+    asked = ["run", "cantilever", "--duration", "8 ms", "--summary", str(summary), "--error-estimate"]
+    assert main(asked) == 3
+    written = json.loads(summary.read_text())
+    assert written["termination"] == "completed" and "global_error" not in written
+    assert "half the step: too hard" in capsys.readouterr().err
+
+
+def test_runs_that_close_in_on_no_limit_are_told(capsys):
+    values = {COARSER_STEP: 1.0, BASE: 1.1, FINER_STEP: 0.8}
+    row = study.Row("com.x", values, estimate((2.0, 1.0, 0.5), tuple(values.values())), None)
+    print_errors(study.Study("sdirk2", "adaptive", [row], {}))
+    shown = capsys.readouterr().out
+    assert "none seen" in shown and "± 1.8e+03 mm" in shown and "no bound where motion is chaotic" in shown
+
+
+def test_the_time_of_a_contact_is_known_to_a_step():
+    scene = load_scene("gripping", ["stimuli.humidity.schedule={type: hold, value: 1}"])
+    row = estimate_error(scene, 1.0, ["body.ball.first_contact"], workers=2).rows[0]
+    assert row.bar >= Simulator(scene).steps.longest

@@ -1,0 +1,56 @@
+"""The global error of a run as a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from bilayer_core.converge.order import ROUNDING
+from bilayer_core.converge.quantities import unit_of
+from bilayer_core.converge.study import BASE, FINER_STEP, Row, Study
+
+NO_ORDER = "none seen"
+
+
+def errors_of(study: Study) -> dict[str, Any]:
+    """As it stands in the summary, in SI units; an order that was not seen is None."""
+    figures = {
+        row.name: {
+            "value": row.values[BASE],
+            "finer": row.values[FINER_STEP],
+            "error": row.time.bar,
+            "order": row.time.order,
+        }
+        for row in study.rows
+    }
+    return {"figures": figures, "missing": study.missing}
+
+
+def print_errors(study: Study) -> None:
+    """Print it, one line a figure."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for title in ("global error", "value", FINER_STEP, "error", "order"):
+        table.add_column(title, justify="left" if title == "global error" else "right")
+    for row in study.rows:
+        unit, factor = unit_of(row.name)
+        values = (f"{factor * row.values[run]:.6g} {unit}" for run in (BASE, FINER_STEP))
+        table.add_row(row.name, *values, f"± {factor * row.time.bar:.2g} {unit}", _order(row))
+    Console(width=120).print(table)
+    for name, reason in study.missing.items():
+        click.echo(f"  {name}: {reason}")
+    click.echo("  Of the time steps alone; `bilayer converge` adds the mesh. Contact begins and ends within a step.")
+    if any(_order(row) == NO_ORDER for row in study.rows):
+        click.echo(
+            "  Where no order is seen, runs at twice, once and half the step do not close in on a limit: the error is\n"
+            "  six times their last change, and no bound where motion is chaotic or can go two ways."
+        )
+
+
+def _order(row: Row) -> str:
+    if row.time.order is not None:
+        return f"{row.time.order:.2f}"
+    return NO_ORDER if abs(row.time.change) > ROUNDING else "–"
