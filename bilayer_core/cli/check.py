@@ -14,7 +14,9 @@ from bilayer_core.cli.report import CHOICES
 
 WIDTH = 100
 """Of the text beside a name [characters]."""
-ERROR_OF_A_RUN = "the tolerance bounds the error per step; that of a run is larger: `bilayer converge` measures it"
+ERROR_OF_A_RUN = (
+    "the tolerance bounds the error per step; that of a run is larger: `bilayer run --error-estimate` tells it"
+)
 
 
 @click.command(cls=Verb)

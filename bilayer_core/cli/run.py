@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
 TOLERANCE_HELP = (
     "Adaptive steps: largest error per step, over the longest rod. The error of a whole run is larger; "
-    "`bilayer converge` measures it."
+    "`--error-estimate` tells it."
 )
 ERROR_HELP = "Show the global error of the headline numbers, from runs at twice and half the step."
 OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")

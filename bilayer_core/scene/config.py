@@ -191,7 +191,7 @@ class Solver(Part):
     first after a jump of a stimulus or a load."""
     tolerance: ErrorTolerance | None = None
     """Largest error per adaptive step: displacement over the length of the longest rod; 1e-4 unless `dt` is given. It
-    bounds no error of a whole run, in which those of steps add up; `bilayer converge` measures that."""
+    bounds no error of a whole run, in which those of steps add up; `bilayer run --error-estimate` tells that."""
     max_step: PositiveTime | None = None
     """Longest adaptive step; by default a period of `output.rate`."""
     newton_tolerance: PositiveSpeed | None = None

@@ -49,7 +49,7 @@ class Simulator:
         Alone: fixed steps of this length [s], whatever the scene says; with `tolerance` the first adaptive one.
     tolerance : float, optional
         Overrides the scene's: the largest error per step, relative to the longest rod. With one, steps are adaptive.
-        It is no bound on the error of a whole run, which is larger; ``bilayer converge`` measures that.
+        It is no bound on the error of a whole run, which is larger; `bilayer_core.estimate_error` tells that.
     budget : bool
         Keep the energy budget of the run (`budget`), in two to three times the time.
 

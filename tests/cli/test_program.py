@@ -100,7 +100,7 @@ def test_check_says_what_is_computed_and_why_the_rest_is_skipped(capsys):
         "  integrator    sdirk2 (second order, L-stable; ",
         "  stepping      adaptive, error per step at most 0.0001 of the longest rod (neither `dt` nor `tolerance` is",
         "  time          2 s, the first step 1 ms long, none longer than 20 ms\n",
-        "  accuracy      the tolerance bounds the error per step; that of a run is larger: `bilayer converge`",
+        "  accuracy      the tolerance bounds the error per step; that of a run is larger: `bilayer run",
         "  active        stretching, bending, eigenstrain, inertia, damping\n",
         "  skipped       twisting: nothing twists in a plane\n",
         "gravity: gravity is zero\n",
@@ -116,7 +116,7 @@ def test_check_says_what_is_computed_and_why_the_rest_is_skipped(capsys):
 def test_help_of_run_says_that_the_tolerance_is_no_error_of_the_run(capsys):
     assert main(["run", "--help"]) == 0
     text = " ".join(capsys.readouterr().out.split())
-    for told in ("largest error per step", "The error of a whole run is larger; `bilayer converge` measures it."):
+    for told in ("largest error per step", "The error of a whole run is larger; `--error-estimate` tells it."):
         assert told in text
 
 
