@@ -7,7 +7,7 @@ EVALUATE_STATE = 0
 SETTLE = 1
 """One round of statics: minimise the potential with inertia that wants everything to stay where it is."""
 COUNT = 2
-"""Count the directions in which the state is unstable."""
+"""Count the directions in which the state is unstable, or those in which disturbances grow faster than a rate."""
 
 EVALUATION_TIME = 1e-6
 """Time over which an evaluation sees a velocity as a displacement [s]; rounding makes 1e-10 m/s of it."""

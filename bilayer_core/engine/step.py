@@ -246,7 +246,8 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
     mode : int
         From `modes`.
     length : float
-        In the mode `SETTLE` that over which inertia acts [s].
+        In the mode `SETTLE` that over which inertia acts [s]; in the mode `COUNT` the time in which a disturbance that
+        counts grows e-fold, or 0 for all that grow at rest.
     tolerance : float
         In the mode `SETTLE` [m/s].
     max_iterations : int
@@ -262,7 +263,11 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
     _clear(p.outcome)
     call(p.calls.take_state, (p, state, start))
     if mode != SETTLE:
-        stage.lengths[:] = EVALUATION_TIME if mode == EVALUATE_STATE else WITHOUT_INERTIA
+        if mode == EVALUATE_STATE:
+            length = EVALUATION_TIME
+        elif length == 0.0:
+            length = WITHOUT_INERTIA
+        stage.lengths[:] = length
         status, e = _evaluate_at_rest(p, state, work, s, t, mode == COUNT)
         return _leave(p, status, -1, e)
     stage.lengths[:] = length

@@ -25,6 +25,7 @@ from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
 from .frame import Description, Frame
 from .observers import Observer, Schedule
+from .plane_watch import PlaneWatch
 from .result import BodyView, RunResult, Termination
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
@@ -86,14 +87,16 @@ class Simulator:
         self._ledger = EnergyLedger(self.model) if budget else None
         self._state = self._initial_state()
         self._compile_time: float | None = None
+        self.plane_watch = PlaneWatch(self._in_dimension, scene.duration) if self.plan.dimension == 2 else None
         self._start_over()
 
     def _stepper_of(self, model: Model) -> Stepper:
         return Stepper(model, self._method, self.steps, self.scene.solver.max_newton_iterations)
 
-    def _in_space(self) -> Stepper:
-        """The stepper of the same scene in dimension 3."""
-        return self._stepper_of(build_model(self.scene, self.plan.model, 3))
+    def _in_dimension(self, dimension: int) -> Stepper:
+        """A stepper of the same scene in a dimension."""
+        same = dimension == self.plan.dimension
+        return self._stepper_of(self.model if same else build_model(self.scene, self.plan.model, dimension))
 
     def _initial_state(self) -> State:
         return initial_state(self.model, self._keeps_history, self._fingerprint, memory_size(self.model))
@@ -104,6 +107,8 @@ class Simulator:
         self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
+        if self.plane_watch is not None:
+            self.plane_watch.restart(self.time)
 
     def _begin_budget(self) -> None:
         if self._ledger is not None:
@@ -283,6 +288,8 @@ class Simulator:
         has reached `due` [s].
         """
         state, before = self._state, float(self._state.step[0])
+        if self.plane_watch is not None:
+            most = min(most, self.plane_watch.steps_left)
         begin, wall = clock.thread_time(), clock.perf_counter()
         try:
             found = self._stepper.integrate(state, most, until, due)
@@ -292,7 +299,22 @@ class Simulator:
         self.statistics.update(found, int(state.step[0] - before), self._stepper)
         self.cpu_time += clock.thread_time() - begin
         self.wall_time += clock.perf_counter() - wall
+        self._look_out(found.done)
         return found
+
+    def _look_out(self, steps: int, last: bool = False) -> None:
+        """Look out of the plane now and then, after so many more steps; the first look needs more of the program."""
+        if self.plane_watch is None or not self.plane_watch.is_due(steps, last):
+            return
+        begin, wall = clock.thread_time(), clock.perf_counter()
+        surroundings, started = self._stepper.surroundings, self.plane_watch.started
+        rest = surroundings.rest_strains_of(self._state.transduction)
+        self.plane_watch.look(self._state, rest, surroundings.load_factor(self.time))
+        if started:
+            self.cpu_time += clock.thread_time() - begin
+            self.wall_time += clock.perf_counter() - wall
+        else:
+            self._compile_time += clock.thread_time() - begin
 
     def run(
         self,
@@ -354,6 +376,7 @@ class Simulator:
                     break
             else:
                 termination = Termination.COMPLETED
+                self._look_out(0, last=True)
         except SimulationError:
             termination = Termination.FAILED
             raise
@@ -386,7 +409,7 @@ class Simulator:
         self.compile()
         begin, wall = clock.thread_time(), clock.perf_counter()
         try:
-            in_space = self._in_space if self.plan.dimension == 2 else None
+            in_space = (lambda: self._in_dimension(3)) if self.plan.dimension == 2 else None
             return solve_static(self._stepper, self._state, tolerance, in_space)
         finally:
             self._stepper.evaluate(self._state)

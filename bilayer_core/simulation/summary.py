@@ -10,6 +10,7 @@ import numpy as np
 from ..engine.energy_account import LARGEST, NUMERICAL
 from ..model.validity import LARGE_STRAIN
 from . import observation as observe
+from .plane_watch import PlaneWatch
 from .result import Termination
 
 LARGE_NUMERICAL = 0.1
@@ -26,7 +27,7 @@ def summarise(simulator: Any) -> dict:
     ``contact_nodes``. ``largest_energy`` is that of motion, elasticity and contact together, with the potential of
     gravity from its value at the start, and ``numerical_energy`` what steps have made or, below zero, lost of it beyond
     all forces (`engine.energy_account`). ``warnings`` tell where the run left the range in which the model is meant to
-    be used.
+    be used, or where the robot would have left the plane of a model of dimension 2.
     """
     model, statistics, plan = simulator.model, simulator.statistics, simulator.plan
     positions = simulator.positions
@@ -84,12 +85,12 @@ def summarise(simulator: Any) -> dict:
         "numerical_energy": numerical,
         **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
-        "warnings": list(_warnings(statistics.max_strain, numerical, largest)),
+        "warnings": list(_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch)),
         "versions": observe.versions(),
     }
 
 
-def _warnings(strain: float, numerical: float, largest: float) -> Iterator[str]:
+def _warnings(strain: float, numerical: float, largest: float, plane_watch: PlaneWatch | None) -> Iterator[str]:
     if strain > LARGE_STRAIN:
         yield (
             f"largest strain of an edge {100 * strain:.3g} % (at most {100 * LARGE_STRAIN:g} %): "
@@ -101,6 +102,8 @@ def _warnings(strain: float, numerical: float, largest: float) -> Iterator[str]:
             f"{100 * LARGE_NUMERICAL:g} %): what vibrates or meets is too fast for the steps; a smaller tolerance or "
             "dt resolves it, `retardation_time` of a material damps it"
         )
+    if plane_watch is not None and plane_watch.since is not None:
+        yield plane_watch.warning()
 
 
 def _bodies(simulator: Any) -> dict:

@@ -23,7 +23,7 @@ from ...model.records.outcome import SHIFT, SIMPLIFIED
 from ...model.records.problem import BorderedSystem, Problem
 from ...model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
 from ...model.records.step import Configuration, Stage
-from ..modes import SLOWEST_GROWTH
+from ..modes import SLOWEST_GROWTH, WITHOUT_INERTIA
 from . import arms, bordered_system, planar_assembly  # noqa: F401 (declare pieces)
 from .assembly import hold_unknowns
 from .contact_columns import gather_columns, scatter_columns
@@ -71,8 +71,9 @@ def factorise(p, at, stage, counts):
 
     What is negative in the contact of rods is left out, then multiples of the mass matrix are added, until the matrix
     is positive definite. If it `counts`, nothing of the kind is done, but the number of the matrix's negative
-    eigenvalues (Sylvester's law of inertia) is left in `System.negative`: of second derivatives in a step so long that
-    inertia does not count, with masses over the square of the slowest growth time.
+    eigenvalues (Sylvester's law of inertia) is left in `System.negative`: of K + C/τ + M/τ², which has as many as there
+    are disturbances that grow faster than exp(t/τ). τ is the length of the stage; of one `WITHOUT_INERTIA`, C is 0 and
+    1/τ the slowest growth that counts.
 
     Returns
     -------
@@ -84,12 +85,13 @@ def factorise(p, at, stage, counts):
     strands, band = p.strands, p.system.band
     factor = 1.0 / (stage.lengths[0] * stage.lengths[1]) + p.damping / stage.lengths[0]
     shift, simplified = 0.0, EXACT
-    if counts:
+    at_rest = counts and stage.lengths[0] >= WITHOUT_INERTIA
+    if at_rest:
         factor = SLOWEST_GROWTH * SLOWEST_GROWTH
     while True:
         call(p.calls.assemble, (p, at, factor * (1.0 + shift), simplified))
         figures[SHIFT], figures[SIMPLIFIED] = shift, simplified
-        of_bodies = factor if counts else shift * factor
+        of_bodies = factor if at_rest else shift * factor
         if p.border.exists:
             call(p.calls.restrict_bodies, (p, of_bodies))
         if p.contact_columns.exists and not call(p.calls.move_to_border, (p,)):

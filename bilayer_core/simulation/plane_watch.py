@@ -1,0 +1,160 @@
+"""Looks out of the plane of a run in two dimensions, which cannot buckle out of it.
+
+A planar scene is its own mirror image, so small disturbances δ out of the plane follow a linear equation along the run,
+
+    M δ̈ + C δ̇ + K(t) δ = 0
+
+K the Hessian in space and C that of drag, damping and friction, with contacts as they are. Frozen at a look, as many
+modes grow faster than e^{rt} as K + r C + r² M has negative eigenvalues, since these rise with r. So pivots tell the
+largest rate, and its integral over the looks what a disturbance has grown by.
+
+A robot that nothing holds turns out of the plane for free. By an angle φ about an axis in it, a point at a distance s
+from the axis comes to z = φ s, and z̈ = (s̈/s) z looks like growth wherever the robot expands. With forces g at points
+s from the mass centre that is, for the two axes, λ of V a = λ J a, V = Σ g sᵀ and J = Σ m s sᵀ, and rates near √λ tell
+nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.linalg import eigh
+
+from ..engine.modes import COUNT, EVALUATE_STATE
+from ..forces.register import memory_size
+from ..model.planarity import require_plane
+from ..model.rest_strains import RestStrains
+from ..model.state import PARTS, State, initial_state
+from .stepper import Stepper
+
+Array = np.ndarray
+GROWTH = math.log(100.0)
+"""Logarithm of what a disturbance may grow by unnoticed."""
+FIRST_LOOK, MOST_STEPS = 8, 256
+"""Steps to the first look, and the most between two; until then each comes after twice as many. A look costs two steps
+or three."""
+CLEAR_OF_TURNING = 2.0
+"""Times the rate at which a free robot's turning seems to grow: modes of a larger rate are others."""
+THIN = 1e-6
+"""Part of the larger moment of inertia that the smaller one has at least: a straight rod does not turn about itself."""
+FASTEST = 1e9
+"""Rate at which to leave off [1/s]."""
+
+
+class PlaneWatch:
+    """Watches a run in a plane for modes that leave it.
+
+    Parameters
+    ----------
+    make : callable
+        Makes a stepper of the same scene in dimension 2 or 3.
+    duration : float
+        Of the scene [s]: slower growth than a hundredfold in it is not looked for.
+
+    Attributes
+    ----------
+    since : float or None
+        When a disturbance had grown a hundredfold [s], None as long as it has not.
+    """
+
+    def __init__(self, make: Callable[[int], Stepper], duration: float):
+        self._make, self._slowest = make, GROWTH / duration
+        self._space: Stepper | None = None
+        self.restart(0.0)
+
+    def restart(self, time: float) -> None:
+        """Begin anew at a time [s]."""
+        self.since: float | None = None
+        self._growth, self._unstable = 0.0, 0
+        self._time, self._rate = time, 0.0
+        self._done = self._since_look = 0
+        self._next = FIRST_LOOK
+
+    @property
+    def started(self) -> bool:
+        """Whether there was a look."""
+        return self._space is not None
+
+    @property
+    def steps_left(self) -> int:
+        """To the next look, at least 1."""
+        return max(1, self._next - self._since_look)
+
+    def is_due(self, steps: int, last: bool = False) -> bool:
+        """Whether to look after so many more steps, of which the `last` of a run was one."""
+        self._done += steps
+        self._since_look += steps
+        enough = self._since_look >= (FIRST_LOOK if last else self._next)
+        return enough and self.since is None
+
+    def look(self, state: State, rest: RestStrains, load_factor: Array) -> None:
+        """Look at a state under the rest strains and factors of loads that act there."""
+        if self._space is None:
+            self._space, self._plane = self._make(3), self._make(2)
+            model = self._space.model
+            self._copy = initial_state(model, memory=memory_size(model))
+        for name in PARTS:
+            mine, part = getattr(self._copy, name), getattr(state, name)
+            if name != "memory" and mine.shape == part.shape:  # one without history or fingerprint is enough
+                mine[...] = part
+        for stepper in (self._space, self._plane):
+            stepper.engine.set_drive(rest, load_factor)
+        time, rate = float(state.time[0]), self._largest_rate(state)
+        self._growth += 0.5 * (rate + self._rate) * (time - self._time)
+        self._unstable += rate > 0.0
+        self._time, self._rate = time, rate
+        self._since_look, self._next = 0, min(self._done, MOST_STEPS)
+        if self._growth >= GROWTH and self._unstable > 1:
+            self.since = time
+
+    def _largest_rate(self, state: State) -> float:
+        """Of modes that leave the plane [1/s], to a factor of two, which it is below; 0 if none is fast enough."""
+        if self._leaving(state, self._slowest) == 0:
+            return 0.0
+        rate, found = max(self._slowest, CLEAR_OF_TURNING * turning_rate(self._plane, state)), 0.0
+        while rate < FASTEST and self._leaving(state, rate) > 0:
+            found, rate = rate, 2.0 * rate
+        return found
+
+    def _leaving(self, state: State, rate: float) -> int:
+        """How many modes that leave the plane grow faster than a rate [1/s]; 0 if that cannot be told."""
+        unstable = 0
+        for stepper, of, sign in ((self._space, self._copy, 1), (self._plane, state, -1)):
+            if not stepper.engine.do_once(of, COUNT, 1.0 / rate).converged:
+                return 0
+            unstable += sign * stepper.engine.unstable
+            if unstable == 0:
+                return 0
+        return max(unstable, 0)
+
+    def warning(self) -> str:
+        """What a user is told."""
+        plane = require_plane(self._plane.model.scene)
+        return (
+            f"by t = {self.since:.3g} s a disturbance that leaves {plane} would have grown a "
+            "hundredfold, and the robot have buckled: run it from the start in space (`--dimension 3`), "
+            "with an `imperfection`"
+        )
+
+
+def turning_rate(stepper: Stepper, state: State) -> float:
+    """Rate at which turning out of its plane seems to grow [1/s] for a robot that no prescribed body holds, else 0."""
+    model, engine = stepper.model, stepper.engine
+    if np.any(model.attached_free < 0):
+        return 0.0
+    engine.do_once(state, EVALUATE_STATE)
+    sums, axes, free = engine.sums, model.plane.axes, model.bodies.body_of_free
+    unknowns = model.layout.node[:, None] + np.arange(3)
+    force, of_bodies = -sums.gradient[unknowns], -sums.body[: len(free), :3]
+    force[model.attached_node] = -sums.attached
+    np.add.at(of_bodies, model.attached_free, sums.attached)
+    mass = np.concatenate([model.node_mass, model.bodies.mass])
+    place = np.concatenate([state.position, state.body_position[free]]) @ axes.T
+    place -= mass @ place / mass.sum()
+    force = np.concatenate([force, of_bodies]) @ axes.T
+    virial, inertia = force.T @ place, (mass[:, None] * place).T @ place
+    inertia += THIN * np.trace(inertia) * np.eye(2)
+    expansion = float(eigh(0.5 * (virial + virial.T), inertia, eigvals_only=True)[-1])
+    return math.sqrt(max(0.0, expansion))

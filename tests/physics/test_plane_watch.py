@@ -1,0 +1,127 @@
+"""Looks out of the plane of a run: what they find, what is no buckling, and that they change nothing."""
+
+import math
+
+import numpy as np
+import pytest
+from planar_scenes import snap
+from sample_scenes import GROUND, contact, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.model.plan import MODELS
+from bilayer_core.simulation.plane_watch import FIRST_LOOK, MOST_STEPS, turning_rate
+from bilayer_core.validate.plane import blade
+
+
+def warnings_of(simulator):
+    """Those that name the remedy."""
+    return [warning for warning in simulator.summary()["warnings"] if "--dimension 3" in warning]
+
+
+def released(strain, **solver):
+    """A bilayer on the ground whose upper layer grows at once; it jumps."""
+    growing = layer("top", eigenstrain={"stimulus": "heat", "gain": strain})
+    strip = rod([layer(), growing], length=0.05, start=(0, 0, 1.2e-3))
+    held = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
+    content = scene([strip], gravity=[0, 0, -9.81], obstacles=[GROUND], stimuli=held, contact=contact(1e-4, 0.3))
+    return load_scene({**content, "solver": solver, "duration": 0.02})
+
+
+def growth_in_space(config, time):
+    """What nanometres out of the plane have become by a time [s], as multiples of themselves."""
+    space = Simulator(config, dimension=3)
+    shift = 1e-9 * np.random.default_rng(2).standard_normal(space.model.node_count - 1)
+    space._state.position[1:, 1] += shift
+    space.run(time)
+    away = space.positions[: space.model.node_count, 1]
+    return np.abs(away - away.mean()).max() / np.abs(shift).max()
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(("part", "leaves"), [(0.9, False), (1.5, True)])
+def test_a_run_tells_that_a_blade_would_have_turned_over(model, part, leaves):
+    content = blade(part) | {"duration": 2.0}
+    simulator = Simulator(load_scene(content), model=model)
+    simulator.run()
+    told = warnings_of(simulator)
+    assert bool(told) == leaves
+    assert (growth_in_space(load_scene(content), 1.5) > 100.0) == leaves
+    if leaves:
+        assert "leaves the plane y = 0 would have grown a hundredfold" in told[0] and "from the start" in told[0]
+        simulator.reset()
+        assert not warnings_of(simulator)
+
+
+def test_a_warning_comes_at_the_time_at_which_a_disturbance_has_grown_in_space():
+    content = load_scene(blade(1.5) | {"duration": 2.0})
+    simulator = Simulator(content)
+    simulator.run()
+    since = simulator.plane_watch.since
+    assert growth_in_space(content, 0.5 * since) < 100.0 < growth_in_space(content, 1.5 * since)
+
+
+@pytest.mark.parametrize("name", ["jumping", "crawling_inchworm"])
+def test_the_robots_that_stay_in_a_plane_do_not_warn(name):
+    simulator = Simulator(load_scene(name))
+    simulator.run()
+    assert simulator.plane_watch.started and not warnings_of(simulator)
+
+
+def test_a_robot_that_swings_in_flight_is_not_taken_for_one_that_buckles():
+    content = load_scene({**snap(), "duration": 0.2, "solver": {"tolerance": 1e-6}})
+    simulator = Simulator(content)
+    simulator.run()
+    assert simulator.statistics.steps > MOST_STEPS
+    assert not warnings_of(simulator) and growth_in_space(content, 0.2) < 100.0
+
+
+def test_a_release_that_does_buckle_is_told():
+    content = released(0.3)
+    simulator = Simulator(content)
+    simulator.run()
+    assert warnings_of(simulator) and growth_in_space(content, 0.004) > 100.0
+
+
+def test_looks_change_nothing():
+    seen, alone = (Simulator(released(0.3)) for _ in range(2))
+    alone.plane_watch = None
+    for simulator in (seen, alone):
+        simulator.run(0.004)
+    assert seen.statistics.steps > MOST_STEPS and seen.plane_watch.started
+    np.testing.assert_array_equal(seen.save_state(), alone.save_state())
+    assert seen.energy() == alone.energy()
+    np.testing.assert_array_equal(seen.contact_forces, alone.contact_forces)
+
+
+def test_looks_do_not_depend_on_how_a_run_is_made():
+    together, apart = (Simulator(load_scene(blade(1.5) | {"duration": 2.0})) for _ in range(2))
+    together.run(2.0)
+    while apart.time < 2.0:
+        apart.step(until=2.0)
+    assert apart.plane_watch.since == together.plane_watch.since is not None
+
+
+def test_short_runs_are_looked_at_too():
+    simulator = Simulator(load_scene(blade(1.5)))
+    for _ in range(FIRST_LOOK):
+        assert not simulator.plane_watch.started
+        simulator.step()
+    assert simulator.plane_watch.started
+
+
+def test_nobody_looks_out_of_space():
+    assert Simulator(load_scene(blade(1.5)), dimension=3).plane_watch is None
+
+
+def test_a_compressed_strip_that_flies_apart_seems_to_turn():
+    """Its ends push with EA ε at L/2 from the middle, and m L²/12 is its moment of inertia."""
+    length, strain, stations = 0.1, 1e-3, 41
+    strip = rod([layer(thickness=2e-3)], length=length, stations=stations)
+    simulator = Simulator(load_scene(scene([strip])), dimension=2)
+    state = simulator._state
+    state.position[:, 0] *= 1.0 - strain
+    stiffness, density = 1e8, 1000.0
+    expected = math.sqrt(12.0 * stiffness * strain / (density * length**2))
+    stepper = simulator._in_dimension(2)
+    stepper.evaluate(state)
+    assert turning_rate(stepper, state) == pytest.approx(expected, rel=5e-3)
