@@ -91,6 +91,7 @@ def _only_rod(scene: SceneConfig) -> Rod:
         "rods[0]: width, thickness and stiffness must not vary": not any(
             isinstance(value, Profile) for layer in layers for value in (rod.width, layer.thickness, layer.stiffness)
         ),
+        "rods[0].imperfection: must be none": rod.imperfection is None,
         "rods[0].layers: natural curvature and twist must be zero": not any(
             layer.natural_curvature or layer.natural_twist for layer in layers
         ),

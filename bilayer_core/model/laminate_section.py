@@ -87,7 +87,7 @@ def layer_halves(
     twist = halves(section.twisting_stiffness)
     moment = np.zeros_like(bend)
     if layer.natural_curvature is not None:
-        start = shape.strains()[:, 0] / shape.voronoi
+        start = (shape.strains() - shape.imperfection)[:, 0] / shape.voronoi
         natural = ratio * values_at(layer.natural_curvature, along).reshape(-1, 2)
         moment = bend * (natural - np.stack([start[:-1], start[1:]], axis=1))
     return LayerHalves(

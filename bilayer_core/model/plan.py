@@ -10,6 +10,7 @@ from ..scene.config import Coupling, SceneConfig
 from ..scene.rod import Rod
 from .colliders import contact_pairs, is_ribbon
 from .force_list import planned
+from .imperfection import advice
 from .laminate import uneven_faces
 from .planarity import find_plane, require_plane
 from .rod_pairs import RodPair, passing_warnings, rod_pairs
@@ -89,6 +90,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
             *validity_warnings(scene),
             *passing_warnings(scene),
             *_warnings_of(scene, chosen_model, chosen_dimension),
+            *advice(scene),
         ),
     )
 

@@ -98,6 +98,8 @@ class _Survey:
         for what in self._vectors():
             yield f"{what} leaves {plane}"
         for rod in scene.rods:
+            if rod.imperfection is not None and rod.imperfection.direction != "normal":
+                yield f"rods.{rod.name}.imperfection leaves {plane}"
             for layer in rod.layers:
                 if any(extremes(layer.natural_twist)):
                     yield f"rods.{rod.name}.layers.{layer.name}.natural_twist turns the rod out of {plane}"

@@ -104,8 +104,8 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     along, voronoi = rod.edge_length * np.arange(first, last + 1), shape.voronoi
     rest = shape.strains()
     if layer.natural_curvature is not None:
-        rest[:, :2] = 0.0
-        rest[:, 0] = values_at(layer.natural_curvature, along) * voronoi
+        rest[:, :2] = shape.imperfection[:, :2]
+        rest[:, 0] += values_at(layer.natural_curvature, along) * voronoi
     rest[:, 2] += values_at(layer.natural_twist, along) * voronoi
     return rest
 

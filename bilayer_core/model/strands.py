@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ..kinematics.rotation import rotation_matrix
 from ..scene.config import SceneConfig
 from ..scene.eigenstrain import Eigenstrain
 from ..scene.rod import ArcPath, Rod, SpiralPath
+from .imperfection import departure
 from .strand_arrays import StrandArrays
 
 Array = np.ndarray
@@ -73,8 +74,8 @@ def turn_of_copy(rod: Rod, copy: int) -> Turn:
 
 @dataclass(frozen=True)
 class StrandShape:
-    """A strand at the start: its nodes [m], the lengths [m] and frames of its edges, and the frames of the path at its
-    two ends.
+    """A strand at the start: its nodes [m], the lengths [m] and frames of its edges, the frames of the path at its two
+    ends, and what an imperfection adds to the rest values of a layer that are not those of the start.
     """
 
     positions: Array  # shape (n_node, 3)
@@ -83,6 +84,7 @@ class StrandShape:
     normals: Array  # likewise
     end_tangents: Array  # shape (2, 3)
     end_normals: Array  # likewise
+    imperfection: Array  # κ₁ κ₂ ψ [rad], shape (n_node, 3)
 
     @property
     def voronoi(self) -> Array:
@@ -103,19 +105,39 @@ class StrandShape:
 
 def strand_shape(rod: Rod, height: Array, first: int, last: int, turn: Turn) -> StrandShape:
     """Shape of the strand that lies `height` [m] over the path at the stations from first to last."""
+    shape = _shape(rod, height, first, last, turn, _path)
+    if rod.imperfection is None:
+        return shape
+    imperfect = _shape(rod, height, first, last, turn, _imperfect_path)
+    return replace(imperfect, imperfection=imperfect.strains() - shape.strains())
+
+
+def _path(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
+    """Points [m], tangents and normals of the path at lengths `arc` [m] along it, shapes (n, 3)."""
     frame = (np.array(rod.path.start), np.array(rod.path.direction), np.array(rod.normal))
+    if isinstance(rod.path, SpiralPath):
+        side = 1.0 if rod.path.toward == "normal" else -1.0
+        return spiral(*frame, rod.path.start_radius, rod.path.growth, side, rod.path.angle_at(arc))
+    if isinstance(rod.path, ArcPath):
+        return circle(*frame, rod.path.curvature, arc)
+    return straight(*frame, arc)
 
-    def along(stations: Array) -> tuple[Array, Array, Array]:
-        arc = rod.edge_length * stations
-        if isinstance(rod.path, SpiralPath):
-            side = 1.0 if rod.path.toward == "normal" else -1.0
-            return spiral(*frame, rod.path.start_radius, rod.path.growth, side, rod.path.angle_at(arc))
-        if isinstance(rod.path, ArcPath):
-            return circle(*frame, rod.path.curvature, arc)
-        return straight(*frame, arc)
 
-    points, tangents, normals = along(np.arange(first, last + 1))
-    _, _, middle_normals = along(np.arange(first, last) + 0.5)
+def _imperfect_path(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
+    """The same with the imperfection: x + f n + g t×n, of which the tangent is (1 − κ f) t + f′ n + g′ t×n."""
+    points, tangents, normals = _path(rod, arc)
+    across = np.cross(tangents, normals)
+    (f, g), (slope_f, slope_g) = (part.T[..., None] for part in departure(rod, arc))
+    along = (1.0 - rod.path.curvature_at(arc)[:, None] * f) * tangents + slope_f * normals + slope_g * across
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return points + f * normals + g * across, along, _across(normals, along)
+
+
+def _shape(
+    rod: Rod, height: Array, first: int, last: int, turn: Turn, path: Callable[[Rod, Array], tuple[Array, Array, Array]]
+) -> StrandShape:
+    points, tangents, normals = path(rod, rod.edge_length * np.arange(first, last + 1))
+    _, _, middle_normals = path(rod, rod.edge_length * (np.arange(first, last) + 0.5))
     positions = turn(points + height[:, None] * normals, about=True)
     edges = np.diff(positions, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
@@ -131,6 +153,7 @@ def strand_shape(rod: Rod, height: Array, first: int, last: int, turn: Turn) -> 
         _across(turn(middle_normals), edge_tangents),
         end_tangents,
         _across(turn(normals[ends]), end_tangents),
+        np.zeros((len(positions), 3)),
     )
 
 

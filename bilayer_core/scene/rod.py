@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, field_serializer, model_validator
 
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, refuse_all, repeated
+from bilayer_core.scene.imperfection import Imperfection
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.profile import Profile, extremes, varying
 from bilayer_core.scene.units import (
@@ -208,6 +209,8 @@ class Rod(Part):
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
     friction_axis: Literal["path", "normal", "across"] = "path"
     """Direction of the rod that counts as forward for friction: along its path, its normal, or path × normal."""
+    imperfection: Imperfection | None = None
+    """Small departure of the shape at rest from the path; none by default."""
     pattern: Pattern | None = None
     """Equal rods round an axis; without it there is one."""
     clamp_start: Name | None = None
@@ -248,6 +251,10 @@ class Rod(Part):
         return self
 
 
+LARGEST_IMPERFECTION = 0.1
+"""Part of the length of the path: more is another path."""
+
+
 def faults_of_spiral(path: SpiralPath) -> list[Fault]:
     """Radii that make it no spiral."""
     if math.isclose(path.start_radius, path.end_radius, rel_tol=ROUNDING):
@@ -271,6 +278,12 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
 
     faults += _profiles(rod, (), ("width",), rod.path.length)
     faults += _faces_of_path(rod)
+    if rod.imperfection is not None:
+        curvature = abs(rod.path.curvature_at(np.array([0.0, rod.path.length]))).max()
+        largest = min(LARGEST_IMPERFECTION * rod.path.length, 0.5 / curvature if curvature else math.inf)
+        if rod.imperfection.size > largest:
+            demand = f"must be at most {largest:g} m: a tenth of the path's length, and half its radius"
+            faults.append((("imperfection", "size"), rod.imperfection.size, demand))
     for index, layer in enumerate(rod.layers):
         varying = ("thickness", "stiffness", "natural_curvature", "natural_twist")
         faults += _profiles(layer, ("layers", index), varying, rod.path.length)

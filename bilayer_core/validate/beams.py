@@ -67,6 +67,21 @@ def _critical(answer: float, description: Callable[[float], dict], dimension: in
     return 0.5 * (low + high), 1.0
 
 
+def imperfect_column(
+    part: float, direction: str = "normal", dimension: int | str = "auto", model: str = "laminate"
+) -> tuple[float, float]:
+    """Distance of a column's tip from its axis at a part of Euler's load, over its imperfection, and 1/(1 − part)."""
+    size, sides = 1e-4 * LENGTH, (WIDTH, THICKNESS) if direction == "normal" else (THICKNESS, WIDTH)
+    load = part * EULER_FREE_END * BENDING / LENGTH**2
+    press = {"name": "press", "rod": "rod", "position": LENGTH, "force": [-load, 0, 0]}
+    config = beam(101, loads=[press])
+    imperfection = {"shape": "bow", "size": size, "direction": direction}
+    config["rods"][0] |= {"width": sides[0], "imperfection": imperfection, "layers": [layer(thickness=sides[1])]}
+    simulator = Simulator(load_scene(config), dimension=dimension, model=model)
+    simulator.solve_static()
+    return float(np.linalg.norm(simulator.positions[100, 1:])) / size, 1.0 / (1.0 - part)
+
+
 def eulers_load(dimension: int = 3) -> tuple[float, float]:
     """End load at which a column with one free end buckles, over Euler's."""
 
@@ -158,6 +173,15 @@ CASES = [
     ),
     Case("beams/cantilever tip/order in space", "order 2 of the bending elements", 0.1, order_in_space, scale=1.0),
     Case("beams/Euler's load", "π² EI/4L², by the stability of the straight column", 0.01, eulers_load),
+    *(
+        Case(
+            f"beams/imperfect column/{part:g} of Euler's load",
+            "1/(1 − P/P_cr) times the imperfection",
+            2e-3,
+            lambda part=part: imperfect_column(part),
+        )
+        for part in (0.5, 0.9)
+    ),
     Case("beams/Greenhill's weight", "q L³ = 7.837 EI, by the stability of the column", 0.01, greenhills_weight),
     *(
         Case(
