@@ -163,3 +163,13 @@ def test_the_time_of_a_contact_is_known_to_a_step():
     scene = load_scene("gripping", ["stimuli.humidity.schedule={type: hold, value: 1}"])
     row = estimate_error(scene, 1.0, ["body.ball.first_contact"], workers=2).rows[0]
     assert row.bar >= Simulator(scene).steps.longest
+
+
+def test_an_estimate_that_is_interrupted_leaves_the_run_and_its_outputs(tmp_path, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(study, "estimate_error", interrupt)
+    summary = tmp_path / "s.json"
+    assert main(["run", "cantilever", "--duration", "8 ms", "--summary", str(summary), "--error-estimate"]) == 130
+    assert json.loads(summary.read_text())["termination"] == "completed"
