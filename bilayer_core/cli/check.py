@@ -37,6 +37,7 @@ def check(scene: str, overrides: tuple[str, ...], as_json: bool) -> None:
 
 def _report(simulator) -> dict[str, Any]:
     """What will be computed, as the content of ``check --json``."""
+    from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
     from bilayer_core.model.validity import validity_figures
     from bilayer_core.record.topics import Rate, output_topics
@@ -70,7 +71,7 @@ def _report(simulator) -> dict[str, Any]:
             for topic in output_topics(simulator.description)
         ],
         "within_validity": [str(figure) for figure in figures if not figure.outside],
-        "warnings": list(plan.warnings),
+        "warnings": [*plan.warnings, *impact_warnings(model)],
     }
 
 

@@ -37,7 +37,7 @@ from ..model.records.problem import Border, System
 
 Array = np.ndarray
 NONE = np.zeros(0, dtype=np.int64)
-LEAST_FALL = 0.01
+LEAST_FALL = 0.2
 """Of the longest rod: motions of less energy than a fall of everything by so much are not watched for theirs."""
 ROUNDING_STRAIN = 1e-11
 """Strain of an edge that may be rounding, at any length of edges."""

@@ -11,15 +11,16 @@ own weights b (`Method.works`). What a stimulus supplies is ∫ s·dη, s = −�
 
 A step is not accepted that makes energy: without driving, T + V less the work of constant loads can only fall. Where it
 has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
-again, shorter, unless its own part is less than `SMALL` of that. Driving ends this: a stimulus that changes, a
-prescribed body that moves, a flow, forces that follow.
+again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
+much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops. Driving
+ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself. Its change beyond the work that the motion has done on them by the powers at the stages is an error of the step
-beside that of positions (`engine.integrate`), over the largest energy of the run, and at most the energy that barriers
-have held in the step. It is of the same order, says what of an impact's energy a step makes or loses, and nothing where
-contacts rest. (An error relative to the present gap would not see a step that crosses the barrier forth and back: its
-gaps are large at both ends.)
+beside that of positions (`engine.integrate`), over the largest energy of the run. It is of the same order, says what of
+an impact's energy a step makes or loses, and nothing where contacts rest. (An error relative to the present gap would
+not see a step that crosses the barrier forth and back: its gaps are large at both ends.) Where a barrier cannot hold
+an impact, no step resolves it: the shortest are taken, and counted.
 
 The account is part of the state, so that a run that is continued makes the same steps.
 """
@@ -52,15 +53,17 @@ barriers take up [W]; T + V less all that was supplied, and the lowest that was 
 of the run; what steps have made or, below zero, lost; the potential of gravity at the start [J]; 1 if all these are of
 the state.
 """
+NONE, SOME, MUCH = range(3)
+"""What a step makes of energy: nothing that counts, too much with the steps before, or by itself."""
 LARGEST_GAIN = 9e-4
 SMALL = 1e-3
 ROUNDING = 1e-11
 """Part of the energies that may be rounding."""
 SAME = 1e-6
 """Part of the energies by which a state's may differ from those in its account."""
-SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, HIGHEST = range(8)
+SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN = range(7)
 """Places in `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
-[W], whether anything drives it, and the highest energy in barriers at its ends and stages [J].
+[W], and whether anything drives it.
 """
 CONSERVATIVE = tuple(NAMES.index(name) for name, kind in kinds().items() if kind is Kind.CONSERVATIVE)
 BARRIER, GRAVITY, INERTIA, ROD_BARRIER = map(slot_of, ("barrier", "gravity", "inertia", "rod barrier"))
@@ -159,7 +162,7 @@ def begin_step_account(p, state, work, weight, start):
     drives, work_done = p.drives, work.account
     work_done[SUPPLIED], work_done[LOST] = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
     work_done[TAKEN_UP] = weight * state.account[POWER_BARRIER]
-    work_done[DRIVEN], work_done[HIGHEST] = 0.0, state.account[IN_BARRIERS]
+    work_done[DRIVEN] = 0.0
     for i in range(work.start_strain.shape[0]):
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
@@ -294,7 +297,6 @@ def add_powers(p, work, inputs, n, weight, at):
     _write_rates(p.bodies, inputs, n, at, work.end, work.rates)
     done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if p.has_contact else 0.0
     done[TAKEN_UP] += weight * done[TAKING_UP]
-    done[HIGHEST] = max(done[HIGHEST], _in_barriers(sums))
     driven = p.followers.exists or p.moments.exists
     if flow.exists:
         driven |= flow.velocity[0] != 0.0 or flow.velocity[1] != 0.0 or flow.velocity[2] != 0.0
@@ -345,7 +347,7 @@ def _after_last_correction(p, stage, at):
     return (1.0 - 0.5 * part) * part * slope + sums.energy[INERTIA] - _inertial(p, stage, at)
 
 
-@piece(bool, Problem, StateArrays, Work, bool, Configuration)
+@piece(int, Problem, StateArrays, Work, bool, Configuration)
 def close_step_account(p, state, work, beyond, end):
     """Take the account of a step into that of a state, which is its end, at `end`; whether it makes too much energy."""
     account, done = state.account, work.account
@@ -360,9 +362,9 @@ def close_step_account(p, state, work, beyond, end):
     p.outcome.figures[CONTACT_ERROR] = 0.0
     if account[OPEN] == 0.0:
         call(p.calls.open_account, (p, state, end))
-        return False
+        return NONE
     energy, barriers, scale = _energies(p, state, end)
-    missed = min(abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP]), max(done[HIGHEST], barriers))
+    missed = abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP])
     if not beyond:
         energy += _after_last_correction(p, work.stage, end)
     gain = energy - account[ENERGY] - done[SUPPLIED]
@@ -377,4 +379,6 @@ def close_step_account(p, state, work, beyond, end):
         account[LOWEST] = account[FREE]
     account[LOWEST] = min(account[LOWEST], account[FREE])
     allowed = LARGEST_GAIN * account[LARGEST]
-    return account[FREE] - account[LOWEST] > allowed and gain > SMALL * allowed
+    if account[FREE] - account[LOWEST] <= allowed or gain <= SMALL * allowed:
+        return NONE
+    return SOME if gain <= allowed else MUCH

@@ -101,7 +101,9 @@ class Engine:
         status, pair = int(outcome.counts[STATUS]), int(outcome.counts[PAIR])
         if done > 0 or status in FAILURES:
             self._take_end()
-        iterations, factorisations, settlings, rejected, inaccurate, restarts, gaining = counts.numbers.tolist()
+        iterations, factorisations, settlings, rejected, inaccurate, restarts, gaining, unresolved = (
+            counts.numbers.tolist()
+        )
         shortest, longest, length = counts.lengths.tolist()
         residual, largest_residual = counts.residuals.tolist()
         error = 0.0
@@ -109,7 +111,7 @@ class Engine:
             length, residual, error, iterations = counts.failure.tolist()
         return IntegrationReport(
             *(done, status, pair, int(iterations), factorisations, settlings, residual, largest_residual),
-            *(shortest, longest, length, rejected, inaccurate, gaining, restarts, error),
+            *(shortest, longest, length, rejected, inaccurate, gaining, unresolved, restarts, error),
         )
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:

@@ -31,14 +31,14 @@ from ..model.records.problem import Problem
 from ..model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
 from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
 from .actuation import Actuation, stimulus_has_jumped, take_first_stimuli
-from .energy_account import LARGEST
+from .energy_account import LARGEST, NONE, SOME
 from .error_norm import ErrorNorm, fastest
 from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, NUMBER_ROUNDING, after_rejection, after_success, fit, next_end
 
 configuration_at = record_at(Configuration)
 TIME_ROUNDING = 1e-9
 """Part of a step, or of an output period, by which two times are the same."""
-CONTACT_SHARE = 30.0
+CONTACT_SHARE = 8.0
 """Part of the energy of the run by which the energy of contacts may err in a step, over the tolerance: by default an
 impact of ten steps ends with its speed right to 1 or 2 %.
 """
@@ -74,7 +74,8 @@ class Counts:
     """What came of steps, added up until they are cleared."""
 
     numbers: (
-        Indices  # iterations, factorisations, settlings, attempts refused, of these for errors, restarts, for energy
+        Indices  # iterations, factorisations, settlings, attempts refused, of these for errors, restarts, for energy;
+        # last, steps that do not resolve their contact
     )
     lengths: Vector  # shortest, longest, and last step [s]
     residuals: Vector  # of the last step, and the largest [m/s]
@@ -103,7 +104,7 @@ class Integration:
 
 def empty_counts() -> Counts:
     """Counts of no steps."""
-    return Counts(numbers=np.zeros(7, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
+    return Counts(numbers=np.zeros(8, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
 
 
 def clear(counts: Counts) -> None:
@@ -256,17 +257,22 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             numbers[0] += iterations
             numbers[1] += found[FACTORISATIONS]
             numbers[2] += found[SETTLINGS]
-            error = math.inf
+            error, of_contact = math.inf, 0.0
             if status == CONVERGED:
                 error = 0.0
                 if not fixed:
                     defect = call(p.calls.step_defect, (run.error_norm, start_state, state, h))
-                    of_contact = figures[CONTACT_ERROR] / (CONTACT_SHARE * state.account[LARGEST])
-                    error = max(method.estimate * defect, of_contact) / control.tolerance
-                gains = found[GAINS] != 0
-                if error <= 1.0 and (not gains or h <= GROWTH_LIMIT * shortest):
+                    error = method.estimate * defect / control.tolerance
+                    of_contact = figures[CONTACT_ERROR] / (CONTACT_SHARE * state.account[LARGEST] * control.tolerance)
+                gains = found[GAINS]
+                if gains == SOME and h <= GROWTH_LIMIT * shortest:
+                    shortest = _shortest(run, begin)
+                    gains = NONE if h <= GROWTH_LIMIT * shortest else SOME  # rounding, or what Newton left
+                if error <= 1.0 and gains == NONE and (of_contact <= 1.0 or h <= GROWTH_LIMIT * control.shortest):
+                    numbers[7] += of_contact > 1.0
                     break
-                status = TOO_INACCURATE if error > 1.0 else GAINS_ENERGY
+                status = GAINS_ENERGY if error <= 1.0 and gains != NONE else TOO_INACCURATE
+                error = max(error, of_contact)
             if h <= GROWTH_LIMIT * shortest:
                 shortest = _shortest(run, begin)
             if status >= TOO_INACCURATE:
@@ -278,7 +284,10 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                 return _leave(run, k, status, pair, end, gap)
             rejected += 1
             numbers[3] += 1
-            numbers[6] += status == GAINS_ENERGY
+            if status == GAINS_ENERGY:
+                numbers[6] += 1
+                if run.method.history:  # what it remembers does not get better with shorter steps
+                    method, starts = run.starter, True
             if status == TOO_INACCURATE:
                 numbers[4] += 1
                 h = after_rejection(control.order, h, error)

@@ -8,6 +8,7 @@ from ..model.records.status import (
     BEYOND,
     BLOCKED,
     CONVERGED,
+    GAINS_ENERGY,
     INDEFINITE,
     LINE_SEARCH,
     MAX_ITERATIONS,
@@ -24,6 +25,7 @@ FAILURES = {
     BLOCKED: "prescribed motion would push a surface through another one",
     BEYOND: "the end of the step, beyond its last stage, lies behind a surface",
     UNSETTLED: "normal forces and friction do not settle on each other",
+    GAINS_ENERGY: "steps make energy however short they are",
     TOO_INACCURATE: "the error of the step stays above the tolerance",
 }
 """Statuses of a step that failed, with the message."""
@@ -51,6 +53,8 @@ class IntegrationReport:
         Lengths of the steps made, and that of the last one, or of the attempt that failed [s].
     rejected, inaccurate, gaining : int
         Attempts that were made again, shorter, those of them whose error was too large, and those that made energy.
+    unresolved : int
+        Steps as short as allowed that do not resolve the energy of their contact.
     restarts : int
         Steps of the method that stands in for one with a history.
     error : float
@@ -71,6 +75,7 @@ class IntegrationReport:
     rejected: int = 0
     inaccurate: int = 0
     gaining: int = 0
+    unresolved: int = 0
     restarts: int = 0
     error: float = 0.0
 
@@ -97,5 +102,15 @@ class IntegrationReport:
         return self.status in FAILURES
 
 
-SUMS = ("done", "iterations", "factorisations", "settlings", "rejected", "inaccurate", "gaining", "restarts")
+SUMS = (
+    "done",
+    "iterations",
+    "factorisations",
+    "settlings",
+    "rejected",
+    "inaccurate",
+    "gaining",
+    "unresolved",
+    "restarts",
+)
 """Figures of which those of several reports add up."""

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from ..contact.barrier import barrier
 from ..engine.newton import LAST_DIGITS
 from ..engine.report import IntegrationReport
+from ..model.impacts import heaviest, stiffness_that_holds
 from ..model.model import Model
-from ..model.records.status import BEYOND, BLOCKED, LINE_SEARCH, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
+from ..model.records.status import BEYOND, BLOCKED, GAINS_ENERGY, LINE_SEARCH, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
 from ..scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
 from .step_choice import Steps
 
@@ -35,7 +35,7 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
     gap : float
         The smallest in the last attempt [m].
     speed : float
-        Of the fastest node before it [m/s].
+        Of the fastest node or body before it, or by the largest energy of the run [m/s].
     """
     scene = model.scene
     solver, usual = scene.solver, Solver.model_fields["max_newton_iterations"].default
@@ -49,17 +49,19 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
         return f"set `solver.max_newton_iterations` to {usual}, or leave it out"
     if solver.max_halvings is not None:
         return f"leave `solver.max_halvings` out, or set it above {solver.max_halvings}"
+    if found.status == GAINS_ENERGY and solver.newton_tolerance is not None:
+        return "leave `solver.newton_tolerance` out: what it leaves undone is energy"
     if found.status == BEYOND:
         return "set `solver.integrator` to sdirk2, which ends where it has looked"
     if not steps.adaptive:
         return f"leave `solver.dt` out for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s"
+    if scene.contact is not None and gap < SPENT * scene.contact.barrier_distance:
+        return f"set `contact.stiffness` to {_stiffness_that_holds(model, speed):.0e} Pa"
     if found.status == TOO_INACCURATE:
         needed = _rounded_up(MARGIN * found.error * steps.tolerance)
         if needed <= LARGEST_TOLERANCE:
             return f"set `solver.tolerance` to {needed:.1g}"
         return "let what acts on the robot grow over a time instead of at once"
-    if scene.contact is not None and gap < SPENT * scene.contact.barrier_distance:
-        return f"set `contact.stiffness` to {_rounded_up(_stiffness_that_holds(model, speed)):.0e} Pa"
     friction = scene.contact.friction if scene.contact is not None else None
     if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
         return f"set `contact.friction.speed_threshold` to {_rounded_up(MUCH_FASTER * steps.newton_tolerance):.1g} m/s"
@@ -74,14 +76,10 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
 
 
 def _stiffness_that_holds(model: Model, speed: float) -> float:
-    """K_c [Pa] with which the barrier takes up the motion of the heaviest node before nine tenths of it are gone.
-
-    K_c b(d̂/10) = ½ (m/Δl) u²,    b(d̂/10) = 0.81 ln 10 d̂²
-    """
-    mass = float((model.node_mass / model.node_length).max())
-    reach = model.scene.contact.barrier_distance
-    needed = 0.5 * mass * speed**2 / barrier(0.1 * reach, reach)
-    return max(needed, MUCH_FASTER * model.scene.contact.stiffness)
+    """K_c [Pa] with which the barrier takes up the motion of what is heaviest."""
+    contact = model.scene.contact
+    needed = stiffness_that_holds(0.5 * heaviest(model) * speed**2, contact.barrier_distance)
+    return max(needed, MUCH_FASTER * contact.stiffness)
 
 
 def _rounded_up(value: float) -> float:

@@ -46,6 +46,7 @@ class RunStatistics:
     rejected: int = 0
     inaccurate: int = 0
     gaining: int = 0
+    unresolved: int = 0
     shortest: float = math.inf
     longest: float = 0.0
     iterations: int = 0
@@ -76,6 +77,7 @@ class RunStatistics:
         self.rejected += report.rejected
         self.inaccurate += report.inaccurate
         self.gaining += report.gaining
+        self.unresolved += report.unresolved
         self.shortest, self.longest = min(self.shortest, report.shortest), max(self.longest, report.longest)
         self.iterations += report.iterations
         self.factorisations += report.factorisations

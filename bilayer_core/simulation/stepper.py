@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..engine.energy_account import LARGEST
 from ..engine.engine import Engine
 from ..engine.integrate import TIME_ROUNDING, StepControl
 from ..engine.modes import EVALUATE_STATE
@@ -199,5 +200,8 @@ class Stepper:
                 text += f" (correction left {found.residual:.3g} m/s, allowed {self.steps.newton_tolerance:.3g} m/s, "
                 text += f"{found.iterations} iterations)"
             text += f": {self.engine.who_blocks(found.pair)}" if found.pair >= 0 else ""
-        speed = float(np.linalg.norm(state.velocity, axis=1).max())
+        moving = np.concatenate([state.velocity, state.body_velocity])
+        mass = self.model.node_mass.sum() + self.model.bodies.mass.sum()
+        of_energy = math.sqrt(2.0 * state.account[LARGEST] / mass)
+        speed = max(float(np.linalg.norm(moving, axis=1).max()), of_energy)
         return f"{text}; remedy: {remedy(found, self.steps, self.model, gap, speed)}"

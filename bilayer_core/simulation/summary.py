@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..engine.energy_account import LARGEST, NUMERICAL
+from ..model.impacts import heaviest, stiffness_that_holds
+from ..model.model import Model
 from ..model.validity import LARGE_STRAIN
 from . import observation as observe
 from .plane_watch import PlaneWatch
@@ -55,6 +57,7 @@ def summarise(simulator: Any) -> dict:
         "rejected_steps": statistics.rejected,
         "inaccurate_steps": statistics.inaccurate,
         "gaining_steps": statistics.gaining,
+        "unresolved_steps": statistics.unresolved,
         "step_length": {
             "shortest": statistics.shortest if statistics.steps else None,
             "longest": statistics.longest if statistics.steps else None,
@@ -85,7 +88,10 @@ def summarise(simulator: Any) -> dict:
         "numerical_energy": numerical,
         **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
-        "warnings": list(_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch)),
+        "warnings": [
+            *_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch),
+            *_of_contact(model, statistics.unresolved, largest),
+        ],
         "versions": observe.versions(),
     }
 
@@ -104,6 +110,17 @@ def _warnings(strain: float, numerical: float, largest: float, plane_watch: Plan
         )
     if plane_watch is not None and plane_watch.since is not None:
         yield plane_watch.warning()
+
+
+def _of_contact(model: Model, unresolved: int, energy: float) -> Iterator[str]:
+    if not unresolved:
+        return
+    contact, square = model.scene.contact, 2.0 * energy / (model.node_mass.sum() + model.bodies.mass.sum())
+    needed = stiffness_that_holds(0.5 * heaviest(model) * square, contact.barrier_distance)
+    remedy = "a larger `contact.barrier_distance`"
+    if needed > contact.stiffness:
+        remedy = f"`contact.stiffness` {needed:.0e} Pa, or {remedy}"
+    yield f"{unresolved} steps, as short as allowed, did not resolve an impact on the barrier: {remedy}, holds it"
 
 
 def _bodies(simulator: Any) -> dict:

@@ -12,8 +12,6 @@ from bilayer_core.bench.configurations import Configuration, Family, families
 from bilayer_core.cli import main
 from bilayer_core.model.plan import MODELS
 
-BLURRED = {("jumping", "laminate")}
-"""The rise of the jumper hangs on how its ends slap the ground, and settles slowly with mesh and step."""
 FAMILY = Family("two_rod", 3, "sdirk2")
 
 
@@ -116,7 +114,7 @@ def test_every_problem_has_a_reference_that_fits_it(problem):
         assert reference.values.shape[1] in (1, 4) and np.isfinite(reference.values).all()
         # two methods that have neither mesh nor step, or not the integrator, in common
         assert reference.difference <= reference.bar + 1e-3
-        assert (reference.bar > references.BLURRED) is ((problem.name, model) in BLURRED)
+        assert reference.bar <= references.BLURRED
 
 
 @pytest.mark.parametrize("problem", problems.PROBLEMS, ids=lambda problem: problem.name)

@@ -60,9 +60,8 @@ def test_a_warning_comes_at_the_time_at_which_a_disturbance_has_grown_in_space()
     assert growth_in_space(content, 0.5 * since) < 100.0 < growth_in_space(content, 1.5 * since)
 
 
-@pytest.mark.parametrize("name", ["jumping", "crawling_inchworm"])
-def test_the_robots_that_stay_in_a_plane_do_not_warn(name):
-    simulator = Simulator(load_scene(name))
+def test_a_crawler_that_stays_in_its_plane_does_not_warn():
+    simulator = Simulator(load_scene("crawling_inchworm"))
     simulator.run()
     assert simulator.plane_watch.started and not warnings_of(simulator)
 
@@ -78,8 +77,8 @@ def test_a_robot_that_swings_in_flight_is_not_taken_for_one_that_buckles():
 def test_a_release_that_does_buckle_is_told():
     content = released(0.3)
     simulator = Simulator(content)
-    simulator.run()
-    assert warnings_of(simulator) and growth_in_space(content, 0.004) > 100.0
+    simulator.run(0.0028)
+    assert warnings_of(simulator) and growth_in_space(content, 0.0028) > 100.0
 
 
 def test_looks_change_nothing():

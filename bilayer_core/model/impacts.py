@@ -1,0 +1,90 @@
+"""Whether a barrier can hold what will meet it: its energy down to a tenth of its distance, against that of motion.
+
+A barrier K_c b(d) w, w the length of rod that a contact point stands for, takes up K_c w b(d̂/10) while nine tenths of
+its distance close, b(d̂/10) = 0.81 ln 10 d̂². What comes with more energy along the normal turns where the gap is a tiny
+part of d̂, which no step resolves.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..contact.barrier import barrier
+from ..contact.shapes import PLANE
+from .model import Model
+
+Array = np.ndarray
+HELD = 0.1
+"""Part of the barrier distance down to which its energy counts."""
+
+
+def stiffness_that_holds(energy_per_length: float, distance: float) -> float:
+    """K_c [Pa] of a barrier of a distance d̂ [m] that takes up so much [J/m] down to d̂/10, to a digit, rounded up."""
+    needed = max(energy_per_length / barrier(HELD * distance, distance), sys.float_info.min)
+    digit = 10.0 ** math.floor(math.log10(needed))
+    return math.ceil(needed / digit) * digit
+
+
+def heaviest(model: Model) -> float:
+    """Largest mass per length of contact, of free bodies and of nodes [kg/m]."""
+    points, found = model.contact_points, [float((model.node_mass / model.node_length).max())]
+    for slot, body in enumerate(model.bodies.body_of_free):
+        weights = points.weight[points.body == body]
+        found += [float(model.bodies.mass[slot] / weights.max())] if weights.size else []
+    return max(found)
+
+
+def impact_warnings(model: Model) -> Iterator[str]:
+    """Of bodies and free rods that fly or fall towards planes with more than the barrier holds, as far as velocities
+    and heights at the start tell.
+    """
+    contact = model.scene.contact
+    if contact is None or not model.has_surface_contact:
+        return
+    for what, mass, length, speed in _approaching(model):
+        energy = 0.5 * mass / length * speed**2
+        held = contact.stiffness * barrier(HELD * contact.barrier_distance, contact.barrier_distance)
+        if energy <= held:
+            continue
+        stiffness = stiffness_that_holds(energy, contact.barrier_distance)
+        distance = contact.barrier_distance * math.sqrt(energy / held)
+        yield (
+            f"contact: {what} meets a plane at {speed:.3g} m/s with {energy:.3g} J per metre of contact, more than the "
+            f"barrier holds ({held:.3g} J/m down to a tenth of its distance): its rebound would be unresolved; "
+            f"stiffness {stiffness:.0e} Pa or barrier_distance {1e3 * distance:.2g} mm holds it"
+        )
+
+
+def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
+    """Name, mass [kg], length of contact [m] and speed towards the nearest plane of free bodies and rods [m/s]."""
+    bodies, points = model.bodies, model.contact_points
+    for slot, body in enumerate(bodies.body_of_free):
+        own = np.flatnonzero(points.body == body)
+        if own.size:
+            places = (
+                bodies.start_position[body] + points.position[own - model.node_count] @ bodies.start_rotation[body].T
+            )
+            speed = _speed(model, places, points.radius[own], bodies.start_velocity[body])
+            yield f"body {bodies.names[body]!r}", float(bodies.mass[slot]), float(points.weight[own].max()), speed
+    for strand in model.strands:
+        nodes = strand.first_node + np.arange(strand.node_count)
+        if not np.isin(nodes, model.attached_node).any():
+            speed = _speed(model, model.start_position[nodes], points.radius[nodes], np.zeros(3))
+            mass, length = model.node_mass[nodes].sum(), model.node_length[nodes].sum()
+            yield f"rod {strand.name!r}", float(mass), float(length), speed
+
+
+def _speed(model: Model, places: Array, radius: Array, velocity: Array) -> float:
+    """Largest speed along a plane's normal with which points meet it [m/s]."""
+    surfaces, gravity, largest = model.surfaces, np.array(model.scene.gravity), 0.0
+    for s in np.flatnonzero((surfaces.kind == PLANE) & (surfaces.body == len(model.bodies.names))):
+        normal = surfaces.rotation[s][:, 2]
+        gap = float(((places - surfaces.position[s]) @ normal - radius).min())
+        if gap > 0.0:
+            fall = 2.0 * max(-float(gravity @ normal), 0.0) * gap
+            largest = max(largest, math.sqrt(max(-float(velocity @ normal), 0.0) ** 2 + fall))
+    return largest
