@@ -3,6 +3,7 @@
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.forces.register import memory_size
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
 from bilayer_core.model.rest_strains import RestStrains
@@ -81,7 +82,8 @@ class Problem:
         def draw(count):
             return rng.standard_normal((count, len(axes))) @ axes
 
-        state = self.state = initial_state(model)
+        state = self.state = initial_state(model, memory=memory_size(model))
+        state.memory[:] = 0.05  # speeds of approach
         rest, bent = evaluator.new(), evaluator.new()
         evaluator.take_state(state, rest)
         evaluator.take_state(state, bent)
@@ -100,7 +102,9 @@ class Problem:
         evaluator.take_state(state, start)
         origin = evaluator.start_point(state, start)  # of a later stage: not where that is solved from
         origin.displacement[:] += origin_noise * draw(model.node_count)
-        origin.strain[:] += 1e-3 * np.random.default_rng(7).standard_normal(len(origin.strain))
+        strains = model.strain_count
+        origin.strain[:strains] += 1e-3 * np.random.default_rng(7).standard_normal(strains)
+        origin.strain[strains:] += origin_noise * np.random.default_rng(8).standard_normal(len(model.impact_pairs))
         turned = 0.0
         if in_space:
             origin.body_displacement[:] += origin_noise * draw(len(origin.body_displacement))

@@ -31,6 +31,7 @@ def everything(stations=6):
         {"name": "rotor", "body": "ball", "force": [1e-3, 0, 0], "moment": [0, 1e-5, 0], "frame": "material"},
     ]
     loads[0]["schedule"] = loads[3]["schedule"] = {"type": "sine", "mean": 1, "amplitude": 0.5, "period": 0.1}
+    uneven["restitution"] = 0.5
     uneven["friction"] |= {"forward": 0.3, "backward": 0.6, "sideways": 0.4}
     return scene(
         [arm],

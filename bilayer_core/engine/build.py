@@ -8,6 +8,7 @@ import numpy as np
 
 from ..contact.broad_phase import RodSearch
 from ..forces.added_mass import fluid_momentum
+from ..forces.restitution import damping_of
 from ..model.force_slots import slot_of
 from ..model.layout import columns
 from ..model.model import Model, PointLoads
@@ -24,6 +25,7 @@ from ..model.records.parts import (
     OffAxis,
     Plane,
     PointForces,
+    Restitution,
     RodContact,
     RodContactList,
     RodPoints,
@@ -39,6 +41,8 @@ Array = np.ndarray
 NONE = np.zeros(0, dtype=np.int64)
 LEAST_FALL = 0.2
 """Of the longest rod: motions of less energy than a fall of everything by so much are not watched for theirs."""
+SLOWEST_APPROACH = 1.0
+"""Barrier distances per second: slower approaches count as that."""
 ROUNDING_STRAIN = 1e-11
 """Strain of an edge that may be rounding, at any length of edges."""
 
@@ -173,6 +177,25 @@ def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
         rotation=surfaces.rotation,
         can_collide=surfaces.can_collide,
         margin=np.full(1, -1.0),  # no list yet
+    )
+
+
+def restitution_of(model: Model, sizes: dict[str, int]) -> Restitution:
+    """Absent where no impact is damped."""
+    pairs, contact = model.impact_pairs, model.scene.contact
+    if not len(pairs):
+        return Restitution.absent()
+    row = np.full((sizes["contact_point"], sizes["surface"]), -1, dtype=np.int64)
+    row[pairs[:, 0], pairs[:, 1]] = np.arange(len(pairs))
+    return Restitution.zeros(
+        sizes,
+        damping=damping_of(contact.restitution),
+        slowest=SLOWEST_APPROACH * contact.barrier_distance,
+        first=model.strain_count,
+        memory=np.zeros(1, dtype=np.int64),
+        point=pairs[:, 0].copy(),
+        surface=pairs[:, 1].copy(),
+        row=row,
     )
 
 

@@ -10,6 +10,7 @@ import math
 
 from ..forces.added_mass import momentum_at
 from ..forces.inertia import moment_of_rotation
+from ..forces.restitution import measure_gaps
 from ..forces.viscosity import measure_strains
 from ..jit import kernel, piece
 from ..jit.flat import flat
@@ -58,6 +59,7 @@ def end_stage(p, state, work, inputs, n, end):
         point.angle[k] = work.start_angle[k] + end.total_angle[k]
         point.spin[k] = (end.total_angle[k] - stage.origin_angle[k]) / length
     measure_strains(p, end, point.strain)
+    measure_gaps(p, end, point.strain)
     for k in range(point.strain.shape[0]):
         point.strain_rate[k] = (point.strain[k] - stage.origin_strain[k]) / length
     momentum_at(p.fluid, end, point.velocity, point.fluid_momentum)

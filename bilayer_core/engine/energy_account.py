@@ -46,12 +46,12 @@ from ..model.records.step import Configuration, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of
 from .step import grow
 
-ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER = range(5)
-FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN = range(5, 11)
+ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
+FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN = range(6, 12)
 """Places in `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
-barriers take up [W]; T + V less all that was supplied, and the lowest that was since driving ended; the largest energy
-of the run; what steps have made or, below zero, lost; the potential of gravity at the start [J]; 1 if all these are of
-the state.
+barriers take up and contact damping takes [W]; T + V less all that was supplied, and the lowest that was since driving
+ended; the largest energy of the run; what steps have made or, below zero, lost; the potential of gravity at the start
+[J]; 1 if all these are of the state.
 """
 NONE, SOME, MUCH = range(3)
 """What a step makes of energy: nothing that counts, too much with the steps before, or by itself."""
@@ -66,7 +66,11 @@ SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN = range(7)
 [W], and whether anything drives it.
 """
 CONSERVATIVE = tuple(NAMES.index(name) for name, kind in kinds().items() if kind is Kind.CONSERVATIVE)
-BARRIER, GRAVITY, INERTIA, ROD_BARRIER = map(slot_of, ("barrier", "gravity", "inertia", "rod barrier"))
+BARRIER, GRAVITY, INERTIA, RESTITUTION, ROD_BARRIER = map(
+    slot_of, ("barrier", "gravity", "inertia", "restitution", "rod barrier")
+)
+DAMPING_SHARE = 0.01
+"""Of the change of contact damping's power over a step, times its length: what its work may be wrong by."""
 
 
 @kernel
@@ -347,8 +351,8 @@ def _after_last_correction(p, stage, at):
     return (1.0 - 0.5 * part) * part * slope + sums.energy[INERTIA] - _inertial(p, stage, at)
 
 
-@piece(int, Problem, StateArrays, Work, bool, Configuration)
-def close_step_account(p, state, work, beyond, end):
+@piece(int, Problem, StateArrays, Work, float, bool, Configuration)
+def close_step_account(p, state, work, h, beyond, end):
     """Take the account of a step into that of a state, which is its end, at `end`; whether it makes too much energy."""
     account, done = state.account, work.account
     changed = False
@@ -374,6 +378,9 @@ def close_step_account(p, state, work, beyond, end):
     account[NUMERICAL] += gain + done[LOST]
     account[FREE] += gain
     account[LARGEST] = max(account[LARGEST], scale)
+    damping = p.sums.lost[RESTITUTION] if p.restitution.exists else 0.0
+    missed += DAMPING_SHARE * h * abs(damping - account[POWER_DAMPING])
+    account[POWER_DAMPING] = damping
     p.outcome.figures[CONTACT_ERROR] = missed
     if changed or done[DRIVEN] != 0.0:
         account[LOWEST] = account[FREE]

@@ -176,6 +176,8 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         call(p.calls.write_end, (p, state, work.end, end, inputs, stages - 1))
         if with_history:  # for the step after, which can take them if nothing touches anew
             call(p.calls.keep_stage_derivatives, (state, work.origin, work.end, stage.lengths[1], method.carry))
+            if not method.history:  # a first step may begin with velocities, but with no rates of strains
+                state.strain_acceleration[:] = 0.0
             state.has_history[0] = _compare_touched(p.sums, work.touched)
     copy(work.transduction, state.transduction)
     status = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
@@ -185,7 +187,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         return _leave(p, status, -1, e)
     figures[RESIDUAL] = worst
     last = configuration_at(work.configurations[e])
-    p.outcome.counts[GAINS] = call(p.calls.close_step_account, (p, state, work, ends > stages, last))
+    p.outcome.counts[GAINS] = call(p.calls.close_step_account, (p, state, work, h, ends > stages, last))
     return _leave(p, CONVERGED, -1, e)
 
 

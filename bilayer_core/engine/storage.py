@@ -17,7 +17,16 @@ from ..model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEE
 from ..model.records.step import Configuration, Point, Stage, Work
 from ..model.rod_surfaces import NearPairs
 from ..model.sizes import sizes_of
-from .build import contact_columns_of, lasting_groups, plane_of, rod_contact_of, sliding_of, slips_of, surfaces_of
+from .build import (
+    contact_columns_of,
+    lasting_groups,
+    plane_of,
+    restitution_of,
+    rod_contact_of,
+    sliding_of,
+    slips_of,
+    surfaces_of,
+)
 from .dispatch import calls_of
 
 Array = np.ndarray
@@ -112,6 +121,7 @@ class Storage:
             **self._groups,
             bordered=BorderedSystem.zeros(sizes, width=self._width) if border else BorderedSystem.absent(),
             surfaces=Surfaces.absent() if not surfaces else before.surfaces if same else surfaces_of(model, sizes),
+            restitution=restitution_of(model, sizes),
             sliding=self._sliding(before, sizes) if surfaces else Sliding.absent(),
             rod_contact=self._rod_contact(before) if rods else RodContact.absent(),
             slips=slips_of(model, sizes) if surfaces or rods else Slips.absent(),

@@ -23,6 +23,7 @@ from .drag import add_drag, update_directions_of_drag
 from .inertia import add_inertial_forces
 from .loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
 from .planar import add_elasticity_in_plane
+from .restitution import add_restitution, end_restitution, start_restitution, with_memory
 from .rod_contact import (
     add_rod_barrier,
     add_rod_friction,
@@ -90,7 +91,15 @@ TERMS: tuple[Term, ...] = (
     Term(("stretching", "viscosity"), lambda model, of: None, add_viscosity, start_elements),
     Term(("inertia", "damping", "gravity"), lambda model, of: None, add_inertial_forces),
     Term(("loads",), lambda model, of: of["loads"], add_point_forces, start_dead_loads),
-    Term(("barrier",), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),
+    Term(("barrier", "restitution"), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),
+    Term(
+        ("restitution",),
+        lambda model, of: with_memory(of["restitution"], of["memory"]),
+        add_restitution,
+        start_restitution,
+        end=end_restitution,
+        memory=lambda model: len(model.impact_pairs),
+    ),
     Term(("rod barrier",), lambda model, of: of["rod_contact"], add_rod_barrier, start_rod_barrier),
     Term(("followers",), lambda model, of: of["followers"], add_point_forces, update_lagged=update_followers),
     Term(("moments",), lambda model, of: of["moments"], add_moments, update_lagged=update_moments),

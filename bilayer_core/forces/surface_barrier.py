@@ -32,6 +32,7 @@ from ..model.records.parts import Surfaces
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative
+from .restitution import RESTITUTION, damping_at
 from .rod_arms import add_to_edges, has_arm, new_arm, node_of, write_curvature, write_material_rate
 
 BARRIER = slot_of("barrier")
@@ -56,10 +57,11 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
     The energy is infinite if a contact point is behind a surface. The gaps of the list of near pairs are written.
     """
     sums, min_gap = p.sums, math.inf
-    if not sums.selected[BARRIER]:
+    damped = p.restitution.exists and sums.selected[RESTITUTION]
+    if not (sums.selected[BARRIER] or damped):
         return min_gap
-    d_hat, size = surfaces.d_hat, surfaces.size
-    energy = 0.0
+    d_hat, size, elastic = surfaces.d_hat, surfaces.size, 1.0 * sums.selected[BARRIER]
+    energy = of_damping = lost = part = beta = 0.0
     m = stack_matrix(3, 3)
     g, n, arm, lever = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
     arm[0] = arm[1] = arm[2] = 0.0
@@ -76,8 +78,16 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
             break
         a, b = surfaces.contact_point_body[i], surfaces.body[s]
         stiffness = surfaces.stiffness * surfaces.weight[i]
-        energy += stiffness * barrier(d, d_hat)
+        energy += elastic * stiffness * barrier(d, d_hat)
         slope = stiffness * barrier_gradient(d, d_hat)
+        if damped:
+            part, beta, damping = damping_at(p, stage, i, s, d)
+            of_damping += stiffness * damping
+            if part != 0.0:
+                origin = stage.origin_strain[p.restitution.first + p.restitution.row[i, s]]
+                lost -= slope * part * (d - origin) / stage.lengths[0]
+        curvature = stiffness * barrier_hessian(d, d_hat) * (elastic - part) - beta * slope
+        slope *= elastic - part
         node = node_of(surfaces, i)
         for c in range(3):
             g[c] = slope * n[c]
@@ -96,7 +106,6 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
         if with_hessian:
             h = shape_curvature(surfaces.kind[s], size[s, 0], size[s, 1], size[s, 2], p0, p1, p2)
             _in_world(at.surface_rotation, s, slope, h, m)
-            curvature = stiffness * barrier_hessian(d, d_hat)
             for c in range(3):
                 for e in range(c, 3):
                     m[c, e] += curvature * n[c] * n[e]
@@ -105,6 +114,8 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
                 write_curvature(surfaces, p.strands, at, i, g, r, sums)
             add_second_derivative(p, m, g, arm, lever, 1.0, node, r, a, b)
     sums.energy[BARRIER] = energy
+    if damped:
+        sums.energy[RESTITUTION], sums.lost[RESTITUTION] = of_damping, lost
     return min_gap
 
 

@@ -46,6 +46,7 @@ from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative
+from .restitution import damping_at
 from .rod_arms import add_motion_of_arm, add_step_of_arm, add_to_edges, copy_rate, new_arm, node_of, write_rate
 
 FRICTION = slot_of("friction")
@@ -234,6 +235,8 @@ def _freeze(sliding, p, at, stage):
         sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
         sliding.last_load[count] = sliding.load[count]
         sliding.load[count] = -surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
+        if p.restitution.exists:
+            sliding.load[count] *= 1.0 - damping_at(p, stage, i, s, d)[0]
         for c in range(3):
             touched = at.contact_point[i, c] - surfaces.radius[i] * n[c]
             arm[c] = touched - (at.pose_position[a, c] if a >= 0 else at.position[node, c])

@@ -121,6 +121,15 @@ def _friction(q: Question) -> str | None:
     return _unless(law is not None and law.acts, "no friction coefficient above zero")
 
 
+def _restitution(q: Question) -> str | None:
+    if not q.pairs:
+        return "no surfaces that can meet"
+    if q.scene.contact.restitution is None or q.scene.contact.restitution == 1.0:
+        return "contact.restitution is not below 1"
+    bodies = any(body.contact_points or body.surface for body in q.scene.bodies)
+    return _unless(bodies, "no body that can touch anything")
+
+
 def _rod_barrier(q: Question) -> str | None:
     if q.rods_touch:
         return None
@@ -176,6 +185,7 @@ FORCES: tuple[Force, ...] = (
         lambda q: _unless(bool(q.pairs), "no surfaces that can meet"),
         on_nodes=True,
     ),
+    Force("restitution", DISSIPATIVE, "restitution.py", _restitution, on_nodes=True),
     Force("friction", DISSIPATIVE, "surface_friction.py", _friction, on_nodes=True),
     Force("rod barrier", CONSERVATIVE, "rod_contact.py", _rod_barrier, on_nodes=True),
     Force("rod friction", DISSIPATIVE, "rod_contact.py", _rod_friction, on_nodes=True),

@@ -208,6 +208,22 @@ class Model(ReadOnlyArrays):
         return self.contact_points.point_count
 
     @property
+    def impact_pairs(self) -> Array:
+        """Contact points of bodies and surfaces that they can meet, if impacts are damped, shape (n_impact, 2)."""
+        if "restitution" not in self.forces:
+            return np.zeros((0, 2), dtype=np.int64)
+        points = np.flatnonzero(self.contact_points.body >= 0)
+        pairs = np.argwhere(self.surfaces.can_collide[:, self.contact_points.group[points]].T)
+        return np.stack([points[pairs[:, 0]], pairs[:, 1]], axis=1)
+
+    @property
+    def strain_count(self) -> int:
+        """How many strains viscosity acts on; the gaps of `impact_pairs` come after them."""
+        if "viscosity" not in self.forces:
+            return 0
+        return self.edge_count + 3 * (len(self.joint_a) + len(self.pair_joint))
+
+    @property
     def has_surface_contact(self) -> bool:
         """Whether any contact point can meet a surface."""
         return self.scene.contact is not None and bool(self.surfaces.can_collide.any())

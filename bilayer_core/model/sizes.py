@@ -15,7 +15,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         model.plane is not None,
         len(model.fluid_mass) > 0,
     )
-    edges_of_rods = model.edge_count
+    impacts = len(model.impact_pairs)
     points, joints, pairs = model.contact_points, len(model.joint_a), len(model.pair_joint)
     return {
         "node": model.node_count,
@@ -23,7 +23,8 @@ def sizes_of(model: Model) -> dict[str, int]:
         "edge+clamp": edges,
         "joint": joints,
         "pair": pairs,
-        "strain": edges_of_rods + 3 * (joints + pairs) if "viscosity" in model.forces else 0,
+        "strain": model.strain_count + impacts,
+        "impact": impacts,
         "strand": len(model.strands),
         "attached": len(model.attached_node),
         "contact_point": len(points.weight),

@@ -52,9 +52,9 @@ class State:
     body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
     body_moment: Array  # on free bodies [N m], shape (n_free, 3)
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
-    strain_rate: Array  # of all elements [1/s], shape (n_edge + 3 n_joint + 3 n_pair,) or (0,); see `forces.viscosity`
+    strain_rate: Array  # of all elements with viscosity [1/s], and of gaps with damped impacts [m/s]
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
-    account: Array  # of energy; see `engine.energy_account`, shape (11,)
+    account: Array  # of energy; see `engine.energy_account`, shape (12,)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
@@ -147,7 +147,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
     `fingerprint` says what the state belongs to (`model.fingerprint`).
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
-    strains = model.edge_count + 3 * (len(model.joint_a) + len(model.pair_joint)) if "viscosity" in model.forces else 0
+    strains = model.strain_count + len(model.impact_pairs)
     channels = list(model.scene.stimuli.values())
     before = np.array([channel.schedule.value_before(0.0, LAST_STEP) for channel in channels])
     return State(
@@ -176,7 +176,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         fluid_force=np.zeros((with_history * in_fluid, 3)),
         strain_rate=np.zeros(strains),
         strain_acceleration=np.zeros(with_history * strains),
-        account=np.zeros(11),
+        account=np.zeros(12),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels), np.nan),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),

@@ -42,6 +42,7 @@ ErrorTolerance = real(
     above=0.0,
     at_most=LARGEST_TOLERANCE,
 )
+Restitution = real("a coefficient of restitution", "1", "0.5", at_least=0.0, at_most=1.0)
 PoissonRatio = real("Poisson's ratio", "1", "0.5", above=-1.0, at_most=0.5)
 
 
@@ -115,6 +116,9 @@ class Contact(Part):
     """Of the barrier, per length of rod; a larger one leaves the gap nearer to `barrier_distance`."""
     friction: Friction | None = None
     """Of all surfaces; without it they are smooth."""
+    restitution: Restitution | None = None
+    """Speed after an impact over that before, of bodies with each other and with obstacles; without it a barrier gives
+    back all. Rods rebound by their waves, which the retardation time of a material damps."""
     rods: Literal["auto", True, False] = "auto"
     """Whether rods touch each other and themselves; `auto`: where their lengths and free curvatures let them meet."""
 

@@ -65,6 +65,21 @@ CASES = [
     ),
     *(
         Case(
+            f"impacts/restitution {restitution:g}/{dimension}-D {integrator}",
+            "speed after the impact over that before",
+            0.02,
+            lambda dimension=dimension, integrator=integrator, tolerance=tolerance, restitution=restitution: (
+                rebound(dimension, integrator, tolerance, restitution=restitution),
+                restitution,
+            ),
+            scale=1.0,
+        )
+        for restitution in (0.0, 0.1, 0.5, 0.9)
+        for dimension in (2, 3)
+        for integrator, tolerance in TOLERANCES.items()
+    ),
+    *(
+        Case(
             f"impacts/no energy from nothing/{integrator} {1e6 * dt:g} us",
             "energy that the steps of an impact make, over the largest",
             1e-3,

@@ -198,6 +198,20 @@ class Surfaces:
 
 
 @record
+class Restitution:
+    """Pairs of bodies' contact points and surfaces whose impacts are damped; see `forces.restitution`."""
+
+    damping: float  # z
+    slowest: float  # approach that counts [m/s]
+    first: int  # of their gaps among strains
+    memory: Indices  # where their speeds of approach begin in `Problem.memory`, shape (1,)
+    point: Indices
+    surface: Indices
+    row: IndexTable  # of a contact point and a surface, −1 without, shape (n_contact_point, n_surface)
+    rate: Vector = ("impact",)  # λ [s/m]
+
+
+@record
 class Sliding:
     """Friction of the contacts at the start of a stage; see `forces.surface_friction`."""
 

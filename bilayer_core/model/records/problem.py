@@ -16,6 +16,7 @@ from .parts import (
     OffAxis,
     Plane,
     PointForces,
+    Restitution,
     RodContact,
     Sliding,
     Slips,
@@ -214,6 +215,7 @@ class Problem:
     constrained: Constrained
     attachments: Attachments
     surfaces: Surfaces
+    restitution: Restitution
     sliding: Sliding
     rod_contact: RodContact
     slips: Slips

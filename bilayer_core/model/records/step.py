@@ -96,7 +96,7 @@ class Point:
     body_velocity: Matrix = ("free", 3)  # of free bodies [m/s]
     angular_momentum: Matrix = ("free", 3)  # of free bodies about their mass centres [N m s]
     fluid_momentum: Matrix = ("wet", 3)  # of the fluid at nodes [N s]
-    strain: Vector = ("strain",)  # of all elements; none without viscosity
+    strain: Vector = ("strain",)  # of all elements with viscosity, and gaps of damped impacts [m]
     strain_rate: Vector = ("strain",)  # [1/s]
     rotation: Stack = ("body", 3, 3)  # of all bodies
 
