@@ -68,3 +68,9 @@ def test_it_does_not_drift_at_rest():
     start = place()
     simulator.run(0.5)
     assert abs(place() - start) < 0.5 * 1e-5  # 0.01 mm/s
+
+
+@pytest.mark.parametrize("change", [(), ("solver.tolerance=1e-5",), (DAMPED, "solver.dt=1 ms")])
+def test_with_a_film_that_damps_the_stride_is_the_same_over_integrators_and_tolerances(change):
+    moved, _ = strides(SCENE, 2, "materials.film.retardation_time=1 ms", *change)
+    assert moved[1] == pytest.approx(28.77e-3, abs=0.15e-3)
