@@ -10,7 +10,8 @@ from bilayer_core.model.plan import MODELS
 
 ELASTIC = ("stretching", "bending", "bond")
 IDLE = ("rod barrier", "rod friction")  # nothing in this scene touches: see below
-ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in ("twisting", *IDLE)]
+WITHOUT = ("twisting", "restitution", *IDLE)  # the latter: see `test_restitution.py`
+ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in WITHOUT]
 
 
 def of_everything(ahead, hub, seed, model):
