@@ -38,7 +38,7 @@ def everything_in_plane(ahead, hub="prescribed", stations=6):
     )
     arm["path"] |= {"start": in_plane(ahead, 0.002, 0.0425), "direction": list(ahead)}
     point = {"position": [0, 0, -0.0005], "length": 0.01, "offset": 0.0005}
-    law = contact(coefficient=0.5, speed_threshold=1e-2)
+    law = contact(coefficient=0.5, speed_threshold=1e-2) | {"restitution": 0.5}
     law["friction"] |= {"forward": 0.3, "backward": 0.6, "sideways": 0.4}
     jet = {"name": "jet", "rod": "arm", "position": spacing, "force": [1e-3, 2e-3, 0], "frame": "material"}
     return scene(

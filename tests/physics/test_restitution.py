@@ -1,13 +1,16 @@
 """Contact damping of bodies from a coefficient of restitution; rebounds are cases of `bilayer validate`."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.contact.barrier import barrier
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.errors import SceneError
-from bilayer_core.forces.restitution import damping_of
+from bilayer_core.forces.restitution import damping_of, integral_of_barrier
 from bilayer_core.model.build import build_model
 from bilayer_core.model.state import initial_state
 from bilayer_core.validate.impacts import rebound, thrown
@@ -25,6 +28,35 @@ def speed_after(content, seconds, **steps):
 @pytest.mark.parametrize(("restitution", "z"), [(1.0, 0.0), (0.9, 0.1665), (0.5, 1.433), (0.1, 10.0), (0.0, 100.0)])
 def test_the_damping_of_a_coefficient_is_that_of_the_closed_form(restitution, z):
     assert damping_of(restitution) == pytest.approx(z, rel=1e-3, abs=1e-12)
+
+
+def exact_logarithm(x):
+    """ln x to 40 digits, by ln x = −k ln 2 + 2 artanh((m − 1)/(m + 1)) with m = 2^k x in [1, 2)."""
+
+    def doubled_artanh(z):
+        return 2 * sum(z ** (2 * k + 1) / (2 * k + 1) for k in range(60))
+
+    doublings = 0
+    while x < 1:
+        x, doublings = 2 * x, doublings + 1
+    return doubled_artanh((x - 1) / (x + 1)) - doublings * doubled_artanh(Fraction(1, 3))
+
+
+@pytest.mark.parametrize("gap", [1e-9, 0.1, 0.3, 0.69, 0.7, 0.71, 0.9, 0.99, 0.999, 1.0 - 1e-6])
+def test_the_integral_of_the_barrier_keeps_its_digits(gap):
+    distance = 1e-3
+    y = 1 - Fraction(gap * distance) / Fraction(distance)
+    closed = ((y**3 - 1) * exact_logarithm(1 - y) - y - y**2 / 2 - y**3 / 3) / 3
+    reference = Fraction(distance) ** 3 * closed
+    rounding = 2e-16 / float(y)  # of 1 − d/d̂
+    assert abs(integral_of_barrier(gap * distance, distance) / reference - 1) < 1e-14 + 4 * rounding
+
+
+@pytest.mark.parametrize("gap", [0.2, 0.65, 0.75, 0.95])
+def test_the_integral_of_the_barrier_has_the_barrier_as_its_slope(gap):
+    distance, h = 1e-3, 1e-8
+    above, below = (integral_of_barrier(gap * distance + s * h, distance) for s in (1, -1))
+    assert (above - below) / (2 * h) == pytest.approx(barrier(gap * distance, distance), rel=1e-6)
 
 
 @pytest.mark.parametrize("integrator", ["sdirk2", "tr_bdf2", "generalised_alpha"])
