@@ -46,3 +46,12 @@ def everything(stations=6):
         masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
         loads=loads,
     )
+
+
+HALF_SIZES = {
+    "plane": (0.0, 0.0, 0.0),
+    "sphere": (0.0, 0.0, 0.0),
+    "box": (0.3, 0.2, 0.15),
+    "cylinder": (0.25, 0.25, 0.2),
+}
+"""Of shapes along their axes [m], for tests of shapes by themselves."""

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from bilayer_core.cli.options import Verb, scene_argument, set_option
-from bilayer_core.cli.report import CHOICES
+from bilayer_core.cli.report import choices
 
 WIDTH = 100
 """Of the text beside a name [characters]."""
@@ -60,6 +60,7 @@ def _report(simulator) -> dict[str, Any]:
         "reasons": simulator.reasons,
         "nodes": model.node_count + model.point_count,
         "dof": model.unknowns,
+        "contact_stiffness": model.contact_stiffness or None,
         "dt": simulator.dt,
         "tolerance": simulator.tolerance,
         "max_step": None if simulator.tolerance is None else simulator.steps.longest,
@@ -124,8 +125,8 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         for name, text in report["stimuli"].items():
             yield from _block(name, [text])
     yield "computation"
-    for key in CHOICES:
-        yield from _block(key, [f"{report[key]} ({report['reasons'][key]})"])
+    for name, choice in choices(report):
+        yield from _block(name, [choice])
     yield from _block("size", [f"{report['nodes']} nodes, {report['dof']} unknowns"])
     yield from _block("time", [_time(report)])
     if report["tolerance"] is not None:

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-CHOICES = ("model", "dimension", "integrator", "stepping")
-"""What `auto` may choose; `reasons` says why for each."""
+
+def choices(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Names of what was chosen for a scene, and what that is, with the reasons."""
+    for key, reason in report["reasons"].items():
+        chosen = report[key]
+        yield key.replace("_", " "), f"{f'{chosen:.0e} Pa' if isinstance(chosen, float) else chosen} ({reason})"
 
 
 def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
@@ -21,8 +25,8 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     """
     factor = summary["real_time_factor"]
     yield f"{summary['scene']}: {summary['termination']}, {summary['simulated']:g} s in {summary['steps']} steps"
-    for key in CHOICES:
-        yield f"  {key:22}{summary[key]} ({summary['reasons'][key]})"
+    for name, choice in choices(summary):
+        yield f"  {name:22}{choice}"
     yield f"  {'size':22}{summary['nodes']} nodes, {summary['dof']} unknowns"
     yield f"  {'CPU time':22}{summary['cpu_time']:.3g} s" + (f", real-time factor {factor:.3g}" if factor else "")
     iterations = summary["newton_iterations"]

@@ -155,7 +155,7 @@ def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
     return Surfaces.zeros(
         sizes,
         d_hat=contact.barrier_distance,
-        stiffness=contact.stiffness,
+        stiffness=model.contact_stiffness,
         radius=contact_points.radius,
         weight=contact_points.weight,
         contact_point_body=contact_points.body,
@@ -256,7 +256,7 @@ def rod_contact_of(
     return RodContact.zeros(
         sizes,
         d_hat=contact.barrier_distance,
-        stiffness=contact.stiffness,
+        stiffness=model.contact_stiffness,
         slides=law is not None and law.acts and law.coefficient > 0.0,
         coefficient=law.coefficient if law is not None else 0.0,
         threshold=law.speed_threshold if law is not None else 1.0,

@@ -42,13 +42,12 @@ from ..model.force_slots import NAMES, slot_of
 from ..model.records.outcome import CONTACT_ERROR, FRACTION
 from ..model.records.problem import Problem
 from ..model.records.status import READY
-from ..model.records.step import Configuration, StageInputs, StateArrays, Work
+from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of
-from .step import grow
 
 ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
 FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN = range(6, 12)
-"""Places in `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
+"""Slots of `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
 barriers take up and contact damping takes [W]; T + V less all that was supplied, and the lowest that was since driving
 ended; the largest energy of the run; what steps have made or, below zero, lost; the potential of gravity at the start
 [J]; 1 if all these are of the state.
@@ -62,7 +61,7 @@ ROUNDING = 1e-11
 SAME = 1e-6
 """Part of the energies by which a state's may differ from those in its account."""
 SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN = range(7)
-"""Places in `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
+"""Slots of `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
 [W], and whether anything drives it.
 """
 CONSERVATIVE = tuple(NAMES.index(name) for name, kind in kinds().items() if kind is Kind.CONSERVATIVE)
@@ -123,9 +122,9 @@ def _energies(p, state, at):
     return kinetic + potential, barriers, measure
 
 
-@piece(int, Problem, StateArrays, Configuration)
-def open_account(p, state, at):
-    """Begin with a state whose potential has been evaluated at `at`, unless the account is its own."""
+@piece(int, Problem, StateArrays, Stage, Configuration)
+def open_account(p, state, stage, at):
+    """Begin with a state whose potential has been evaluated at `at` in a stage, unless the account is its own."""
     account = state.account
     energy, _, scale = _energies(p, state, at)
     if account[OPEN] == 1.0 and abs(account[ENERGY] - energy) <= SAME * scale:
@@ -134,6 +133,7 @@ def open_account(p, state, at):
     account[GRAVITY_AT_START] = p.sums.energy[GRAVITY]
     account[ENERGY], account[IN_BARRIERS], account[LARGEST] = _energies(p, state, at)
     account[OPEN] = 1.0
+    _write_forces_of_laws(p, at, stage, state.law_force)
     return READY
 
 
@@ -160,9 +160,9 @@ def _write_forces_of_laws(p, at, stage, force_out):
     return READY
 
 
-@piece(int, Problem, StateArrays, Work, float, Configuration)
-def begin_step_account(p, state, work, weight, start):
-    """Begin with a step from a state, at the configuration `start`; `weight` is that of the powers there [s]."""
+@piece(int, Problem, StateArrays, Work, float)
+def begin_step_account(p, state, work, weight):
+    """Begin with a step from a state; `weight` is that of the powers there [s]."""
     drives, work_done = p.drives, work.account
     work_done[SUPPLIED], work_done[LOST] = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
     work_done[TAKEN_UP] = weight * state.account[POWER_BARRIER]
@@ -170,9 +170,6 @@ def begin_step_account(p, state, work, weight, start):
     for i in range(work.start_strain.shape[0]):
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
-    if work.start_strain.shape[0] > 0:
-        grow(drives, work.start_strain, work.stage.rest_edge, work.stage.rest_joint)
-        _write_forces_of_laws(p, start, work.stage, work.start_force)
     return READY
 
 
@@ -299,7 +296,7 @@ def add_powers(p, work, inputs, n, weight, at):
         supplied += sums.supplied[k]
         lost += sums.lost[k]
     _write_rates(p.bodies, inputs, n, at, work.end, work.rates)
-    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if p.has_contact else 0.0
+    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if _in_barriers(sums) != 0.0 else 0.0
     done[TAKEN_UP] += weight * done[TAKING_UP]
     driven = p.followers.exists or p.moments.exists
     if flow.exists:
@@ -358,15 +355,15 @@ def close_step_account(p, state, work, h, beyond, end):
     changed = False
     for i in range(work.start_strain.shape[0]):
         changed |= work.strain[i] != work.start_strain[i]
-    if changed:
-        _write_forces_of_laws(p, end, work.stage, work.end_force)
-        for i in range(work.start_strain.shape[0]):
-            mean = 0.5 * (work.start_force[i] + work.end_force[i])
-            done[SUPPLIED] -= mean * (work.strain[i] - work.start_strain[i])
     p.outcome.figures[CONTACT_ERROR] = 0.0
     if account[OPEN] == 0.0:
-        call(p.calls.open_account, (p, state, end))
+        call(p.calls.open_account, (p, state, work.stage, end))
         return NONE
+    _write_forces_of_laws(p, end, work.stage, work.end_force)
+    for i in range(work.start_strain.shape[0]):
+        mean = 0.5 * (state.law_force[i] + work.end_force[i])
+        done[SUPPLIED] -= mean * (work.strain[i] - work.start_strain[i])
+    copy(work.end_force, state.law_force)
     energy, barriers, scale = _energies(p, state, end)
     missed = abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP])
     if not beyond:

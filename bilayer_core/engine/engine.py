@@ -207,7 +207,7 @@ class Engine:
     def open_account(self, state: State) -> None:
         """Begin with the energy of a state that was evaluated, unless its account is its own."""
         run = self._parts_for(state)
-        open_account(run.problem, run.state, self.end)
+        open_account(run.problem, run.state, self._work.stage, self.end)
 
     def count_shape(self, state: State) -> None:
         """Take the shape of a state that was evaluated, and to which no step has led, into the extrema."""

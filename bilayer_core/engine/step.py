@@ -28,7 +28,7 @@ configuration_at = record_at(Configuration)
 
 
 @kernel
-def grow(drives, law_strain, rest_edge_out, rest_joint_out):
+def _grow(drives, law_strain, rest_edge_out, rest_joint_out):
     """Rest strains of edges and joints from the eigenstrain of laws."""
     copy(drives.rest_strain, rest_edge_out)
     for k in range(drives.driven_edge.shape[0]):
@@ -61,7 +61,7 @@ def drive_stage(p, state, inputs, n, work):
         transduction[i] = lagged(state.transduction[i], first, last, lags[0], lags[1], inputs.elapsed[n])
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         strain[i] = eigenstrain_of(transduction[i], law[0], law[1], law[2])
-    grow(drives, strain, stage.rest_edge, stage.rest_joint)
+    _grow(drives, strain, stage.rest_edge, stage.rest_joint)
     for i in range(stage.load_factor.shape[0]):
         stage.load_factor[i] = inputs.load_factor[n, i]
     return READY
@@ -135,8 +135,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     _clear(p.outcome)
     call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
     call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), work.first))
-    first = configuration_at(work.configurations[s])
-    call(p.calls.begin_step_account, (p, state, work, method.works[0] * h, first))
+    call(p.calls.begin_step_account, (p, state, work, method.works[0] * h))
     stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
     work.start_angle[:] = 0.0
     worst = 0.0

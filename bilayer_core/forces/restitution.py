@@ -59,7 +59,7 @@ def damping_of(restitution: float) -> float:
 
 
 def with_memory(restitution: Restitution, first: int) -> Restitution:
-    """The record, which remembers from place `first` of `Problem.memory` on."""
+    """The record, which remembers from slot `first` of `Problem.memory` on."""
     restitution.memory[:] = first
     return restitution
 
@@ -137,9 +137,9 @@ def end_restitution(restitution, p, at, stage):
     """Take the speeds of approach at the end of a step into memory; returns a status."""
     for k in range(restitution.rate.shape[0]):
         i, s = restitution.point[k], restitution.surface[k]
-        x, place = at.contact_point, restitution.memory[0] + k
+        x, slot = at.contact_point, restitution.memory[0] + k
         gap = gap_normal(p.surfaces, at, i, s, x[i, 0], x[i, 1], x[i, 2])[0]
         closing = max((stage.origin_strain[restitution.first + k] - gap) / stage.lengths[0], 0.0)
-        known = abs(p.memory[place])
-        p.memory[place] = -closing if gap >= p.surfaces.d_hat else max(known, closing)
+        known = abs(p.memory[slot])
+        p.memory[slot] = -closing if gap >= p.surfaces.d_hat else max(known, closing)
     return READY

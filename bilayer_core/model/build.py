@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..scene.config import SceneConfig
 from .bodies import build_bodies
 from .contact_points import build_contact, refuse_penetration
 from .force_list import active_forces
+from .impacts import stiffness_for_impacts
 from .laminate import add_laminate
 from .layout import number_unknowns
 from .model import Bodies, Model
@@ -17,7 +20,7 @@ from .points import add_point_masses, build_loads
 from .rod_penetration import refuse_meeting_rods
 from .rod_surfaces import build_rod_surfaces
 from .rods import add_bonded_rods
-from .strands import Collected, turn_of_copy
+from .strands import Collected, rotation_of_copy
 
 ADD_ROD = {"two_rod": add_bonded_rods, "laminate": add_laminate}
 """How each model turns a rod into strands."""
@@ -38,7 +41,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     body_index = {body.name: index for index, body in enumerate(scene.bodies)}
     for rod in scene.rods:
         for copy, name in enumerate(rod.copies):
-            ADD_ROD[model](found, scene, rod, name, turn_of_copy(rod, copy), body_index)
+            ADD_ROD[model](found, scene, rod, name, rotation_of_copy(rod, copy), body_index)
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found, plane)
@@ -72,6 +75,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
             layout=number_unknowns(*numbered, dimension=2),
         ),
         bodies=bodies,
+        contact_stiffness=0.0 if scene.contact is None else scene.contact.stiffness,
         contact_points=contact_points,
         surfaces=surfaces,
         dead_loads=build_loads(scene, found, bodies, "world"),
@@ -133,14 +137,14 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     )
     refuse_penetration(arrays)
     refuse_meeting_rods(arrays)
-    return arrays
+    return replace(arrays, contact_stiffness=stiffness_for_impacts(arrays))
 
 
 def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
     """Sign σ of m1 = σ normal × t of edges and clamp edges, shape (n_edge + n_clamp_edge,)."""
-    turn = bodies.start_rotation[found.column("attached_body", np.int64)]
+    rotation = bodies.start_rotation[found.column("attached_body", np.int64)]
     columns = [found.column(f"clamp_edge_{name}", width=3) for name in ("tangent", "director1")]
-    clamp_edges = [np.einsum("kij,kj->ki", turn, column) for column in columns]
+    clamp_edges = [np.einsum("kij,kj->ki", rotation, column) for column in columns]
     tangent, director1 = (
         np.concatenate([found.column(name, width=3), of_clamp_edges])
         for name, of_clamp_edges in zip(("tangent", "director1"), clamp_edges, strict=True)
@@ -167,6 +171,6 @@ def _joints_of_clamp_edges(joint_a: np.ndarray, joint_b: np.ndarray, edge_count:
     """The joint that each clamp edge takes part in, shape (n_clamp_edge,)."""
     joints = np.empty(clamp_edges, dtype=np.int64)
     for edges in (joint_a, joint_b):
-        of_wall = np.flatnonzero(edges >= edge_count)
-        joints[edges[of_wall] - edge_count] = of_wall
+        of_clamp = np.flatnonzero(edges >= edge_count)
+        joints[edges[of_clamp] - edge_count] = of_clamp
     return joints

@@ -1,6 +1,6 @@
 """The list of forces, from which the plan, the engine, the energy budget and the documentation take theirs.
 
-A force has its line here and its formula in `forces/`; the part of the engine that computes it asks for its place by
+A force has its line here and its formula in `forces/`; the part of the engine that computes it asks for its slot by
 name (`model.force_slots.slot_of`). An engine refuses to be built for a scene that needs a force that no term of
 `forces.register` computes.
 """

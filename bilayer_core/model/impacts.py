@@ -2,7 +2,7 @@
 
 A barrier K_c b(d) w, w the length of rod that a contact point stands for, takes up K_c w b(d̂/10) while nine tenths of
 its distance close, b(d̂/10) = 0.81 ln 10 d̂². What comes with more energy along the normal turns where the gap is a tiny
-part of d̂, which no step resolves.
+part of d̂, which no step resolves. `contact.impact_speed` has the model use the stiffness that holds it.
 """
 
 from __future__ import annotations
@@ -43,11 +43,9 @@ def impact_warnings(model: Model) -> Iterator[str]:
     and heights at the start tell.
     """
     contact = model.scene.contact
-    if contact is None or not model.has_surface_contact:
-        return
     for what, mass, length, speed in _approaching(model):
         energy = 0.5 * mass / length * speed**2
-        held = contact.stiffness * barrier(HELD * contact.barrier_distance, contact.barrier_distance)
+        held = model.contact_stiffness * barrier(HELD * contact.barrier_distance, contact.barrier_distance)
         if energy <= held:
             continue
         stiffness = stiffness_that_holds(energy, contact.barrier_distance)
@@ -55,20 +53,43 @@ def impact_warnings(model: Model) -> Iterator[str]:
         yield (
             f"contact: {what} meets a plane at {speed:.3g} m/s with {energy:.3g} J per metre of contact, more than the "
             f"barrier holds ({held:.3g} J/m down to a tenth of its distance): its rebound would be unresolved; "
-            f"stiffness {stiffness:.0e} Pa or barrier_distance {1e3 * distance:.2g} mm holds it"
+            f"stiffness {stiffness:.0e} Pa or barrier_distance {1e3 * distance:.2g} mm holds it, and "
+            f"impact_speed {speed:.3g} m/s has the model take such a stiffness"
         )
+
+
+def stiffness_for_impacts(model: Model) -> float:
+    """K_c [Pa] of the scene, or what its `contact.impact_speed` needs if that is more; 0 without contact."""
+    contact = model.scene.contact
+    if contact is None:
+        return 0.0
+    if contact.impact_speed is None:
+        return contact.stiffness
+    energy = 0.5 * heaviest(model) * contact.impact_speed**2
+    return max(contact.stiffness, stiffness_that_holds(energy, contact.barrier_distance))
+
+
+def reason_of_stiffness(model: Model) -> dict[str, str]:
+    """Why `contact_stiffness` is what it is, where that is not the scene's own."""
+    contact = model.scene.contact
+    if contact is None or model.contact_stiffness == contact.stiffness:
+        return {}
+    why = f"not {contact.stiffness:.3g} Pa, to hold impacts at `contact.impact_speed`, {contact.impact_speed:g} m/s"
+    return {"contact_stiffness": why}
 
 
 def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
     """Name, mass [kg], length of contact [m] and speed towards the nearest plane of free bodies and rods [m/s]."""
     bodies, points = model.bodies, model.contact_points
+    if not model.has_surface_contact:
+        return
     for slot, body in enumerate(bodies.body_of_free):
         own = np.flatnonzero(points.body == body)
         if own.size:
-            places = (
+            positions = (
                 bodies.start_position[body] + points.position[own - model.node_count] @ bodies.start_rotation[body].T
             )
-            speed = _speed(model, places, points.radius[own], bodies.start_velocity[body])
+            speed = _speed(model, positions, points.radius[own], bodies.start_velocity[body])
             yield f"body {bodies.names[body]!r}", float(bodies.mass[slot]), float(points.weight[own].max()), speed
     for strand in model.strands:
         nodes = strand.first_node + np.arange(strand.node_count)
@@ -78,12 +99,12 @@ def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
             yield f"rod {strand.name!r}", float(mass), float(length), speed
 
 
-def _speed(model: Model, places: Array, radius: Array, velocity: Array) -> float:
+def _speed(model: Model, positions: Array, radius: Array, velocity: Array) -> float:
     """Largest speed along a plane's normal with which points meet it [m/s]."""
     surfaces, gravity, largest = model.surfaces, np.array(model.scene.gravity), 0.0
     for s in np.flatnonzero((surfaces.kind == PLANE) & (surfaces.body == len(model.bodies.names))):
         normal = surfaces.rotation[s][:, 2]
-        gap = float(((places - surfaces.position[s]) @ normal - radius).min())
+        gap = float(((positions - surfaces.position[s]) @ normal - radius).min())
         if gap > 0.0:
             fall = 2.0 * max(-float(gravity @ normal), 0.0) * gap
             largest = max(largest, math.sqrt(max(-float(velocity @ normal), 0.0) ** 2 + fall))

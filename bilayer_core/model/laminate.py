@@ -14,7 +14,7 @@ from .immersed import add_fluid
 from .laminate_section import LayerHalves, WholeSection, layer_halves, side
 from .section import Section, outline, sections
 from .strand_arrays import StrandArrays
-from .strands import Collected, StrandElements, Turn, add_strand, strand_shape
+from .strands import Collected, Rotate, StrandElements, add_strand, strand_shape
 from .validity import Figure
 
 Array = np.ndarray
@@ -43,12 +43,12 @@ class _Placed:
 
 
 def add_laminate(
-    found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Turn, body_index: dict[str, int]
+    found: Collected, scene: SceneConfig, rod: Rod, name: str, rotate: Rotate, body_index: dict[str, int]
 ) -> None:
     """Add one copy of a rod: a strand with the stiffness and mass of its layers, and their drag."""
     layers = _placed(scene, rod)
     axis = _axis(layers)
-    shape = strand_shape(rod, np.full(rod.stations, axis), 0, rod.stations - 1, turn)
+    shape = strand_shape(rod, np.full(rod.stations, axis), 0, rod.stations - 1, rotate)
     halves = [
         layer_halves(scene, rod, slot, axis, shape, layer.length / shape.lengths, layer.present)
         for slot, layer in enumerate(layers)

@@ -25,7 +25,7 @@ class Bodies(ReadOnlyArrays):
     """
 
     names: tuple[str, ...]
-    free_index: Array  # place among the free bodies, −1 for a prescribed one and the world, shape (n_body + 1,)
+    free_index: Array  # index among the free bodies, −1 for a prescribed one and the world, shape (n_body + 1,)
     body_of_free: Array  # the reverse, shape (n_free,)
     start_position: Array  # [m], shape (n_body, 3)
     start_rotation: Array  # shape (n_body, 3, 3)
@@ -86,7 +86,7 @@ class LoadShares(ReadOnlyArrays):
     """Parts of loads, each on one node or on one free body."""
 
     target: Array  # node or free body, shape (n_share,)
-    load: Array  # place of the load in the scene, shape (n_share,)
+    load: Array  # index of the load in the scene, shape (n_share,)
     vector: Array  # force [N] or moment [N m] at factor 1, shape (n_share, 3)
 
     def scaled(self, factor: Array) -> Array:
@@ -124,6 +124,7 @@ class Model(ReadOnlyArrays):
     layout: Layout
     plane: InPlane | None  # None in three dimensions
     bodies: Bodies
+    contact_stiffness: float  # of the barrier, `contact.stiffness` or more [Pa]; 0 without contact
     contact_points: ContactPoints
     surfaces: Surfaces
     dead_loads: PointLoads  # of fixed direction
@@ -232,11 +233,6 @@ class Model(ReadOnlyArrays):
     def free_count(self) -> int:
         """Number of free bodies."""
         return len(self.bodies.mass)
-
-    @property
-    def has_moments(self) -> bool:
-        """Whether a moment acts on a body."""
-        return len(self.dead_loads.moments.target) + len(self.follower_loads.moments.target) > 0
 
     @property
     def unknowns(self) -> int:

@@ -20,7 +20,7 @@ from ..scene.profile import extremes
 from ..scene.rod import Rod
 from .plane import Plane
 from .shapes import Shape, obstacle_pose, shape_of
-from .strands import turn_of_copy
+from .strands import rotation_of_copy
 
 Array = np.ndarray
 ROUNDING = 1e-9
@@ -107,8 +107,8 @@ class _Survey:
             if self._carries_points(body) and not self._mirrored(self._points(body)):
                 yield f"the points by which bodies.{body.name} touches are not symmetric about {plane}"
             if body.surface is not None:
-                shape, turn = shape_of(body.surface), rotation_matrix(np.array(body.rotation))
-                if not self._fits(shape, np.array(body.position), turn, isinstance(body.motion, Free)):
+                shape, rotation = shape_of(body.surface), rotation_matrix(np.array(body.rotation))
+                if not self._fits(shape, np.array(body.position), rotation, isinstance(body.motion, Free)):
                     yield f"bodies.{body.name}.surface is not symmetric about {plane}"
         for obstacle in scene.obstacles:
             if not self._fits(shape_of(obstacle), *obstacle_pose(obstacle)):
@@ -119,9 +119,9 @@ class _Survey:
         scene = self._scene
         for rod in scene.rods:
             for copy, name in enumerate(rod.copies):
-                turn = turn_of_copy(rod, copy)
-                start = turn(np.array(rod.path.start), about=True)
-                directions = turn(np.array(rod.path.direction)), turn(np.array(rod.normal))
+                rotate = rotation_of_copy(rod, copy)
+                start = rotate(np.array(rod.path.start), about=True)
+                directions = rotate(np.array(rod.path.direction)), rotate(np.array(rod.normal))
                 if not (self._is_on(start) and self._lies_in(*directions)):
                     yield f"rods.{name}"
         if not self._lies_in(scene.gravity):
@@ -155,9 +155,9 @@ class _Survey:
                 yield "motion.velocity"
             if not self._along_normal(motion.angular_velocity):
                 yield "motion.angular_velocity"
-            turn = rotation_matrix(np.array(body.rotation))
+            rotation = rotation_matrix(np.array(body.rotation))
             inertia = shape_of(body.surface).inertia(motion.mass) if motion.inertia is None else np.diag(motion.inertia)
-            if not self._along_normal(turn @ inertia @ turn.T @ self._normal):
+            if not self._along_normal(rotation @ inertia @ rotation.T @ self._normal):
                 yield "motion.inertia, of which no principal axis is along its normal,"
 
     def _of_load(self, load) -> tuple[Array, Array]:
@@ -167,8 +167,8 @@ class _Survey:
             return force, moment
         if load.body is not None:
             body = next(body for body in self._scene.bodies if body.name == load.body)
-            turn = rotation_matrix(np.array(body.rotation))
-            return turn @ force, turn @ moment
+            rotation = rotation_matrix(np.array(body.rotation))
+            return rotation @ force, rotation @ moment
         return force[2] * self._normal, moment  # along path × normal, which is ± the plane's
 
     def _carries_points(self, body: Body) -> bool:
@@ -190,9 +190,9 @@ class _Survey:
         apart = np.abs(points[:, None] - image[None]).max(axis=2, initial=0.0)
         return bool(np.all(apart.min(axis=1, initial=np.inf) <= ROUNDING * self._size)) if len(points) else True
 
-    def _fits(self, shape: Shape, position: Array, turn: Array, free: bool = False) -> bool:
+    def _fits(self, shape: Shape, position: Array, rotation: Array, free: bool = False) -> bool:
         """Whether a surface is symmetric about the plane, or runs on along the normal wherever it can be touched."""
-        axes = turn @ shape.rotation
+        axes = rotation @ shape.rotation
         if shape.kind == "plane":
             return self._lies_in(axes[:, 2])
         if shape.kind == "sphere":

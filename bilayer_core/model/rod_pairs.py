@@ -34,7 +34,7 @@ HALF_TURN = math.pi
 
 @dataclass(frozen=True)
 class RodPair:
-    """Two rods of a scene by their place in it, copies of one, or one and itself; and what was decided about them.
+    """Two rods of a scene by their index in it, copies of one, or one and itself; and what was decided about them.
 
     `possible` is what geometry says, `active` whether contact is computed, `geometry` and `reason` why.
     """
@@ -96,9 +96,9 @@ def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str]:
     sag = weight * length**3 / (6.0 * float(stiffness.min()))
     if rod.clamp_start is not None or rod.clamp_end is not None:
         sag = min(sag, 0.5 * HALF_TURN)
-    turn = rod.path.turn + float(bent.sum()) * rod.edge_length + sag
-    degrees = f"{math.degrees(turn):.0f}°" if turn < 100.0 * HALF_TURN else "many times"
-    if turn < HALF_TURN:
+    angle = rod.path.turn + float(bent.sum()) * rod.edge_length + sag
+    degrees = f"{math.degrees(angle):.0f}°" if angle < 100.0 * HALF_TURN else "many times"
+    if angle < HALF_TURN:
         return False, f"turns by {degrees} at most, 180° would be needed to meet itself"
     return True, f"can turn by {degrees}"
 

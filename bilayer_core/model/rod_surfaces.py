@@ -37,7 +37,7 @@ class RodSurfaces(ReadOnlyArrays):
     edge_radius: Array  # largest radius of its strand's nodes [m], shape (n_edge,)
     first_point: Array  # of each edge, shape (n_edge + 1,)
     point_edge: Array  # shape (n_point,)
-    point_fraction: Array  # place on its edge, 0 … 1, shape (n_point,)
+    point_fraction: Array  # position on its edge, 0 … 1, shape (n_point,)
     point_arc: Array  # along the path of its rod [m], shape (n_point,)
     point_weight: Array  # Δl [m], shape (n_point,)
     rod_can_collide: Array  # whether two rods, or one and itself, can meet, shape (n_rod, n_rod)
@@ -50,13 +50,13 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     decisions = [rod_pair for rod_pair in rod_pairs(scene) if rod_pair.active]
     if not decisions:
         return None
-    place = [index for index, rod in enumerate(scene.rods) for _ in rod.copies]  # of each expanded rod in the scene
-    rods = [scene.rods[index] for index in place]
+    scene_index = [index for index, rod in enumerate(scene.rods) for _ in rod.copies]  # of each rod with copies
+    rods = [scene.rods[index] for index in scene_index]
     names = [name for rod in scene.rods for name in rod.copies]
     can_collide = np.zeros((len(rods), len(rods)), dtype=bool)
     for rod_pair in decisions:
-        for a in (i for i, p in enumerate(place) if p == rod_pair.first):
-            for b in (i for i, p in enumerate(place) if p == rod_pair.second):
+        for a in (i for i, p in enumerate(scene_index) if p == rod_pair.first):
+            for b in (i for i, p in enumerate(scene_index) if p == rod_pair.second):
                 if rod_pair.first != rod_pair.second or (a != b) == rod_pair.copies:
                     can_collide[a, b] = can_collide[b, a] = True
     joined = np.array(

@@ -13,13 +13,13 @@ from ..scene.rod import Layer, Rod
 from .immersed import add_fluid
 from .section import Section, bond, sections
 from .strand_arrays import StrandArrays
-from .strands import Collected, Span, StrandElements, StrandShape, Turn, add_strand, strand_shape
+from .strands import Collected, Rotate, Span, StrandElements, StrandShape, add_strand, strand_shape
 
 Array = np.ndarray
 
 
 def add_bonded_rods(
-    found: Collected, scene: SceneConfig, rod: Rod, name: str, turn: Turn, body_index: dict[str, int]
+    found: Collected, scene: SceneConfig, rod: Rod, name: str, rotate: Rotate, body_index: dict[str, int]
 ) -> None:
     """Add one copy of a rod: its strands, their drag, and the bond between them."""
     strands: list[_Bonded] = []
@@ -27,7 +27,7 @@ def add_bonded_rods(
         first, last = rod.covered_stations(layer)
         at_nodes, at_edges = _sections(scene, rod, layer, first, last)
         side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
-        shape = strand_shape(rod, side * at_nodes.thickness, first, last, turn)
+        shape = strand_shape(rod, side * at_nodes.thickness, first, last, rotate)
         strand = StrandArrays(
             name=f"{name}/{layer.name}",
             rod=name,

@@ -25,7 +25,7 @@ class Shape:
         Half sizes along its own axes, rounding included [m], shape (3,); zero for a plane.
     rounding : float
         Radius of its edges, that of a sphere [m].
-    turn : ndarray
+    rotation : ndarray
         Columns are its own axes in the owner's frame; z is a cylinder's axis and a plane's normal, shape (3, 3).
     rim_points : int
         Points on each rim of a cylinder.
@@ -113,8 +113,8 @@ def shape_of(surface: scene_shapes.Surface | scene_shapes.Obstacle) -> Shape:
 def obstacle_pose(obstacle: scene_shapes.Obstacle) -> tuple[np.ndarray, np.ndarray]:
     """Position [m], shape (3,), and rotation of an obstacle, shape (3, 3)."""
     position = obstacle.point if obstacle.type == "plane" else obstacle.position
-    turn = rotation_matrix(np.array(obstacle.rotation)) if obstacle.type == "box" else np.eye(3)
-    return np.array(position), turn
+    rotation = rotation_matrix(np.array(obstacle.rotation)) if obstacle.type == "box" else np.eye(3)
+    return np.array(position), rotation
 
 
 def signed_distance(shape: Shape, points: np.ndarray) -> np.ndarray:

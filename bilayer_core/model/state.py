@@ -55,6 +55,7 @@ class State:
     strain_rate: Array  # of all elements with viscosity [1/s], and of gaps with damped impacts [m/s]
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
     account: Array  # of energy; see `engine.energy_account`, shape (12,)
+    law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
@@ -177,6 +178,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         strain_rate=np.zeros(strains),
         strain_acceleration=np.zeros(with_history * strains),
         account=np.zeros(12),
+        law_force=np.zeros(len(model.law_channel)),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels), np.nan),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),

@@ -55,19 +55,19 @@ class Collected:
         return self.laws.index(numbers)
 
 
-Turn = Callable[..., Array]
+Rotate = Callable[..., Array]
 
 
-def turn_of_copy(rod: Rod, copy: int) -> Turn:
+def rotation_of_copy(rod: Rod, copy: int) -> Rotate:
     """Function that turns directions of a rod, or points with ``about=True``, to those of one of its copies."""
     if rod.pattern is None:
         return lambda vectors, about=False: vectors
-    turn = rotation_matrix(2.0 * np.pi * copy / rod.pattern.count * np.array(rod.pattern.axis))
-    turn[np.abs(turn) < 1e-15] = 0.0  # quarter turns are exact
+    rotation = rotation_matrix(2.0 * np.pi * copy / rod.pattern.count * np.array(rod.pattern.axis))
+    rotation[np.abs(rotation) < 1e-15] = 0.0  # quarter turns are exact
     center = np.array(rod.pattern.center)
 
     def apply(vectors: Array, about: bool = False) -> Array:
-        return (vectors - center) @ turn.T + center if about else vectors @ turn.T
+        return (vectors - center) @ rotation.T + center if about else vectors @ rotation.T
 
     return apply
 
@@ -103,12 +103,12 @@ class StrandShape:
         return rest_strains(tangents[:-1], normals[:-1], tangents[1:], normals[1:])
 
 
-def strand_shape(rod: Rod, height: Array, first: int, last: int, turn: Turn) -> StrandShape:
+def strand_shape(rod: Rod, height: Array, first: int, last: int, rotate: Rotate) -> StrandShape:
     """Shape of the strand that lies `height` [m] over the path at the stations from first to last."""
-    shape = _shape(rod, height, first, last, turn, _path)
+    shape = _shape(rod, height, first, last, rotate, _path)
     if rod.imperfection is None:
         return shape
-    imperfect = _shape(rod, height, first, last, turn, _imperfect_path)
+    imperfect = _shape(rod, height, first, last, rotate, _imperfect_path)
     return replace(imperfect, imperfection=imperfect.strains() - shape.strains())
 
 
@@ -134,25 +134,30 @@ def _imperfect_path(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
 
 
 def _shape(
-    rod: Rod, height: Array, first: int, last: int, turn: Turn, path: Callable[[Rod, Array], tuple[Array, Array, Array]]
+    rod: Rod,
+    height: Array,
+    first: int,
+    last: int,
+    rotate: Rotate,
+    path: Callable[[Rod, Array], tuple[Array, Array, Array]],
 ) -> StrandShape:
     points, tangents, normals = path(rod, rod.edge_length * np.arange(first, last + 1))
     _, _, middle_normals = path(rod, rod.edge_length * (np.arange(first, last) + 0.5))
-    positions = turn(points + height[:, None] * normals, about=True)
+    positions = rotate(points + height[:, None] * normals, about=True)
     edges = np.diff(positions, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
     edge_tangents = edges / lengths[:, None]
     ends = [0, -1]
     slopes = (height[[1, -1]] - height[[0, -2]]) / rod.edge_length  # of a layer whose thickness varies
     end_tangents = tangents[ends] + slopes[:, None] * normals[ends]
-    end_tangents = turn(end_tangents / np.linalg.norm(end_tangents, axis=1, keepdims=True))
+    end_tangents = rotate(end_tangents / np.linalg.norm(end_tangents, axis=1, keepdims=True))
     return StrandShape(
         positions,
         lengths,
         edge_tangents,
-        _across(turn(middle_normals), edge_tangents),
+        _across(rotate(middle_normals), edge_tangents),
         end_tangents,
-        _across(turn(normals[ends]), end_tangents),
+        _across(rotate(normals[ends]), end_tangents),
         np.zeros((len(positions), 3)),
     )
 

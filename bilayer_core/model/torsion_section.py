@@ -71,12 +71,12 @@ def bond_torsion(shear_moduli: Array, width: Array, thickness: Array) -> Array:
     width : ndarray
         [m], shape (n_place,)
     """
-    places = np.concatenate([shear_moduli, width[None], thickness])
-    if np.all(places == places[:, :1]):  # most rods are uniform
-        places, back = places[:, :1], np.zeros(len(width), int)
+    sections = np.concatenate([shear_moduli, width[None], thickness])
+    if np.all(sections == sections[:, :1]):  # most rods are uniform
+        sections, back = sections[:, :1], np.zeros(len(width), int)
     else:
-        places, back = np.unique(places, axis=1, return_inverse=True)
-    moduli, width, thickness = places[:2, :, None], places[2][:, None], places[3:, :, None]
+        sections, back = np.unique(sections, axis=1, return_inverse=True)
+    moduli, width, thickness = sections[:2, :, None], sections[2][:, None], sections[3:, :, None]
 
     def term(k: Array) -> Array:
         s = np.tanh(0.5 * k * thickness).sum(axis=0)
@@ -85,4 +85,4 @@ def bond_torsion(shear_moduli: Array, width: Array, thickness: Array) -> Array:
     step = 2.0 * np.pi / width
     first = np.sum(term(step * (np.arange(TERMS) + 0.5)), axis=1)
     rest = TERMS * np.sum(WEIGHTS / NODES**2 * term(TERMS * step / NODES), axis=1)
-    return (32.0 / places[2] * (first + rest))[back.reshape(-1)]
+    return (32.0 / sections[2] * (first + rest))[back.reshape(-1)]

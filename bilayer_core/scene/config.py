@@ -114,6 +114,9 @@ class Contact(Part):
     """Distance at which the barrier begins to act."""
     stiffness: PositivePressure
     """Of the barrier, per length of rod; a larger one leaves the gap nearer to `barrier_distance`."""
+    impact_speed: PositiveSpeed | None = None
+    """Speed of the impacts that the barrier has to hold: where the heaviest part needs a larger stiffness than
+    `stiffness` for that, it is used, and stated."""
     friction: Friction | None = None
     """Of all surfaces; without it they are smooth."""
     restitution: Restitution | None = None

@@ -107,14 +107,3 @@ class Pieces(BaseModel):
                 piece = self.piece(t)
             found.append(piece.value(t))
         return found
-
-    def values_before(self, times: list[float], steps: list[float]) -> list[float]:
-        """`value_before` at increasing times, where steps of such lengths [s] end."""
-        found, piece = [], self.piece(times[0] - NEARLY * steps[0])
-        for t, h in zip(times, steps, strict=True):
-            if t > piece.until + SAME * h:
-                piece = self.piece(t - NEARLY * h)
-                if t > piece.until + SAME * h:
-                    piece = self.piece(t)
-            found.append(piece.value(t))
-        return found

@@ -65,15 +65,7 @@ def eigenstrain_of(filtered, gain, reference, saturation):
     return strain if math.isinf(saturation) else saturation * math.tanh(strain / saturation)
 
 
-def first_order_lag(filtered: np.ndarray, first, last, rising, falling, dt: float) -> np.ndarray:
-    """`lagged` for each of some laws, shape (n,)."""
-    return _for_each(lagged.py_func, filtered, first, last, rising, falling, dt)
-
-
 def free_strain(filtered: np.ndarray, gain, reference, saturation) -> np.ndarray:
     """`eigenstrain_of` for each of some laws, shape (n,)."""
-    return _for_each(eigenstrain_of.py_func, filtered, gain, reference, saturation)
-
-
-def _for_each(law, *arguments) -> np.ndarray:
-    return np.array([law(*(float(value) for value in values)) for values in np.broadcast(*arguments)], dtype=float)
+    laws = np.broadcast(filtered, gain, reference, saturation)
+    return np.array([eigenstrain_of.py_func(*(float(value) for value in law)) for law in laws], dtype=float)

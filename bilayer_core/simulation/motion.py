@@ -54,10 +54,10 @@ class Motion:
         return -sum(float(np.vdot(getattr(gradient, part), getattr(self, part))) for part in PARTS)
 
 
-def compose(model: Model, node: Array, turn: Array, wall: Array, contact: Array) -> Motion:
+def compose(model: Model, node: Array, turn: Array, clamp_edge: Array, contact: Array) -> Motion:
     """A motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of all bodies."""
     i = model.edge_node
-    edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), wall])
+    edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), clamp_edge])
     top0, top1, bottom0, bottom1 = (node[of_pairs] for of_pairs in model.pair_node.T)
     body = contact[model.bodies.body_of_free]
     return Motion(node, edge, 0.5 * (top0 + top1 - bottom0 - bottom1), body, contact)
@@ -67,11 +67,11 @@ def displacement(model: Model, start: Configuration, end: Configuration) -> Moti
     """From one configuration to another; turns, each by less than half a turn, are those beyond parallel transport."""
     edges = model.edge_count
     turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
-    wall = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
+    clamp_edge = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
     contact = np.hstack([end.pose_position - start.pose_position, np.zeros_like(end.pose_position)])
     for b in range(len(model.bodies.names)):
         contact[b, 3:] = rotation_vector(end.rotation[b] @ start.rotation[b].T)
-    return compose(model, end.position - start.position, turn[:edges], wall, contact)
+    return compose(model, end.position - start.position, turn[:edges], clamp_edge, contact)
 
 
 def velocity(model: Model, at: Configuration, state: State) -> Motion:
@@ -80,8 +80,8 @@ def velocity(model: Model, at: Configuration, state: State) -> Motion:
     contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
     tangent = at.tangent[model.edge_count :]
     spin = contact[model.clamp_edge_body, 3:]
-    wall = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
-    return compose(model, state.velocity, state.spin, wall, contact)
+    clamp_edge = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
+    return compose(model, state.velocity, state.spin, clamp_edge, contact)
 
 
 def of_prescribed(model: Model, motion: Motion) -> Motion:

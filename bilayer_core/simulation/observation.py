@@ -76,12 +76,12 @@ def _strand(s: StrandArrays) -> Strand:
     )
 
 
-def _shape_info(shape: Shape, position: Array | None = None, turn: Array | None = None) -> ShapeInfo:
+def _shape_info(shape: Shape, position: Array | None = None, rotation: Array | None = None) -> ShapeInfo:
     """A shape of an owner at a pose, by default that of the owner's frame."""
     place = (0.0, 0.0, 0.0) if position is None else tuple(position.tolist())
-    turn = shape.rotation if turn is None else turn @ shape.rotation
+    rotation = shape.rotation if rotation is None else rotation @ shape.rotation
     rounding = 0.0 if shape.kind == "sphere" else shape.rounding
-    size, quaternion = (2.0 * shape.half).tolist(), quaternion_from_matrix(turn).tolist()
+    size, quaternion = (2.0 * shape.half).tolist(), quaternion_from_matrix(rotation).tolist()
     return ShapeInfo(shape.kind, tuple(size), rounding, place, tuple(quaternion))
 
 

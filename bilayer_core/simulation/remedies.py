@@ -79,7 +79,7 @@ def _stiffness_that_holds(model: Model, speed: float) -> float:
     """K_c [Pa] with which the barrier takes up the motion of what is heaviest."""
     contact = model.scene.contact
     needed = stiffness_that_holds(0.5 * heaviest(model) * speed**2, contact.barrier_distance)
-    return max(needed, MUCH_FASTER * contact.stiffness)
+    return max(needed, MUCH_FASTER * model.contact_stiffness)
 
 
 def _rounded_up(value: float) -> float:

@@ -15,6 +15,7 @@ from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
 from ..model.build import build_model
 from ..model.fingerprint import fingerprint_of
+from ..model.impacts import reason_of_stiffness
 from ..model.model import Model
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
@@ -119,8 +120,10 @@ class Simulator:
 
     @property
     def reasons(self) -> dict[str, str]:
-        """Why `model`, `dimension`, `integrator` and `stepping` are what they are."""
-        return {**self.plan.reasons, "stepping": self.steps.reason}
+        """Why `model`, `dimension`, `integrator` and `stepping` are what they are, and `contact_stiffness` if that is
+        not the scene's.
+        """
+        return {**self.plan.reasons, "stepping": self.steps.reason, **reason_of_stiffness(self.model)}
 
     # what the scene looks like now
 
@@ -178,7 +181,7 @@ class Simulator:
 
     @property
     def energy_account(self) -> Array:
-        """What steps supplied, lost and made of energy; places in `engine.energy_account`."""
+        """What steps supplied, lost and made of energy; slots in `engine.energy_account`."""
         return self._state.account.copy()
 
     def budget(self) -> dict:

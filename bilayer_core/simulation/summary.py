@@ -81,6 +81,7 @@ def summarise(simulator: Any) -> dict:
         "mean_curvature": float(np.average(curvature, weights=model.node_length)),
         "tip_positions": {s.name: positions[s.first_node + s.node_count - 1].tolist() for s in model.strands},
         "max_strain": statistics.max_strain,
+        "contact_stiffness": model.contact_stiffness or None,
         "min_gap": min_gap if np.isfinite(min_gap) else None,
         "max_contact_force": statistics.max_contact_force,
         "energy": simulator.energy(),
@@ -118,7 +119,7 @@ def _of_contact(model: Model, unresolved: int, energy: float) -> Iterator[str]:
     contact, square = model.scene.contact, 2.0 * energy / (model.node_mass.sum() + model.bodies.mass.sum())
     needed = stiffness_that_holds(0.5 * heaviest(model) * square, contact.barrier_distance)
     remedy = "a larger `contact.barrier_distance`"
-    if needed > contact.stiffness:
+    if needed > model.contact_stiffness:
         remedy = f"`contact.stiffness` {needed:.0e} Pa, or {remedy}"
     yield f"{unresolved} steps, as short as allowed, did not resolve an impact on the barrier: {remedy}, holds it"
 

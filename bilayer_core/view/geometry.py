@@ -85,9 +85,9 @@ def shape_mesh(shape: ShapeInfo, colours: Colours) -> Mesh:
         normals.append(directions.reshape(-1, 3))
         shades.append(np.tile(np.array(colours[number % 2], np.uint8), (rows * columns, 1)))
         first += rows * columns
-    turn = np.stack([rotated(np.array(shape.quaternion), axis) for axis in range(3)])
-    placed = np.concatenate(vertices) @ turn + np.array(shape.position)
-    directions = np.concatenate(normals) @ turn
+    rotation = np.stack([rotated(np.array(shape.quaternion), axis) for axis in range(3)])
+    placed = np.concatenate(vertices) @ rotation + np.array(shape.position)
+    directions = np.concatenate(normals) @ rotation
     return (
         placed.astype(np.float32),
         directions.astype(np.float32),
@@ -129,9 +129,9 @@ def _box_patches(core: np.ndarray, rounding: float):
 
 def shape_extent(shape: ShapeInfo) -> np.ndarray:
     """Corners of a box that holds a shape, in the frame of its owner [m], shape (8, 3); its position for a plane."""
-    turn = np.stack([rotated(np.array(shape.quaternion), axis) for axis in range(3)])
+    rotation = np.stack([rotated(np.array(shape.quaternion), axis) for axis in range(3)])
     signs = np.array(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5])).reshape(3, -1).T
-    return np.array(shape.position) + (signs * np.array(shape.size)) @ turn
+    return np.array(shape.position) + (signs * np.array(shape.size)) @ rotation
 
 
 def plane_mesh(

@@ -2,8 +2,9 @@
 
 import re
 
+import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, layer, rod, scene
+from sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SimulationError
@@ -58,3 +59,46 @@ def test_a_fall_and_a_free_rod_count_too():
     assert "rod 'rod/only' meets a plane at 6.26 m/s" in warning
     content["contact"]["barrier_distance"] = 1e-3
     assert not list(impact_warnings(Simulator(load_scene(content)).model))
+
+
+@pytest.mark.parametrize("speed", ["10 m/s", 12.0])
+def test_a_barrier_takes_the_stiffness_that_its_impacts_need_and_says_so(speed):
+    content = thrown(1e7, 2)
+    content["contact"]["impact_speed"] = speed
+    simulator = Simulator(load_scene(content), tolerance=1e-4)
+    assert not list(impact_warnings(simulator.model))
+    assert "not 1e+07 Pa, to hold impacts at `contact.impact_speed`, 1" in simulator.reasons["contact_stiffness"]
+    simulator.run(2e-3)
+    summary = simulator.summary()
+    assert summary["contact_stiffness"] == (6e8 if speed == 12.0 else 4e8)
+    assert not summary["warnings"]
+    height = simulator.bodies["ball"].position[2]
+    simulator.run(1e-4)
+    assert (simulator.bodies["ball"].position[2] - height) / 1e-4 == pytest.approx(SPEED, rel=0.02)
+
+
+def test_a_barrier_that_holds_its_impacts_keeps_its_stiffness():
+    content = thrown(1e9, 2)
+    content["contact"]["impact_speed"] = 10.0
+    simulator = Simulator(load_scene(content))
+    assert simulator.model.contact_stiffness == 1e9
+    assert "contact_stiffness" not in simulator.reasons
+
+
+def test_the_barrier_between_rods_has_that_stiffness_too():
+    def fallen(**keys):
+        strips = [
+            rod([layer()], name="lower", length=0.05, stations=11, start=(0, 0, 0.01), clamp_start="base"),
+            rod([layer()], name="upper", length=0.05, stations=11, start=(0, 0, 0.015)),
+        ]
+        base = fixed("base", (0, 0, 0.01))
+        content = scene(strips, gravity=[0, 0, -9.81], bodies=[base], contact=contact(1e-3) | {"rods": True} | keys)
+        simulator = Simulator(load_scene(content), dimension=3)
+        simulator.run(0.04)
+        return simulator
+
+    adapted = fallen(stiffness=10.0, impact_speed=1.0)
+    assert adapted.model.contact_stiffness > 10.0
+    meant = fallen(stiffness=adapted.model.contact_stiffness)
+    assert meant.summary()["max_contact_force"] > 0.0
+    np.testing.assert_array_equal(adapted.positions, meant.positions)

@@ -11,7 +11,7 @@ from sample_scenes import layer, rod, scene
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.engine.evaluator import Evaluator
-from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, solve_band, width
+from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, forward_band, width
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 from bilayer_core.kinematics.vector import angle
@@ -105,7 +105,8 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     right[:n] = rng.standard_normal((n, 6))
     expected = np.linalg.solve(dense, right[:n])
     one = right[:, 2].copy()
-    solve_band(band, n, width(b), one)
+    forward_band(band, n, width(b), one)
+    backward_band(band, n, width(b), one)
     assert one[:n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
     right[:25] = 0.0  # where columns of a border begin
     expected = np.linalg.solve(dense, right[:n])

@@ -105,7 +105,7 @@ def test_layers_of_different_retardation_times_are_two_rods():
         make_plan(config, model="laminate")
 
 
-def test_the_integrator_by_default_has_stages_of_second_order_and_the_midpoint_rule_is_refused():
+def test_viscosity_takes_tr_bdf2_by_default_and_refuses_the_midpoint_rule():
     config = load_scene(bilayer() | {"solver": {}})
     assert make_plan(config).integrator == "tr_bdf2"
     with pytest.raises(SceneError, match="implicit_midpoint does not follow viscosity"):

@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from bilayer_core.scene.transduction import first_order_lag, free_strain
+from bilayer_core.scene.transduction import free_strain, lagged
+
+first_order_lag = np.vectorize(lagged)
 
 
 @pytest.mark.parametrize("change", [0.0, 0.2], ids=["held", "linear"])

@@ -80,13 +80,6 @@ def backward_band(band, n, bandwidth, right):
 
 
 @kernel
-def solve_band(band, n, bandwidth, right):
-    """Overwrite `right`, of n + b values whose last b are zero, with the solution of the factorised system."""
-    forward_band(band, n, bandwidth, right)
-    backward_band(band, n, bandwidth, right)
-
-
-@kernel
 def eliminate_band(band, n, b, m, border, scaled_out, corner):
     """Eliminate the factorised band A = L D Lᵀ from a matrix with m more columns and rows,
 

@@ -21,7 +21,7 @@ class Strands:
     bandwidth: int  # half of it, without the diagonal
     axes: Matrix  # directions of a node's unknowns in the matrix, shape (dimension, 3)
     row: Indices  # first of them in the matrix, shape (n_node,)
-    node_unknown: Indices  # place of a node in gradients and steps, which are vectors in space
+    node_unknown: Indices  # slot of a node in gradients and steps, which are vectors in space
     edge_unknown: Indices  # likewise of an edge
     edge_node: Indices
     node_mass: Vector
@@ -108,7 +108,7 @@ class Bonds:
 
 @record
 class Bodies:
-    """Rigid bodies; the last place is the world."""
+    """Rigid bodies; the last one is the world."""
 
     free_index: Indices
     body_of_free: Indices
@@ -169,7 +169,7 @@ class Surfaces:
     radius: Vector
     weight: Vector
     contact_point_body: Indices
-    free_index: Indices  # places of all bodies among the free ones; none if none is free
+    free_index: Indices  # indices of all bodies among the free ones; none if none is free
     moved_by: Indices
     node_free: Flags
     group: Indices
@@ -296,7 +296,7 @@ class ContactColumns:
     stiffness: Vector = ("contact",)  # κ, 0 where the nearest point is a node
     foot_gradient: Stack = ("contact", 4, "dimension")  # a_m along the unknowns of nodes
     strand: Indices  # of each node
-    attached: Indices  # place of each node among those that bodies hold, which are in the border already, or −1
+    attached: Indices  # index of each node among those that bodies hold, which are in the border already, or −1
     mark: IndexTable = ("node", 3)  # scratch
     met: IndexTable = ("strand", "strand")  # scratch
     row: Indices = ("node",)  # in the band, of each node that has columns, ascending

@@ -189,7 +189,7 @@ class Calls:
 
 @record
 class Outcome:
-    """What a piece found beside the number that it returns; places in `model.records.outcome`."""
+    """What a piece found beside the number that it returns; slots in `model.records.outcome`."""
 
     counts: Indices
     figures: Vector

@@ -164,8 +164,7 @@ class Work:
     transduction: Vector = ("law",)  # at a stage
     strain: Vector = ("law",)  # of laws at a stage
     start_strain: Vector = ("law",)  # and at the start of the step
-    start_force: Vector = ("law",)  # −∂V/∂η of laws there [J]
-    end_force: Vector = ("law",)  # and at its end
+    end_force: Vector = ("law",)  # −∂V/∂η of laws at its end [J]
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
     account: Vector = (7,)  # of the energy of a step; see `engine.energy_account`
     touched: Flags = ("contact_point",)  # contact points that something pushed at the end of the last step
@@ -198,4 +197,5 @@ class StateArrays:
     strain_rate: Vector
     strain_acceleration: Vector
     account: Vector
+    law_force: Vector
     transduction: Vector
