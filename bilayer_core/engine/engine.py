@@ -22,6 +22,7 @@ from .actuation import Actuation
 from .energy_account import open_account
 from .error_norm import ErrorNorm
 from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
+from .potential import add_forces, expand_to_unknowns
 from .report import FAILURES, IntegrationReport
 from .run_extrema import count_shape
 from .step import treat_state
@@ -78,6 +79,7 @@ class Engine:
         self._error_norm, self._counts = error_norm_of(model), empty_counts()
         self._state: State | None = None
         self._integration: Integration | None = None
+        self._evaluated = True  # whether forces are those of `end`
         self.extrema = RunExtrema.zeros(
             sizes_of(model),
             mass_moment=model.mass_moment,
@@ -101,6 +103,7 @@ class Engine:
         status, pair = int(outcome.counts[STATUS]), int(outcome.counts[PAIR])
         if done > 0 or status in FAILURES:
             self._take_end()
+            self._evaluated = False
         iterations, factorisations, settlings, rejected, inaccurate, restarts, gaining, unresolved = (
             counts.numbers.tolist()
         )
@@ -123,6 +126,7 @@ class Engine:
                 break
         counts, figures = self._outcome.counts.tolist(), self._outcome.figures
         self._take_end()
+        self._evaluated = True
         numbers = counts[ITERATIONS], counts[FACTORISATIONS], counts[SETTLINGS]
         return IntegrationReport(1, status, counts[PAIR], *numbers, float(figures[RESIDUAL]))
 
@@ -203,6 +207,19 @@ class Engine:
         """What acts on the state in modes other than steps."""
         stage = self._work.stage
         stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
+
+    def evaluate_end(self) -> None:
+        """Find the gradients at the end of the last step, after Newton's last correction, with all that its last stage
+        had frozen: forces are then those of the end to the last digit. A step does not depend on it, and energies
+        stay as it left them.
+        """
+        if not self._evaluated:
+            problem = self._storage.problem
+            energy = problem.sums.energy.copy()
+            add_forces(problem, self.end, self._work.stage, False, False)
+            expand_to_unknowns(problem, self.end)
+            problem.sums.energy[:] = energy
+            self._evaluated = True
 
     def open_account(self, state: State) -> None:
         """Begin with the energy of a state that was evaluated, unless its account is its own."""

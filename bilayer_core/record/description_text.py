@@ -47,8 +47,7 @@ def from_text(attributes: dict[str, str], scene_text: str) -> Description:
     values = {name: json.loads(attributes[name]) for name in names}
     values["strands"] = tuple(map(_strand, values["strands"]))
     values["bodies"] = tuple(
-        BodyInfo(body["name"], _shape(body["shape"]) if body["shape"] else None, body["prescribed"])
-        for body in values["bodies"]
+        BodyInfo(**body | {"shape": _shape(body["shape"]) if body["shape"] else None}) for body in values["bodies"]
     )
     values["obstacles"] = tuple(ObstacleInfo(part["name"], _shape(part["shape"])) for part in values["obstacles"])
     values["channels"] = tuple(values["channels"])

@@ -137,8 +137,12 @@ class FrameEncoder:
                 lambda frame, i=index: np.concatenate([frame.body_positions[i], frame.body_quaternions[i]]),
             )
             self._encoders[f"contact_wrench/{body.name}"] = _simple(
-                stamped_template(6), lambda frame, i=index: frame.body_wrenches[i]
+                stamped_template(6), lambda frame, i=index: frame.contact_wrenches[i]
             )
+            if body.holds_rods:
+                self._encoders[f"clamp_wrench/{body.name}"] = _simple(
+                    stamped_template(6), lambda frame, i=index: frame.clamp_wrenches[i]
+                )
 
     def encode(self, name: str, frame: Frame) -> bytes:
         """The message of topic `name` (a `TopicSpec.name`) for `frame`; give it to ``publish`` as it is."""

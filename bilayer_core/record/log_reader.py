@@ -167,6 +167,8 @@ def _assemble(description: Description, columns, times, labels) -> RunData:
     bodies = [body.name for body in description.bodies]
     scalar_topics = ["stimulus_applied", "energy", "solver", "com"]
     scalar_topics += [f"{kind}/{body}" for body in bodies for kind in ("body_pose", "contact_wrench")]
+    holding = [body.name for body in description.bodies if body.holds_rods]
+    scalar_topics += [f"clamp_wrench/{body}" for body in holding]
     frames = min((len(columns[name]) for name in scalar_topics), default=0)
     shapes = min(len(columns["nodes"]), len(columns["points"]))
 
@@ -182,6 +184,7 @@ def _assemble(description: Description, columns, times, labels) -> RunData:
         return np.stack(parts, axis=1) if parts else np.empty((frames, 0, width))
 
     poses = of_bodies("body_pose", 7)
+    columns |= {f"clamp_wrench/{body}": [np.zeros(6)] * frames for body in bodies if body not in holding}
     points = stack("points", shapes, (description.node_count, len(encoders.POINT_FIELDS)))
     return RunData(
         description=description,
@@ -191,7 +194,8 @@ def _assemble(description: Description, columns, times, labels) -> RunData:
         com=stack("com", frames, (3,)),
         body_positions=poses[..., :3],
         body_quaternions=poses[..., 3:],
-        body_wrenches=of_bodies("contact_wrench", 6),
+        contact_wrenches=of_bodies("contact_wrench", 6),
+        clamp_wrenches=of_bodies("clamp_wrench", 6),
         solver=labelled("solver"),
         shape_times=np.array(times["points"][:shapes], float) / NANOSECONDS,
         positions=points[..., :3],
@@ -216,6 +220,7 @@ def _fixed_fields(description: Description) -> dict[str, tuple[int, tuple]]:
     for body in description.bodies:
         fields[f"body_pose/{body.name}"] = place(encoders.stamped_template(7))
         fields[f"contact_wrench/{body.name}"] = place(encoders.stamped_template(6))
+        fields[f"clamp_wrench/{body.name}"] = fields[f"contact_wrench/{body.name}"]
     return fields
 
 

@@ -24,8 +24,10 @@ class RunData:
         Term -> [J], shape (frames,).
     com : ndarray
         [m], shape (frames, 3).
-    body_positions, body_quaternions, body_wrenches : ndarray
-        [m], x y z w, [N, N m], shapes (frames, bodies, 3 | 4 | 6).
+    body_positions, body_quaternions : ndarray
+        [m], x y z w, shapes (frames, bodies, 3 | 4).
+    contact_wrenches, clamp_wrenches : ndarray
+        Of contact, and of the rods that a body holds [N, N m], shape (frames, bodies, 6).
     solver : dict
         Name -> shape (frames,): iterations, residual [m/s], substeps, min_gap [m], cpu_time [s].
     shape_times : ndarray
@@ -45,7 +47,8 @@ class RunData:
     com: np.ndarray
     body_positions: np.ndarray
     body_quaternions: np.ndarray
-    body_wrenches: np.ndarray
+    contact_wrenches: np.ndarray
+    clamp_wrenches: np.ndarray
     solver: dict[str, np.ndarray]
     shape_times: np.ndarray
     positions: np.ndarray

@@ -67,6 +67,7 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
     ``solver``                       labels iterations, residual [m/s], substeps, min_gap [m], cpu_time [s]: see `Frame`
     ``body_pose/<body>``             mass centre and orientation
     ``contact_wrench/<body>``        contact force [N] and moment about the mass centre [N m], world frame
+    ``clamp_wrench/<body>``          likewise of the rods that the body holds, for bodies that hold some
     ``state``                        all that a restart needs; every label is ``name:shape``, its size that of the part
     ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
                                      frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
@@ -85,6 +86,11 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
         *(
             TopicSpec(f"contact_wrench/{body.name}", "geometry_msgs/msg/WrenchStamped", output)
             for body in description.bodies
+        ),
+        *(
+            TopicSpec(f"clamp_wrench/{body.name}", "geometry_msgs/msg/WrenchStamped", output)
+            for body in description.bodies
+            if body.holds_rods
         ),
         TopicSpec("state", MULTI_ARRAY, output),
         TopicSpec("nodes", "geometry_msgs/msg/PoseArray", display),

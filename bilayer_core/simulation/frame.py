@@ -88,6 +88,7 @@ class BodyInfo:
     name: str
     shape: ShapeInfo | None
     prescribed: bool
+    holds_rods: bool = False
 
 
 @dataclass(frozen=True)
@@ -166,8 +167,10 @@ class Frame:
         Mass centre [m], shape (bodies, 3), and orientation x y z w, shape (bodies, 4).
     body_velocities, body_angular_velocities : ndarray
         [m/s] and [rad/s] in the world frame, shape (bodies, 3).
-    body_wrenches : ndarray
+    contact_wrenches : ndarray
         Contact force [N] and moment about the mass centre [N m] on every body, shape (bodies, 6).
+    clamp_wrenches : ndarray
+        Likewise of the rods that it holds, shape (bodies, 6).
     com : ndarray
         Mass centre of the robot: rods and clamped bodies, free bodies left out [m], shape (3,).
     stimulus : ndarray
@@ -200,7 +203,8 @@ class Frame:
     body_quaternions: np.ndarray
     body_velocities: np.ndarray
     body_angular_velocities: np.ndarray
-    body_wrenches: np.ndarray
+    contact_wrenches: np.ndarray
+    clamp_wrenches: np.ndarray
     com: np.ndarray
     stimulus: np.ndarray
     energy: dict[str, float]

@@ -48,8 +48,10 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         edge_count=model.edge_count,
         strands=tuple(map(_strand, model.strands)),
         bodies=tuple(
-            BodyInfo(name, _shape_info(shape) if shape else None, bool(free < 0))
-            for name, shape, free in zip(bodies.names, bodies.shapes, bodies.free_index, strict=False)
+            BodyInfo(name, _shape_info(shape) if shape else None, bool(free < 0), index in model.attached_body)
+            for index, (name, shape, free) in enumerate(
+                zip(bodies.names, bodies.shapes, bodies.free_index, strict=False)
+            )
         ),
         obstacles=tuple(
             ObstacleInfo(part.name, _shape_info(shape_of(part), *obstacle_pose(part))) for part in scene.obstacles
@@ -111,9 +113,38 @@ def contact_forces(stepper: Stepper) -> Array:
     return -stepper.engine.sums.contact_point[: model.node_count + model.point_count]
 
 
-def body_wrenches(stepper: Stepper) -> Array:
+def contact_wrenches(stepper: Stepper) -> Array:
     """Contact force [N] and moment about its position [N m] on every body, shape (n_body, 6)."""
     return -stepper.engine.sums.contact[:-1]
+
+
+def clamp_wrenches(stepper: Stepper) -> Array:
+    """Force [N] and moment about its position [N m] that the rods which a body holds exert on it, shape (n_body, 6).
+
+    They are −∂Φ/∂X and −∂Φ/∂φ of the potential Φ of the step through the nodes x = X + ρ and the fixed directions t
+    that bodies hold (`engine.linear.attachments`): with the gradients g of a node and (g, g_θ) of a clamp edge
+
+        F = −Σ g,    M = −Σ ρ × g − Σ (t × g + g_θ t)
+
+    Φ has all that acts on what is held: elasticity, weight and inertia of half an edge, contact, drag, damping.
+    """
+    return sum_of_clamps(stepper.model, each_clamp(stepper))
+
+
+def each_clamp(stepper: Stepper) -> Array:
+    """The part of each held node with its direction in `clamp_wrenches`, shape (n_attached, 6)."""
+    model, sums, at = stepper.model, stepper.engine.sums, stepper.end
+    force, edges = -sums.attached, slice(model.edge_count, None)
+    tangent, of_edge = at.tangent[edges], -sums.edge[edges]
+    moment = np.cross(at.arm, force) + np.cross(tangent, of_edge[:, :3]) + of_edge[:, 3:] * tangent
+    return np.hstack([force, moment])
+
+
+def sum_of_clamps(model: Model, wrenches: Array) -> Array:
+    """Of each body, shape (n_body, 6)."""
+    total = np.zeros((len(model.bodies.names), 6))
+    np.add.at(total, model.attached_body, wrenches)
+    return total
 
 
 def node_strain(model: Model, stepper: Stepper) -> Array:
@@ -161,6 +192,7 @@ def energies(stepper: Stepper, state: State) -> dict[str, float]:
 def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:
     """Snapshot of the last accepted configuration."""
     model = stepper.model
+    stepper.engine.evaluate_end()
     return Frame(
         time=time,
         step=int(state.step[0]),
@@ -174,7 +206,8 @@ def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStati
         body_quaternions=np.array([quaternion_from_matrix(r) for r in state.body_rotation]).reshape(-1, 4),
         body_velocities=state.body_velocity.copy(),
         body_angular_velocities=state.body_angular_velocity.copy(),
-        body_wrenches=body_wrenches(stepper),
+        contact_wrenches=contact_wrenches(stepper),
+        clamp_wrenches=clamp_wrenches(stepper),
         com=center_of_mass(model, state),
         stimulus=stepper.stimulus.copy(),
         energy=energies(stepper, state),

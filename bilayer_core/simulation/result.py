@@ -1,13 +1,9 @@
-"""What a run returns: why and when it ended, and where bodies are."""
+"""What a run returns: why and when it ended."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-
-import numpy as np
-
-Array = np.ndarray
 
 
 class Termination(Enum):
@@ -41,11 +37,3 @@ class RunResult:
     steps: int
     cpu_time: float
     wall_time: float
-
-
-@dataclass(frozen=True)
-class BodyView:
-    """Pose of a body: position [m], shape (3,), and quaternion x y z w, shape (4,)."""
-
-    position: Array
-    quaternion: Array

@@ -27,11 +27,12 @@ from .equilibrium import StaticReport, solve_static
 from .frame import Description, Frame
 from .observers import Observer, Schedule
 from .plane_watch import PlaneWatch
-from .result import BodyView, RunResult, Termination
+from .result import RunResult, Termination
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
 from .stepper import Stepper, StepReport
 from .summary import summarise
+from .views import BodyView, ClampView, Present, body_views, clamp_views
 
 Array = np.ndarray
 STEPS_AT_ONCE = 64
@@ -145,8 +146,7 @@ class Simulator:
     @property
     def contact_forces(self) -> Array:
         """Barrier and friction force on each of them [N], shape (nodes, 3)."""
-        self.compile()
-        return observe.contact_forces(self._stepper)
+        return observe.contact_forces(self._evaluated())
 
     @property
     def com(self) -> Array:
@@ -161,12 +161,23 @@ class Simulator:
 
     @property
     def bodies(self) -> dict[str, BodyView]:
-        """Pose of every body."""
-        state = self._state
-        return {
-            name: BodyView(state.body_position[i].copy(), observe.quaternion_from_matrix(state.body_rotation[i]))
-            for i, name in enumerate(self.model.bodies.names)
-        }
+        """Every body by name: its pose, and the force and moment of contact and of the rods that it holds."""
+        return body_views(self._present)
+
+    @property
+    def clamps(self) -> dict[str, ClampView]:
+        """Every end of a rod that a body holds, by ``ROD.start`` or ``ROD.end``: the force and moment that it bears."""
+        return clamp_views(self._present)
+
+    @property
+    def _present(self) -> Present:
+        return Present(self.model, self._state, self._evaluated)
+
+    def _evaluated(self) -> Stepper:
+        """The stepper, with forces of the present state."""
+        self.compile()
+        self._stepper.engine.evaluate_end()
+        return self._stepper
 
     @property
     def curvatures(self) -> Array:

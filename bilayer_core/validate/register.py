@@ -20,6 +20,7 @@ from . import (
     motion,
     plane,
     profiles,
+    reactions,
     torsion,
     viscosity,
 )
@@ -36,6 +37,7 @@ FAMILIES = (
     plane,
     loads,
     profiles,
+    reactions,
     contacts,
     friction,
     motion,

@@ -34,6 +34,7 @@ def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
     text = rrb.TextDocumentView(name="Run", origin="summary")
     plots = [("stimulus", "Stimulus")] if run.description.channels else []
     plots += [("contact_force", "Contact force [N]")] if run.contact_forces.any() else []
+    plots += [("clamp_force", "Force on clamps [N]")] if run.clamp_wrenches.any() else []
     plots += [("height", "Height of mass centres [mm]"), ("energy", "Energy [mJ]"), ("solver", "Solver")]
     curves = [
         rrb.TimeSeriesView(name=name, origin=f"plots/{group}", plot_legend=rrb.Corner2D.LeftTop)

@@ -160,15 +160,21 @@ def _send_forces(recording: rr.RecordingStream, run: RunData, scales: Scales) ->
         )
 
 
+def _sizes(run: RunData, wrenches: np.ndarray) -> dict[str, np.ndarray]:
+    """How large the forces on each body are that any acts on [N]."""
+    return {
+        f"on {body.name}": np.linalg.norm(wrenches[:, i, :3], axis=1)
+        for i, body in enumerate(run.description.bodies)
+        if wrenches[:, i].any()
+    }
+
+
 def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
-    """Curves: stimulus, contact force on each body, heights, energies, the solver's health."""
+    """Curves: stimulus, forces of contact and of rods on each body, heights, energies, the solver's health."""
     groups: dict[str, dict[str, np.ndarray]] = {
         "stimulus": {name: run.stimulus[:, i] for i, name in enumerate(run.description.channels)},
-        "contact_force": {
-            f"on {body.name}": np.linalg.norm(run.body_wrenches[:, i, :3], axis=1)
-            for i, body in enumerate(run.description.bodies)
-            if np.any(run.body_wrenches[:, i])
-        },
+        "contact_force": _sizes(run, run.contact_wrenches),
+        "clamp_force": _sizes(run, run.clamp_wrenches),
         "height": {
             "robot": 1e3 * run.com[:, 2],
             **{

@@ -114,7 +114,7 @@ def test_messages_hold_the_values_of_the_frame(encoder, typestore):
     ]
     np.testing.assert_array_equal(state.data, frame.state)
     wrench = read("contact_wrench/ball").wrench
-    assert [wrench.force.x, wrench.torque.z] == frame.body_wrenches[1, [0, 5]].tolist()
+    assert [wrench.force.x, wrench.torque.z] == frame.contact_wrenches[1, [0, 5]].tolist()
     pose = read("body_pose/hub").pose
     assert [pose.position.y, pose.orientation.w] == [frame.body_positions[0, 1], frame.body_quaternions[0, 3]]
     points = read("points")

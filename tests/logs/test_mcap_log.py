@@ -118,7 +118,7 @@ def test_rosbags_reads_every_message(log):
     with AnyReader([log]) as reader:
         counts = {connection.topic: connection.msgcount for connection in reader.connections}
         decoded = [reader.deserialize(raw, connection.msgtype) for connection, _, raw in reader.messages()]
-    assert len(decoded) == sum(counts.values()) == 13 * 51 + 1
+    assert len(decoded) == sum(counts.values()) == 14 * 51 + 1
 
 
 def test_mcap_ros2_reads_every_message_in_order_of_time(log):
@@ -129,7 +129,7 @@ def test_mcap_ros2_reads_every_message_in_order_of_time(log):
         last = {}
         for _, channel, message, decoded in reader.iter_decoded_messages():
             last[channel.topic] = (message.log_time, decoded)
-    assert len(last) == 14
+    assert len(last) == 15
     stamp, pose = last["/bilayer_sim/body_pose/ball"]
     assert stamp == 10**9
     assert (pose.header.stamp.sec, pose.header.frame_id) == (1, "world")
@@ -178,9 +178,9 @@ def test_a_log_of_a_killed_process_is_readable_up_to_its_last_second(tmp_path, r
     survivors = info.topics["/clock"]["count"]
     assert info.last_time == pytest.approx(0.02 * (survivors - 1))
     assert observed[-1] - observed[survivors - 1] < 1.0
-    run = read_log(path)
-    assert len(run.times) == survivors
-    assert read_state(path)[1] == info.last_time
+    lost = survivors - len(read_log(path).times)
+    assert lost in (0, 1)  # a chunk may end within a frame
+    assert read_state(path)[1] == pytest.approx(info.last_time, abs=0.02 * lost)
 
 
 @pytest.mark.parametrize("missing", [1, 7, 500, 30_000, 100_000])

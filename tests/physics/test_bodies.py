@@ -112,7 +112,7 @@ def test_a_free_body_with_feet_stands_on_the_ground():
     simulator.run(0.5)
     weight = 9.81 * (0.01 + simulator.model.node_mass.sum())
     assert simulator.contact_forces[-4:, 2] == pytest.approx(np.full(4, weight / 4), rel=1e-3)
-    assert simulator.frame().body_wrenches[0] == pytest.approx([0, 0, weight, 0, 0, 0], abs=1e-3 * weight)
+    assert simulator.frame().contact_wrenches[0] == pytest.approx([0, 0, weight, 0, 0, 0], abs=1e-3 * weight)
 
 
 def test_a_tumbling_body_does_not_cross_the_ground_with_its_feet_or_its_mast():

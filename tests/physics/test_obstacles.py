@@ -51,7 +51,7 @@ def test_a_block_resting_on_the_ground_presses_with_its_weight_from_its_lower_co
     forces = simulator.contact_forces[3:, 2]
     assert forces.sum() == pytest.approx(0.02 * 9.81, rel=1e-6)
     assert np.sort(forces)[-4:] == pytest.approx(np.full(4, 0.02 * 9.81 / 4), rel=1e-4)
-    assert simulator.frame().body_wrenches[1] == pytest.approx([0, 0, 0.02 * 9.81, 0, 0, 0], abs=1e-6)
+    assert simulator.frame().contact_wrenches[1] == pytest.approx([0, 0, 0.02 * 9.81, 0, 0, 0], abs=1e-6)
 
 
 def test_a_box_creeps_down_a_gentle_slope_at_the_smoothed_laws_speed():
@@ -119,7 +119,7 @@ def test_action_is_reaction_between_bodies_moments_included(shape, mu):
     before = simulator.frame()
     simulator.step()
     frame = simulator.frame()
-    wrench, position = frame.body_wrenches[1:], frame.body_positions[1:]
+    wrench, position = frame.contact_wrenches[1:], frame.body_positions[1:]
     force = np.linalg.norm(wrench[0, :3])
     assert force > 1e-3 and (mu == 0.0 or np.linalg.norm(wrench[1, 3:]) > 1e-6)
     left = (wrench[:, 3:] + np.cross(position, wrench[:, :3])).sum(axis=0)
@@ -212,7 +212,7 @@ def test_a_scheduled_box_pushes_a_ribbon_and_turns_it():
     frame = simulator.frame()
     nodes = frame.contact_forces[: simulator.model.node_count].sum(axis=0)
     assert nodes[2] > 0.0
-    assert frame.body_wrenches[1, :3] == pytest.approx(-nodes, abs=1e-9)
+    assert frame.contact_wrenches[1, :3] == pytest.approx(-nodes, abs=1e-9)
     assert simulator.statistics.min_gap > 0.0
     assert simulator.statistics.bodies["pusher"].nodes >= 1
 
