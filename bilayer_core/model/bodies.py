@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..kinematics.rotation import rotation_matrix
-from ..scene.body import Body, Free, Prescribed
+from ..scene.body import Body, Free, Guided, Prescribed
 from ..scene.config import SceneConfig
 from .model import Bodies
 from .plane import Plane
@@ -22,18 +22,21 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
     freedom = []
     for slot, index in enumerate(free):
         motion = scene.bodies[index].motion
-        allowed = np.zeros((6 * len(free), motions.shape[1] if isinstance(motion, Free) else 1))
         if isinstance(motion, Free):
             velocity[index], angular_velocity[index] = motion.velocity, motion.angular_velocity
-            allowed[6 * slot : 6 * slot + 6] = motions
+            own = motions
         else:
-            velocity[index] = motion.speed * np.array(motion.axis)
-            allowed[6 * slot : 6 * slot + 3, 0] = motion.axis
+            velocity[index] = motion.speed * np.array(motion.axis or (0.0, 0.0, 0.0))
+            angular_velocity[index] = motion.angular_speed * np.array(motion.hinge or (0.0, 0.0, 0.0))
+            own = _guided_motions(motion, motions)
+        allowed = np.zeros((6 * len(free), own.shape[1]))
+        allowed[6 * slot : 6 * slot + 6] = own
         freedom.append(allowed)
     shapes = tuple(shape_of(body.surface) if body.surface else None for body in scene.bodies)
     free_index = np.full(count + 1, -1, dtype=np.int64)
     free_index[free] = np.arange(len(free))
-    moments = np.array([_second_moment(scene.bodies[i], shapes[i]) for i in free]).reshape(len(free), 3, 3)
+    held = _inertia_of_held(found, count)
+    moments = np.array([_second_moment(scene.bodies[i], shapes[i], held[i]) for i in free]).reshape(len(free), 3, 3)
     schedules = [b.motion if isinstance(b.motion, Prescribed) else Prescribed(type="prescribed") for b in scene.bodies]
     return Bodies(
         names=tuple(body.name for body in scene.bodies),
@@ -63,7 +66,8 @@ def _bounding_radii(
     """
     bounding_radius = np.zeros(len(shapes) + 1)
     for index, moment in zip(free, moments, strict=True):
-        bounding_radius[index] = np.sqrt(np.trace(moment) / scene.bodies[index].motion.mass)
+        if scene.bodies[index].motion.mass > 0.0:
+            bounding_radius[index] = np.sqrt(np.trace(moment) / scene.bodies[index].motion.mass)
     for index, (body, shape) in enumerate(zip(scene.bodies, shapes, strict=True)):
         if shape is not None:
             bounding_radius[index] = shape.bound if np.isfinite(shape.bound) else 0.0
@@ -74,13 +78,54 @@ def _bounding_radii(
     return bounding_radius
 
 
-def _second_moment(body: Body, shape: Shape | None) -> np.ndarray:
-    """J = ½ tr(I) 1 − I of a free body [kg m²]. A guided body does not turn: any I."""
+def _guided_motions(motion: Guided, motions: np.ndarray) -> np.ndarray:
+    """What a rail, a hinge and a pin leave of the motions (X, φ) of a body, a column each, shape (6, ·)."""
+    columns = []
+    if motion.axis is not None:
+        columns.append([*motion.axis, 0.0, 0.0, 0.0])
+    if motion.hinge is not None:
+        columns.append([0.0, 0.0, 0.0, *motion.hinge])
+    if motion.pinned:
+        columns += [column for column in motions.T if not column[:3].any()]
+    return np.array(columns).T
+
+
+def _inertia_of_held(found: Collected, count: int) -> np.ndarray:
+    """Moments of inertia of the half edges that bodies hold [kg m²], in the bodies' axes, shape (n_body, 3, 3).
+
+    A half edge of the length l and the mass m, with the moment I of its section along the tangent t, has about its end
+
+        I t tᵀ + (m l²/3 + I/2) (1 − t tᵀ)
+
+    (of its section the mean of both directions across). Its mass is that of its node, which moves with the body.
+    """
+    inertia = np.zeros((count, 3, 3))
+    node, tangents = found.column("attached_node", np.int64), found.column("clamp_edge_tangent", width=3)
+    edge = found.column("node_edges", np.int64, 2)[node, 0]
+    along = 0.5 * found.column("spin_inertia")[edge]
+    across = found.column("edge_mass")[edge] * found.column("rest_length")[edge] ** 2 / 24.0 + 0.5 * along
+    for k, body in enumerate(found.column("attached_body", np.int64)):
+        on_axis = np.outer(tangents[k], tangents[k])
+        inertia[body] += along[k] * on_axis + across[k] * (np.eye(3) - on_axis)
+    return inertia
+
+
+def _second_moment(body: Body, shape: Shape | None, of_held: np.ndarray) -> np.ndarray:
+    """J = ½ tr(I) 1 − I of a free body [kg m²]; `of_held` is the inertia of the half edges that it holds.
+
+    A guided body that does not turn has any I, and one on a hinge a moment about every axis that is its own about the
+    hinge: so its angular momentum stays along that.
+    """
     motion = body.motion
-    if not isinstance(motion, Free):
+    if isinstance(motion, Guided) and not motion.turns:
         inertia = np.eye(3)
     elif motion.inertia is not None:
         inertia = np.diag(motion.inertia)
+    elif motion.mass == 0.0:
+        inertia = of_held
     else:
-        inertia = shape.inertia(motion.mass, motion.shell)
+        inertia = shape.inertia(motion.mass, isinstance(motion, Free) and motion.shell)
+    if isinstance(motion, Guided) and motion.hinge is not None:
+        hinge = rotation_matrix(np.array(body.rotation)).T @ np.array(motion.hinge)
+        inertia = hinge @ inertia @ hinge * np.eye(3)
     return 0.5 * np.trace(inertia) * np.eye(3) - inertia

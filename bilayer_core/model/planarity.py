@@ -146,8 +146,12 @@ class _Survey:
             if not self._along_normal(*motion.rotations):
                 yield "motion.rotations"
         elif isinstance(motion, Guided):
-            if not self._lies_in(motion.axis):
+            if motion.axis is not None and not self._lies_in(motion.axis):
                 yield "motion.axis"
+            if motion.hinge is not None and not self._along_normal(motion.hinge):
+                yield "motion.hinge"
+            if motion.pinned:
+                yield from self._inertia(body)
         else:
             if not self._is_on(body.position):
                 yield "position"
@@ -155,10 +159,19 @@ class _Survey:
                 yield "motion.velocity"
             if not self._along_normal(motion.angular_velocity):
                 yield "motion.angular_velocity"
-            rotation = rotation_matrix(np.array(body.rotation))
-            inertia = shape_of(body.surface).inertia(motion.mass) if motion.inertia is None else np.diag(motion.inertia)
-            if not self._along_normal(rotation @ inertia @ rotation.T @ self._normal):
-                yield "motion.inertia, of which no principal axis is along its normal,"
+            yield from self._inertia(body)
+
+    def _inertia(self, body: Body) -> Iterator[str]:
+        """The key of the inertia of a body that turns, if it would turn it out of the plane."""
+        motion, rotation = body.motion, rotation_matrix(np.array(body.rotation))
+        if motion.inertia is not None:
+            inertia = np.diag(motion.inertia)
+        elif motion.mass > 0.0:
+            inertia = shape_of(body.surface).inertia(motion.mass)
+        else:
+            return  # that of rods in the plane
+        if not self._along_normal(rotation @ inertia @ rotation.T @ self._normal):
+            yield "motion.inertia, of which no principal axis is along its normal,"
 
     def _of_load(self, load) -> tuple[Array, Array]:
         """Force and moment of a load in the world's axes at the start, but that of a rod in the axes of the first."""
@@ -173,7 +186,7 @@ class _Survey:
 
     def _carries_points(self, body: Body) -> bool:
         """Whether forces on its points could turn a free body out of the plane: it, or one whose surface they meet."""
-        return isinstance(body.motion, Free) or self._free_surface
+        return not isinstance(body.motion, Prescribed) and body.motion.turns or self._free_surface
 
     def _points(self, body: Body) -> Array:
         """Places of its contact points and those of its surface, with radius and length [m], shape (·, 5)."""

@@ -207,6 +207,7 @@ def add_strand(
         position=shape.positions,
         tangent=shape.tangents,
         director1=shape.normals,
+        edge_mass=elements.edge_mass,
         node_mass=halves_to_nodes(elements.edge_mass),
         node_length=voronoi,
         node_radius=elements.node_radius,

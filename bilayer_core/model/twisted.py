@@ -78,8 +78,7 @@ def _naturally_twisted(rod: Rod) -> bool:
 def _twisted_by_bodies(scene: SceneConfig, rod: Rod) -> bool:
     """Whether two bodies hold it that may turn against each other."""
     held = [body.motion for body in scene.bodies if body.name in (rod.clamp_start, rod.clamp_end)]
-    turns = [motion.type == "free" or any(map(any, getattr(motion, "rotations", ()))) for motion in held]
-    return len(held) == 2 and any(turns)
+    return len(held) == 2 and any(motion.turns for motion in held)
 
 
 def _of_clamps(rod: Rod, part: float) -> Figure:

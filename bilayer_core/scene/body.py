@@ -13,28 +13,36 @@ from bilayer_core.scene.shape import RotationVector, Surface
 from bilayer_core.scene.units import (
     AngularSpeed,
     NonNegativeLength,
+    NonNegativeMass,
     NonNegativeTime,
     PositiveInertia,
     PositiveLength,
-    PositiveMass,
     Speed,
 )
+
+Inertia = tuple[PositiveInertia, PositiveInertia, PositiveInertia]
 
 
 class Free(Part):
     """A body that moves as the forces on it demand."""
 
     type: Literal["free"]
-    mass: PositiveMass
-    """Its own, without that of the rods it holds."""
-    inertia: tuple[PositiveInertia, PositiveInertia, PositiveInertia] | None = None
-    """Principal moments of inertia; without them those of the solid surface, or of a hollow ball if `shell` is true."""
+    mass: NonNegativeMass = 0.0
+    """Its own, without that of the rods it holds; 0 for a junction, which moves with the inertia of what it holds."""
+    inertia: Inertia | None = None
+    """Principal moments of inertia; without them those of the solid surface, or of a hollow ball if `shell` is true; of
+    a junction those of the half edges that it holds, about their ends."""
     shell: bool = False
     """Whether a ball is hollow: moment of inertia 2/3 m r² instead of 2/5 m r²."""
     velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
     """At the start."""
     angular_velocity: tuple[AngularSpeed, AngularSpeed, AngularSpeed] = (0.0, 0.0, 0.0)
     """At the start, about the axes of the world."""
+
+    @property
+    def turns(self) -> bool:
+        """Whether it can."""
+        return True
 
     @model_validator(mode="after")
     def _check(self) -> Free:
@@ -43,15 +51,36 @@ class Free(Part):
 
 
 class Guided(Part):
-    """A body on a rail: it slides along an axis as the forces on it demand, and does not turn."""
+    """A body on a rail, a hinge or a pin: it slides along an axis or turns, as the forces on it demand, and makes no
+    other motion.
+    """
 
     type: Literal["guided"]
-    axis: Direction
-    """Of the rail."""
-    mass: PositiveMass
-    """Its own, without that of the rods it holds."""
+    axis: Direction | None = None
+    """Of the rail; without one it does not slide."""
+    hinge: Direction | None = None
+    """About which it turns, through its position."""
+    pinned: bool = False
+    """Whether it turns in all directions about its position."""
+    mass: NonNegativeMass = 0.0
+    """Its own, without that of the rods it holds; 0 for a joint, which moves with the inertia of what it holds."""
+    inertia: Inertia | None = None
+    """Principal moments of inertia of one that turns; by default those of its surface, or of the half edges that it
+    holds, about their ends, if its mass is 0."""
     speed: Speed = 0.0
     """At the start, along the axis."""
+    angular_speed: AngularSpeed = 0.0
+    """At the start, about the hinge."""
+
+    @property
+    def turns(self) -> bool:
+        """Whether it can."""
+        return self.pinned or self.hinge is not None
+
+    @model_validator(mode="after")
+    def _check(self) -> Guided:
+        refuse_all("Guided", faults_of_guided(self))
+        return self
 
 
 class Prescribed(Part):
@@ -68,6 +97,11 @@ class Prescribed(Part):
     def breakpoint_after(self, t: float) -> float:
         """First of the times after `t` [s], infinity if there is none: there the acceleration jumps."""
         return first_after(t, self.times)
+
+    @property
+    def turns(self) -> bool:
+        """Whether it ever does."""
+        return any(map(any, self.rotations))
 
     @property
     def moves(self) -> bool:
@@ -119,11 +153,27 @@ class Body(Part):
     """Points by which the body itself touches surfaces."""
 
 
-def faults_of_inertia(motion: Free) -> list[Fault]:
+def faults_of_guided(motion: Guided) -> list[Fault]:
+    """Whether it moves, and what of its motion has no meaning."""
+    faults: list[Fault] = []
+    if motion.axis is None and not motion.turns:
+        faults.append((("axis",), None, "must be given, or `hinge`, or `pinned`: else it does not move"))
+    if motion.axis is None and motion.speed:
+        faults.append((("speed",), motion.speed, "must be left out: without an axis it does not slide"))
+    if motion.hinge is not None and motion.pinned:
+        faults.append((("hinge",), motion.hinge, "must be left out: a pinned body turns in all directions"))
+    if motion.hinge is None and motion.angular_speed:
+        faults.append((("angular_speed",), motion.angular_speed, "must be left out: without a hinge it has no axis"))
+    if motion.inertia is not None and not motion.turns:
+        faults.append((("inertia",), motion.inertia, "must be left out: it does not turn"))
+    return [*faults, *faults_of_inertia(motion)]
+
+
+def faults_of_inertia(motion: Free | Guided) -> list[Fault]:
     """Whether the moments of inertia can be those of a body."""
     if motion.inertia is None:
         return []
-    if motion.shell:
+    if isinstance(motion, Free) and motion.shell:
         return [(("shell",), True, "must be left out where `inertia` is given")]
     small, middle, large = sorted(motion.inertia)
     if large > (1.0 + ROUNDING) * (small + middle):

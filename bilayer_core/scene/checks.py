@@ -117,16 +117,21 @@ def _clamps(scene: SceneConfig) -> Iterator[Fault]:
 
 def _surfaces(scene: SceneConfig) -> Iterator[Fault]:
     for index, body in enumerate(scene.bodies):
-        if body.motion.type != "free":
+        motion = body.motion
+        if motion.type == "prescribed":
+            continue
+        if motion.mass == 0.0 and not any(body.name in (rod.clamp_start, rod.clamp_end) for rod in scene.rods):
+            yield ("bodies", index, "motion", "mass"), 0.0, "must be a mass [kg] above 0 for a body that holds no rod"
+        if not motion.turns:
             continue
         shape = body.surface.shape if body.surface is not None else None
         if shape == "plane":
-            demand = "must be `sphere`, `box` or `cylinder` for a free body: a plane has no end"
+            demand = f"must be `sphere`, `box` or `cylinder` for a {motion.type} body that turns: a plane has no end"
             yield ("bodies", index, "surface", "shape"), shape, demand
-        elif shape is None and body.motion.inertia is None:
-            demand = "must be given for a free body without a surface"
+        elif shape is None and motion.inertia is None and motion.mass > 0.0:
+            demand = f"must be given for a {motion.type} body with a mass but without a surface"
             yield ("bodies", index, "motion", "inertia"), None, demand
-        if body.motion.shell and shape not in ("sphere", None, "plane"):
+        if motion.type == "free" and motion.shell and shape not in ("sphere", None, "plane"):
             yield ("bodies", index, "motion", "shell"), True, "is for spheres: give `inertia` for a hollow body"
     touching = [plane.name for plane in scene.obstacles] + [
         body.name for body in scene.bodies if body.surface is not None or body.contact_points
@@ -153,11 +158,11 @@ def _points(scene: SceneConfig) -> Iterator[Fault]:
         if load.body not in names:
             yield ("loads", index, "body"), load.body, one_of("bodies", load.body, names)
             continue
-        motion = scene.bodies[names.index(load.body)].motion.type
-        if motion == "prescribed":
+        motion = scene.bodies[names.index(load.body)].motion
+        if motion.type == "prescribed":
             yield ("loads", index, "body"), load.body, "must be a free or a guided body; the path of this one is given"
-        elif motion == "guided" and any(load.moment):
-            yield ("loads", index, "moment"), load.moment, "must be left out: a guided body does not turn"
+        elif motion.type == "guided" and not motion.turns and any(load.moment):
+            yield ("loads", index, "moment"), load.moment, "must be left out: this guided body does not turn"
 
 
 def _place_on_rod(scene: SceneConfig, where: Location, part: PointMass | Load) -> Iterator[Fault]:
