@@ -57,7 +57,7 @@ class State:
     account: Array  # of energy; see `engine.energy_account`, shape (12,)
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
-    override: Array  # value set from outside of each channel, NaN where the schedule acts, shape (n_channel,)
+    override: Array  # value of each channel, then factor of each load, set from outside; NaN where schedules act
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
 
     def __post_init__(self):
@@ -180,6 +180,6 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         account=np.zeros(12),
         law_force=np.zeros(len(model.law_channel)),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
-        override=np.full(len(channels), np.nan),
+        override=np.full(len(channels) + len(model.scene.loads), np.nan),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),
     )

@@ -106,6 +106,11 @@ class EnergyLedger:
         self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
         self._stimulus = 0.0
 
+    def begin_step(self, state: State, rest: RestStrains, load_factor: Array) -> None:
+        """Take the factors of loads with which a step begins, where they have jumped since the last one ended."""
+        if not np.array_equal(load_factor, self._last.load_factor):
+            self._last = self._evaluate_state(state, rest, load_factor)
+
     def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
         """Add the works of a step of length `h` [s] that has just been accepted."""
         before, after = self._last, self._evaluate_state(state, rest, load_factor)

@@ -123,7 +123,7 @@ class _Search:
     def _drive(self, stepper: Stepper) -> None:
         """Have the rest strains and the loads of now in a stepper."""
         rest = self.stepper.surroundings.rest_strains_of(self.state.transduction)
-        stepper.engine.set_drive(rest, self.stepper.surroundings.load_factor(self.time))
+        stepper.engine.set_drive(rest, self.stepper.surroundings.load_factor(self.state))
 
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine

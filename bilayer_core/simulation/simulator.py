@@ -116,7 +116,7 @@ class Simulator:
         if self._ledger is not None:
             surroundings = self._stepper.surroundings
             rest = surroundings.rest_strains_of(self._state.transduction)
-            self._ledger.begin(self._state, rest, surroundings.load_factor(self.time))
+            self._ledger.begin(self._state, rest, surroundings.load_factor(self._state))
             self._stepper.ledger = self._ledger
 
     @property
@@ -253,11 +253,31 @@ class Simulator:
             )
         self._override(index, float(value))
 
-    def _override(self, channel: int, value: float) -> None:
+    def set_load(self, name: str, factor: float | None) -> None:
+        """Multiply force and moment of a load by a factor from the next step on; None gives it back to its schedule.
+
+        Raises
+        ------
+        InputError
+            If there is no such load, or the factor is not finite; nothing is changed then.
+        """
+        names = [load.name for load in self.scene.loads]
+        if name not in names:
+            known = ", ".join(names) or "none"
+            raise InputError(f"load {name!r}: no such load; the scene {self.scene.name!r} has: {known}")
+        if factor is not None and not math.isfinite(factor):
+            raise InputError(f"load {name!r}: a factor of {factor} is not allowed; it must be finite")
+        if self._override(len(self.scene.stimuli) + names.index(name), math.nan if factor is None else float(factor)):
+            self._state.has_history.fill(0.0)  # accelerations jump with a load
+
+    def _override(self, index: int, value: float) -> bool:
+        """Set a value of `State.override`; whether it was another."""
         override = self._state.override
-        if not np.array_equal(override[channel], value, equal_nan=True):
+        changes = not np.array_equal(override[index], value, equal_nan=True)
+        if changes:
             self._stepper.restart(self._state)
-        override[channel] = value
+        override[index] = value
+        return changes
 
     def compile(self) -> float:
         """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took.
@@ -323,7 +343,7 @@ class Simulator:
         begin, wall = clock.thread_time(), clock.perf_counter()
         surroundings, started = self._stepper.surroundings, self.plane_watch.started
         rest = surroundings.rest_strains_of(self._state.transduction)
-        self.plane_watch.look(self._state, rest, surroundings.load_factor(self.time))
+        self.plane_watch.look(self._state, rest, surroundings.load_factor(self._state))
         if started:
             self.cpu_time += clock.thread_time() - begin
             self.wall_time += clock.perf_counter() - wall

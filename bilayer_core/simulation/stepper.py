@@ -127,7 +127,7 @@ class Stepper:
         """Evaluate the potential at a state as it stands, for energies and contact forces before the next step."""
         time = float(state.time[0])
         rest = self.surroundings.rest_strains_of(state.transduction)
-        self.engine.set_drive(rest, self.surroundings.load_factor(time))
+        self.engine.set_drive(rest, self.surroundings.load_factor(state))
         self.engine.do_once(state, EVALUATE_STATE)
         self.engine.touched[:] = self.engine.touching
         self.engine.stimulus[:] = self.surroundings.stimulus_at(state, time)
@@ -163,6 +163,9 @@ class Stepper:
         begin = float(state.time[0])
         if until <= begin + self._same:
             raise InputError(f"until: {until} is not allowed; it must be later than the present time, {begin} s")
+        if self.ledger is not None:
+            rest = self.surroundings.rest_strains_of(state.transduction)
+            self.ledger.begin_step(state, rest, self.surroundings.load_factor(state))
         found = self._integrate(state, until, due, 1 if self.ledger is not None else most)
         if found.failed:
             gap = self.engine.gap
@@ -171,7 +174,7 @@ class Stepper:
                 raise SimulationError(self._why(found, state, gap), begin)
         if self.ledger is not None:
             rest = self.surroundings.rest_strains_of(state.transduction)
-            load_factor = self.surroundings.load_factor(float(state.time[0]), found.length)
+            load_factor = self.surroundings.load_factor(state, found.length)
             self.ledger.record(state, rest, load_factor, found.length)
         return found
 

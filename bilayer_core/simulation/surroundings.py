@@ -41,14 +41,14 @@ class Surroundings:
         self._loads = [load.factor for load in scene.loads]
         self._ranges = np.array([c.maximum - c.minimum for c in scene.stimuli.values()], dtype=float)
         self._paths = paths_of(model)
-        self._begin, self._override = 0.0, np.full(len(self._channels), math.nan)
+        self._begin, self._override = 0.0, np.full(len(self._channels) + len(self._loads), math.nan)
         self.actuation: Actuation | None = None
         self.actuation = self._pieces_about(0.0)
 
     def stimulus_at(self, state: State, time: float) -> Array:
         """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's."""
         scheduled = [schedule.value(time) for schedule in self._channels]
-        return np.where(np.isnan(state.override), np.array(scheduled, dtype=float), state.override)
+        return _overridden(scheduled, state.override[: len(scheduled)])
 
     def rest_strains_of(self, transduction: Array) -> RestStrains:
         """Strains without stress from the filtered stimuli."""
@@ -63,12 +63,13 @@ class Surroundings:
             joint.flags.writeable = False
         return RestStrains(model.rest_strain + eigenstrain, joint)
 
-    def load_factor(self, time: float, ended: float = 0.0) -> Array:
-        """Factor of each load at `time`, shape (n_load,): at the end of a step of length `ended` [s] that from before
+    def load_factor(self, state: State, ended: float = 0.0) -> Array:
+        """Factor of each load in a state, shape (n_load,): at the end of a step of length `ended` [s] that from before
         a jump there.
         """
-        values = [load.value_before(time, ended) if ended else load.value(time) for load in self._loads]
-        return np.array(values, dtype=float)
+        time = float(state.time[0])
+        scheduled = [load.value_before(time, ended) if ended else load.value(time) for load in self._loads]
+        return _overridden(scheduled, state.override[len(self._channels) :])
 
     def cover(self, time: float, override: Array) -> None:
         """Have `actuation` hold what acts from `time` [s] on, and a little before, where something may jump.
@@ -77,7 +78,7 @@ class Surroundings:
         ----------
         time : float
         override : Array
-            Values of channels set from outside, NaN where the schedule acts (`State.override`).
+            Values of channels and factors of loads set from outside, NaN where schedules act (`State.override`).
         """
         known = self._begin <= time and time + self._ahead < self.actuation.horizon[0]
         if not (known and np.array_equal(override, self._override, equal_nan=True)):
@@ -85,9 +86,9 @@ class Surroundings:
             self.actuation = self._pieces_about(time)
 
     def _pieces_about(self, time: float) -> Actuation:
-        channels = zip(self._channels, self._override.tolist(), strict=True)
-        fixed = [schedule if math.isnan(value) else value for schedule, value in channels]
-        rows = [_next_pieces(of, time - self._ahead, time + self._ahead) for of in [*fixed, *self._loads]]
+        schedules = zip([*self._channels, *self._loads], self._override.tolist(), strict=True)
+        acting = [schedule if math.isnan(value) else value for schedule, value in schedules]
+        rows = [_next_pieces(of, time - self._ahead, time + self._ahead) for of in acting]
         size = max((len(row) for row in rows), default=0)
         size = max(size, PIECES_AT_ONCE)  # so that it seldom changes
         padded = [row + [row[-1]] * (size - len(row)) for row in rows]
@@ -101,6 +102,11 @@ class Surroundings:
             )
         present.stimulus[:], present.load[:], present.horizon[0] = stimulus, load, horizon
         return present
+
+
+def _overridden(scheduled: list[float], override: Array) -> Array:
+    """What schedules give, but what is set from outside where that is a number."""
+    return np.where(np.isnan(override), np.array(scheduled, dtype=float), override)
 
 
 def _next_pieces(schedule: Pieces | float, begin: float, end: float) -> list[Piece]:

@@ -1,12 +1,14 @@
 """Point masses, forces and moments from outside, against closed forms."""
 
 import math
+import re
 
 import numpy as np
 import pytest
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.errors import InputError
 from bilayer_core.kinematics.rotation import matrix_from_quaternion
 
 LENGTH = 0.1
@@ -194,3 +196,59 @@ def test_a_state_restores_a_run_under_scheduled_loads_bit_for_bit():
     simulator.load_state(snapshot)
     simulator.run(0.01)
     assert np.array_equal(simulator.positions, expected)
+
+
+@pytest.mark.parametrize(
+    "integrator", ["implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"]
+)
+def test_a_factor_that_is_set_acts_from_the_next_step_on_with_its_whole_impulse(integrator):
+    simulator = Simulator(load_scene(in_space(force=[0.1, 0, 0])), integrator=integrator, dt=1e-3, budget=True)
+    speeds = []
+    for factor in (0.0, 2.0, -3.0, None):
+        simulator.set_load("push", factor)
+        simulator.run(0.01)
+        speeds.append(simulator.frame().body_velocities[1, 0])
+    impulses = np.cumsum([0.0, 2.0, -3.0, 1.0]) * 0.1 * 0.01
+    assert speeds == pytest.approx(impulses / 0.2, rel=1e-9, abs=1e-15)
+    budget = simulator.budget()
+    kinetic = 0.5 * 0.2 * speeds[-1] ** 2
+    assert budget["supplied"]["loads"] - budget["lost"]["numerical"] == pytest.approx(kinetic, rel=1e-9)
+    if integrator == "implicit_midpoint":
+        assert budget["supplied"]["loads"] == pytest.approx(kinetic, abs=1e-12)
+
+
+def test_a_factor_that_is_set_is_that_of_a_schedule_with_the_same_jump():
+    def strip_under(load):
+        content = scene([strip(stations=11)], bodies=[fixed()], materials=SOFT, loads=[load])
+        return Simulator(load_scene(content), integrator="generalised_alpha", dt=1e-3)
+
+    jump = {"type": "pulse_train", "low": 0, "high": 1, "period": 1.0, "width": 0.9, "count": 1, "start": 0.02}
+    scheduled = strip_under(force_on_rod([0, 0, 0.01], schedule=jump))
+    steered = strip_under(force_on_rod([0, 0, 0.01]))
+    steered.set_load("pull", 0.0)
+    steered.run(0.02)
+    steered.set_load("pull", 1.0)
+    snapshot = steered.save_state()
+    for simulator, seconds in ((scheduled, 0.04), (steered, 0.02)):
+        simulator.run(seconds)
+    np.testing.assert_allclose(steered.positions, scheduled.positions, atol=1e-12)
+    again = strip_under(force_on_rod([0, 0, 0.01]))
+    again.load_state(snapshot)  # it has the factor
+    again.run(0.02)
+    np.testing.assert_array_equal(again.positions, steered.positions)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "fault"),
+    [
+        ("pull", 1.0, "load 'pull': no such load; the scene 'sample' has: push"),
+        ("push", math.inf, "load 'push': a factor of inf is not allowed; it must be finite"),
+        ("push", math.nan, "load 'push': a factor of nan is not allowed; it must be finite"),
+    ],
+)
+def test_a_load_that_cannot_be_set_changes_nothing(name, factor, fault):
+    simulator = Simulator(load_scene(in_space(force=[0.1, 0, 0])))
+    before = simulator.save_state()
+    with pytest.raises(InputError, match=re.escape(fault)):
+        simulator.set_load(name, factor)
+    np.testing.assert_array_equal(simulator.save_state(), before)

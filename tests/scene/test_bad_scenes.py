@@ -51,7 +51,7 @@ def faults_of(content) -> list[str]:
         ("rods.arm.path", DELETE, "is missing; must be a mapping of keys to values"),
         ("rods.arm.width", DELETE, "is missing; must be a length [m] above 0, such as 1 mm, or a profile {at: [...], "),
         ("rods.arm.stations", DELETE, "is missing; must be a whole number of at least 3"),
-        ("bodies.ball.motion.mass", DELETE, "is missing; must be a mass [kg] above 0, such as 2.7 g"),
+        ("bodies.ball.motion.mass", DELETE, "found 0.0; must be a mass [kg] above 0 for a body that holds no rod"),
         ("contact.friction.speed_threshold", DELETE, "is missing; must be a speed [m/s] above 0, such as 0.1 mm/s"),
         # types
         ("title", 3, "found 3; must be text"),
@@ -202,14 +202,14 @@ def test_a_fault_is_told_with_its_place_the_value_found_and_what_is_allowed(path
         (
             "bodies.ball.surface",
             None,
-            "ball.motion.inertia: found null; must be given for a free body without a surface",
+            "ball.motion.inertia: found null; must be given for a free body with a mass but without a surface",
         ),
         ("loads.crank.name", "tug", 'loads.tug.name: found "tug"; must be a name of its own among the loads'),
         ("loads.crank.body", DELETE, "loads.crank.rod: found null; must be given, or `body` instead of it: a"),
         (
             "bodies.ball.motion",
             {"type": "guided", "axis": [0, 0, 1], "mass": 1},
-            "loads.crank.moment: found [2e-05, -1e-05, 3e-05]; must be left out: a guided body does not turn",
+            "loads.crank.moment: found [2e-05, -1e-05, 3e-05]; must be left out: this guided body does not turn",
         ),
         ("loads.tug.schedule.period", 0, "loads.tug.schedule.period: found 0; must be a time [s] above 0, such as"),
         ("stimuli.humidity.maximum", -1, "stimuli.humidity.maximum: found -1.0; must be above `minimum` (0)"),
