@@ -54,6 +54,17 @@ def everything_in_plane(ahead, hub="prescribed", stations=6):
         damping={"mass": 2.0},
         materials={"gel": {**GEL, "retardation_time": 1e-3}},
         fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": in_plane(ahead, 0.1, 0.05), "added_mass": True},
+        joints=[
+            {
+                "name": "knee",
+                "type": "hinge",
+                "bodies": ["hub", "ball"],
+                "point": in_plane(ahead, 0.004, 0.03),
+                "axis": list(across),
+                "stiffness": 2.0,
+                "torsional_stiffness": 1e-3,
+            }
+        ],
         masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
         loads=[
             {"name": "tug", "rod": "arm_1", "position": 3.5 * spacing, "force": in_plane(ahead, 2e-3, 3e-3)},

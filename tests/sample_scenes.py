@@ -43,6 +43,16 @@ def everything(stations=6):
         damping={"mass": 2.0},
         materials={"gel": {**GEL, "retardation_time": 1e-3}},
         fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05], "added_mass": True},
+        joints=[
+            {
+                "name": "knee",
+                "type": "weld",
+                "bodies": ["hub", "ball"],
+                "point": [0.004, 0.003, 0.03],
+                "stiffness": 2.0,
+                "torsional_stiffness": 1e-3,
+            }
+        ],
         masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
         loads=loads,
     )

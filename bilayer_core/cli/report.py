@@ -54,5 +54,8 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
         if name in moved:
             heights = f"{1e3 * body['lift']:.2f} mm at most, {1e3 * body['lift_end']:.2f} mm at the end"
             yield f"  {name + ' lifted by':22}{heights}"
+    if summary["joints"]:
+        worst = [max(joint[key] for joint in summary["joints"].values()) for key in ("distance", "angle")]
+        yield f"  {'joints give way by':22}{1e6 * worst[0]:.2g} um and {1e6 * worst[1]:.2g} urad at most at the end"
     for warning in summary["warnings"]:
         yield f"  {'WARNING':22}{warning}"

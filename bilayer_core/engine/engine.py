@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..forces.joints import Joints
 from ..integrators.method import Method
 from ..integrators.sdirk2 import METHOD as SELF_STARTING
 from ..model.contact_points import contact_point_names
@@ -171,6 +172,11 @@ class Engine:
     def sums(self) -> Sums:
         """What forces added at the configuration evaluated last."""
         return self._storage.problem.sums
+
+    @property
+    def joints(self) -> Joints:
+        """Joints between bodies, with what they exerted there; without any, absent."""
+        return next((own for own in self._storage.problem.forces.holds if isinstance(own, Joints)), Joints.absent())
 
     @property
     def energies(self) -> dict[str, float]:

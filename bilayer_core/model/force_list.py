@@ -152,6 +152,7 @@ FORCES: tuple[Force, ...] = (
     Force("bending", CONSERVATIVE, "bend_twist.py", _always),
     Force("twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")),
     Force("bond", CONSERVATIVE, "bond.py", _bond),
+    Force("joints", CONSERVATIVE, "joints.py", lambda q: _unless(bool(q.scene.joints), "no joints")),
     Force("eigenstrain", None, "stretch.py", _eigenstrain),
     Force("viscosity", DISSIPATIVE, "viscosity.py", _viscosity),
     Force("inertia", INERTIAL, "inertia.py", _always),

@@ -130,6 +130,11 @@ class _Survey:
             yield "fluid.velocity"
         for body in scene.bodies:
             yield from (f"bodies.{body.name}.{key}" for key in self._motions(body))
+        for joint in scene.joints:
+            if joint.axis is not None and not self._along_normal(joint.axis):
+                yield f"joints.{joint.name}.axis"
+            if not self._is_on(joint.point):
+                yield f"joints.{joint.name}.point"
         for load in scene.loads:
             force, moment = self._of_load(load)
             if not self._lies_in(force):

@@ -28,7 +28,8 @@ def faults_of_scene(scene: SceneConfig) -> list[Fault]:
     """Names that refer to other parts, names that occur twice, and parts that need another."""
     references = list(_references(scene))
     rest_lengths = [] if references else _rest_lengths(scene)
-    return [*_names(scene), *references, *rest_lengths, *_clamps(scene), *_surfaces(scene), *_points(scene)]
+    parts = _clamps(scene), _joints(scene), _surfaces(scene), _points(scene)
+    return [*_names(scene), *references, *rest_lengths, *(fault for faults in parts for fault in faults)]
 
 
 def _names(scene: SceneConfig) -> Iterator[Fault]:
@@ -38,7 +39,7 @@ def _names(scene: SceneConfig) -> Iterator[Fault]:
         *((("obstacles", index, "name"), plane.name) for index, plane in enumerate(scene.obstacles)),
     ]
     yield from repeated(named, "rods, bodies and obstacles")
-    for key in ("masses", "loads"):
+    for key in ("joints", "masses", "loads"):
         yield from repeated([((key, i, "name"), part.name) for i, part in enumerate(getattr(scene, key))], key)
 
 
@@ -113,6 +114,16 @@ def _clamps(scene: SceneConfig) -> Iterator[Fault]:
             name = getattr(rod, end)
             if name is not None and name not in names:
                 yield ("rods", number, end), name, one_of("bodies", name, names)
+
+
+def _joints(scene: SceneConfig) -> Iterator[Fault]:
+    motions = {body.name: body.motion.type for body in scene.bodies}
+    for number, joint in enumerate(scene.joints):
+        for place, name in enumerate(joint.bodies):
+            if name not in motions:
+                yield ("joints", number, "bodies", place), name, one_of("bodies", name, list(motions))
+        if all(motions.get(name) == "prescribed" for name in joint.bodies):
+            yield ("joints", number, "bodies"), list(joint.bodies), "one must not be prescribed: neither can give way"
 
 
 def _surfaces(scene: SceneConfig) -> Iterator[Fault]:

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
 from bilayer_core.scene.faults import Fault, refuse, refuse_all
+from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import Name, Part
 from bilayer_core.scene.rod import Rod
@@ -244,6 +245,8 @@ class SceneConfig(Part):
     """The ribbons of the robot."""
     bodies: list[Body] = []
     """Rigid parts: hubs, walls, junctions, things to grasp."""
+    joints: list[Joint] = []
+    """Between bodies."""
     masses: list[PointMass] = []
     """Masses fixed to rods."""
     loads: list[Load] = []

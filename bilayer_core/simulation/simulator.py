@@ -32,7 +32,7 @@ from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
 from .stepper import Stepper, StepReport
 from .summary import summarise
-from .views import BodyView, ClampView, Present, body_views, clamp_views
+from .views import BodyView, ClampView, JointView, Present, body_views, clamp_views, joint_views
 
 Array = np.ndarray
 STEPS_AT_ONCE = 64
@@ -168,6 +168,11 @@ class Simulator:
     def clamps(self) -> dict[str, ClampView]:
         """Every end of a rod that a body holds, by ``ROD.start`` or ``ROD.end``: the force and moment that it bears."""
         return clamp_views(self._present)
+
+    @property
+    def joints(self) -> dict[str, JointView]:
+        """Every joint between bodies by name: the force and moment that it bears, and how far it gives way."""
+        return joint_views(self._present)
 
     @property
     def _present(self) -> Present:

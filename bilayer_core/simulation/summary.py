@@ -89,6 +89,7 @@ def summarise(simulator: Any) -> dict:
         "numerical_energy": numerical,
         **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
+        "joints": {name: {"distance": at.distance, "angle": at.angle} for name, at in simulator.joints.items()},
         "warnings": [
             *_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),

@@ -96,6 +96,51 @@ class ClampView:
         return wrench
 
 
+class JointView:
+    """A joint between two bodies as it is at present.
+
+    Attributes
+    ----------
+    bodies : tuple of str
+        The two that it joins.
+    wrench : Array
+        Force [N] that it exerts on the first of them, and moment about the joint [N m], in the world's axes, shape
+        (6,); on the second the opposite.
+    distance, angle : float
+        By how much it gives way: of the two points [m], and of the directions that it keeps [rad].
+    """
+
+    def __init__(self, present: Present, bodies: tuple[str, str], index: int):
+        self._present, self.bodies, self._index = present, bodies, index
+
+    def __repr__(self) -> str:
+        return f"joint of {self.bodies[0]} and {self.bodies[1]}, {self.distance:.2g} m and {self.angle:.2g} rad apart"
+
+    @property
+    def wrench(self) -> Array:
+        joints, first = self._present.evaluated().engine.joints, 2 * self._index
+        body, wrench = joints.body[first], -joints.gradient[first]
+        arm = self._present.state.body_rotation[body] @ joints.arm[first]
+        wrench[3:] -= np.cross(arm, wrench[:3])
+        return wrench
+
+    @property
+    def distance(self) -> float:
+        joints = self._present.evaluated().engine.joints
+        return float(np.linalg.norm(self.wrench[:3]) / joints.stiffness[self._index])
+
+    @property
+    def angle(self) -> float:
+        joints = self._present.evaluated().engine.joints
+        return float(np.linalg.norm(self.wrench[3:]) / joints.torsional[self._index])
+
+
+def joint_views(present: Present) -> dict[str, JointView]:
+    """Every joint by name."""
+    joints = enumerate(present.model.scene.joints)
+    return {joint.name: JointView(present, joint.bodies, index) for index, joint in joints}
+
+
 def body_views(present: Present) -> dict[str, BodyView]:
     """Every body by name."""
     return {name: BodyView(present, index) for index, name in enumerate(present.model.bodies.names)}

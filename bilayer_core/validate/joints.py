@@ -76,19 +76,102 @@ def period(model: str, dimension: int) -> tuple[float, float]:
     return 1e3 * (times[2] - times[0]), 2e3 * math.pi * math.sqrt(radius / 9.81) * (1.0 + angle**2 / 16.0)
 
 
+def hinged_link(model: str, start: tuple, angle: float, name: str, first: str, last: str | None = None) -> dict:
+    """A stiff strip that hangs at an angle from the vertical, or lies at 90°."""
+    link = rod(layers_of(model), LENGTH, 21, start=start, width=WIDTH, name=name, clamp_start=first, clamp_end=last)
+    link["path"]["direction"] = [math.sin(angle), 0.0, -math.cos(angle)]
+    return link | {"normal": [math.cos(angle), 0.0, math.sin(angle)]}
+
+
+def _end_of(start: tuple, angle: float) -> tuple[float, float, float]:
+    return start[0] + LENGTH * math.sin(angle), 0.0, start[2] - LENGTH * math.cos(angle)
+
+
+def _on_hinge(name: str, position: tuple) -> dict:
+    return {"name": name, "position": position, "motion": {"type": "guided", "hinge": [0, 1, 0]}}
+
+
+def _light(name: str, position: tuple) -> dict:
+    return {"name": name, "position": position, "motion": {"type": "free"}}
+
+
+def _hinge(name: str, first: str, second: str, point: tuple) -> dict:
+    return {"name": name, "type": "hinge", "bodies": [first, second], "point": point, "axis": [0, 1, 0]}
+
+
+def _swings(content: dict, model: str, dimension: int) -> float:
+    """Time of a whole swing of the last node [s]."""
+    simulator = Simulator(load_scene(content), model=model, dimension=dimension, integrator="sdirk2", dt=5e-4)
+    rest = 0.0 if content["name"] == "sample" else LENGTH
+    times, last = [], simulator.positions[-1, 0] - rest
+    while len(times) < 3:
+        before = simulator.time
+        simulator.step()
+        now = simulator.positions[-1, 0] - rest
+        if last * now < 0.0:
+            times.append(before + (simulator.time - before) * last / (last - now))
+        last = now
+    return times[2] - times[0]
+
+
+def double_pendulum(model: str, dimension: int) -> tuple[float, float]:
+    """Period of the slow mode of two equal strips, one hinged to the other [ms]: ω² = 3 (1 − 2/√7) g/L."""
+    first, ratio = math.radians(0.5), 1.4303
+    knee = _end_of((0, 0, 0), first)
+    strips = [
+        hinged_link(model, (0, 0, 0), first, "upper", "pin", "above"),
+        hinged_link(model, knee, ratio * first, "lower", "below"),
+    ]
+    bodies = [_on_hinge("pin", (0, 0, 0)), _light("above", knee), _light("below", knee)]
+    stiff = {"gel": GEL | {"youngs_modulus": 1e11}}
+    joints = [_hinge("knee", "above", "below", knee)]
+    content = scene(strips, bodies=bodies, joints=joints, gravity=[0, 0, -9.81], materials=stiff)
+    return 1e3 * _swings(content, model, dimension), 2e3 * math.pi / math.sqrt(
+        3 * (1 - 2 / math.sqrt(7)) * 9.81 / LENGTH
+    )
+
+
+def four_bar(model: str, dimension: int) -> tuple[float, float]:
+    """Period of a parallelogram of three equal strips on two hinges in the world [ms]: ω² = 6/5 g/L."""
+    angle, apart = math.radians(1.0), LENGTH
+    left, right = (0.0, 0.0, 0.0), (apart, 0.0, 0.0)
+    ends = _end_of(left, angle), _end_of(right, angle)
+    strips = [
+        hinged_link(model, left, angle, "left", "pin_left", "left_end"),
+        hinged_link(model, ends[0], math.pi / 2, "coupler", "coupler_start", "coupler_end"),
+        hinged_link(model, right, angle, "right", "pin_right", "right_end"),
+    ]
+    bodies = [
+        _on_hinge("pin_left", left),
+        _on_hinge("pin_right", right),
+        *(_light(name, ends[0]) for name in ("left_end", "coupler_start")),
+        *(_light(name, ends[1]) for name in ("right_end", "coupler_end")),
+    ]
+    stiff = {"gel": GEL | {"youngs_modulus": 1e11}}
+    joints = [
+        _hinge("left_knee", "left_end", "coupler_start", ends[0]),
+        _hinge("right_knee", "right_end", "coupler_end", ends[1]),
+    ]
+    content = scene(strips, bodies=bodies, joints=joints, gravity=[0, 0, -9.81], materials=stiff, name="four_bars")
+    return 1e3 * _swings(content, model, dimension), 2e3 * math.pi / math.sqrt(1.2 * 9.81 / LENGTH)
+
+
 @cache
-def _sinking(model: str, dimension: int, junction: bool) -> float:
-    """Of the tip of a heavy strip [m]; with a junction in its middle it is two."""
+def _sinking(model: str, dimension: int, joined_by: str = "") -> float:
+    """Of the tip of a heavy strip [mm]; joined in its middle it is two."""
     half, soft = 0.5 * LENGTH, {"gel": GEL | {"youngs_modulus": 1e7}}
-    if junction:
+    if joined_by:
+        second = "junction" if joined_by == "junction" else "other"
         strips = [
             rod(layers_of(model), half, EDGES // 2 + 1, name="first", clamp_start="wall", clamp_end="junction"),
-            rod(layers_of(model), half, EDGES // 2 + 1, start=(half, 0, 0), name="second", clamp_start="junction"),
+            rod(layers_of(model), half, EDGES // 2 + 1, start=(half, 0, 0), name="second", clamp_start=second),
         ]
-        bodies = [fixed(), {"name": "junction", "position": [half, 0, 0], "motion": {"type": "free"}}]
+        bodies = [fixed(), *(_light(name, (half, 0, 0)) for name in dict.fromkeys(("junction", second)))]
     else:
         strips, bodies = [rod(layers_of(model), LENGTH, EDGES + 1, clamp_start="wall")], [fixed()]
-    content = scene(strips, bodies=bodies, gravity=[0, 0, -9.81], materials=soft)
+    weld = {"name": "weld", "type": "weld", "bodies": ["junction", "other"], "point": (half, 0, 0)}
+    joints = [weld] if joined_by == "weld" else []
+    content = scene(strips, bodies=bodies, joints=joints, gravity=[0, 0, -9.81], materials=soft)
     simulator = Simulator(load_scene(content), model=model, dimension=dimension)
     simulator.solve_static()
     return 1e3 * (simulator.model.start_position[-1, 2] - simulator.positions[-1, 2])
@@ -122,15 +205,30 @@ CASES = [
     ),
     *(
         Case(
-            f"joints/junction/{dimension}-D {model}",
+            f"joints/{name}/{dimension}-D {model}",
+            against,
+            1e-3,
+            lambda model=model, dimension=dimension, measure=measure: measure(model, dimension),
+            unit="ms",
+        )
+        for name, measure, against in (
+            ("double pendulum", double_pendulum, "slow mode of two rigid strips, ω² = 3 (1 − 2/√7) g/L"),
+            ("four-bar linkage", four_bar, "swing of a parallelogram of three rigid strips, ω² = 6/5 g/L"),
+        )
+        for model, dimension in SIZES
+    ),
+    *(
+        Case(
+            f"joints/{name}/{dimension}-D {model}",
             "sinking of a strip in one part",
             1e-5,
-            lambda model=model, dimension=dimension: (
-                _sinking(model, dimension, True),
-                _sinking(model, dimension, False),
+            lambda model=model, dimension=dimension, name=name: (
+                _sinking(model, dimension, name),
+                _sinking(model, dimension),
             ),
             unit="mm",
         )
+        for name in ("junction", "weld")
         for model, dimension in SIZES
     ),
 ]

@@ -116,6 +116,95 @@ def test_a_junction_is_the_limit_of_light_bodies():
     assert far[2] < 1e-3 * 0.04  # what is left is the inertia of the half edges: of second order in their length
 
 
+def two_links(kind, model="laminate", **keys):
+    """Two soft strips, the first held by a wall, the second by a joint."""
+    half, soft = 0.05, {"gel": {"youngs_modulus": 1e7, "poisson_ratio": 0.5, "density": 1000.0}}
+    strips = [
+        rod(layers_of(model), half, 11, name="first", clamp_start="wall", clamp_end="inner"),
+        rod(layers_of(model), half, 11, start=(half, 0, 0), name="second", clamp_start="outer"),
+    ]
+    light = [{"name": name, "position": [half, 0, 0], "motion": {"type": "free"}} for name in ("inner", "outer")]
+    joint = {"name": "knee", "type": kind, "bodies": ["inner", "outer"], "point": [half, 0, 0], **keys}
+    return scene(strips, bodies=[fixed(), *light], joints=[joint], gravity=GRAVITY, materials=soft)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("model", MODELS)
+def test_a_hinge_between_rods_bears_what_hangs_on_it_and_says_how_far_it_gives_way(model, dimension):
+    content = two_links("hinge", model, axis=[0, 1, 0])
+    simulator = Simulator(load_scene(content), model=model, dimension=dimension)
+    simulator.solve_static()
+    weight = 0.05 * 0.01 * 1e-3 * 1000.0 * 9.81
+    knee, outer = simulator.joints["knee"], simulator.bodies["outer"]
+    assert knee.bodies == ("inner", "outer")
+    assert knee.wrench[:3] == pytest.approx([0, 0, -weight], abs=1e-7 * weight)
+    assert knee.wrench[3:] == pytest.approx([0, 0, 0], abs=1e-9 * weight)
+    assert outer.clamp_wrench[:3] == pytest.approx([0, 0, -weight], abs=1e-7 * weight)
+    assert simulator.clamps["second.start"].wrench[4] == pytest.approx(0.0, abs=1e-8 * weight)
+    apart = np.linalg.norm(simulator.bodies["inner"].position - outer.position)
+    assert knee.distance == pytest.approx(apart, rel=1e-6, abs=1e-16) and 0.0 < apart < 1e-8
+    assert simulator.summary()["joints"]["knee"] == {"distance": knee.distance, "angle": knee.angle}
+    below = simulator.positions[simulator.model.node_count - 1] - outer.position
+    assert below == pytest.approx([0, 0, -0.05], abs=2e-3)  # it hangs straight down
+
+
+def test_a_stiffer_joint_gives_way_less_and_changes_nothing_else():
+    def solved(**keys):
+        simulator = Simulator(load_scene(two_links("weld", **keys)), model="laminate")
+        simulator.solve_static()
+        return simulator.joints["knee"].distance, simulator.positions
+
+    usual, stiff = solved(), solved(stiffness=1e9)
+    assert stiff[0] < 0.2 * usual[0]
+    np.testing.assert_allclose(stiff[1], usual[1], atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["pin", "hinge", "weld"])
+def test_joints_keep_momentum_and_the_energy_budget(kind):
+    content = two_links(kind, **({"axis": [0, 1, 0]} if kind == "hinge" else {}))
+    content |= {"gravity": [0, 0, 0]}
+    content["rods"][0].pop("clamp_start")
+    content["bodies"] = content["bodies"][1:]
+    content["loads"] = [
+        {"name": "kick", "rod": "first", "position": 0.01, "force": [0, 0, 0.02]},
+        {"name": "back", "rod": "second", "position": 0.03, "force": [0, 0, -0.02]},
+    ]
+    simulator = Simulator(load_scene(content), model="laminate", integrator="sdirk2", tolerance=1e-5, budget=True)
+    simulator.run(0.05)
+    momentum = simulator.model.node_mass @ simulator.velocities[: simulator.model.node_count]
+    assert np.abs(momentum).max() < 1e-10
+    assert np.ptp(simulator.positions[:, 2]) > 0.01
+    assert abs(simulator.budget()["relative_residual"]) < 1e-3
+    assert simulator.joints["knee"].distance < 1e-6
+    assert not simulator.summary()["warnings"]
+
+
+@pytest.mark.parametrize(
+    ("keys", "fault"),
+    [
+        ({"bodies": ["inner", "inner"]}, "joints.knee.bodies: .*must be two different bodies"),
+        ({"bodies": ["inner", "nobody"]}, r"joints.knee.bodies\[1\]: found .nobody.; must be one of the bodies"),
+        ({"type": "hinge", "axis": None}, "joints.knee.axis: .*must be given for a hinge"),
+        ({"axis": [0, 1, 0]}, "joints.knee.axis: .*must be left out: a pin has none"),
+        ({"torsional_stiffness": 1.0}, "joints.knee.torsional_stiffness: .*a pin turns freely"),
+        ({"stiffness": 0}, "joints.knee.stiffness: found 0; must be a stiffness"),
+        ({"type": "slider"}, "joints.knee.type: .*pin"),
+    ],
+)
+def test_a_joint_between_bodies_that_cannot_be_is_refused(keys, fault):
+    content = two_links("pin")
+    content["joints"][0] |= keys
+    with pytest.raises(SceneError, match=fault):
+        load_scene(content)
+
+
+def test_two_bodies_on_prescribed_paths_are_not_joined():
+    content = two_links("pin")
+    content["bodies"][1]["motion"] = content["bodies"][2]["motion"] = {"type": "prescribed"}
+    with pytest.raises(SceneError, match="joints.knee.bodies: .*one must not be prescribed"):
+        load_scene(content)
+
+
 @pytest.mark.parametrize(
     ("motion", "fault"),
     [

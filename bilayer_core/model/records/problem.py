@@ -42,7 +42,7 @@ class Sums:
     pair: Matrix = ("pair", 3)  # ∂/∂p of vectors between layers
     body: Matrix = ("free", 6)  # ∂/∂(X, φ) of free bodies
     contact_point: Matrix = ("contact_point", 3)  # ∂/∂x of contact points by contact alone [N]; nodes take theirs
-    contact: Matrix = ("body+world", 6)  # ∂/∂(X, φ) of all bodies by contact alone, of which free ones take theirs
+    contact: Matrix = ("body+world", 6)  # ∂/∂(X, φ) of all bodies by contact and joints alone; free ones take theirs
     gradient: Vector = ("unknown",)  # of the unknowns, zero where nodes are held
     attached: Matrix = ("attached", 3)  # of held nodes before that
     hessians: Vector  # all second derivatives but those of arms and links in one piece
