@@ -69,8 +69,9 @@ def _forward(sliding, edges, start, on_rod, i, n0, n1, n2):
         x, y, z = t0, t1, t2
         if axis == 1:
             x, y, z = m0, m1, m2
-        elif axis == 2:
-            x, y, z = t1 * m2 - t2 * m1, t2 * m0 - t0 * m2, t0 * m1 - t1 * m0
+        elif axis != 0:
+            side = 0.5 * axis  # −1 where the rod is a mirror image
+            x, y, z = side * (t1 * m2 - t2 * m1), side * (t2 * m0 - t0 * m2), side * (t0 * m1 - t1 * m0)
     for _ in range(2):
         along = x * n0 + y * n1 + z * n2
         x, y, z = x - along * n0, y - along * n1, z - along * n2

@@ -20,7 +20,7 @@ from .points import add_point_masses, build_loads
 from .rod_penetration import refuse_meeting_rods
 from .rod_surfaces import build_rod_surfaces
 from .rods import add_bonded_rods
-from .strands import Collected, rotation_of_copy
+from .strands import Collected
 
 ADD_ROD = {"two_rod": add_bonded_rods, "laminate": add_laminate}
 """How each model turns a rod into strands."""
@@ -40,8 +40,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     found = Collected()
     body_index = {body.name: index for index, body in enumerate(scene.bodies)}
     for rod in scene.rods:
-        for copy, name in enumerate(rod.copies):
-            ADD_ROD[model](found, scene, rod, name, rotation_of_copy(rod, copy), body_index)
+        for copy in rod.copies:
+            ADD_ROD[model](found, scene, copy, body_index)
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found, plane)

@@ -9,12 +9,13 @@ import numpy as np
 
 from ..scene.config import SceneConfig
 from ..scene.profile import values_at
-from ..scene.rod import Layer, Rod
+from ..scene.pattern import placed
+from ..scene.rod import Layer, Rod, RodCopy
 from .immersed import add_fluid
 from .laminate_section import LayerHalves, WholeSection, layer_halves, side
 from .section import Section, outline, sections
 from .strand_arrays import StrandArrays
-from .strands import Collected, Rotate, StrandElements, add_strand, strand_shape
+from .strands import Collected, StrandElements, add_strand, strand_shape
 from .validity import Figure
 
 Array = np.ndarray
@@ -42,13 +43,12 @@ class _Placed:
         return self.present * self.length * self.section.spin_inertia + self.mass * (self.height - axis) ** 2
 
 
-def add_laminate(
-    found: Collected, scene: SceneConfig, rod: Rod, name: str, rotate: Rotate, body_index: dict[str, int]
-) -> None:
+def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: dict[str, int]) -> None:
     """Add one copy of a rod: a strand with the stiffness and mass of its layers, and their drag."""
+    rod, name = copy.rod, copy.name
     layers = _placed(scene, rod)
     axis = _axis(layers)
-    shape = strand_shape(rod, np.full(rod.stations, axis), 0, rod.stations - 1, rotate)
+    shape = strand_shape(rod, np.full(rod.stations, axis), 0, rod.stations - 1, copy.place)
     halves = [
         layer_halves(scene, rod, slot, axis, shape, layer.length / shape.lengths, layer.present)
         for slot, layer in enumerate(layers)
@@ -105,7 +105,7 @@ def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
             _Placed(
                 section,
                 (first <= edges) & (edges < last),
-                strand_shape(rod, height, 0, rod.stations - 1, lambda vectors, about=False: vectors).lengths,
+                strand_shape(rod, height, 0, rod.stations - 1, placed()).lengths,
                 side(rod, slot) * section.thickness,
             )
         )

@@ -97,7 +97,7 @@ def layer_halves(
         bend=bend,
         across=across,
         twist=twist / ratio,
-        twist_moment=twist * values_at(layer.natural_twist, along).reshape(-1, 2),
+        twist_moment=shape.handedness * twist * values_at(layer.natural_twist, along).reshape(-1, 2),
         natural_moment=moment,
         height=side(rod, slot) * section.thickness.reshape(-1, 2) - axis,
     )

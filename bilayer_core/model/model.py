@@ -55,7 +55,7 @@ class ContactPoints(ReadOnlyArrays):
     radius: Array  # half the thickness, offset, or radius [m], shape (n_contact_point,)
     friction: Array  # coefficients forward, backward and sideways, shape (n_contact_point, 3)
     node_edges: Array  # edges before and after each node, the same at an end, shape (n_node, 2)
-    node_axis: Array  # which direction counts as forward: 0 t, 1 m1, 2 m2, shape (n_node,)
+    node_axis: Array  # which direction counts as forward: 0 t, 1 m1, ±2 ± m2, shape (n_node,)
     body: Array  # body that takes the force, −1 for those of rods, shape (n_contact_point,)
     moved_by: Array  # body that moves it, −1 for those of rods that none holds, shape (n_contact_point,)
     position: Array  # of points and centres in the body's frame [m], shape (n_point, 3)

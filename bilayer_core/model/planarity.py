@@ -17,10 +17,9 @@ from ..kinematics.rotation import rotation_matrix
 from ..scene.body import Body, Free, Guided, Prescribed
 from ..scene.config import SceneConfig
 from ..scene.profile import extremes
-from ..scene.rod import Rod
+from ..scene.rod import RodCopy
 from .plane import Plane
 from .shapes import Shape, obstacle_pose, shape_of
-from .strands import rotation_of_copy
 
 Array = np.ndarray
 ROUNDING = 1e-9
@@ -29,7 +28,7 @@ ROUNDING = 1e-9
 
 def find_plane(scene: SceneConfig) -> tuple[Plane | None, str]:
     """The plane of a scene and why it stays in it, or None and what leaves the plane of its first rod."""
-    plane = _plane_of(scene.rods[0])
+    plane = _plane_of(scene.rods[0].copies[0])
     offence = next(_Survey(scene, plane).offences(), None)
     return (plane, f"all stays in {plane}") if offence is None else (None, offence)
 
@@ -50,9 +49,19 @@ def require_plane(scene: SceneConfig) -> Plane:
     return plane
 
 
-def _plane_of(rod: Rod) -> Plane:
+def _frame(copy: RodCopy) -> tuple[Array, Array, Array]:
+    """Start [m], direction and normal of a rod."""
+    path, place = copy.rod.path, copy.place
+    return (
+        place.points(np.array(path.start)),
+        place.directions(np.array(path.direction)),
+        place.directions(np.array(copy.rod.normal)),
+    )
+
+
+def _plane_of(copy: RodCopy) -> Plane:
     """Plane of the path and normal of a rod."""
-    p, q = np.array(rod.path.direction), np.array(rod.normal)
+    start, p, q = _frame(copy)
     normal = np.cross(p, q)
     axis = int(np.argmax(np.abs(normal)))
     if np.all(np.abs(np.delete(normal, axis)) < ROUNDING):
@@ -60,7 +69,7 @@ def _plane_of(rod: Rod) -> Plane:
     else:
         q = np.cross(normal / np.linalg.norm(normal), p)
         axes = np.stack([p, q / np.linalg.norm(q)])
-    return Plane(np.array(rod.path.start), axes)
+    return Plane(start, axes)
 
 
 class _Survey:
@@ -118,12 +127,10 @@ class _Survey:
         """Keys of rods, directions and motions that leave the plane."""
         scene = self._scene
         for rod in scene.rods:
-            for copy, name in enumerate(rod.copies):
-                rotate = rotation_of_copy(rod, copy)
-                start = rotate(np.array(rod.path.start), about=True)
-                directions = rotate(np.array(rod.path.direction)), rotate(np.array(rod.normal))
+            for copy in rod.copies:
+                start, *directions = _frame(copy)
                 if not (self._is_on(start) and self._lies_in(*directions)):
-                    yield f"rods.{name}"
+                    yield f"rods.{copy.name}"
         if not self._lies_in(scene.gravity):
             yield "gravity"
         if scene.fluid is not None and not self._lies_in(scene.fluid.velocity):

@@ -54,7 +54,7 @@ def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[R
     """Rods of a name, or the copies of a pattern, each with its strands and the height of its path over these [m]."""
     spans = iter(zip(found.rods, found.path_height, strict=True))
     for rod in scene.rods:
-        for copy in rod.copies:
+        for copy in rod.copy_names:
             own = next(spans)
             if name in (copy, rod.name):
                 yield rod, *own

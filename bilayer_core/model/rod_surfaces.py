@@ -50,9 +50,9 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     decisions = [rod_pair for rod_pair in rod_pairs(scene) if rod_pair.active]
     if not decisions:
         return None
-    scene_index = [index for index, rod in enumerate(scene.rods) for _ in rod.copies]  # of each rod with copies
-    rods = [scene.rods[index] for index in scene_index]
-    names = [name for rod in scene.rods for name in rod.copies]
+    copies = [(index, copy) for index, rod in enumerate(scene.rods) for copy in rod.copies]
+    scene_index = [index for index, _ in copies]  # of each rod with copies
+    rods, names = [copy.rod for _, copy in copies], [copy.name for _, copy in copies]
     can_collide = np.zeros((len(rods), len(rods)), dtype=bool)
     for rod_pair in decisions:
         for a in (i for i, p in enumerate(scene_index) if p == rod_pair.first):

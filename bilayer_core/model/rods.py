@@ -9,25 +9,24 @@ import numpy as np
 from ..kinematics.path import rest_strains
 from ..scene.config import SceneConfig
 from ..scene.profile import values_at
-from ..scene.rod import Layer, Rod
+from ..scene.rod import Layer, Rod, RodCopy
 from .immersed import add_fluid
 from .section import Section, bond, sections
 from .strand_arrays import StrandArrays
-from .strands import Collected, Rotate, Span, StrandElements, StrandShape, add_strand, strand_shape
+from .strands import Collected, Span, StrandElements, StrandShape, add_strand, strand_shape
 
 Array = np.ndarray
 
 
-def add_bonded_rods(
-    found: Collected, scene: SceneConfig, rod: Rod, name: str, rotate: Rotate, body_index: dict[str, int]
-) -> None:
+def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: dict[str, int]) -> None:
     """Add one copy of a rod: its strands, their drag, and the bond between them."""
+    rod, name = copy.rod, copy.name
     strands: list[_Bonded] = []
     for slot, layer in enumerate(rod.layers):
         first, last = rod.covered_stations(layer)
         at_nodes, at_edges = _sections(scene, rod, layer, first, last)
         side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
-        shape = strand_shape(rod, side * at_nodes.thickness, first, last, rotate)
+        shape = strand_shape(rod, side * at_nodes.thickness, first, last, copy.place)
         strand = StrandArrays(
             name=f"{name}/{layer.name}",
             rod=name,
@@ -106,7 +105,7 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     if layer.natural_curvature is not None:
         rest[:, :2] = shape.imperfection[:, :2]
         rest[:, 0] += values_at(layer.natural_curvature, along) * voronoi
-    rest[:, 2] += values_at(layer.natural_twist, along) * voronoi
+    rest[:, 2] += shape.handedness * values_at(layer.natural_twist, along) * voronoi
     return rest
 
 

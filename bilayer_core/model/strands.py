@@ -11,6 +11,7 @@ from ..kinematics.path import circle, rest_strains, spiral, straight
 from ..kinematics.rotation import rotation_matrix
 from ..scene.config import SceneConfig
 from ..scene.eigenstrain import Eigenstrain
+from ..scene.pattern import Placement
 from ..scene.rod import ArcPath, Rod, SpiralPath
 from .imperfection import departure
 from .strand_arrays import StrandArrays
@@ -55,23 +56,6 @@ class Collected:
         return self.laws.index(numbers)
 
 
-Rotate = Callable[..., Array]
-
-
-def rotation_of_copy(rod: Rod, copy: int) -> Rotate:
-    """Function that turns directions of a rod, or points with ``about=True``, to those of one of its copies."""
-    if rod.pattern is None:
-        return lambda vectors, about=False: vectors
-    rotation = rotation_matrix(2.0 * np.pi * copy / rod.pattern.count * np.array(rod.pattern.axis))
-    rotation[np.abs(rotation) < 1e-15] = 0.0  # quarter turns are exact
-    center = np.array(rod.pattern.center)
-
-    def apply(vectors: Array, about: bool = False) -> Array:
-        return (vectors - center) @ rotation.T + center if about else vectors @ rotation.T
-
-    return apply
-
-
 @dataclass(frozen=True)
 class StrandShape:
     """A strand at the start: its nodes [m], the lengths [m] and frames of its edges, the frames of the path at its two
@@ -85,6 +69,7 @@ class StrandShape:
     end_tangents: Array  # shape (2, 3)
     end_normals: Array  # likewise
     imperfection: Array  # κ₁ κ₂ ψ [rad], shape (n_node, 3)
+    handedness: float  # −1 of a mirror image, 1 of any other
 
     @property
     def voronoi(self) -> Array:
@@ -103,12 +88,12 @@ class StrandShape:
         return rest_strains(tangents[:-1], normals[:-1], tangents[1:], normals[1:])
 
 
-def strand_shape(rod: Rod, height: Array, first: int, last: int, rotate: Rotate) -> StrandShape:
+def strand_shape(rod: Rod, height: Array, first: int, last: int, place: Placement) -> StrandShape:
     """Shape of the strand that lies `height` [m] over the path at the stations from first to last."""
-    shape = _shape(rod, height, first, last, rotate, _path)
+    shape = _shape(rod, height, first, last, place, _path)
     if rod.imperfection is None:
         return shape
-    imperfect = _shape(rod, height, first, last, rotate, _imperfect_path)
+    imperfect = _shape(rod, height, first, last, place, _imperfect_path)
     return replace(imperfect, imperfection=imperfect.strains() - shape.strains())
 
 
@@ -138,27 +123,28 @@ def _shape(
     height: Array,
     first: int,
     last: int,
-    rotate: Rotate,
+    place: Placement,
     path: Callable[[Rod, Array], tuple[Array, Array, Array]],
 ) -> StrandShape:
     points, tangents, normals = path(rod, rod.edge_length * np.arange(first, last + 1))
     _, _, middle_normals = path(rod, rod.edge_length * (np.arange(first, last) + 0.5))
-    positions = rotate(points + height[:, None] * normals, about=True)
+    positions = place.points(points + height[:, None] * normals)
     edges = np.diff(positions, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
     edge_tangents = edges / lengths[:, None]
     ends = [0, -1]
     slopes = (height[[1, -1]] - height[[0, -2]]) / rod.edge_length  # of a layer whose thickness varies
     end_tangents = tangents[ends] + slopes[:, None] * normals[ends]
-    end_tangents = rotate(end_tangents / np.linalg.norm(end_tangents, axis=1, keepdims=True))
+    end_tangents = place.directions(end_tangents / np.linalg.norm(end_tangents, axis=1, keepdims=True))
     return StrandShape(
         positions,
         lengths,
         edge_tangents,
-        _across(rotate(middle_normals), edge_tangents),
+        _across(place.directions(middle_normals), edge_tangents),
         end_tangents,
-        _across(rotate(normals[ends]), end_tangents),
+        _across(place.directions(normals[ends]), end_tangents),
         np.zeros((len(positions), 3)),
+        place.handedness,
     )
 
 
@@ -212,7 +198,7 @@ def add_strand(
         node_length=voronoi,
         node_radius=elements.node_radius,
         node_edges=first_edge + np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1),
-        node_axis=np.full(nodes, ["path", "normal", "across"].index(rod.friction_axis)),
+        node_axis=np.full(nodes, {"path": 0, "normal": 1, "across": 2 * int(shape.handedness)}[rod.friction_axis]),
         spin_inertia=elements.spin_inertia,
         half_width=elements.half_width,
         edge_node=first_node + np.arange(edges),

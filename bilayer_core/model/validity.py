@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene.config import SceneConfig
+from ..scene.eigenstrain import Eigenstrain
 from ..scene.profile import values_at
-from ..scene.rod import Rod
+from ..scene.rod import Layer, Rod
 from .section import outline
 
 LARGE_STRAIN = 0.1  # linear elasticity and the rectangular section lose meaning
@@ -133,8 +134,18 @@ def _of_edges(rod: Rod, thin: float, distance: float) -> Figure:
     )
 
 
+def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[Eigenstrain, ...]) -> np.ndarray:
+    """Largest magnitude, least and largest eigenstrain over the channels' ranges, shape (3, n_edge)."""
+    found = np.zeros((3, rod.stations - 1))
+    for law in laws:
+        channel = scene.stimuli[law.stimulus]
+        least, most = np.sort(law.strain_at(np.array([channel.minimum, channel.maximum])))
+        found[:, rod.driven_edges(layer, law)] += np.array([[max(abs(least), abs(most))], [least], [most]])
+    return found
+
+
 class EdgeFigures:
-    """Figures of a rod at the middle of each of its edges.
+    """Figures of a rod at the middle of each of its edges; of several copies, those of the one with the most.
 
     Attributes
     ----------
@@ -155,12 +166,10 @@ class EdgeFigures:
         for index, layer in enumerate(rod.layers):
             stiffness = values_at(layer.stiffness, rod.edge_length * stations)
             self._moduli[index] = stiffness * scene.materials[layer.material].youngs_modulus
-            for law in layer.eigenstrain:
-                channel = scene.stimuli[law.stimulus]
-                strains = np.sort(law.strain_at(np.array([channel.minimum, channel.maximum])))
-                edges = rod.driven_edges(layer, law)
-                self.eigenstrain[index, edges] += np.abs(strains).max()
-                self.eigenstrain_range[:, index, edges] += strains[:, None]
+            of_copies = dict.fromkeys(tuple(variant.layers[index].eigenstrain) for variant in rod.variants)
+            ranges = np.array([_eigenstrain_range(scene, rod, layer, laws) for laws in of_copies])
+            self.eigenstrain[index] = ranges[:, 0].max(axis=0)
+            self.eigenstrain_range[:, index] = ranges[:, 1].min(axis=0), ranges[:, 2].max(axis=0)
         self.thickness = self._layers.sum(axis=0)
         along = rod.edge_length * stations
         self._path = rod.path.curvature_at(along)

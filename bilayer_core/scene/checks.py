@@ -10,6 +10,7 @@ import numpy as np
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
 from bilayer_core.scene.load import Load, PointMass
+from bilayer_core.scene.rod import Rod
 
 
 class SceneConfig(Protocol):
@@ -34,7 +35,7 @@ def faults_of_scene(scene: SceneConfig) -> list[Fault]:
 
 def _names(scene: SceneConfig) -> Iterator[Fault]:
     named = [
-        *((("rods", index, "name"), copy) for index, rod in enumerate(scene.rods) for copy in rod.copies),
+        *((("rods", index, "name"), copy) for index, rod in enumerate(scene.rods) for copy in rod.copy_names),
         *((("bodies", index, "name"), body.name) for index, body in enumerate(scene.bodies)),
         *((("obstacles", index, "name"), plane.name) for index, plane in enumerate(scene.obstacles)),
     ]
@@ -53,6 +54,11 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
                 if law.stimulus not in scene.stimuli:
                     demand = one_of("stimuli", law.stimulus, scene.stimuli)
                     yield (*where, "eigenstrain", place, "stimulus"), law.stimulus, demand
+        for name, channels in rod.pattern.stimuli.items() if rod.pattern else ():
+            for copy, channel in enumerate(channels):
+                if channel not in scene.stimuli:
+                    demand = one_of("stimuli", channel, scene.stimuli)
+                    yield ("rods", number, "pattern", "stimuli", name, copy), channel, demand
 
 
 def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:
@@ -62,28 +68,41 @@ def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:
     stiffness, and so above −1 where they are.
     """
     for number, rod in enumerate(scene.rods):
-        for index, layer in enumerate(rod.layers):
-            acting: dict[int, tuple[int, ...]] = {}
-            for place, law in enumerate(layer.eigenstrain):
-                for edge in rod.driven_edges(layer, law):
-                    acting[edge] = (*acting.get(edge, ()), place)
-            worst, least = (), -1.0
-            for places in sorted(set(acting.values())):
-                strain = _least_strain(scene, [layer.eigenstrain[place] for place in places])
-                if strain <= least:
-                    worst, least = places, strain
-            if not worst:
-                continue
-            place = min(worst, key=lambda k: _least_strain(scene, [layer.eigenstrain[k]]))
-            law = layer.eigenstrain[place]
-            channel = scene.stimuli[law.stimulus]
-            others = ", with the laws that act there too," if len(worst) > 1 else ""
-            demand = (
-                f"must leave the layer a length: `{law.stimulus}` from {channel.minimum:g} to {channel.maximum:g} "
-                f"[{channel.unit}]{others} can take its eigenstrain to {100 * least:.4g} %; allowed is above -100 %, "
-                "by a smaller gain, a `saturation` below 1 or a narrower range of the channel"
-            )
-            yield ("rods", number, "layers", index, "eigenstrain", place, "gain"), law.gain, demand
+        for index in range(len(rod.layers)):
+            laws = {tuple(variant.layers[index].eigenstrain): variant for variant in rod.variants}
+            faults = (_rest_length(scene, variant, index) for variant in laws.values())
+            worst = min((fault for fault in faults if fault), key=lambda fault: fault[0], default=None)
+            if worst is not None:
+                _, place, gain, demand = worst
+                own = rod.pattern is not None and rod.pattern.gains is not None
+                where: Location = ("pattern", "gains") if own else ("layers", index, "eigenstrain", place, "gain")
+                yield ("rods", number, *where), rod.pattern.gains if own else gain, demand
+
+
+def _rest_length(scene: SceneConfig, rod: Rod, index: int) -> tuple[float, int, float, str] | None:
+    """Least eigenstrain of a layer that leaves it no length, the law to blame for it with its gain, and the demand."""
+    layer = rod.layers[index]
+    acting: dict[int, tuple[int, ...]] = {}
+    for place, law in enumerate(layer.eigenstrain):
+        for edge in rod.driven_edges(layer, law):
+            acting[edge] = (*acting.get(edge, ()), place)
+    worst, least = (), -1.0
+    for places in sorted(set(acting.values())):
+        strain = _least_strain(scene, [layer.eigenstrain[place] for place in places])
+        if strain <= least:
+            worst, least = places, strain
+    if not worst:
+        return None
+    place = min(worst, key=lambda k: _least_strain(scene, [layer.eigenstrain[k]]))
+    law = layer.eigenstrain[place]
+    channel = scene.stimuli[law.stimulus]
+    others = ", with the laws that act there too," if len(worst) > 1 else ""
+    demand = (
+        f"must leave the layer a length: `{law.stimulus}` from {channel.minimum:g} to {channel.maximum:g} "
+        f"[{channel.unit}]{others} can take its eigenstrain to {100 * least:.4g} %; allowed is above -100 %, "
+        "by a smaller gain, a `saturation` below 1 or a narrower range of the channel"
+    )
+    return least, place, law.gain, demand
 
 
 SAMPLES = 257
@@ -111,9 +130,12 @@ def _clamps(scene: SceneConfig) -> Iterator[Fault]:
     names = [body.name for body in scene.bodies]
     for number, rod in enumerate(scene.rods):
         for end in ("clamp_start", "clamp_end"):
-            name = getattr(rod, end)
-            if name is not None and name not in names:
-                yield ("rods", number, end), name, one_of("bodies", name, names)
+            own: list[tuple[Location, str | None]] = [(("rods", number, end), getattr(rod, end))]
+            of_copies = getattr(rod.pattern, end, None) or ()
+            own += [(("rods", number, "pattern", end, copy), name) for copy, name in enumerate(of_copies)]
+            for where, name in own:
+                if name is not None and name not in names:
+                    yield where, name, one_of("bodies", name, names)
 
 
 def _joints(scene: SceneConfig) -> Iterator[Fault]:
@@ -177,7 +199,7 @@ def _points(scene: SceneConfig) -> Iterator[Fault]:
 
 
 def _place_on_rod(scene: SceneConfig, where: Location, part: PointMass | Load) -> Iterator[Fault]:
-    rods = {name: rod for rod in scene.rods for name in (rod.name, *rod.copies)}
+    rods = {name: rod for rod in scene.rods for name in (rod.name, *rod.copy_names)}
     if part.rod not in rods:
         yield (*where, "rod"), part.rod, one_of("rods or their copies", part.rod, rods)
         return

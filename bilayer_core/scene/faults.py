@@ -112,7 +112,8 @@ def _demand(fault: ErrorDetails) -> str:
 def key_path(location: Location, data: Any) -> str:
     """Key path as a user writes it, such as ``rods.arm.layers.active.thickness`` or ``gravity[2]``.
 
-    pydantic puts the chosen type of a union into its location; that is not a key of the file and is left out.
+    pydantic puts the chosen type of a union into its location, given or by default; that is not a key of the file and
+    is left out.
     """
     path, here = "", data
     for place, part in enumerate(location):
@@ -125,7 +126,12 @@ def key_path(location: Location, data: Any) -> str:
             name = item.get("name") if isinstance(item, dict) else None
             path += f".{name}" if isinstance(name, str) else f"[{part}]"
             here = item
-        elif isinstance(here, dict) and part not in here and place < len(location) - 1 and part in here.values():
+        elif (
+            isinstance(here, dict)
+            and part not in here
+            and place < len(location) - 1
+            and (part in here.values() or "type" not in here)
+        ):
             continue
         else:
             path += f".{part}"

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, field_serializer, model_validator
 
 from bilayer_core.scene.eigenstrain import Eigenstrain
-from bilayer_core.scene.faults import ROUNDING, Fault, Location, refuse_all, repeated
+from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, refuse_all, repeated
 from bilayer_core.scene.imperfection import Imperfection
 from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.pattern import Patterns, Placement, placed
 from bilayer_core.scene.profile import Profile, extremes, varying
 from bilayer_core.scene.units import (
     Curvature,
@@ -153,17 +155,6 @@ class SpiralPath(Part):
         return curvature if self.toward == "normal" else -curvature
 
 
-class Pattern(Part):
-    """Copies of a rod, turned about an axis at equal angles; the first is the rod itself."""
-
-    axis: Direction = (0.0, 0.0, 1.0)
-    """About which copies are turned."""
-    center: Point = (0.0, 0.0, 0.0)
-    """A point of the axis."""
-    count: whole(1)
-    """Rods in all, at equal angles over a full turn; they are called `NAME_0`, `NAME_1` and so on."""
-
-
 class Layer(Part):
     """One layer of a rod. It covers the whole path, or the stations nearest to `interval`."""
 
@@ -184,6 +175,14 @@ class Layer(Part):
     natural_twist: varying(Twist) = 0.0
     """Of the layer by itself, about the path."""
 
+    def driven_by(self, channels: dict[str, str], gain: float) -> Layer:
+        """This layer with other channels in its laws, by those that it has, and its gains multiplied by a number."""
+        laws = [
+            law.model_copy(update={"stimulus": channels.get(law.stimulus, law.stimulus), "gain": gain * law.gain})
+            for law in self.eigenstrain
+        ]
+        return self.model_copy(update={"eigenstrain": laws})
+
     @field_serializer("eigenstrain")
     def _as_written(self, laws: list[Eigenstrain]) -> Any:
         """A single law without its list, as scenes state it, so that overrides find its keys."""
@@ -191,7 +190,7 @@ class Layer(Part):
 
 
 class Rod(Part):
-    """One or two layers along a path, or several equal ones about an axis."""
+    """One or two layers along a path, or a pattern of several such rods."""
 
     name: Name
     """Unique among rods, bodies and obstacles."""
@@ -211,8 +210,8 @@ class Rod(Part):
     """Direction of the rod that counts as forward for friction: along its path, its normal, or path × normal."""
     imperfection: Imperfection | None = None
     """Small departure of the shape at rest from the path; none by default."""
-    pattern: Pattern | None = None
-    """Equal rods round an axis; without it there is one."""
+    pattern: Patterns | None = None
+    """Several rods from this one: round an axis, in a row, in a grid, mirrored or placed one by one."""
     clamp_start: Name | None = None
     """Body that holds the start, position and direction; free by default."""
     clamp_end: Name | None = None
@@ -224,9 +223,38 @@ class Rod(Part):
         return self.path.length / (self.stations - 1)
 
     @property
-    def copies(self) -> list[str]:
+    def copy_names(self) -> list[str]:
         """Names of the rods that this one stands for: its own, or numbered ones if it has a pattern."""
-        return [f"{self.name}_{index}" for index in range(self.pattern.count)] if self.pattern else [self.name]
+        return [f"{self.name}_{index}" for index in range(self.pattern.copies)] if self.pattern else [self.name]
+
+    @property
+    def copies(self) -> list[RodCopy]:
+        """The rods that this one stands for."""
+        if self.pattern is None:
+            return [RodCopy(self.name, self, placed())]
+        places = zip(self.copy_names, self.pattern.places(), strict=True)
+        return [RodCopy(name, self._copy(index), place) for index, (name, place) in enumerate(places)]
+
+    def _copy(self, index: int) -> Rod:
+        """This rod with what the pattern has for one copy, and without the pattern."""
+        own: dict[str, Any] = {"pattern": None}
+        for end in ("clamp_start", "clamp_end"):
+            bodies = getattr(self.pattern, end)
+            own |= {} if bodies is None else {end: bodies[index]}
+        channels = {name: of_copies[index] for name, of_copies in self.pattern.stimuli.items()}
+        gain = 1.0 if self.pattern.gains is None else self.pattern.gains[index]
+        if channels or gain != 1.0:
+            own["layers"] = [layer.driven_by(channels, gain) for layer in self.layers]
+        return self.model_copy(update=own)
+
+    @property
+    def variants(self) -> list[Rod]:
+        """The rods that this one stands for as far as their clamps and laws differ, wherever they are."""
+        found: dict[Any, Rod] = {}
+        for copy in self.copies:
+            laws = tuple(tuple(layer.eigenstrain) for layer in copy.rod.layers)
+            found.setdefault((copy.rod.clamp_start, copy.rod.clamp_end, laws), copy.rod)
+        return list(found.values())
 
     def covered_stations(self, layer: Layer) -> tuple[int, int]:
         """First and last station of `layer`, those nearest to its interval."""
@@ -249,6 +277,15 @@ class Rod(Part):
     def _check(self) -> Rod:
         refuse_all("Rod", faults_of_rod(self))
         return self
+
+
+@dataclass(frozen=True)
+class RodCopy:
+    """One of the rods that a rod of a scene stands for: its name, what it is made of, and where it is."""
+
+    name: str
+    rod: Rod
+    place: Placement
 
 
 LARGEST_IMPERFECTION = 0.1
@@ -307,7 +344,36 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             "one layer must cover the whole path; layers that each cover a part of it are two rods, joined by a body"
         )
         faults.append((("layers",), [layer.interval for layer in rod.layers], demand))
+    faults += _faults_of_copies(rod) if rod.pattern is not None else ()
     return faults
+
+
+def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
+    """What a pattern says of laws and clamps that the rod does not have, or has itself, and copies at one place."""
+    laws = [law for layer in rod.layers for law in layer.eigenstrain]
+    channels = dict.fromkeys(law.stimulus for law in laws)
+    for name in rod.pattern.stimuli:
+        if name not in channels:
+            yield ("pattern", "stimuli", name), name, one_of("channels in the rod's eigenstrain laws", name, channels)
+    if rod.pattern.gains is not None and not laws:
+        yield ("pattern", "gains"), rod.pattern.gains, "must be left out: no layer has an eigenstrain"
+    for end in ("clamp_start", "clamp_end"):
+        if getattr(rod, end) is not None and getattr(rod.pattern, end) is not None:
+            yield (end,), getattr(rod, end), f"must be left out where `pattern.{end}` has the body of each copy"
+    straight = rod.path.shape == "straight"
+    start, direction, normal = (np.array(v) for v in (rod.path.start, rod.path.direction, rod.normal))
+    frames = []  # the two ends of a straight copy; the start of any other with what it and its normal lead to
+    for place in rod.pattern.places():
+        begin, end = place.points(np.stack([start, start + rod.path.length * direction]))
+        frames.append([begin, end] if straight else [begin, end, begin + rod.path.length * place.directions(normal)])
+    for second in range(1, len(frames)):
+        ways = [frames[second], frames[second][::-1]] if straight else [frames[second]]
+        apart = np.min([np.abs(np.array(frames[:second]) - way).max(axis=(1, 2)) for way in ways], axis=0)
+        if apart.min() <= ROUNDING * rod.path.length:
+            first = rod.copy_names[int(apart.argmin())]
+            demand = f"must leave no copy where another is: {rod.copy_names[second]} lies on {first}"
+            yield ("pattern",), rod.pattern.type, demand
+            return
 
 
 def _faces_of_path(rod: Rod) -> Iterator[Fault]:

@@ -18,7 +18,7 @@ NUMERICS = ENGINE | {"simulation"}
 ALLOWED = {
     "errors": set(),
     "jit": {"errors"},
-    "scene": BASE,
+    "scene": BASE | {"kinematics"},
     "kinematics": BASE,
     "contact": BASE | {"kinematics"},
     "model": GEOMETRY | {"scene"},

@@ -1,0 +1,239 @@
+"""Patterns: several rods from one, each with a placement and with what it has of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.scene.faults import Fault, Location, refuse, refuse_all
+from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.units import Angle, Number, whole
+
+Array = np.ndarray
+EXACT = 1e-15
+"""Entries of a rotation below it are zero, so that quarter turns are exact."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """An isometry of space, x ↦ Q (x − c) + c + s with Q orthogonal: where a copy of a rod is.
+
+    A reflection, det Q = −1, takes points, tangents and normals as the vectors they are; then m1 = Q m1 and, as
+    m2 = t × m1, m2 = −Q m2. What is measured along m1 keeps its sign: curvature about m2, natural curvature, the order
+    of layers, friction along path and normal. What is measured along m2 or about t is a pseudoscalar and changes it:
+    twist, natural twist, and the direction that `friction_axis: across` calls forward (`handedness`).
+    """
+
+    matrix: Array  # Q, shape (3, 3)
+    center: Array  # c [m], shape (3,)
+    shift: Array  # s [m], shape (3,)
+
+    @property
+    def handedness(self) -> float:
+        """1, or −1 for a mirror image."""
+        return float(np.sign(np.linalg.det(self.matrix)))
+
+    def directions(self, vectors: Array) -> Array:
+        """Directions of the rod as those of the copy, shape (..., 3)."""
+        return vectors @ self.matrix.T
+
+    def points(self, points: Array) -> Array:
+        """Points of the rod as those of the copy [m], shape (..., 3)."""
+        return (points - self.center) @ self.matrix.T + self.center + self.shift
+
+
+def placed(matrix: Any = None, center: Any = (0.0, 0.0, 0.0), shift: Any = (0.0, 0.0, 0.0)) -> Placement:
+    """A placement from what of it is not that of the rod itself."""
+    return Placement(np.eye(3) if matrix is None else matrix, np.array(center, float), np.array(shift, float))
+
+
+def _turned(vector: Array) -> Array:
+    """Rotation matrix of a rotation vector [rad], shape (3, 3)."""
+    rotation = rotation_matrix(vector)
+    rotation[np.abs(rotation) < EXACT] = 0.0
+    return rotation
+
+
+def _not_zero(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(vector):
+        raise refuse("must not be zero: all copies would lie on each other")
+    return vector
+
+
+Step = Annotated[Point, AfterValidator(_not_zero)]
+
+
+class Pattern(Part):
+    """What copies of a rod may have of their own, one entry for each copy."""
+
+    stimuli: dict[Name, list[Name]] = {}
+    """By the name of a channel in the rod's eigenstrain laws: the channel that drives each copy instead. What is to
+    come later in one copy than in another has a channel of its own, whose schedule has the delay."""
+    gains: list[Number] | None = None
+    """By which the gains of each copy's eigenstrain laws are multiplied; all 1 by default."""
+    clamp_start: list[Name | None] | None = None
+    """Body that holds the start of each copy, null for a free one; by default the rod's `clamp_start` holds all."""
+    clamp_end: list[Name | None] | None = None
+    """Body that holds the end of each copy, likewise."""
+
+    @property
+    def copies(self) -> int:
+        """Rods in all."""
+        return self.count
+
+    def places(self) -> list[Placement]:
+        """Of each copy."""
+        raise NotImplementedError
+
+    def per_copy(self) -> Iterator[tuple[Location, list]]:
+        """Lists that have an entry for each copy, with their keys."""
+        yield from ((("stimuli", name), channels) for name, channels in self.stimuli.items())
+        for key in ("gains", "clamp_start", "clamp_end"):
+            if getattr(self, key) is not None:
+                yield (key,), getattr(self, key)
+
+    @model_validator(mode="after")
+    def _check(self) -> Pattern:
+        faults = list(self._faults())
+        for where, entries in () if faults else self.per_copy():
+            if len(entries) != self.copies:
+                demand = f"must have an entry for each of the {self.copies} copies"
+                faults.append((where, f"{len(entries)} entries", demand))
+        refuse_all(type(self).__name__, faults)
+        return self
+
+    def _faults(self) -> Iterator[Fault]:
+        return iter(())
+
+
+class Rotation(Pattern):
+    """Copies turned about an axis; the first is the rod itself. The default where `type` is left out."""
+
+    type: Literal["rotation"] = "rotation"
+    axis: Direction = (0.0, 0.0, 1.0)
+    """About which copies are turned."""
+    center: Point = (0.0, 0.0, 0.0)
+    """A point of the axis."""
+    count: whole(1)
+    """Rods in all; they are called `NAME_0`, `NAME_1` and so on."""
+    angle: Angle | None = None
+    """Between a copy and the next; by default they are even over a full turn."""
+
+    def places(self) -> list[Placement]:
+        """Of each copy."""
+        step = 2.0 * np.pi if self.angle is None else self.angle
+        parts = self.count if self.angle is None else 1
+        axis = np.array(self.axis)
+        return [placed(_turned(step * copy / parts * axis), self.center) for copy in range(self.count)]
+
+    def _faults(self) -> Iterator[Fault]:
+        if self.angle == 0.0:
+            yield ("angle",), self.angle, "must not be zero: all copies would lie on each other"
+
+
+class Translation(Pattern):
+    """Copies in a row; the first is the rod itself."""
+
+    type: Literal["translation"]
+    step: Step
+    """From a copy to the next."""
+    count: whole(1)
+    """Rods in all; they are called `NAME_0`, `NAME_1` and so on."""
+
+    def places(self) -> list[Placement]:
+        """Of each copy."""
+        return [placed(shift=copy * np.array(self.step)) for copy in range(self.count)]
+
+
+class Grid(Pattern):
+    """Copies in rows and columns, and in layers of these with three steps; the first is the rod itself."""
+
+    type: Literal["grid"]
+    steps: list[Step] = Field(min_length=2, max_length=3)
+    """From a copy to the next in its row, from a row to the next, and from a layer to the next."""
+    counts: list[whole(1)] = Field(min_length=2, max_length=3)
+    """Along each step. Copies are called `NAME_0`, `NAME_1` and so on along the first row, then along the next."""
+
+    @property
+    def copies(self) -> int:
+        """Rods in all."""
+        return math.prod(self.counts)
+
+    def places(self) -> list[Placement]:
+        """Of each copy, the first step running fastest."""
+        steps = np.array(self.steps)
+        places = product(*(range(count) for count in reversed(self.counts)))
+        return [placed(shift=np.array(place[::-1], float) @ steps) for place in places]
+
+    def _faults(self) -> Iterator[Fault]:
+        if len(self.counts) != len(self.steps):
+            yield ("counts",), f"{len(self.counts)} entries", f"must be as many as `steps`, {len(self.steps)}"
+
+
+class Mirror(Pattern):
+    """The rod, `NAME_0`, and its mirror image, `NAME_1`.
+
+    Path and normal are mirrored as vectors, and layers keep their order along the normal. Twist, natural twist and the
+    forward direction of `friction_axis: across` change their sign with respect to path × normal. A load in axes of the
+    material is not mirrored: its third component is along the image's own path × normal.
+    """
+
+    type: Literal["mirror"]
+    axis: Direction
+    """Normal of the mirror."""
+    center: Point = (0.0, 0.0, 0.0)
+    """A point of the mirror."""
+
+    @property
+    def copies(self) -> int:
+        """The rod and its image."""
+        return 2
+
+    def places(self) -> list[Placement]:
+        """Of the rod and its image."""
+        return [placed(), placed(np.eye(3) - 2.0 * np.outer(self.axis, self.axis), self.center)]
+
+
+class Placed(Part):
+    """Where a copy is: turned about a point, then shifted."""
+
+    rotation: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+    """Rotation vector."""
+    center: Point = (0.0, 0.0, 0.0)
+    """The point that the rotation leaves where it is."""
+    position: Point = (0.0, 0.0, 0.0)
+    """Shift."""
+
+
+class Listed(Pattern):
+    """Copies at given places. The rod itself is among them only if one of these is `{}`."""
+
+    type: Literal["list"]
+    placements: list[Placed] = Field(min_length=1)
+    """Of each copy; they are called `NAME_0`, `NAME_1` and so on."""
+
+    @property
+    def copies(self) -> int:
+        """As many as there are places."""
+        return len(self.placements)
+
+    def places(self) -> list[Placement]:
+        """Of each copy."""
+        return [placed(_turned(np.array(of.rotation)), of.center, of.position) for of in self.placements]
+
+
+def _with_type(value: Any) -> Any:
+    """A pattern without its type is a rotation."""
+    return {"type": "rotation", **value} if isinstance(value, dict) and "type" not in value else value
+
+
+Patterns = Annotated[
+    Rotation | Translation | Grid | Mirror | Listed, Field(discriminator="type"), BeforeValidator(_with_type)
+]
