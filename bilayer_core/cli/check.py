@@ -37,6 +37,7 @@ def check(scene: str, overrides: tuple[str, ...], as_json: bool) -> None:
 
 def _report(simulator) -> dict[str, Any]:
     """What will be computed, as the content of ``check --json``."""
+    from bilayer_core.model.findings import told
     from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
     from bilayer_core.model.validity import validity_figures
@@ -71,24 +72,31 @@ def _report(simulator) -> dict[str, Any]:
             {"topic": topic.full_name(), "type": topic.type, "rate": rates[topic.rate]}
             for topic in output_topics(simulator.description)
         ],
-        "within_validity": [str(figure) for figure in figures if not figure.outside],
-        "warnings": [*plan.warnings, *impact_warnings(model)],
+        "within_validity": list(told(figure for figure in figures if not figure.outside)),
+        "warnings": [*plan.warnings, *told(impact_warnings(model))],
     }
 
 
 def _parts(scene) -> dict[str, list[str]]:
     """What the robot and its surroundings are made of, by name."""
+    from bilayer_core.model.findings import few
     from bilayer_core.model.validity import EdgeFigures
     from bilayer_core.scene.profile import extremes
 
     parts = {}
     for rod in scene.rods:
-        copies = f"{rod.pattern.count} of them, each " if rod.pattern else ""
+        copies = f"{rod.pattern.copies} of them, each " if rod.pattern else ""
         section = f"{1e3 * rod.path.length:.4g} mm long, {_millimetres(extremes(rod.width))} wide"
         stations = f"{rod.stations} stations {1e3 * rod.edge_length:.3g} mm apart"
         layers = ", ".join(f"{layer.name} {_millimetres(extremes(layer.thickness))}" for layer in rod.layers)
-        held = [f"{end} held by {name}" for end, name in (("start", rod.clamp_start), ("end", rod.clamp_end)) if name]
+        held = [
+            f"{end} held by {few(list(names))}"
+            for end, key in (("start", "clamp_start"), ("end", "clamp_end"))
+            if (names := {name: None for copy in rod.copies if (name := getattr(copy.rod, key))})
+        ]
         lines = [f"{copies}{section}, {stations}; {', '.join(held) or 'both ends free'}", f"bottom to top: {layers}"]
+        if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):
+            lines.append(_own_laws(rod.pattern))
         figures = EdgeFigures(scene, rod)
         strain, curvature = figures.eigenstrain.max(), figures.free_curvature().max()
         natural = abs(figures.natural_change()).max()
@@ -107,6 +115,15 @@ def _parts(scene) -> dict[str, list[str]]:
         parts[body.name] = [f"{body.motion.type} body{surface}"]
     parts |= {obstacle.name: [f"{obstacle.type}, fixed"] for obstacle in scene.obstacles}
     return parts
+
+
+def _own_laws(pattern) -> str:
+    """By what the eigenstrains of copies differ."""
+    from bilayer_core.model.findings import few
+
+    told = [f"{name} is {few(channels, 4)}" for name, channels in pattern.stimuli.items()]
+    told += [f"gain times {few([f'{gain:g}' for gain in pattern.gains], 4)}"] if pattern.gains else []
+    return f"copy by copy: {'; '.join(told)}"
 
 
 def _millimetres(limits: tuple[float, float]) -> str:

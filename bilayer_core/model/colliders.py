@@ -81,13 +81,24 @@ def shapes_can_collide(point: Collider, surface: Collider) -> bool:
     return surface.kind != "sphere" or (point.kind == "sphere" and point.order < surface.order)
 
 
-def contact_pairs(scene: SceneConfig, dimension: int = 3) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class ContactPair:
+    """Two parts of a scene that can meet, and how that is resolved."""
+
+    what: str
+    how: str
+
+    def __str__(self) -> str:
+        return f"{self.what} ({self.how})"
+
+
+def contact_pairs(scene: SceneConfig, dimension: int = 3) -> tuple[ContactPair, ...]:
     """Which parts of a scene can meet, each with how it is resolved in a dimension."""
     if scene.contact is None:
         return ()
     bodies, obstacles = colliders(scene)
     pairs = [
-        f"rods – {s.name} ({_points_of_rods(scene, dimension, s.kind)})"
+        ContactPair(f"rods – {s.name}", _points_of_rods(scene, dimension, s.kind))
         for s in (*obstacles, *bodies)
         if points_can_collide(RODS, s)
     ]
@@ -99,7 +110,9 @@ def contact_pairs(scene: SceneConfig, dimension: int = 3) -> tuple[str, ...]:
             if shapes_can_collide(point, surface):
                 how += [{"sphere": "ball", "box": "corners", "cylinder": "rims"}[point.kind]]
             if how:
-                pairs.append(f"{point.name} – {surface.name} ({' and '.join(how)} against {surface.kind})")
+                pairs.append(
+                    ContactPair(f"{point.name} – {surface.name}", f"{' and '.join(how)} against {surface.kind}")
+                )
     return tuple(pairs)
 
 

@@ -15,7 +15,8 @@ from functools import cached_property
 from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
 from ..scene.load import Load
-from .colliders import contact_pairs
+from .colliders import ContactPair, contact_pairs
+from .findings import few
 from .rod_pairs import RodPair, rod_pairs
 
 
@@ -37,7 +38,7 @@ class Question:
     dimension: int
 
     @cached_property
-    def pairs(self) -> tuple[str, ...]:
+    def pairs(self) -> tuple[ContactPair, ...]:
         """Surfaces that something can meet."""
         return contact_pairs(self.scene)
 
@@ -133,10 +134,12 @@ def _restitution(q: Question) -> str | None:
 def _rod_barrier(q: Question) -> str | None:
     if q.rods_touch:
         return None
-    reasons = {rod_pair.reason for rod_pair in q.rod_pairs}
+    reasons: dict[str, list[str]] = {}
+    for rod_pair in q.rod_pairs:
+        reasons.setdefault(rod_pair.reason, []).append(rod_pair.what)
     if len(reasons) == 1:
-        return reasons.pop()
-    return "; ".join(f"{rod_pair.what}: {rod_pair.reason}" for rod_pair in q.rod_pairs)
+        return next(iter(reasons))
+    return "; ".join(f"{few(pairs)}: {reason}" for reason, pairs in reasons.items())
 
 
 def _rod_friction(q: Question) -> str | None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..contact.barrier import barrier
 from ..contact.shapes import PLANE
+from .findings import Finding
 from .model import Model
 
 Array = np.ndarray
@@ -38,7 +39,7 @@ def heaviest(model: Model) -> float:
     return max(found)
 
 
-def impact_warnings(model: Model) -> Iterator[str]:
+def impact_warnings(model: Model) -> Iterator[Finding]:
     """Of bodies and free rods that fly or fall towards planes with more than the barrier holds, as far as velocities
     and heights at the start tell.
     """
@@ -50,11 +51,15 @@ def impact_warnings(model: Model) -> Iterator[str]:
             continue
         stiffness = stiffness_that_holds(energy, contact.barrier_distance)
         distance = contact.barrier_distance * math.sqrt(energy / held)
-        yield (
-            f"contact: {what} meets a plane at {speed:.3g} m/s with {energy:.3g} J per metre of contact, more than the "
+        yield Finding(
+            kind="impact",
+            where=what,
+            before="contact: ",
+            after=f" meets a plane at {speed:.3g} m/s with {energy:.3g} J per metre of contact, more than the "
             f"barrier holds ({held:.3g} J/m down to a tenth of its distance): its rebound would be unresolved; "
             f"stiffness {stiffness:.0e} Pa or barrier_distance {1e3 * distance:.2g} mm holds it, and "
-            f"impact_speed {speed:.3g} m/s has the model take such a stiffness"
+            f"impact_speed {speed:.3g} m/s has the model take such a stiffness",
+            severity=energy / held,
         )
 
 

@@ -24,7 +24,8 @@ from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
 from ..scene.faults import ROUNDING
 from ..scene.imperfection import Imperfection
-from ..scene.rod import Rod, StraightPath
+from ..scene.rod import Rod, RodCopy, StraightPath
+from .findings import Finding
 from .section import outline
 
 Array = np.ndarray
@@ -70,21 +71,26 @@ def _modes(rod: Rod, x: Array) -> tuple[Array, Array]:
     return 1.0 - np.cos(k * from_clamp), sign * k * np.sin(k * from_clamp)
 
 
-def advice(scene: SceneConfig) -> Iterator[str]:
+def advice(scene: SceneConfig) -> Iterator[Finding]:
     """Rods whose buckling is left to rounding, each with what to declare."""
-    for rod in scene.rods:
-        reason = _symmetry(scene, rod) if rod.imperfection is None else ""
-        if reason:
-            thickness = float(outline(rod, np.arange(rod.stations))[1].sum(axis=0).min())
-            shape = "random" if rod.clamp_start and rod.clamp_end else "bow"
-            yield (
-                f"rods.{rod.name}: {reason}, so that rounding decides when and which way it buckles or snaps; "
-                f"declare `imperfection: {{shape: {shape}, size: {1e6 * ADVISED * thickness:.2g} um}}`"
-            )
+    for scene_rod in scene.rods:
+        for copy in scene_rod.copies if scene_rod.imperfection is None else ():
+            reason, rod = _symmetry(scene, copy), copy.rod
+            if reason:
+                thickness = float(outline(rod, np.arange(rod.stations))[1].sum(axis=0).min())
+                shape = "random" if rod.clamp_start and rod.clamp_end else "bow"
+                yield Finding(
+                    kind=reason,
+                    where=f"rods.{rod.name}",
+                    after=f": {reason}, so that rounding decides when and which way it buckles or snaps; "
+                    f"declare `imperfection: {{shape: {shape}, size: {1e6 * ADVISED * thickness:.2g} um}}`",
+                )
 
 
-def _symmetry(scene: SceneConfig, rod: Rod) -> str:
+def _symmetry(scene: SceneConfig, copy: RodCopy) -> str:
     """What leaves the buckling of a rod to rounding; empty if nothing does."""
+    rod = copy.rod
+    direction, normal = (copy.place.directions(np.array(vector)) for vector in (rod.path.direction, rod.normal))
     bodies = {body.name: body.motion for body in scene.bodies}
     holders = [bodies.get(name) for name in (rod.clamp_start, rod.clamp_end)]
     grows = any(layer.eigenstrain for layer in rod.layers)
@@ -94,11 +100,11 @@ def _symmetry(scene: SceneConfig, rod: Rod) -> str:
     bent = grows or any(layer.natural_curvature or layer.natural_twist for layer in rod.layers)
     if bent or not isinstance(rod.path, StraightPath) or (rod.clamp_start is None) == (rod.clamp_end is None):
         return ""
-    away = np.array(rod.path.direction) * (1.0 if rod.clamp_start else -1.0)
+    away = direction * (1.0 if rod.clamp_start else -1.0)
     forces = [np.array(scene.gravity)]
     for load in scene.loads:
-        if load.rod is not None and load.rod in (rod.name, *rod.copies):
-            axes = np.array([rod.path.direction, rod.normal, np.cross(rod.path.direction, rod.normal)])
+        if load.rod is not None and load.rod in (rod.name, copy.name):
+            axes = np.array([direction, normal, np.cross(direction, normal)])
             forces.append(np.array(load.force) @ (axes if load.frame == "material" else np.eye(3)))
     across = any(np.linalg.norm(np.cross(force, away)) > ROUNDING * np.linalg.norm(force) for force in forces)
     return "" if across or sum(force @ away < 0.0 for force in forces) == 0 else "is pressed along its axis"

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..scene.config import SceneConfig
-from ..scene.profile import values_at
 from ..scene.pattern import placed
+from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod, RodCopy
 from .immersed import add_fluid
 from .laminate_section import LayerHalves, WholeSection, layer_halves, side
@@ -170,6 +170,7 @@ def uneven_faces(rod: Rod, scene: SceneConfig) -> Iterator[Figure]:
             "faces are",
             f"{1e3 * near:.3g} to {1e3 * far:.3g} mm from the laminate's curve",
             f"equal within {100 * UNEVEN:g} %",
+            float((difference / np.maximum(high, -low)).max()) / UNEVEN,
             "contact with rods counts from the farther one on both sides: the nearer feels them up to "
             f"{1e3 * difference.max():.3g} mm too early",
         )

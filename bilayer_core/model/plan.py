@@ -8,14 +8,15 @@ from dataclasses import dataclass, field
 from ..errors import SceneError
 from ..scene.config import Coupling, SceneConfig
 from ..scene.rod import Rod
-from .colliders import contact_pairs, is_ribbon
+from .colliders import ContactPair, contact_pairs, is_ribbon
+from .findings import few, told
 from .force_list import planned
 from .imperfection import advice
 from .laminate import uneven_faces
 from .planarity import find_plane, require_plane
 from .rod_pairs import RodPair, passing_warnings, rod_pairs
 from .twisted import HELIX, helix_error, twist_figures
-from .validity import validity_warnings
+from .validity import Figure, validity_warnings
 
 MODELS = ("two_rod", "laminate")
 DIMENSIONS = (3, 2)
@@ -24,6 +25,9 @@ RECOMMENDED = "sdirk2", "second order, L-stable; least CPU time to an error of 1
 """The integrator that `auto` takes, and why."""
 WITH_VISCOSITY = "tr_bdf2", "second order where viscosity makes motions stiff, too: its stages are of order 2"
 """The same for scenes with viscosity."""
+
+FEW_PAIRS = 4
+"""Contact pairs of one kind that are told one by one."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class Plan:
     contact_pairs : tuple of str
         Which surfaces can meet.
     warnings : tuple of str
-        Where the validity of the model ends.
+        Where the validity of the model ends, a line for each kind.
     """
 
     model: str
@@ -86,21 +90,23 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         reasons,
         planned(scene, chosen_model, chosen_dimension),
         _contact_pairs(scene, chosen_dimension),
-        (
-            *validity_warnings(scene),
-            *passing_warnings(scene),
-            *_warnings_of(scene, chosen_model, chosen_dimension),
-            *advice(scene),
+        told(
+            [
+                *validity_warnings(scene),
+                *passing_warnings(scene),
+                *_warnings_of(scene, chosen_model, chosen_dimension),
+                *advice(scene),
+            ]
         ),
     )
 
 
-def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[str]:
+def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[Figure]:
     """Warnings that depend on the model."""
-    yield from (str(figure) for figure in twist_figures(scene, model, dimension) if figure.outside)
+    yield from (figure for figure in twist_figures(scene, model, dimension) if figure.outside)
     if model == "laminate":
         in_contact = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
-        yield from (str(figure) for rod in sorted(in_contact) for figure in uneven_faces(scene.rods[rod], scene))
+        yield from (figure for rod in sorted(in_contact) for figure in uneven_faces(scene.rods[rod], scene))
 
 
 def simplest_model(scene: SceneConfig) -> tuple[str, str]:
@@ -156,10 +162,22 @@ def _choose(key: str, asked, of_scene, allowed: tuple) -> tuple | None:
 
 
 def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[str, ...]:
-    between = [pair for pair in rod_pairs(scene) if pair.active]
-    return (
+    """Which surfaces can meet and how; many of one kind on one line."""
+    pairs = [
         *contact_pairs(scene, dimension),
-        *(f"{pair.what} (round the curves of their nodes{_left_out(scene, pair)})" for pair in between),
+        *(
+            ContactPair(pair.what, f"round the curves of their nodes{_left_out(scene, pair)}")
+            for pair in rod_pairs(scene)
+            if pair.active
+        ),
+    ]
+    kinds: dict[str, list[str]] = {}
+    for pair in pairs:
+        kinds.setdefault(pair.how, []).append(pair.what)
+    return tuple(
+        str(ContactPair(what, how))
+        for how, of_kind in kinds.items()
+        for what in (of_kind if len(of_kind) <= FEW_PAIRS else [few(of_kind)])
     )
 
 

@@ -26,6 +26,7 @@ from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
 from ..scene.profile import values_at
 from ..scene.rod import Rod
+from .findings import Finding
 from .section import sections
 from .validity import EdgeFigures
 
@@ -47,28 +48,41 @@ class RodPair:
     active: bool
     geometry: str
     reason: str
+    severity: float = 0.0  # of rods that may meet themselves, by how far they turn [rad]
+
+    @property
+    def itself(self) -> bool:
+        """Whether it is one rod and itself."""
+        return self.first == self.second and not self.copies
 
 
 def rod_pairs(scene: SceneConfig) -> tuple[RodPair, ...]:
     """All pairs of rods, with the decision and its reason."""
-    found = []
+    found, regions = [], [_regions(scene, rod) for rod in scene.rods]
     for index, rod in enumerate(scene.rods):
-        found.append(RodPair(index, index, False, f"{rod.name} – itself", *_decide(scene, _can_close(scene, rod))))
-        if len(rod.copies) > 1:
-            can = _can_reach(scene, rod, rod)
+        possible, geometry, angle = _can_close(scene, rod)
+        decided = _decide(scene, (possible, geometry))
+        found.append(RodPair(index, index, False, f"{rod.name} – itself", *decided, severity=angle))
+        if len(rod.copy_names) > 1:
+            can = _can_reach(scene, regions[index], regions[index], copies=True)
             found.append(RodPair(index, index, True, f"{rod.name} – its copies", *_decide(scene, can)))
         for other in range(index):
-            can = _can_reach(scene, scene.rods[other], rod)
+            can = _can_reach(scene, regions[other], regions[index])
             found.append(RodPair(other, index, False, f"{scene.rods[other].name} – {rod.name}", *_decide(scene, can)))
     return tuple(found)
 
 
-def passing_warnings(scene: SceneConfig) -> Iterator[str]:
+def passing_warnings(scene: SceneConfig) -> Iterator[Finding]:
     """Warnings of rods that could meet, but would pass through each other."""
     for rod_pair in rod_pairs(scene):
         if rod_pair.possible and not rod_pair.active:
-            why = f"{rod_pair.reason}; by geometry: {rod_pair.geometry}"
-            yield f"rods may pass through each other: {rod_pair.what} ({why})"
+            yield Finding(
+                kind="rods that pass through themselves" if rod_pair.itself else "rods that pass through each other",
+                where=rod_pair.what,
+                before="rods may pass through each other: ",
+                after=f" ({rod_pair.reason}; by geometry: {rod_pair.geometry})",
+                severity=rod_pair.severity,
+            )
 
 
 def _decide(scene: SceneConfig, by_geometry: tuple[bool, str]) -> tuple[bool, bool, str, str]:
@@ -81,8 +95,8 @@ def _decide(scene: SceneConfig, by_geometry: tuple[bool, str]) -> tuple[bool, bo
     return possible, scene.contact.rods, geometry, f"contact.rods is {str(scene.contact.rods).lower()}"
 
 
-def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str]:
-    """Whether a rod can turn far enough to meet itself."""
+def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str, float]:
+    """Whether a rod can turn far enough to meet itself, the reason, and how far it can turn [rad]."""
     length, middles = rod.path.length, np.arange(rod.stations - 1) + 0.5
     figures = EdgeFigures(scene, rod)
     layers = [sections(rod, layer, scene.materials[layer.material], middles) for layer in rod.layers]
@@ -94,43 +108,50 @@ def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str]:
     natural = [np.abs(values_at(layer.natural_curvature or 0.0, rod.edge_length * middles)) for layer in rod.layers]
     bent = figures.free_curvature() + np.max(natural, axis=0)
     sag = weight * length**3 / (6.0 * float(stiffness.min()))
-    if rod.clamp_start is not None or rod.clamp_end is not None:
+    if all(variant.clamp_start or variant.clamp_end for variant in rod.variants):
         sag = min(sag, 0.5 * HALF_TURN)
     angle = rod.path.turn + float(bent.sum()) * rod.edge_length + sag
     degrees = f"{math.degrees(angle):.0f}°" if angle < 100.0 * HALF_TURN else "many times"
     if angle < HALF_TURN:
-        return False, f"turns by {degrees} at most, 180° would be needed to meet itself"
-    return True, f"can turn by {degrees}"
+        return False, f"turns by {degrees} at most, 180° would be needed to meet itself", angle
+    return True, f"can turn by {degrees}", angle
 
 
-def _can_reach(scene: SceneConfig, first: Rod, second: Rod) -> tuple[bool, str]:
-    """Whether two rods, or copies of one, can come together."""
-    if first is second:
-        return True, "turned about one axis"
-    regions = [_region(scene, rod) for rod in (first, second)]
-    if any(region is None for region in regions):
+Region = tuple[np.ndarray, float]
+"""Centre and radius [m] of a ball."""
+
+
+def _can_reach(
+    scene: SceneConfig, first: list[Region | None], second: list[Region | None], copies: bool = False
+) -> tuple[bool, str]:
+    """Whether copies of two rods, or several of one, can come together."""
+    if None in first or None in second:
         return True, "nothing keeps them apart"
-    (center_a, radius_a), (center_b, radius_b) = regions
-    apart = float(np.linalg.norm(center_a - center_b)) - radius_a - radius_b
+    (center_a, radius_a), (center_b, radius_b) = (
+        map(np.array, zip(*regions, strict=True)) for regions in (first, second)
+    )
+    gaps = np.linalg.norm(center_a[:, None] - center_b, axis=2) - radius_a[:, None] - radius_b
+    apart = float((gaps[np.triu_indices(len(gaps), 1)] if copies else gaps).min())
     if apart > scene.contact.barrier_distance if scene.contact else apart > 0.0:
         return False, f"held {1e3 * apart:.3g} mm apart by their clamps"
     return True, "both reach the space between their clamps"
 
 
-def _region(scene: SceneConfig, rod: Rod) -> tuple[np.ndarray, float] | None:
-    """Centre and radius [m] of a ball that a rod held by a prescribed body does not leave; None for any other, or for a
-    pattern.
-    """
-    if rod.pattern is not None:
-        return None
-    for name in (rod.clamp_start, rod.clamp_end):
-        body = next((body for body in scene.bodies if body.name == name), None)
-        if body is not None and isinstance(body.motion, Prescribed):
-            moved = max((math.dist(move, (0.0, 0.0, 0.0)) for move in body.motion.displacements), default=0.0)
-            start = np.array(rod.path.start) if name == rod.clamp_start else np.array(body.position)
-            figures = EdgeFigures(scene, rod)
-            stretched = 1.0 + figures.eigenstrain.max()
-            offset = float(np.linalg.norm(start - np.array(body.position)))
-            offset *= 2.0 if body.motion.rotations else 1.0
-            return start, rod.path.length * stretched + moved + offset + figures.thickness.max()
-    return None
+def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
+    """Balls that the copies of a rod do not leave; None for one that no prescribed body holds."""
+    figures = EdgeFigures(scene, rod)
+    reach = rod.path.length * (1.0 + figures.eigenstrain.max()) + figures.thickness.max()
+    bodies = {body.name: body for body in scene.bodies if isinstance(body.motion, Prescribed)}
+    regions: list[Region | None] = []
+    for copy in rod.copies:
+        held = [name for name in (copy.rod.clamp_start, copy.rod.clamp_end) if name in bodies]
+        if not held:
+            regions.append(None)
+            continue
+        body = bodies[held[0]]
+        moved = max((math.dist(move, (0.0, 0.0, 0.0)) for move in body.motion.displacements), default=0.0)
+        position = np.array(body.position)
+        start = copy.place.points(np.array(rod.path.start)) if held[0] == copy.rod.clamp_start else position
+        offset = float(np.linalg.norm(start - position)) * (2.0 if body.motion.rotations else 1.0)
+        regions.append((start, reach + moved + offset))
+    return regions

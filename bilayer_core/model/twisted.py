@@ -53,7 +53,8 @@ STRETCH = 0.05
 
 def twist_figures(scene: SceneConfig, model: str, dimension: int) -> Iterator[Figure]:
     """Figures of rods that twist, as they are computed."""
-    for rod in scene.rods if dimension == 3 else ():
+    variants = [variant for scene_rod in scene.rods for variant in scene_rod.variants]
+    for rod in variants if dimension == 3 else ():
         natural = _naturally_twisted(rod)
         if not (natural or _twisted_by_bodies(scene, rod)):
             continue
@@ -87,6 +88,7 @@ def _of_clamps(rod: Rod, part: float) -> Figure:
         "clamped ends hold back about",
         f"{100 * part:.2g} % of its twist",
         f"at most {100 * HELD_BACK:g} %",
+        part / HELD_BACK,
         "there a section cannot warp, in the model it can, so what is computed twists by that much more"
         if part > HELD_BACK
         else "",
@@ -99,6 +101,7 @@ def _of_borders(rod: Rod, part: float) -> Figure:
         "natural twist stretches its borders, which changes its torque by up to",
         f"{100 * part:.2g} %",
         f"at most {100 * STRETCH:g} %",
+        part / STRETCH,
         "it is too wide to twist as a rod, and a real strip winds up differently" if part > STRETCH else "",
     )
 
@@ -109,6 +112,7 @@ def _of_helix(rod: Rod, radius: float, pitch: float) -> Figure:
         "as one curve, the helix to which natural twist winds it is off by",
         f"{100 * radius:.2g} % in radius, {100 * pitch:.2g} % in pitch",
         f"at most {100 * HELIX:g} %",
+        max(radius, pitch) / HELIX,
         "one curve is linear in the strains of its layers; `--model two_rod` is not"
         if max(radius, pitch) > HELIX
         else "",

@@ -31,6 +31,8 @@ class Figure:
         Key path.
     what, value, limit : str
         The quantity, its value with the unit, and the range in which the model is meant to be used.
+    severity : float
+        A number to compare figures of one quantity by: 1 at the limit, more beyond.
     outside : str
         What it means that the value is out of the range; empty while it is within.
     """
@@ -39,16 +41,31 @@ class Figure:
     what: str
     value: str
     limit: str
+    severity: float
     outside: str = ""
 
-    def __str__(self) -> str:
-        text = f"{self.where}: {self.what} {self.value} ({self.limit})"
+    @property
+    def kind(self) -> tuple[str, bool]:
+        """The quantity, and whether it is out of its range."""
+        return self.what, bool(self.outside)
+
+    @property
+    def superlative(self) -> str:
+        """What the figure with the largest severity is among several."""
+        return "worst" if self.outside else "nearest to the limit"
+
+    def line(self, where: str) -> str:
+        """The figure, with the text that names the place."""
+        text = f"{where}: {self.what} {self.value} ({self.limit})"
         return f"{text}: {self.outside}" if self.outside else text
 
+    def __str__(self) -> str:
+        return self.line(self.where)
 
-def validity_warnings(scene: SceneConfig) -> Iterator[str]:
+
+def validity_warnings(scene: SceneConfig) -> Iterator[Figure]:
     """The figures that are out of their range, each with the range and what that means."""
-    return (str(figure) for figure in validity_figures(scene) if figure.outside)
+    return (figure for figure in validity_figures(scene) if figure.outside)
 
 
 def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
@@ -73,6 +90,7 @@ def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
         "length/width",
         f"{slenderness:.2g}",
         f"at least {SLENDER:g}",
+        SLENDER / slenderness,
         "it is a plate more than a rod" if slenderness < SLENDER else "",
     )
     strain = at_edges.eigenstrain.max()
@@ -82,6 +100,7 @@ def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
             "eigenstrain up to",
             f"{100 * strain:.3g} %",
             f"at most {100 * LARGE_STRAIN:g} %",
+            strain / LARGE_STRAIN,
             "the law of the material is linear" if strain > LARGE_STRAIN else "",
         )
     bend = max((curvature * thickness).max(), at_edges.bend_of_layers().max())
@@ -92,16 +111,19 @@ def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
         "curvature × thickness up to",
         f"{bend:.2g}",
         f"at most {THICK_CURVATURE:g}",
+        bend / THICK_CURVATURE,
         "it is no thin rod" if bend > THICK_CURVATURE else "",
     )
     ratio = width**2 * curvature / thickness
     least, most = PLATE_RANGE
     between = ratio[(ratio >= least) & (ratio <= most)]
+    told = float((between if len(between) else ratio).max())
     yield Figure(
         where,
         "w²κ/H up to",
-        f"{(between if len(between) else ratio).max():.2g}",
+        f"{told:.2g}",
         f"below {least:g} or above {most:g}",
+        min(told / least, most / told),
         "between beam and plate an experiment may be up to 1/(1−ν²) stiffer and its swelling curvature 1+ν higher than "
         "computed, and agreement within 30 % means nothing"
         if len(between)
@@ -116,6 +138,7 @@ def _of_barrier(name: str, thin: float, distance: float) -> Figure:
         f"{1e3 * distance:g} mm is",
         f"{distance / thin:.2g} of the least thickness, that of rods.{name}",
         f"at most {FAR:g}",
+        distance / (FAR * thin),
         "surfaces float visibly apart; 0.1 to 0.2 mm is closer" if distance > FAR * thin else "",
     )
 
@@ -128,6 +151,7 @@ def _of_edges(rod: Rod, thin: float, distance: float) -> Figure:
         "edge length",
         f"{1e3 * rod.edge_length:.3g} mm",
         f"at most {1e3 * longest:.3g} mm, {COARSE:g} times least thickness and barrier distance together",
+        rod.edge_length / longest,
         "only nodes feel surfaces, and a small obstacle fits between them; more stations bring them closer"
         if rod.edge_length > longest
         else "",

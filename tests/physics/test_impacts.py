@@ -8,6 +8,7 @@ from sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SimulationError
+from bilayer_core.model.findings import told
 from bilayer_core.model.impacts import impact_warnings
 from bilayer_core.validate.impacts import SPEED, rebound, thrown
 
@@ -17,7 +18,7 @@ METHODS = ["implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha"]
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_a_barrier_that_cannot_hold_an_impact_is_named_before_and_after_the_run(dimension):
     simulator = Simulator(load_scene(thrown(1e7, dimension)), tolerance=1e-4)
-    (before,) = impact_warnings(simulator.model)
+    (before,) = told(impact_warnings(simulator.model))
     assert "body 'ball' meets a plane at 10 m/s with 6.75 J per metre" in before
     assert "stiffness 4e+08 Pa or barrier_distance 0.6 mm" in before
     try:
@@ -55,7 +56,7 @@ def test_no_step_of_any_integrator_returns_more_than_came_where_the_barrier_is_t
 def test_a_fall_and_a_free_rod_count_too():
     strip = rod([layer()], length=0.05, stations=11, start=(0, 0, 2.0))
     content = scene([strip], gravity=[0, 0, -9.81], obstacles=[GROUND], contact=contact(1e-5))
-    (warning,) = impact_warnings(Simulator(load_scene(content)).model)
+    (warning,) = told(impact_warnings(Simulator(load_scene(content)).model))
     assert "rod 'rod/only' meets a plane at 6.26 m/s" in warning
     content["contact"]["barrier_distance"] = 1e-3
     assert not list(impact_warnings(Simulator(load_scene(content)).model))

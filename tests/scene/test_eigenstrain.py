@@ -207,4 +207,6 @@ def test_a_law_is_no_key_to_override_once_its_numbers_are_stated():
     ],
 )
 def test_the_largest_eigenstrain_of_a_layer_counts_laws_where_they_meet(laws, percent):
-    assert any(f"eigenstrain up to {percent} %" in text for text in validity_warnings(load_scene(driven(laws))))
+    assert any(
+        f"eigenstrain up to {percent} %" in str(figure) for figure in validity_warnings(load_scene(driven(laws)))
+    )
