@@ -219,7 +219,8 @@ def _kind_of_bare(annotation: Any) -> Kind:
     if origin is list:
         kind = _kind(parts[0])
         of_many = kind.type if kind.type.startswith("[") else kind.type.replace("list", "lists", 1)
-        of_many = f"{of_many}s" if " " not in of_many and not of_many.startswith("[") else of_many
+        single = of_many == "whole number" or (" " not in of_many and not of_many.startswith("["))
+        of_many = f"{of_many}s" if single else of_many
         return replace(kind, type=f"list of {of_many}")
     if origin is dict:
         return replace(_kind(parts[1]), type=f"{_kind(parts[1]).type} by name")

@@ -14,6 +14,7 @@ CHOSEN = {
     "gripping_friction": ("laminate", 3),
     "helix": ("two_rod", 3),
     "jumping": ("laminate", 2),
+    "lattice": ("laminate", 2),
     "swimming": ("laminate", 3),
 }
 

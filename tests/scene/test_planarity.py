@@ -18,6 +18,7 @@ BUNDLED = {
     "gripping_friction": (3, "rods.arm_1 leaves the plane y = 0"),
     "helix": (3, "rods.strip.layers.helical.natural_twist turns the rod out of the plane y = 0"),
     "jumping": (2, "all stays in the plane y = 0"),
+    "lattice": (2, "all stays in the plane y = 0"),
     "swimming": (3, "rods.arm_1 leaves the plane y = 0"),
 }
 
