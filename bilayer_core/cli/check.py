@@ -150,7 +150,8 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         yield from _block("accuracy", [ERROR_OF_A_RUN])
     yield from _forces(report["terms"])
     yield "contact pairs"
-    yield from (f"  {pair}" for pair in report["contact_pairs"] or ["none"])
+    for pair in report["contact_pairs"] or ["none"]:
+        yield from textwrap.wrap(pair, WIDTH + 16, initial_indent="  ", subsequent_indent="    ")
     yield "output, in simulated time"
     for stream in report["outputs"]:
         yield f"  {stream['topic']:36}{stream['type']:40}{stream['rate']:g} Hz"

@@ -7,6 +7,8 @@ import pytest
 from sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.view.geometry import ribbon_vertices
 
 BOTH = [("laminate", 2), ("laminate", 3), ("two_rod", 2), ("two_rod", 3)]
 RAMP = {"type": "ramp", "start": 0, "end": 0.02, "from": 0, "to": 1}
@@ -151,10 +153,18 @@ def test_a_handedness_that_were_not_mirrored_would_show(what):
     assert np.abs(np.split(changed.positions, 2)[0] - plain).max() > 1e-7
 
 
-def test_each_copy_is_drawn_where_it_is():
-    pattern = {"type": "translation", "step": [0, 0, 0.02], "count": 3}
-    simulator = simulated([arm(pattern=pattern)], "laminate", 3, duration=2e-3)
-    names = [strand.name for strand in simulator.description.strands]
-    assert [name.split("/")[0] for name in names] == sorted(
-        f"arm_{k}" for k in range(3) for _ in range(len(names) // 3)
-    )
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_a_mirror_image_is_drawn_as_the_image_of_what_is_drawn(model):
+    simulator = simulated([arm(pattern=MIRROR)], model, 3, duration=2e-3, gravity=[0, 0, -9.81])
+    memory = MemoryRecorder()
+    simulator.run(2e-3, observers=[memory])
+    run = memory.run_data()
+    corners = {}
+    for part in run.description.layers:
+        drawn = ribbon_vertices(part, run.positions[:, part.nodes], run.material_frames[:, part.nodes])
+        corners[part.name] = drawn[-1].reshape(-1, 3)
+    assert list(corners) == ["arm_0/passive", "arm_0/active", "arm_1/passive", "arm_1/active"]
+    for name in ("passive", "active"):
+        image = reflected(corners[f"arm_0/{name}"])
+        apart = np.linalg.norm(image[:, None] - corners[f"arm_1/{name}"], axis=2)
+        assert apart.min(axis=1).max() < 1e-7 and apart.min(axis=0).max() < 1e-7
