@@ -8,8 +8,9 @@ from ..errors import InputError, SceneError
 from ..model.section import sections
 from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
+from ..scene.paths import StraightPath
 from ..scene.profile import Profile
-from ..scene.rod import Rod, StraightPath
+from ..scene.rod import Rod
 from ..scene.transduction import free_strain
 from .beam import PlanarBeam
 from .energy import Section
@@ -80,7 +81,8 @@ def set_stimuli(beam: PlanarBeam, scene: SceneConfig, values: dict[str, float]) 
 
 def _only_rod(scene: SceneConfig) -> Rod:
     rod = scene.rods[0]
-    gravity, normal = np.array(scene.gravity), np.cross(rod.path.direction, rod.normal)
+    _, tangents, normals = rod.frames_at(np.zeros(1))
+    gravity, normal = np.array(scene.gravity), np.cross(tangents[0], normals[0])
     held = {body.name: body for body in scene.bodies}.get(rod.clamp_start)
     layers = rod.layers
     needs = {

@@ -94,7 +94,11 @@ def _parts(scene) -> dict[str, list[str]]:
             for end, key in (("start", "clamp_start"), ("end", "clamp_end"))
             if (names := {name: None for copy in rod.copies if (name := getattr(copy.rod, key))})
         ]
-        lines = [f"{copies}{section}, {stations}; {', '.join(held) or 'both ends free'}", f"bottom to top: {layers}"]
+        shape = f"{rod.path.describe()}, " if rod.path.describe() else ""
+        lines = [
+            f"{copies}{shape}{section}, {stations}; {', '.join(held) or 'both ends free'}",
+            f"bottom to top: {layers}",
+        ]
         if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):
             lines.append(_own_laws(rod.pattern))
         figures = EdgeFigures(scene, rod)

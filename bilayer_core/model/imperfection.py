@@ -24,7 +24,8 @@ from ..scene.body import Prescribed
 from ..scene.config import SceneConfig
 from ..scene.faults import ROUNDING
 from ..scene.imperfection import Imperfection
-from ..scene.rod import Rod, RodCopy, StraightPath
+from ..scene.paths import StraightPath
+from ..scene.rod import Rod, RodCopy
 from .findings import Finding
 from .section import outline
 
@@ -90,7 +91,6 @@ def advice(scene: SceneConfig) -> Iterator[Finding]:
 def _symmetry(scene: SceneConfig, copy: RodCopy) -> str:
     """What leaves the buckling of a rod to rounding; empty if nothing does."""
     rod = copy.rod
-    direction, normal = (copy.place.directions(np.array(vector)) for vector in (rod.path.direction, rod.normal))
     bodies = {body.name: body.motion for body in scene.bodies}
     holders = [bodies.get(name) for name in (rod.clamp_start, rod.clamp_end)]
     grows = any(layer.eigenstrain for layer in rod.layers)
@@ -100,6 +100,7 @@ def _symmetry(scene: SceneConfig, copy: RodCopy) -> str:
     bent = grows or any(layer.natural_curvature or layer.natural_twist for layer in rod.layers)
     if bent or not isinstance(rod.path, StraightPath) or (rod.clamp_start is None) == (rod.clamp_end is None):
         return ""
+    direction, normal = (copy.place.directions(np.array(vector)) for vector in (rod.path.direction, rod.normal))
     away = direction * (1.0 if rod.clamp_start else -1.0)
     forces = [np.array(scene.gravity)]
     for load in scene.loads:

@@ -119,7 +119,7 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
         error = helix_error(scene, rod)
         if error > HELIX:
             return "two_rod", (
-                f"rods.{rod.name}: natural twist winds it to a helix, which one curve would miss by {100 * error:.2g} %"
+                f"rods.{rod.name}: it winds to a helix, which one curve would miss by {100 * error:.2g} %"
             )
     return "laminate", "one curve carries both layers: half the unknowns, no stiff bond"
 

@@ -49,19 +49,16 @@ def require_plane(scene: SceneConfig) -> Plane:
     return plane
 
 
-def _frame(copy: RodCopy) -> tuple[Array, Array, Array]:
-    """Start [m], direction and normal of a rod."""
-    path, place = copy.rod.path, copy.place
-    return (
-        place.points(np.array(path.start)),
-        place.directions(np.array(path.direction)),
-        place.directions(np.array(copy.rod.normal)),
-    )
+def _frames(copy: RodCopy, arc: Array) -> tuple[Array, Array, Array]:
+    """Points [m], tangents and normals of the path of a rod at lengths along it [m]."""
+    points, tangents, normals = copy.rod.frames_at(arc)
+    place = copy.place
+    return place.points(points), place.directions(tangents), place.directions(normals)
 
 
 def _plane_of(copy: RodCopy) -> Plane:
     """Plane of the path and normal of a rod."""
-    start, p, q = _frame(copy)
+    point, p, q = (part[0] for part in _frames(copy, np.zeros(1)))
     normal = np.cross(p, q)
     axis = int(np.argmax(np.abs(normal)))
     if np.all(np.abs(np.delete(normal, axis)) < ROUNDING):
@@ -69,7 +66,7 @@ def _plane_of(copy: RodCopy) -> Plane:
     else:
         q = np.cross(normal / np.linalg.norm(normal), p)
         axes = np.stack([p, q / np.linalg.norm(q)])
-    return Plane(start, axes)
+    return Plane(point, axes)
 
 
 class _Survey:
@@ -88,10 +85,12 @@ class _Survey:
 
     def _lies_in(self, *vectors) -> bool:
         """Whether vectors are directions in the plane, or zero."""
-        return all(abs(self._normal @ np.array(v)) <= ROUNDING * np.linalg.norm(v) for v in vectors)
+        v = np.array(vectors).reshape(-1, 3)
+        return bool(np.all(np.abs(v @ self._normal) <= ROUNDING * np.linalg.norm(v, axis=1)))
 
     def _is_on(self, *points) -> bool:
-        return all(abs(self._height(point)) <= ROUNDING * self._size for point in points)
+        heights = (np.array(points).reshape(-1, 3) - self._plane.point) @ self._normal
+        return bool(np.all(np.abs(heights) <= ROUNDING * self._size))
 
     def _along_normal(self, *vectors) -> bool:
         """Whether vectors are parallel to the normal, or zero."""
@@ -128,8 +127,8 @@ class _Survey:
         scene = self._scene
         for rod in scene.rods:
             for copy in rod.copies:
-                start, *directions = _frame(copy)
-                if not (self._is_on(start) and self._lies_in(*directions)):
+                points, *directions = _frames(copy, 0.5 * rod.edge_length * np.arange(2 * rod.stations - 1))
+                if not (self._is_on(points) and self._lies_in(*directions)):
                     yield f"rods.{copy.name}"
         if not self._lies_in(scene.gravity):
             yield "gravity"

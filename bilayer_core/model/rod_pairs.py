@@ -142,6 +142,7 @@ def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
     figures = EdgeFigures(scene, rod)
     reach = rod.path.length * (1.0 + figures.eigenstrain.max()) + figures.thickness.max()
     bodies = {body.name: body for body in scene.bodies if isinstance(body.motion, Prescribed)}
+    ends = rod.frames_at(np.array([0.0, rod.path.length]))[0]
     regions: list[Region | None] = []
     for copy in rod.copies:
         held = [name for name in (copy.rod.clamp_start, copy.rod.clamp_end) if name in bodies]
@@ -150,8 +151,7 @@ def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
             continue
         body = bodies[held[0]]
         moved = max((math.dist(move, (0.0, 0.0, 0.0)) for move in body.motion.displacements), default=0.0)
-        position = np.array(body.position)
-        start = copy.place.points(np.array(rod.path.start)) if held[0] == copy.rod.clamp_start else position
-        offset = float(np.linalg.norm(start - position)) * (2.0 if body.motion.rotations else 1.0)
-        regions.append((start, reach + moved + offset))
+        clamped = copy.place.points(ends)[0 if held[0] == copy.rod.clamp_start else 1]
+        offset = float(np.linalg.norm(clamped - np.array(body.position))) * (2.0 if body.motion.rotations else 1.0)
+        regions.append((clamped, reach + moved + offset))
     return regions

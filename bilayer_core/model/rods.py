@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.path import rest_strains
+from ..kinematics.rest_strains import rest_strains
 from ..scene.config import SceneConfig
 from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod, RodCopy
@@ -103,8 +103,7 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     along, voronoi = rod.edge_length * np.arange(first, last + 1), shape.voronoi
     rest = shape.strains()
     if layer.natural_curvature is not None:
-        rest[:, :2] = shape.imperfection[:, :2]
-        rest[:, 0] += values_at(layer.natural_curvature, along) * voronoi
+        rest[:, 0] = shape.imperfection[:, 0] + values_at(layer.natural_curvature, along) * voronoi
     rest[:, 2] += shape.handedness * values_at(layer.natural_twist, along) * voronoi
     return rest
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..kinematics.path import circle, rest_strains, spiral, straight
+from ..kinematics.rest_strains import rest_strains
 from ..kinematics.rotation import rotation_matrix
 from ..scene.config import SceneConfig
 from ..scene.eigenstrain import Eigenstrain
 from ..scene.pattern import Placement
-from ..scene.rod import ArcPath, Rod, SpiralPath
+from ..scene.rod import Rod
 from .imperfection import departure
 from .strand_arrays import StrandArrays
 
@@ -90,32 +90,33 @@ class StrandShape:
 
 def strand_shape(rod: Rod, height: Array, first: int, last: int, place: Placement) -> StrandShape:
     """Shape of the strand that lies `height` [m] over the path at the stations from first to last."""
-    shape = _shape(rod, height, first, last, place, _path)
+    shape = _shape(rod, height, first, last, place, Rod.frames_at)
     if rod.imperfection is None:
         return shape
-    imperfect = _shape(rod, height, first, last, place, _imperfect_path)
+    imperfect = _shape(rod, height, first, last, place, _imperfect_frames)
     return replace(imperfect, imperfection=imperfect.strains() - shape.strains())
 
 
-def _path(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
-    """Points [m], tangents and normals of the path at lengths `arc` [m] along it, shapes (n, 3)."""
-    frame = (np.array(rod.path.start), np.array(rod.path.direction), np.array(rod.normal))
-    if isinstance(rod.path, SpiralPath):
-        side = 1.0 if rod.path.toward == "normal" else -1.0
-        return spiral(*frame, rod.path.start_radius, rod.path.growth, side, rod.path.angle_at(arc))
-    if isinstance(rod.path, ArcPath):
-        return circle(*frame, rod.path.curvature, arc)
-    return straight(*frame, arc)
+def _imperfect_frames(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
+    """Those of the path with the imperfection: points x + f n + g t×n."""
+    points, tangents, normals = rod.frames_at(arc)
+    (f, g), slopes = (part.T[..., None] for part in departure(rod, arc))
+    along = _tangents_beside(rod, arc, tangents, normals, (f, g), slopes)
+    return points + f * normals + g * np.cross(tangents, normals), along, _across(normals, along)
 
 
-def _imperfect_path(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
-    """The same with the imperfection: x + f n + g t×n, of which the tangent is (1 − κ f) t + f′ n + g′ t×n."""
-    points, tangents, normals = _path(rod, arc)
-    across = np.cross(tangents, normals)
-    (f, g), (slope_f, slope_g) = (part.T[..., None] for part in departure(rod, arc))
-    along = (1.0 - rod.path.curvature_at(arc)[:, None] * f) * tangents + slope_f * normals + slope_g * across
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    return points + f * normals + g * across, along, _across(normals, along)
+def _tangents_beside(
+    rod: Rod, arc: Array, tangents: Array, normals: Array, offset: tuple[Array, Array], slopes: tuple[Array, Array]
+) -> Array:
+    """Unit tangents of a curve at the offset (f, g) from the path, x + f n + g t×n: those of
+
+    (1 − χ f − ξ g) t + (f′ − τ g) n + (g′ + τ f) t×n
+    """
+    (f, g), (slope_f, slope_g) = offset, slopes
+    towards, across, twist = rod.curvatures_at(arc).T[..., None]
+    along = (1.0 - towards * f - across * g) * tangents + (slope_f - twist * g) * normals
+    along = along + (slope_g + twist * f) * np.cross(tangents, normals)
+    return along / np.linalg.norm(along, axis=1, keepdims=True)
 
 
 def _shape(
@@ -124,18 +125,21 @@ def _shape(
     first: int,
     last: int,
     place: Placement,
-    path: Callable[[Rod, Array], tuple[Array, Array, Array]],
+    frames_at: Callable[[Rod, Array], tuple[Array, Array, Array]],
 ) -> StrandShape:
-    points, tangents, normals = path(rod, rod.edge_length * np.arange(first, last + 1))
-    _, _, middle_normals = path(rod, rod.edge_length * (np.arange(first, last) + 0.5))
+    arc = rod.edge_length * np.arange(first, last + 1)
+    points, tangents, normals = frames_at(rod, arc)
+    _, _, middle_normals = frames_at(rod, rod.edge_length * (np.arange(first, last) + 0.5))
     positions = place.points(points + height[:, None] * normals)
     edges = np.diff(positions, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
     edge_tangents = edges / lengths[:, None]
     ends = [0, -1]
-    slopes = (height[[1, -1]] - height[[0, -2]]) / rod.edge_length  # of a layer whose thickness varies
-    end_tangents = tangents[ends] + slopes[:, None] * normals[ends]
-    end_tangents = place.directions(end_tangents / np.linalg.norm(end_tangents, axis=1, keepdims=True))
+    away = height[ends, None]
+    slopes = (height[[1, -1]] - height[[0, -2]])[:, None] / rod.edge_length  # of a layer whose thickness varies
+    end_tangents = place.directions(
+        _tangents_beside(rod, arc[ends], tangents[ends], normals[ends], (away, 0.0 * away), (slopes, 0.0 * away))
+    )
     return StrandShape(
         positions,
         lengths,

@@ -1,13 +1,14 @@
 """Where the validity of the models ends in twist, each with an estimate of the error.
 
-One curve for two layers. Natural twist winds a rod up to a helix. `laminate` is linear in the strains of its layers;
-what it leaves out is of the order of (z τ)² beside stretching and of z τ beside curvature and twist, z the distance of
-a layer from the curve: their centrelines are helices themselves, longer and tilted (ψ),
+One curve for two layers. Natural twist winds a rod up to a helix, or its path is one. `laminate` is linear in the
+strains of its layers; what it leaves out is of the order of (z τ)² beside stretching and of z τ beside curvature and
+twist, z the distance of a layer from the curve: their centrelines are helices themselves, longer and tilted (ψ),
 
     a = 1 + ε − z χ,  b = z τ,  r = √(a² + b²),  ψ = atan2(b, a),  χ_l = χ cos ψ − τ sin ψ,  τ_l = τ cos ψ + χ sin ψ
-    E = Σ ½ EA (r − λ − η)² + ½ EI₁ (χ_l − χ̄_l)² + ½ GJ (τ_l − τ̄_l)² + ½ k_φ (ψ_top − ψ_bottom)²    per length
+    E = Σ ½ EA (r − r₀ − η)² + ½ EI₁ (χ_l − χ̄_l)² + ½ GJ (τ_l − τ̄_l)² + ½ k_φ (ψ_top − ψ_bottom − ψ₀)²    per length
 
-with λ = 1 − z χ₀ for a path of curvature χ₀. On the neutral axis the linear part of E has the stiffnesses A, D and GJ
+where r₀, ψ₀ and, unless a layer has natural ones, χ̄_l, τ̄_l are those of the path with its curvature and twist (that
+across the width is not looked at). On the neutral axis the linear part of E has the stiffnesses A, D and GJ
 alone; from its minimum x₀ = (ε, χ, τ) one step x₁ = x₀ − (∂E/∂x)/(A, D, GJ) leads to that of E but for terms of second
 order. Radius |χ|/(χ² + τ²) and pitch 2π |τ|/(χ² + τ²) at x₀ and x₁ give the error: 11.1 % of the radius for natural
 (15, 150) 1/m on a straight layer, 1 + 1 mm, 10 mm wide, where least energy has 11.05 % (`validate.helix`).
@@ -55,25 +56,34 @@ def twist_figures(scene: SceneConfig, model: str, dimension: int) -> Iterator[Fi
     """Figures of rods that twist, as they are computed."""
     variants = [variant for scene_rod in scene.rods for variant in scene_rod.variants]
     for rod in variants if dimension == 3 else ():
-        natural = _naturally_twisted(rod)
-        if not (natural or _twisted_by_bodies(scene, rod)):
+        natural, wound = _naturally_twisted(rod), _on_twisted_path(rod)
+        if not (natural or wound or _twisted_by_bodies(scene, rod)):
             continue
         twisted = TwistedRod(scene, rod)
         if rod.clamp_start or rod.clamp_end:
             yield _of_clamps(rod, twisted.held_back(two_rods=model == "two_rod"))
         if natural:
             yield _of_borders(rod, twisted.stretch())
-            if model == "laminate" and len(rod.layers) == 2:
-                yield _of_helix(rod, *twisted.helix_errors())
+        if (natural or wound) and model == "laminate" and len(rod.layers) == 2:
+            yield _of_helix(rod, *twisted.helix_errors())
 
 
 def helix_error(scene: SceneConfig, rod: Rod) -> float:
-    """Part by which `laminate` misses radius or pitch to which natural twist winds a rod, 0 without such."""
-    return max(TwistedRod(scene, rod).helix_errors()) if _naturally_twisted(rod) else 0.0
+    """Part by which `laminate` misses radius or pitch of a rod that natural twist or its path winds up."""
+    return max(TwistedRod(scene, rod).helix_errors()) if _naturally_twisted(rod) or _on_twisted_path(rod) else 0.0
 
 
 def _naturally_twisted(rod: Rod) -> bool:
     return any(extremes(layer.natural_twist) != (0.0, 0.0) for layer in rod.layers)
+
+
+def _on_twisted_path(rod: Rod) -> bool:
+    return bool(rod.curvatures_at(_middles(rod))[:, 2].any())
+
+
+def _middles(rod: Rod) -> Array:
+    """Of edges, as lengths along the path [m], shape (n_edge,)."""
+    return rod.edge_length * (np.arange(rod.stations - 1) + 0.5)
 
 
 def _twisted_by_bodies(scene: SceneConfig, rod: Rod) -> bool:
@@ -109,7 +119,7 @@ def _of_borders(rod: Rod, part: float) -> Figure:
 def _of_helix(rod: Rod, radius: float, pitch: float) -> Figure:
     return Figure(
         f"rods.{rod.name}",
-        "as one curve, the helix to which natural twist winds it is off by",
+        "as one curve, the helix to which it winds is off by",
         f"{100 * radius:.2g} % in radius, {100 * pitch:.2g} % in pitch",
         f"at most {100 * HELIX:g} %",
         max(radius, pitch) / HELIX,
@@ -126,7 +136,7 @@ class TwistedRod:
 
     def __init__(self, scene: SceneConfig, rod: Rod):
         stations = np.arange(rod.stations - 1) + 0.5
-        along = rod.edge_length * stations
+        along = _middles(rod)
         materials = [scene.materials[layer.material] for layer in rod.layers]
         own = [sections(rod, layer, material, stations) for layer, material in zip(rod.layers, materials, strict=True)]
         self._width, thickness = outline(rod, stations)
@@ -142,13 +152,14 @@ class TwistedRod:
         if len(own) == 2:
             self._tilt = present.all(axis=0) * bond(*own, scene.coupling, rod.torsion).tilt
         self._tilt_arm = middle[-1] - middle[0]
-        self._path = rod.path.curvature_at(along)
+        self._path, _, self._path_twist = rod.curvatures_at(along).T
         self._natural_curvature = np.array(
             [
                 self._path if layer.natural_curvature is None else values_at(layer.natural_curvature, along)
                 for layer in rod.layers
             ]
         )
+        self._bent = np.array([[layer.natural_curvature is not None] for layer in rod.layers])
         self._natural_twist = np.array([values_at(layer.natural_twist, along) for layer in rod.layers])
         self._length, self._clamps = rod.path.length, (bool(rod.clamp_start), bool(rod.clamp_end))
         self._eigenstrain = EdgeFigures(scene, rod).eigenstrain_range
@@ -174,7 +185,8 @@ class TwistedRod:
 
     def stretch(self) -> float:
         """Largest part by which the stretch of borders changes the torque."""
-        squares = (self._axial * (self._linear(0.0)[2] ** 2 - self._natural_twist**2)).sum(axis=0)
+        natural = self._path_twist + self._natural_twist
+        squares = (self._axial * (self._linear(0.0)[2] ** 2 - natural**2)).sum(axis=0)
         return float(np.abs(squares * self._width**4 / (360.0 * self._whole_twist)).max())
 
     def _stiffness(self) -> Array:
@@ -187,19 +199,28 @@ class TwistedRod:
         force = self._axial * eigenstrain
         moment = self._bend * (self._natural_curvature - self._path) - force * self._height_over_axis
         loads = np.array([force.sum(axis=0), moment.sum(axis=0), (self._twist * self._natural_twist).sum(axis=0)])
-        return loads / self._stiffness() + np.array([0.0 * self._path, self._path, 0.0 * self._path])
+        return loads / self._stiffness() + np.array([0.0 * self._path, self._path, self._path_twist])
+
+    def _of_layers(self, at: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """r, ψ, χ_l, τ_l of layers and cos ψ for ε, χ, τ of the curve, shapes (n_layer, n_edge)."""
+        (strain, chi, tau), z = at, self._height_over_axis
+        a, b = 1.0 + strain - z * chi, z * tau
+        r = np.hypot(a, b)
+        cosine, sine = a / r, b / r
+        return r, np.arctan2(b, a), chi * cosine - tau * sine, tau * cosine + chi * sine, cosine
 
     def _gradient(self, at: Array, eigenstrain: Array | float) -> Array:
         """∂E/∂(ε, χ, τ), shape (3, n_edge)."""
-        (strain, chi, tau), z = at, self._height_over_axis
-        a, b = 1.0 + strain - z * chi, z * tau
-        r, tilt = np.hypot(a, b), np.arctan2(b, a)
-        cosine, sine = a / r, b / r
-        own_chi, own_tau = chi * cosine - tau * sine, tau * cosine + chi * sine
-        force = self._axial * (r - (1.0 - z * self._path) - eigenstrain)
-        moment, torque = self._bend * (own_chi - self._natural_curvature), self._twist * (own_tau - self._natural_twist)
+        z = self._height_over_axis
+        r, tilt, own_chi, own_tau, cosine = self._of_layers(at)
+        sine = z * at[2] / r
+        start = np.array([0.0 * self._path, self._path, self._path_twist])
+        r0, tilt0, chi0, tau0, _ = self._of_layers(start)
+        force = self._axial * (r - r0 - eigenstrain)
+        moment = self._bend * (own_chi - np.where(self._bent, self._natural_curvature, chi0))
+        torque = self._twist * (own_tau - tau0 - self._natural_twist)
         along_tilt = own_chi * torque - own_tau * moment
-        bond_moment = self._tilt * (tilt[-1] - tilt[0])
+        bond_moment = self._tilt * (tilt[-1] - tilt[0] - (tilt0[-1] - tilt0[0]))
         along_tilt[-1] += bond_moment
         along_tilt[0] -= bond_moment
         along_a, along_b = force * cosine - along_tilt * sine / r, force * sine + along_tilt * cosine / r

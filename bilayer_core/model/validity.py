@@ -196,7 +196,7 @@ class EdgeFigures:
             self.eigenstrain_range[:, index] = ranges[:, 1].min(axis=0), ranges[:, 2].max(axis=0)
         self.thickness = self._layers.sum(axis=0)
         along = rod.edge_length * stations
-        self._path = rod.path.curvature_at(along)
+        self._path = rod.curvatures_at(along)[:, 0]
         self._natural = np.array(
             [
                 self._path if layer.natural_curvature is None else values_at(layer.natural_curvature, along)

@@ -13,13 +13,14 @@ from pydantic import BeforeValidator, Field, field_serializer, model_validator
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, refuse_all, repeated
 from bilayer_core.scene.imperfection import Imperfection
-from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.part import Direction, Name, Part
+from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
 from bilayer_core.scene.pattern import Patterns, Placement, placed
+from bilayer_core.scene.point_paths import PointPath, PolylinePath, SplinePath
 from bilayer_core.scene.profile import Profile, extremes, varying
 from bilayer_core.scene.units import (
     Curvature,
     NonNegativeLength,
-    PositiveAngle,
     PositiveLength,
     PositiveNumber,
     Twist,
@@ -33,126 +34,6 @@ Eigenstrains = Annotated[
         json_schema_input_type=Eigenstrain | list[Eigenstrain] | None,
     ),
 ]
-
-
-class StraightPath(Part):
-    """A straight line of given length."""
-
-    shape: Literal["straight"]
-    start: Point
-    """Of the interface of two layers, or of the middle of one."""
-    direction: Direction
-    """From the start to the end."""
-    length: PositiveLength
-    """Of the line."""
-
-    @property
-    def turn(self) -> float:
-        """Angle between its tangents at the two ends [rad]."""
-        return 0.0
-
-    def curvature_at(self, arc: np.ndarray) -> np.ndarray:
-        """Towards the normal [1/m] at lengths `arc` [m] from the start."""
-        return np.zeros_like(arc)
-
-
-class ArcPath(Part):
-    """A part of a circle in the plane of its direction and the rod's normal."""
-
-    shape: Literal["arc"]
-    start: Point
-    """Of the interface of two layers, or of the middle of one."""
-    direction: Direction
-    """Tangent at the start."""
-    radius: PositiveLength
-    """Of the circle."""
-    angle: PositiveAngle
-    """How far round; the length is radius times angle."""
-    toward: Literal["normal", "opposite"] = "normal"
-    """Side on which the centre lies: that of the rod's normal at the start, or the other."""
-
-    @property
-    def length(self) -> float:
-        """Length of the arc [m]."""
-        return self.radius * self.angle
-
-    @property
-    def turn(self) -> float:
-        """Angle by which its tangent turns [rad]."""
-        return self.angle
-
-    @property
-    def curvature(self) -> float:
-        """Towards the normal [1/m]."""
-        return (1.0 if self.toward == "normal" else -1.0) / self.radius
-
-    def curvature_at(self, arc: np.ndarray) -> np.ndarray:
-        """Towards the normal [1/m] at lengths `arc` [m] from the start."""
-        return np.full_like(arc, self.curvature)
-
-
-class SpiralPath(Part):
-    """An Archimedean spiral in the plane of its direction and the rod's normal: its radius changes evenly with the
-    angle.
-    """
-
-    shape: Literal["spiral"]
-    start: Point
-    """Where it begins."""
-    direction: Direction
-    """Tangent at the start."""
-    start_radius: PositiveLength
-    """Distance of the start from the centre."""
-    end_radius: PositiveLength
-    """Distance of the end from the centre."""
-    angle: PositiveAngle
-    """By which it goes round its centre; may exceed a full turn."""
-    toward: Literal["normal", "opposite"] = "normal"
-    """Side on which the centre lies: that of the rod's normal at the start, or the other."""
-
-    @model_validator(mode="after")
-    def _check(self) -> SpiralPath:
-        refuse_all("SpiralPath", faults_of_spiral(self))
-        return self
-
-    @property
-    def growth(self) -> float:
-        """Change of the radius with the angle [m/rad]."""
-        return (self.end_radius - self.start_radius) / self.angle
-
-    def _length_to(self, angle: Any) -> Any:
-        """∫ √(r² + a²) dφ from the start to an angle [rad], with the radius r = r₀ + a φ [m]."""
-
-        def primitive(radius):
-            slant = np.hypot(radius, self.growth)
-            return 0.5 * (radius * slant / self.growth + self.growth * np.log((radius + slant) / abs(self.growth)))
-
-        return primitive(self.start_radius + self.growth * angle) - primitive(self.start_radius)
-
-    @property
-    def length(self) -> float:
-        """Length of the spiral [m]."""
-        return float(self._length_to(self.angle))
-
-    def angle_at(self, arc: np.ndarray) -> np.ndarray:
-        """Angles about the centre [rad] at lengths `arc` [m] from the start: Newton's method on the length."""
-        angle = self.angle * arc / self.length
-        for _ in range(20):
-            slope = np.hypot(self.start_radius + self.growth * angle, self.growth)
-            angle = angle - (self._length_to(angle) - arc) / slope
-        return angle
-
-    @property
-    def turn(self) -> float:
-        """Angle by which its tangent turns [rad]."""
-        slope = math.atan2(self.growth, self.start_radius) - math.atan2(self.growth, self.end_radius)
-        return self.angle + slope
-
-    def curvature_at(self, arc: np.ndarray) -> np.ndarray:
-        """Towards the normal [1/m] at lengths `arc` [m] from the start: (r² + 2a²)/(r² + a²)^{3/2}, r = r₀ + a φ."""
-        radius, growth = self.start_radius + self.growth * self.angle_at(arc), self.growth
-        curvature = (radius**2 + 2.0 * growth**2) / (radius**2 + growth**2) ** 1.5
-        return curvature if self.toward == "normal" else -curvature
 
 
 class Layer(Part):
@@ -173,7 +54,7 @@ class Layer(Part):
     natural_curvature: varying(Curvature) | None = None
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
     natural_twist: varying(Twist) = 0.0
-    """Of the layer by itself, about the path."""
+    """Of the layer by itself, about the path, beside the twist of the path."""
 
     def driven_by(self, channels: dict[str, str], gain: float) -> Layer:
         """This layer with other channels in its laws, by those that it has, and its gains multiplied by a number."""
@@ -196,10 +77,14 @@ class Rod(Part):
     """Unique among rods, bodies and obstacles."""
     width: varying(PositiveLength)
     """Of its rectangular section, across path and normal."""
-    path: Annotated[StraightPath | ArcPath | SpiralPath, Field(discriminator="shape")]
+    path: Annotated[
+        StraightPath | ArcPath | SpiralPath | HelixPath | PolylinePath | SplinePath, Field(discriminator="shape")
+    ]
     """Where the rod lies at the start, free of stress."""
     normal: Direction
-    """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path."""
+    """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path. Of a
+    path through points only its part across the path counts.
+    """
     stations: whole(3)
     """Cross-sections along the path, both ends included."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
@@ -221,6 +106,14 @@ class Rod(Part):
     def edge_length(self) -> float:
         """Distance of two stations [m]."""
         return self.path.length / (self.stations - 1)
+
+    def frames_at(self, arc: np.ndarray) -> Frames:
+        """Points [m], tangents and normals of the path at lengths `arc` [m] along it, shapes (n, 3)."""
+        return self.path.frames_at(np.array(self.normal), arc)
+
+    def curvatures_at(self, arc: np.ndarray) -> np.ndarray:
+        """Curvature towards the normal and across, and twist of the path [1/m] there, shape (n, 3)."""
+        return self.path.curvatures_at(np.array(self.normal), arc, self.edge_length)
 
     @property
     def copy_names(self) -> list[str]:
@@ -292,20 +185,10 @@ LARGEST_IMPERFECTION = 0.1
 """Part of the length of the path: more is another path."""
 
 
-def faults_of_spiral(path: SpiralPath) -> list[Fault]:
-    """Radii that make it no spiral."""
-    if math.isclose(path.start_radius, path.end_radius, rel_tol=ROUNDING):
-        return [(("end_radius",), path.end_radius, "must differ from `start_radius`; with equal radii it is an `arc`")]
-    return []
-
-
 def faults_of_rod(rod: Rod) -> list[Fault]:
     """Its normal, and where its layers begin and end."""
-    faults: list[Fault] = []
-    cosine = sum(a * b for a, b in zip(rod.normal, rod.path.direction, strict=True))
-    if abs(cosine) > ROUNDING:
-        tilt = math.degrees(math.asin(min(abs(cosine), 1.0)))
-        faults.append((("normal",), rod.normal, f"must be perpendicular to the path, is {tilt:.3g} deg off"))
+    demand = rod.path.demand_of_normal(np.array(rod.normal))
+    faults: list[Fault] = [(("normal",), rod.normal, demand)] if demand else []
     names = [(("layers", index, "name"), layer.name) for index, layer in enumerate(rod.layers)]
     faults += repeated(names, "layers of a rod")
     ordered = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
@@ -314,9 +197,12 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         return interval[0] < interval[1] <= rod.path.length * (1.0 + ROUNDING)
 
     faults += _profiles(rod, (), ("width",), rod.path.length)
-    faults += _faces_of_path(rod)
+    sharp_bends = list(_sharp_bends(rod))
+    faults += sharp_bends
+    if not (demand or sharp_bends):
+        faults += _crossings(rod)
     if rod.imperfection is not None:
-        curvature = abs(rod.path.curvature_at(np.array([0.0, rod.path.length]))).max()
+        curvature = np.hypot(*rod.curvatures_at(rod.path.sharpest)[:, :2].T).max(initial=0.0)
         largest = min(LARGEST_IMPERFECTION * rod.path.length, 0.5 / curvature if curvature else math.inf)
         if rod.imperfection.size > largest:
             demand = f"must be at most {largest:g} m: a tenth of the path's length, and half its radius"
@@ -348,6 +234,10 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     return faults
 
 
+POINTS_COMPARED = 9
+"""Along two copies of a rod that may lie on each other, in either direction."""
+
+
 def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
     """What a pattern says of laws and clamps that the rod does not have, or has itself, and copies at one place."""
     laws = [law for layer in rod.layers for law in layer.eigenstrain]
@@ -360,15 +250,11 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
     for end in ("clamp_start", "clamp_end"):
         if getattr(rod, end) is not None and getattr(rod.pattern, end) is not None:
             yield (end,), getattr(rod, end), f"must be left out where `pattern.{end}` has the body of each copy"
-    straight = rod.path.shape == "straight"
-    start, direction, normal = (np.array(v) for v in (rod.path.start, rod.path.direction, rod.normal))
-    frames = []  # the two ends of a straight copy; the start of any other with what it and its normal lead to
-    for place in rod.pattern.places():
-        begin, end = place.points(np.stack([start, start + rod.path.length * direction]))
-        frames.append([begin, end] if straight else [begin, end, begin + rod.path.length * place.directions(normal)])
-    for second in range(1, len(frames)):
-        ways = [frames[second], frames[second][::-1]] if straight else [frames[second]]
-        apart = np.min([np.abs(np.array(frames[:second]) - way).max(axis=(1, 2)) for way in ways], axis=0)
+    points = rod.frames_at(np.linspace(0.0, rod.path.length, POINTS_COMPARED))[0]
+    copies = [place.points(points) for place in rod.pattern.places()]
+    for second in range(1, len(copies)):
+        ways = copies[second], copies[second][::-1]
+        apart = np.min([np.abs(np.array(copies[:second]) - way).max(axis=(1, 2)) for way in ways], axis=0)
         if apart.min() <= ROUNDING * rod.path.length:
             first = rod.copy_names[int(apart.argmin())]
             demand = f"must leave no copy where another is: {rod.copy_names[second]} lies on {first}"
@@ -376,23 +262,63 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
             return
 
 
-def _faces_of_path(rod: Rod) -> Iterator[Fault]:
-    """Whether the face on the inner side of a curved path has a length: the path's radius exceeds its distance."""
-    if rod.path.shape == "straight":
+def _sharp_bends(rod: Rod) -> Iterator[Fault]:
+    """Whether the face on the inner side of a curved path has a length, and its border likewise: the path's radius
+    exceeds their distance from it.
+    """
+    arc = rod.path.sharpest
+    if rod.path.turn == 0.0 or not len(arc):
         return
-    toward = rod.path.toward == "normal"
-    inner = rod.layers[-1 if toward else 0]
-    distance = extremes(inner.thickness)[1] * (0.5 if len(rod.layers) == 1 else 1.0)
-    ends = abs(rod.path.curvature_at(np.array([0.0, rod.path.length])))  # that of a spiral falls with its radius
-    radius = 1.0 / float(ends.max())
-    if radius > distance:
+    towards, across = rod.curvatures_at(arc)[:, :2].T
+    share = 0.5 if len(rod.layers) == 1 else 1.0
+    inner = [rod.layers[-1 if curvature > 0.0 else 0] for curvature in towards]
+    distance = share * np.array([extremes(layer.thickness)[1] for layer in inner])
+    half_width = np.full(len(arc), 0.5 * extremes(rod.width)[1])
+    faces = [f"the inner face of layer {layer.name}" for layer in inner]
+    borders = ["its inner border"] * len(arc)
+    for curvature, away, names in ((np.abs(towards), distance, faces), (np.abs(across), half_width, borders)):
+        worst = int((curvature * away).argmax())
+        if curvature[worst] * away[worst] < 1.0:
+            continue
+        key, radius = rod.path.key_of_radius(arc[worst]), f"a radius of {1.0 / curvature[worst]:g} m"
+        place = f", {arc[worst]:g} m along it" if key == "points" else ""
+        demand = (
+            f"must be larger: the path has {radius}{place}, and {names[worst]}, {away[worst]:g} m from it, would have "
+            "no length"
+        )
+        if isinstance(rod.path, PolylinePath):
+            demand += "; longer edges, points on a round bend or `shape: spline` bend less sharply"
+        yield ("path", key), radius if key == "points" else getattr(rod.path, key), demand
+
+
+SAMPLES_PER_THICKNESS = 3
+"""Of a path that may cross itself: two of them are nearer than the thickness wherever it does."""
+
+
+def _crossings(rod: Rod) -> Iterator[Fault]:
+    """Whether a path comes nearer to itself than the thickness of its rod, but for the two sides of a bend no sharper
+    than half the thickness.
+
+    One that turns by less than half a turn cannot. Arcs and spirals may be wound up more densely; contact refuses them.
+    """
+    if not isinstance(rod.path, HelixPath | PointPath) or rod.path.turn < math.pi:
         return
-    key = "radius" if rod.path.shape == "arc" else ("start_radius", "end_radius")[int(ends.argmax())]
-    demand = (
-        f"must be larger: the path has a radius of {radius:g} m, and the inner face of layer {inner.name}, "
-        f"{distance:g} m from it, would have no length"
+    from scipy.spatial import cKDTree
+
+    thickness = sum(extremes(layer.thickness)[1] for layer in rod.layers)
+    arc = np.linspace(0.0, rod.path.length, math.ceil(SAMPLES_PER_THICKNESS * rod.path.length / thickness) + 1)
+    points = rod.frames_at(arc)[0]
+    near = cKDTree(points).query_pairs(thickness * (1.0 - ROUNDING), output_type="ndarray")
+    near = near[np.abs(np.subtract(*arc[near].T)) > 0.5 * math.pi * thickness]
+    if not len(near):
+        return
+    apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
+    first, second = arc[near[apart.argmin()]]
+    yield (
+        ("path",),
+        f"{apart.min():.3g} m between {first:.4g} m and {second:.4g} m along it",
+        f"must not come nearer to itself than the thickness of the rod, {thickness:g} m",
     )
-    yield ("path", key), getattr(rod.path, key), demand
 
 
 def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:

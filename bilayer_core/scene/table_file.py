@@ -30,49 +30,80 @@ class TableFile(BaseModel):
     """Name of the column of values, in the unit of the channel."""
 
 
-def read_table_file(source: TableFile, directory: str | Path) -> tuple[list[float], list[float]]:
-    """Times [s] and values of a csv file; `directory` is where relative file names begin.
+class CsvFile:
+    """A csv file of numbers, whose first line names its columns.
+
+    Parameters
+    ----------
+    title : str
+        Of the mapping that names the file, for the faults, which stand at its key `file`.
+    file : str
+        Its name.
+    directory : str or Path
+        Where relative file names begin.
 
     Raises
     ------
     ValidationError
         If the file cannot be read, or lacks a column, or holds what is no table; says in which line.
     """
-    try:
-        with open(Path(directory, source.file), newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            rows = [(reader.line_num, row) for row in reader]
-            columns = reader.fieldnames or []
-    except OSError as error:
-        _refuse("file", source.file, f"must be a readable file: {error.strerror}")
-    except (UnicodeDecodeError, csv.Error) as error:
-        _refuse("file", source.file, f"must be csv in UTF-8: {error}")
+
+    def __init__(self, title: str, file: str, directory: str | Path):
+        self._title, self.name = title, file
+        try:
+            with open(Path(directory, file), newline="", encoding="utf-8-sig") as opened:
+                reader = csv.DictReader(opened)
+                self._rows = [(reader.line_num, row) for row in reader]
+                self.columns = list(reader.fieldnames or [])
+        except OSError as error:
+            self.refuse(f"must be a readable file: {error.strerror}")
+        except (UnicodeDecodeError, csv.Error) as error:
+            self.refuse(f"must be csv in UTF-8: {error}")
+
+    def refuse(self, demand: str) -> None:
+        """Raise the fault that the file does not meet a demand."""
+        refuse_all(self._title, [(("file",), self.name, demand)])
+
+    @property
+    def lines(self) -> list[int]:
+        """Number of the line of each row."""
+        return [line for line, _ in self._rows]
+
+    def numbers(self, column: str) -> list[float]:
+        """The numbers of a column."""
+        if column not in self.columns:
+            self.refuse(f"must have a column {column}; its columns are {', '.join(self.columns) or 'none'}")
+        if not self._rows:
+            self.refuse("must hold one line or more below the names of its columns")
+        return [self._number(line, row[column], column) for line, row in self._rows]
+
+    def _number(self, line: int, text: str | None, column: str) -> float:
+        try:
+            number = float(text or "")
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            self.refuse(f'must have a number in each line of {column}, line {line} has "{text or ""}"')
+        return number
+
+
+def read_table_file(source: TableFile, directory: str | Path) -> tuple[list[float], list[float]]:
+    """Times [s] and values of a csv file; `directory` is where relative file names begin.
+
+    Raises
+    ------
+    ValidationError
+        As `CsvFile` does, and if times do not increase from 0 or later.
+    """
+    table = CsvFile("TableFile", source.file, directory)
     for key, name in (("time_column", source.time_column), ("value_column", source.value_column)):
-        if name not in columns:
-            _refuse(key, name, one_of(f"columns of {source.file}", name, columns))
-    if not rows:
-        _refuse("file", source.file, "must hold one line or more below the names of its columns")
-    times, values = (
-        [_number(source, line, row[name], name) for line, row in rows]
-        for name in (source.time_column, source.value_column)
-    )
+        if name not in table.columns:
+            refuse_all("TableFile", [((key,), name, one_of(f"columns of {source.file}", name, table.columns))])
+    times, values = (table.numbers(name) for name in (source.time_column, source.value_column))
+    lines = table.lines
     if times[0] < 0.0:
-        _refuse("file", source.file, f"must not begin before 0 s, line {rows[0][0]} has {times[0]:g} s")
-    for (line, _), (before, after) in zip(rows[1:], pairwise(times), strict=True):
+        table.refuse(f"must not begin before 0 s, line {lines[0]} has {times[0]:g} s")
+    for line, (before, after) in zip(lines[1:], pairwise(times), strict=True):
         if after <= before:
-            _refuse("file", source.file, f"must have increasing times, line {line} has {after:g} s after {before:g} s")
+            table.refuse(f"must have increasing times, line {line} has {after:g} s after {before:g} s")
     return times, values
-
-
-def _number(source: TableFile, line: int, text: str | None, column: str) -> float:
-    try:
-        number = float(text or "")
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        _refuse("file", source.file, f'must have a number in each line of {column}, line {line} has "{text or ""}"')
-    return number
-
-
-def _refuse(key: str, found: str, demand: str) -> None:
-    refuse_all("TableFile", [((key,), found, demand)])

@@ -53,7 +53,7 @@ def test_natural_twist_is_computed_by_two_rods_where_one_curve_would_miss_the_he
     strong, weak, slight = strip(15.0, 150.0), strip(40.0, 20.0), strip(0.0, 3.0)
     plan = make_plan(strong)
     assert plan.model == "two_rod"
-    assert plan.reasons["model"] == "rods.rod: natural twist winds it to a helix, which one curve would miss by 11 %"
+    assert plan.reasons["model"] == "rods.rod: it winds to a helix, which one curve would miss by 11 %"
     for config in (weak, slight):
         assert make_plan(config).model == "laminate" and helix_error(config, config.rods[0]) < HELIX
     forced, asked = (" ".join(make_plan(config, model="laminate").warnings) for config in (strong, weak))
