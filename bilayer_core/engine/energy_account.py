@@ -34,7 +34,7 @@ from ..forces.inertia import second_moment_beyond
 from ..forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
 from ..jit import call, kernel, piece
 from ..jit.stack import stack_matrix, stack_vector
-from ..kinematics.copying import copy, copy_row
+from ..kinematics.copying import copy
 from ..kinematics.rotating import inertia_tensor, solve_three
 from ..kinematics.vector import cross, dot, row
 from ..model.force_list import Kind, kinds
@@ -212,7 +212,8 @@ def _write_rates(bodies, inputs, n, at, point, rates):
     for b in range(inputs.rates.shape[1]):
         f = bodies.free_index[b]
         if f < 0:
-            copy_row(inputs.rates[n], b, rates, b)
+            for c in range(6):
+                rates[b, c] = inputs.rates[n, b, c]
             continue
         inertia_tensor(bodies.second_moment, f, at.body_rotation, f, tensor)
         momentum = point.angular_momentum

@@ -101,7 +101,9 @@ def test_the_warnings_are_about_the_worst_section():
     layers = [layer("bottom"), layer("top", eigenstrain={"stimulus": "heat", "gain": 0.05})]
 
     def warned(**more):
-        return " ".join(validity_warnings(load_scene(scene([rod(layers, length=LENGTH, **more)], stimuli=heat))))
+        return " ".join(
+            map(str, validity_warnings(load_scene(scene([rod(layers, length=LENGTH, **more)], stimuli=heat))))
+        )
 
     assert "between beam and plate" in warned(width=linear(1e-3, 10e-3))
     assert "between beam and plate" not in warned(width=linear(1e-3, 2e-3))

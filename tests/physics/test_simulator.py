@@ -157,7 +157,7 @@ def test_a_solver_that_cannot_go_on_says_what_and_when_and_keeps_the_last_state(
 
 def test_prescribed_motion_through_a_surface_stops_the_run_and_nothing_has_crossed():
     pushed = everything()
-    pushed["bodies"], pushed["loads"] = pushed["bodies"][:1], []
+    pushed["bodies"], pushed["loads"], pushed["joints"] = pushed["bodies"][:1], [], []
     pushed["bodies"][0]["motion"] |= {"times": [0.0, 0.05], "displacements": [[0, 0, 0], [0, 0, -0.06]]}
     simulator = Simulator(load_scene(pushed))
     with pytest.raises(SimulationError, match=r"(node|contact point) .* would reach the surface of ground"):
