@@ -10,6 +10,7 @@ from bilayer_core.scene.bundled import bundled_scenes
 from bilayer_core.scene.loader import load_scene
 
 BUNDLED = {
+    "arch": (2, "all stays in the plane y = 0"),
     "awn": (3, "rods.awn leaves the plane with normal (0, 0.390683, -0.920525) through (0.003, 0, 0) m"),
     "bending": (2, "all stays in the plane y = 0"),
     "cantilever": (2, "all stays in the plane y = 0"),
