@@ -116,7 +116,8 @@ def _parts(scene) -> dict[str, list[str]]:
         parts[rod.name] = lines
     for body in scene.bodies:
         surface = f", {body.surface.shape}" if body.surface else ""
-        parts[body.name] = [f"{body.motion.type} body{surface}"]
+        parts[body.name] = [f"{body.motion.describe()}{surface}"]
+    parts |= {f"joint {joint.name}": [f"{joint.type} of {' and '.join(joint.bodies)}"] for joint in scene.joints}
     parts |= {obstacle.name: [f"{obstacle.type}, fixed"] for obstacle in scene.obstacles}
     return parts
 

@@ -44,6 +44,10 @@ class Free(Part):
         """Whether it can."""
         return True
 
+    def describe(self) -> str:
+        """What it is, in a few words."""
+        return "free body" if self.mass > 0.0 else "junction without mass"
+
     @model_validator(mode="after")
     def _check(self) -> Free:
         refuse_all("Free", faults_of_inertia(self))
@@ -77,6 +81,11 @@ class Guided(Part):
         """Whether it can."""
         return self.pinned or self.hinge is not None
 
+    def describe(self) -> str:
+        """What it is, in a few words."""
+        ways = {"on a rail": self.axis is not None, "on a hinge": self.hinge is not None, "on a pin": self.pinned}
+        return f"guided body, {' and '.join(way for way, has in ways.items() if has)}"
+
     @model_validator(mode="after")
     def _check(self) -> Guided:
         refuse_all("Guided", faults_of_guided(self))
@@ -102,6 +111,10 @@ class Prescribed(Part):
     def turns(self) -> bool:
         """Whether it ever does."""
         return any(map(any, self.rotations))
+
+    def describe(self) -> str:
+        """What it is, in a few words."""
+        return "prescribed body"
 
     @property
     def moves(self) -> bool:

@@ -1,10 +1,14 @@
 """Hinges, pins, rails and junctions in motion; columns, periods and shapes at rest are cases of `bilayer validate`."""
 
+import re
+
 import numpy as np
 import pytest
+import yaml
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.cli import main
 from bilayer_core.errors import SceneError
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.validate.joints import layers_of, swinging
@@ -241,3 +245,21 @@ def test_a_hinge_that_leaves_the_plane_is_told():
     content["bodies"] = [{"name": "pin", "position": [0, 0, 0], "motion": {"type": "guided", "hinge": [0, 0, 1]}}]
     with pytest.raises(SceneError, match="bodies.pin.motion.hinge"):
         Simulator(load_scene(content))
+
+
+def test_check_says_what_turns_and_what_is_joined(tmp_path, capsys):
+    content = two_links("hinge", axis=[0, 1, 0])
+    content["bodies"] += [{"name": "pin", "position": [0, 0, 0.1], "motion": {"type": "guided", "pinned": True}}]
+    content["rods"] += [rod([layer()], 0.02, 5, start=(0, 0, 0.1), name="third", clamp_start="pin")]
+    content["bodies"][0]["motion"] = {"type": "guided", "axis": [1, 0, 0], "hinge": [0, 1, 0]}
+    path = tmp_path / "linkage.yaml"
+    path.write_text(yaml.safe_dump(content))
+    assert main(["check", str(path)]) == 0
+    found = capsys.readouterr().out
+    for line in (
+        r"wall +guided body, on a rail and on a hinge",
+        r"inner +junction without mass",
+        r"pin +guided body, on a pin",
+        r"joint knee +hinge of inner and outer",
+    ):
+        assert re.search(line, found), found
