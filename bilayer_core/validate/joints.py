@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from functools import cache
 
+import numpy as np
+
 from ..scene.loader import load_scene
 from ..simulation.simulator import Simulator
 from .case import Case
@@ -47,6 +49,48 @@ def critical_load(model: str, dimension: int, first: dict, expected: float) -> t
         stable = _is_stable(model, dimension, first, middle * BENDING / LENGTH**2)
         low, high = (middle, high) if stable else (low, middle)
     return 0.5 * (low + high), expected
+
+
+SPAN, RISE = 2.0 * LENGTH, 1.2 * THICKNESS
+"""Of the arch; up to a rise of 1.35 times the thickness it snaps without a wave to one side."""
+
+
+def _arch_stands(model: str, dimension: int, load: float) -> bool:
+    """Whether a shallow arch between two hinges, of the shape of half a sine, bears a load [N/m] of the same shape."""
+    wave = math.pi / SPAN
+    points = [[x, 0.0, RISE * math.sin(wave * x)] for x in np.linspace(0.0, SPAN, 201).tolist()]
+    arch = rod(layers_of(model), SPAN, EDGES + 1, width=WIDTH, name="arch", clamp_start="left", clamp_end="right")
+    arch |= {"path": {"shape": "spline", "points": points}, "normal": [-RISE * wave, 0.0, 1.0]}
+    content = scene([arch], bodies=[_on_hinge("left", (0.0, 0.0, 0.0)), _on_hinge("right", (SPAN, 0.0, 0.0))])
+    edge = load_scene(content).rods[0].edge_length
+    content["loads"] = [
+        {
+            "name": f"push_{i}",
+            "rod": "arch",
+            "position": i * edge,
+            "force": [0.0, 0.0, -load * math.sin(math.pi * i / EDGES) * edge],
+        }
+        for i in range(1, EDGES)
+    ]
+    simulator = Simulator(load_scene(content), model=model, dimension=dimension)
+    simulator.solve_static()
+    return bool(simulator.positions[EDGES // 2, 2] > 0.0)
+
+
+def snapping_load(model: str, dimension: int) -> tuple[float, float]:
+    """Load at the middle [N/m] under which a shallow arch snaps through, found by halving.
+
+    With a rise y left of a, thrust EA k²/4 (a² − y²) and k = π/L, the arch bears EI k⁴ (a − y + A/(4I) (a² − y²) y),
+    most at y² = (a² − 4I/A)/3 (Timoshenko and Gere, Theory of Elastic Stability).
+    """
+    wave, slender = math.pi / SPAN, 3.0 / THICKNESS**2  # k and A/(4I)
+    left = math.sqrt((RISE**2 - 1.0 / slender) / 3.0)
+    most = BENDING * wave**4 * (RISE - left + slender * (RISE**2 - left**2) * left)
+    low, high = 0.96 * most, 1.04 * most
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _arch_stands(model, dimension, middle) else (low, middle)
+    return 0.5 * (low + high), most
 
 
 def swinging(model: str, dimension: int, **steps) -> Simulator:
@@ -190,6 +234,16 @@ CASES = [
         for name, first, answer in (
             ("hinged", {"type": "guided", "hinge": [0, 1, 0]}, PINNED),
             ("clamped and hinged", {"type": "prescribed"}, CLAMPED),
+        )
+        for model, dimension in SIZES
+    ),
+    *(
+        Case(
+            f"joints/snap of an arch/{dimension}-D {model}",
+            "largest load of a shallow arch between two hinges",
+            3e-3,
+            lambda model=model, dimension=dimension: snapping_load(model, dimension),
+            unit="N/m",
         )
         for model, dimension in SIZES
     ),
