@@ -47,7 +47,7 @@ class Joints:
     free: Indices  # likewise among the free ones, −1 for a prescribed one
     arm: Matrix  # r in the axes of the body, A and B in turn [m], shape (2 n_joint, 3)
     direction: Stack  # u in the axes of the body, likewise, shape (2 n_joint, 2, 3)
-    kept: Indices  # how many directions each keeps, shape (n_joint,)
+    aligned: Indices  # how many directions each aligns, shape (n_joint,)
     stiffness: Vector  # k [N/m], shape (n_joint,)
     torsional: Vector  # k_θ [N m], shape (n_joint,)
     gradient: Matrix  # ∂E/∂(X, φ) of A and B in turn [N, N m], shape (2 n_joint, 6)
@@ -116,7 +116,7 @@ def add_joints(joints, p, at, stage, with_hessian):
     arms, u, v, g, zero = stack_matrix(2, 3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
     zero[0] = zero[1] = zero[2] = 0.0
     hessian = stack_matrix(12, 12)
-    for k in range(joints.kept.shape[0]):
+    for k in range(joints.aligned.shape[0]):
         a, b = joints.body[2 * k], joints.body[2 * k + 1]
         own = joints.gradient
         for s in range(2):
@@ -136,7 +136,7 @@ def add_joints(joints, p, at, stage, with_hessian):
         add_force(own, 2 * k + 1, -1.0, arms[1], g)
         if with_hessian:
             _add_point(joints.stiffness[k], arms, g, hessian)
-        for j in range(joints.kept[k]):
+        for j in range(joints.aligned[k]):
             _turned(at.rotation, a, joints.direction[2 * k], j, u)
             _turned(at.rotation, b, joints.direction[2 * k + 1], j, v)
             for c in range(3):
@@ -186,7 +186,7 @@ def joints_of(model: Model) -> Joints:
         free=bodies.free_index[body].reshape(-1),
         arm=np.einsum("ksij,ksi->ksj", turned, arms).reshape(-1, 3),
         direction=np.einsum("ksij,kni->ksnj", turned, directions).reshape(-1, 2, 3),
-        kept=np.array([ACROSS[joint.type] for joint in joints]),
+        aligned=np.array([ACROSS[joint.type] for joint in joints]),
         stiffness=np.array([joint.stiffness or STIFFER * edge for joint in joints], dtype=float),
         torsional=np.array([joint.torsional_stiffness or STIFFER * bend for joint in joints], dtype=float),
         gradient=np.zeros((2 * len(joints), 6)),

@@ -140,7 +140,7 @@ def _can_reach(
 def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
     """Balls that the copies of a rod do not leave; None for one that no prescribed body holds."""
     figures = EdgeFigures(scene, rod)
-    reach = rod.path.length * (1.0 + figures.eigenstrain.max()) + figures.thickness.max()
+    extent = rod.path.length * (1.0 + figures.eigenstrain.max()) + figures.thickness.max()
     bodies = {body.name: body for body in scene.bodies if isinstance(body.motion, Prescribed)}
     ends = rod.frames_at(np.array([0.0, rod.path.length]))[0]
     regions: list[Region | None] = []
@@ -153,5 +153,5 @@ def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
         moved = max((math.dist(move, (0.0, 0.0, 0.0)) for move in body.motion.displacements), default=0.0)
         clamped = copy.place.points(ends)[0 if held[0] == copy.rod.clamp_start else 1]
         offset = float(np.linalg.norm(clamped - np.array(body.position))) * (2.0 if body.motion.rotations else 1.0)
-        regions.append((clamped, reach + moved + offset))
+        regions.append((clamped, extent + moved + offset))
     return regions

@@ -122,7 +122,7 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
         return
     free, turned = model.bodies.body_of_free, state.body_rotation @ model.bodies.start_rotation.transpose(0, 2, 1)
     spins = state.body_angular_velocity
-    leaving = {
+    out_of_plane = {
         "position": (state.position - model.start_position) @ plane.normal,
         "velocity": state.velocity @ plane.normal,
         "director1": state.director1 @ plane.normal,
@@ -132,7 +132,7 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
         "body_rotation": turned[free] @ plane.normal - plane.normal,
         "body_angular_velocity": spins - np.outer(spins @ plane.normal, plane.normal),
     }
-    for name, component in leaving.items():
+    for name, component in out_of_plane.items():
         largest = np.abs(component).max(initial=0.0)
         if largest > OUT_OF_PLANE * max(1.0, np.abs(getattr(state, name)).max(initial=0.0)):
             raise InputError(

@@ -7,6 +7,7 @@ segments, by a cubic spline on a smooth curve. Its rate is the twist.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -34,7 +35,7 @@ def curve_through(shape: str, points: Vectors, normals: Vectors | None) -> Curve
     return kind(np.array(points), None if normals is None else np.array(normals))
 
 
-class Curve:
+class Curve(ABC):
     """A curve through points.
 
     Attributes
@@ -58,19 +59,19 @@ class Curve:
     def __init__(self, points: Array, normals: Array | None):
         self.points, self.normals = points, normals
 
+    @abstractmethod
     def carried(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
         """Points [m], tangents and normals at lengths `arc` [m] from the start, shapes (n, 3); the normals do not
         twist.
         """
-        raise NotImplementedError
 
+    @abstractmethod
     def bend(self, arc: Array, over: float) -> Array:
         """t′ there [1/m], shape (n, 3); of corners the mean `over` a length [m]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def angle(self, arc: Array, derivative: int = 0) -> Array:
         """Angle from carried normals [rad] there, where points have normals; or its derivative."""
-        raise NotImplementedError
 
     @cached_property
     def angles(self) -> Array:

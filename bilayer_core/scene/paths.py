@@ -11,6 +11,7 @@ which these turn (`curvatures_at`). With the tangent t, the normal n and t×n ac
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from typing import Any, Literal
 
 import numpy as np
@@ -29,17 +30,17 @@ class Path(Part):
     """What all paths can tell; `start` and `length` [m] are keys or properties of each."""
 
     @property
+    @abstractmethod
     def turn(self) -> float:
         """Angle by which the tangent turns in all [rad]."""
-        raise NotImplementedError
 
+    @abstractmethod
     def frames_at(self, normal: Array, arc: Array) -> Frames:
         """Frames at lengths `arc` [m] from the start, where the rod's normal is `normal`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def curvatures_at(self, normal: Array, arc: Array, over: float) -> Array:
         """χ, ξ, τ [1/m] there, shape (n, 3). Corners have a mean `over` a length [m] alone."""
-        raise NotImplementedError
 
     @property
     def sharpest(self) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
@@ -88,9 +89,9 @@ class Pattern(Part):
         """Rods in all."""
         return self.count
 
+    @abstractmethod
     def places(self) -> list[Placement]:
         """Of each copy."""
-        raise NotImplementedError
 
     def per_copy(self) -> Iterator[tuple[Location, list]]:
         """Lists that have an entry for each copy, with their keys."""

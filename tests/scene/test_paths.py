@@ -286,9 +286,14 @@ def test_a_path_that_cannot_be_is_refused(path, more, fault, tmp_path):
 
 
 def test_helices_and_coils_that_keep_their_distance_are_accepted():
-    load_scene(on_path(HELIX | {"pitch": 3e-4, "angle": "20 turns"}, normal=(-1, 0, 0)))
-    load_scene(on_path(HELIX | {"pitch": 0, "angle": 6.0}, normal=(-1, 0, 0)))
-    load_scene(on_path(through("spline", KNOT)))
+    radius = HELIX["radius"]
+    coil, ring = (
+        load_scene(on_path(HELIX | more, normal=(-1, 0, 0))).rods[0].path
+        for more in ({"pitch": 3e-4, "angle": "20 turns"}, {"pitch": 0, "angle": 6.0})
+    )
+    assert coil.length == pytest.approx(20.0 * np.hypot(2.0 * np.pi * radius, 3e-4))
+    assert ring.length == pytest.approx(6.0 * radius)
+    assert load_scene(on_path(through("spline", KNOT))).rods[0].path.turn > np.pi
 
 
 def test_the_paths_of_the_tutorial_are_accepted(root):
