@@ -1,10 +1,12 @@
 """Contacts with an arm from a node, on the unknowns of that node, its neighbours and the edges between them.
 
-By the unknowns of a *stencil*, the positions before, at and after the node and the angles of the two edges,
+By the *local* unknowns, the position x of the node and the vectors and angles (ε, θ) of the edges before and after, a
+contact moves by ∂y = (1, R) with the rate R of its arm (`forces.rod_arms`). With M = ∂²C/∂y² its second derivatives are
 
-    ∂y = (−J_b, 1 + J_b − J_a, J_a, j_b, j_a)
+    by (x, x)   M        by (x, e)   M R        by (e, e)   Rᵀ M R + ∂²(g·A)/∂e²
 
-with J and j the rates of the arm by the vector and the angle of the edge before and after (`forces.rod_arms`).
+summed over all contacts at a node, and then taken once to the unknowns of a *stencil*, the positions before, at and
+after the node and the two angles, by ε_b = x_i − x_b and ε_a = x_a − x_i.
 """
 
 from __future__ import annotations
@@ -49,52 +51,135 @@ def stencil_jacobian(axes, rate, r, jacobian_out):
 
 
 @kernel
-def _add(band, row, column, value):
-    """A[row, column] += value, where both exist."""
-    if row >= 0 and column >= 0:
-        band[min(row, column), abs(row - column)] += value
+def _add_contact(sums, r, by_node, mixed, by_edges):
+    """Add the second derivatives of a contact by the local unknowns: (x, x), (x, e) and (e, e)."""
+    m, rate = sums.arm_matrix, sums.arm_rate
+    m00, m01, m02 = m[r, 0, 0], m[r, 0, 1], m[r, 0, 2]
+    m11, m12, m22 = m[r, 1, 1], m[r, 1, 2], m[r, 2, 2]
+    by_node[0, 0] += m00
+    by_node[0, 1] += m01
+    by_node[0, 2] += m02
+    by_node[1, 1] += m11
+    by_node[1, 2] += m12
+    by_node[2, 2] += m22
+    moved = stack_matrix(3, 8)  # M R
+    for n in range(8):
+        r0, r1, r2 = rate[r, 0, n], rate[r, 1, n], rate[r, 2, n]
+        moved[0, n] = m00 * r0 + m01 * r1 + m02 * r2
+        moved[1, n] = m01 * r0 + m11 * r1 + m12 * r2
+        moved[2, n] = m02 * r0 + m12 * r1 + m22 * r2
+    for c in range(3):
+        for n in range(8):
+            mixed[c, n] += moved[c, n]
+    for k in range(8):
+        r0, r1, r2 = rate[r, 0, k], rate[r, 1, k], rate[r, 2, k]
+        for n in range(8):
+            by_edges[k, n] += r0 * moved[0, n] + r1 * moved[1, n] + r2 * moved[2, n]
+    if sums.arm_curved[r]:
+        for first in (0, 4):
+            for k in range(4):
+                for n in range(4):
+                    by_edges[first + k, first + n] += sums.arm_curvature[r, first + min(k, n), max(k, n)]
 
 
 @kernel
-def _add_curvature(axes, rows, curvature, r, first, before, after, angle, band):
-    """Add ∂²(g·A) by the vector and angle of an edge, from the stencil's unknown `before` to `after`."""
-    for m in range(axes.shape[0]):
-        for n in range(axes.shape[0]):
+def _add_block(band, axes, row, column, block):
+    """Add a block by two positions, of which the first is earlier in the matrix or both are one."""
+    if axes.shape[0] == 3:
+        for m in range(3):
+            for n in range(m if row == column else 0, 3):
+                band[row + m, column - row + n - m] += block[m, n]
+        return
+    for m in range(2):
+        for n in range(m if row == column else 0, 2):
             value = 0.0
             for c in range(3):
                 for d in range(3):
-                    value += axes[m, c] * axes[n, d] * curvature[r, first + min(c, d), max(c, d)]
-            if n >= m:
-                _add(band, rows[before + m], rows[before + n], value)
-                _add(band, rows[after + m], rows[after + n], value)
-            _add(band, rows[before + m], rows[after + n], -value)
-        if axes.shape[0] == 3:
-            _add(band, rows[before + m], rows[angle], -curvature[r, first + m, 3])
-            _add(band, rows[after + m], rows[angle], curvature[r, first + m, 3])
-    if axes.shape[0] == 3:
-        _add(band, rows[angle], rows[angle], curvature[r, first + 3, 3])
+                    value += axes[m, c] * axes[n, d] * block[c, d]
+            band[row + m, column - row + n - m] += value
+
+
+@kernel
+def _add_angle(band, row, angle, factor, column, k):
+    """Add the derivatives by a position and an angle, from a column of a block."""
+    for m in range(3):
+        at, to = min(row + m, angle), max(row + m, angle)
+        band[at, to - at] += factor * column[m, k]
+
+
+@kernel
+def _add_node(band, strands, rows, by_node, mixed, by_edges):
+    """Take the second derivatives by the local unknowns to those of the stencil."""
+    axes, block, d = strands.axes, stack_matrix(3, 3), strands.dimension
+    before, row, after = rows[0], rows[d], rows[2 * d]
+    has_before, has_after = before >= 0, after >= 0
+    for c in range(3):
+        for e in range(3):
+            of_node = by_node[c, e] if c <= e else by_node[e, c]
+            block[c, e] = (
+                of_node
+                + (mixed[c, e] + mixed[e, c] + by_edges[c, e])
+                - (mixed[c, 4 + e] + mixed[e, 4 + c] - by_edges[4 + c, 4 + e])
+                - (by_edges[c, 4 + e] + by_edges[e, 4 + c])
+            )
+    _add_block(band, axes, row, row, block)
+    if has_before:
+        _add_block(band, axes, before, before, by_edges)
+        for c in range(3):
+            for e in range(3):
+                block[c, e] = by_edges[c, 4 + e] - by_edges[c, e] - mixed[e, c]
+        _add_block(band, axes, before, row, block)
+    if has_after:
+        for c in range(3):
+            for e in range(3):
+                block[c, e] = by_edges[4 + c, 4 + e]
+        _add_block(band, axes, after, after, block)
+        for c in range(3):
+            for e in range(3):
+                block[c, e] = mixed[c, 4 + e] + by_edges[c, 4 + e] - by_edges[4 + c, 4 + e]
+        _add_block(band, axes, row, after, block)
+    if has_before and has_after:
+        for c in range(3):
+            for e in range(3):
+                block[c, e] = -by_edges[c, 4 + e]
+        _add_block(band, axes, before, after, block)
+    if d < 3:
+        return
+    for side in range(2):
+        angle, k = rows[9 + side], 3 + 4 * side
+        if angle < 0:
+            continue
+        for c in range(3):
+            block[c, 0], block[c, 1] = by_edges[c, k], by_edges[4 + c, k]
+            block[c, 2] = mixed[c, k] + by_edges[c, k] - by_edges[4 + c, k]
+        _add_angle(band, row, angle, 1.0, block, 2)
+        if has_before:
+            _add_angle(band, before, angle, -1.0, block, 0)
+        if has_after:
+            _add_angle(band, after, angle, 1.0, block, 1)
+        band[angle, 0] += by_edges[k, k]
+    if has_before and has_after:
+        band[rows[9], rows[10] - rows[9]] += by_edges[3, 7]
 
 
 @piece(int, Problem)
 def assemble_arms(p):
     """Add the second derivatives of contacts with an arm to the band."""
-    sums, strands, band = p.sums, p.strands, p.system.band
-    axes, dimension = strands.axes, strands.dimension
-    rows, jacobian = sums.stencil, stack_matrix(3, 11)
-    for r in range(sums.arms[0]):
-        size = stencil_rows(p.surfaces, strands, sums.arm_node[r], rows)
-        stencil_jacobian(axes, sums.arm_rate, r, jacobian)
-        m = sums.arm_matrix
-        for k in range(size):
-            if rows[k] < 0:
-                continue
-            j0, j1, j2 = jacobian[0, k], jacobian[1, k], jacobian[2, k]
-            v0 = m[r, 0, 0] * j0 + m[r, 0, 1] * j1 + m[r, 0, 2] * j2
-            v1 = m[r, 0, 1] * j0 + m[r, 1, 1] * j1 + m[r, 1, 2] * j2
-            v2 = m[r, 0, 2] * j0 + m[r, 1, 2] * j1 + m[r, 2, 2] * j2
-            for n in range(k + 1):
-                _add(band, rows[n], rows[k], jacobian[0, n] * v0 + jacobian[1, n] * v1 + jacobian[2, n] * v2)
-        if sums.arm_curved[r]:
-            _add_curvature(axes, rows, sums.arm_curvature, r, 0, 0, dimension, 9, band)
-            _add_curvature(axes, rows, sums.arm_curvature, r, 4, dimension, 2 * dimension, 10, band)
+    sums, rows, r = p.sums, p.sums.stencil, 0
+    by_node, mixed, by_edges = stack_matrix(3, 3), stack_matrix(3, 8), stack_matrix(8, 8)
+    while r < sums.arms[0]:
+        node = sums.arm_node[r]
+        for c in range(3):
+            for n in range(3):
+                by_node[c, n] = 0.0
+            for n in range(8):
+                mixed[c, n] = 0.0
+        for k in range(8):
+            for n in range(8):
+                by_edges[k, n] = 0.0
+        while r < sums.arms[0] and sums.arm_node[r] == node:
+            _add_contact(sums, r, by_node, mixed, by_edges)
+            r += 1
+        stencil_rows(p.surfaces, p.strands, node, rows)
+        _add_node(p.system.band, p.strands, rows, by_node, mixed, by_edges)
     return READY
