@@ -8,12 +8,15 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
 from rclpy.node import Node
 from std_msgs.msg import Float64, Float64MultiArray
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
 from bilayer_core.jit.compile_all import ensure_compiled
+from bilayer_core.model.model import Model
+from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.conversions import PATIENCE, to_diagnostics
 from bilayer_sim_ros.lockstep import SHORTEST_PERIOD, Asynchronous, Lockstep, tick_rate
 from bilayer_sim_ros.pacing import Pacer
@@ -62,9 +65,11 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     control = Asynchronous(inputs)
     if lockstep:
         control = Lockstep(inputs, ticks, ClockPublisher(node, description).publish)
+    commands = Commands(partial(_warn_of_refusal, node))
     worker = SimulationWorker(
         simulator,
         control=control,
+        commands=commands,
         publisher=FramePublisher(node, description, rate, scene.output.marker_rate, clock and not lockstep),
         recording=recording,
         rate=rate,
@@ -77,6 +82,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     if lockstep:
         inputs.notify = worker.wake
     _subscribe(node, inputs, description.channels)
+    _subscribe_commands(node, commands, simulator.model)
     services = Services(node, {name: getattr(worker, name) for name in ("pause", "resume", "step", "reset")})
     state = "paused" if parameters["start_paused"] else "running"
     node.get_logger().info(f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}")
@@ -130,11 +136,32 @@ def _subscribe(node: Node, inputs: StimulusInputs, channels: tuple[str, ...]) ->
         try:
             receive(message.data)
         except InputError as error:
-            node.get_logger().warning(
-                f"refused: {error}; the last good value stays", throttle_duration_sec=WARNING_PERIOD
-            )
+            _warn_of_refusal(node, str(error))
 
     node.create_subscription(Float64MultiArray, "~/stimulus", partial(take, inputs.receive_all), 10)
     for channel in channels:
         receive = partial(take, partial(inputs.receive, channel))
         node.create_subscription(Float64, f"~/stimulus/{channel}", receive, 10)
+
+
+def _subscribe_commands(node: Node, commands: Commands, model: Model) -> None:
+    """Subscribe to the poses of bodies that controllers may move, and to factors of loads."""
+
+    def take_pose(body: str, message: PoseStamped) -> None:
+        try:
+            commands.ask_pose(body, message)
+        except InputError as error:
+            _warn_of_refusal(node, str(error))
+
+    def take_load(name: str, message: Float64) -> None:
+        commands.ask_load(name, message.data)
+
+    for index in model.bodies.controlled:
+        body = model.bodies.names[index]
+        node.create_subscription(PoseStamped, f"~/mount_pose/{body}", partial(take_pose, body), 10)
+    for load in model.scene.loads:
+        node.create_subscription(Float64, f"~/load/{load.name}", partial(take_load, load.name), 10)
+
+
+def _warn_of_refusal(node: Node, reason: str) -> None:
+    node.get_logger().warning(f"refused: {reason}; the last good value stays", throttle_duration_sec=WARNING_PERIOD)

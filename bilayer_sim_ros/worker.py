@@ -15,6 +15,7 @@ from bilayer_core.simulation.frame import Frame
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
 from bilayer_core.simulation.simulator import Simulator
+from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.lockstep import Control
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.periods import Periods
@@ -50,6 +51,8 @@ class SimulationWorker:
         Compiled, at its start.
     control : Control
         Stimuli from outside; asked before each step.
+    commands : Commands
+        Poses and loads from outside.
     publisher : Publisher
     recording : Recording
         Files of the first run.
@@ -76,6 +79,7 @@ class SimulationWorker:
         simulator: Simulator,
         *,
         control: Control,
+        commands: Commands,
         publisher: Publisher,
         recording: Recording,
         rate: float,
@@ -87,6 +91,7 @@ class SimulationWorker:
     ):
         self._simulator = simulator
         self._control = control
+        self._commands = commands
         self._publisher = publisher
         self._recording = recording
         self._frames = Periods(rate)
@@ -211,6 +216,7 @@ class SimulationWorker:
         for channel, value in self._control.changes(start).items():
             self._simulator.set_stimulus(channel, value)
             self._recording.log_stimulus(channel, SCHEDULE if value is None else value, start)
+        self._commands.apply(self._simulator)
         self._reporter.add(self._simulator.step(until=self._next_stop()))
         self._frame_is_out = False
         now = self._simulator.time
@@ -272,6 +278,7 @@ class SimulationWorker:
         self._recording = following
         self._simulator.reset()
         self._control.reset()
+        self._commands.reset()
         self._begin()
         answer.set_result("reset to t = 0 s")
 

@@ -10,6 +10,7 @@ import math
 
 from ..jit import kernel, piece
 from ..jit.record import Indices, Matrix, Stack, Vector, record
+from ..jit.stack import stack_vector
 from ..kinematics.rotating import rotate_by, spin_of
 from ..model.records.status import READY
 from ..model.records.step import StageInputs
@@ -18,15 +19,19 @@ from ..scene.piece import ROUNDING, Piece, value_of_piece
 
 @record
 class Paths:
-    """Keyframes of prescribed bodies that move; cubic smoothsteps lead from one to the next."""
+    """Keyframes of prescribed bodies that move; a cubic leads from one to rest at the next: a smoothstep, but where a
+    body leaves a keyframe with a velocity (`simulation.poses`).
+    """
 
     body: Indices  # shape (n_moving,)
     first: Indices  # of the keyframes of each, last the number of all, shape (n_moving + 1,)
     time: Vector  # of keyframes [s], shape (n_keyframe,)
     displacement: Matrix  # [m], shape (n_keyframe, 3)
     rotation_vector: Matrix  # [rad], shape (n_keyframe, 3)
-    position: Matrix  # of all bodies at time 0 [m], shape (n_body, 3)
-    rotation: Stack  # shape (n_body, 3, 3)
+    velocity: Matrix  # with which a keyframe is left [m/s], shape (n_keyframe, 3)
+    rotation_rate: Matrix  # likewise of the rotation vector [rad/s], shape (n_keyframe, 3)
+    position: Matrix  # of all bodies where displacements are counted from [m], shape (n_body, 3)
+    rotation: Stack  # likewise, shape (n_body, 3, 3)
 
 
 @record
@@ -148,19 +153,24 @@ def _follow_paths(paths, time, position, rotation, rates):
         b, first, last = paths.body[k], paths.first[k], paths.first[k + 1]
         before = _keyframe_before(paths, first, last, time)
         a, z = max(before, first), min(before + 1, last - 1)
-        part = rate = 0.0
+        part = rate = carried = kept = 0.0
         if z > a:
             duration = paths.time[z] - paths.time[a]
             s = (time - paths.time[a]) / duration
             part, rate = s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / duration
-        shift, turn = paths.displacement, paths.rotation_vector
+            carried, kept = duration * s * (1.0 - s) ** 2, (1.0 - s) * (1.0 - 3.0 * s)
+        shift, velocity, spin = paths.displacement, paths.velocity, paths.rotation_rate
         for c in range(3):
-            position[b, c] = paths.position[b, c] + shift[a, c] + part * (shift[z, c] - shift[a, c])
-            rates[b, c] = rate * (shift[z, c] - shift[a, c])
-        w0, w1, w2 = turn[z, 0] - turn[a, 0], turn[z, 1] - turn[a, 1], turn[z, 2] - turn[a, 2]
-        v0, v1, v2 = turn[a, 0] + part * w0, turn[a, 1] + part * w1, turn[a, 2] + part * w2
-        rotate_by(v0, v1, v2, paths.rotation, b, rotation, b)
-        rates[b, 3], rates[b, 4], rates[b, 5] = spin_of(v0, v1, v2, rate * w0, rate * w1, rate * w2)
+            change = shift[z, c] - shift[a, c]
+            position[b, c] = paths.position[b, c] + shift[a, c] + part * change + carried * velocity[a, c]
+            rates[b, c] = rate * change + kept * velocity[a, c]
+        v, u = stack_vector(3), stack_vector(3)
+        for c in range(3):
+            begun, change = paths.rotation_vector[a, c], paths.rotation_vector[z, c] - paths.rotation_vector[a, c]
+            v[c] = begun + part * change + carried * spin[a, c]
+            u[c] = rate * change + kept * spin[a, c]
+        rotate_by(v[0], v[1], v[2], paths.rotation, b, rotation, b)
+        rates[b, 3], rates[b, 4], rates[b, 5] = spin_of(v[0], v[1], v[2], u[0], u[1], u[2])
 
 
 @kernel

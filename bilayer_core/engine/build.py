@@ -90,7 +90,8 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             freedom_first=6 * (np.argmax(bodies.freedom != 0.0, axis=0) // 6) if free else NONE,
             bounding_radius=bodies.bounding_radius,
             rotates=np.array(
-                [f >= 0 or len(r) > 0 for f, r in zip(bodies.free_index, bodies.rotations, strict=False)], dtype=bool
+                [f >= 0 or b.motion.turns for f, b in zip(bodies.free_index, model.scene.bodies, strict=False)],
+                dtype=bool,
             ),
         ),
         border=Border.zeros(sizes) if free else Border.absent(),

@@ -52,6 +52,7 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
         freedom=np.concatenate(freedom, axis=1) if freedom else np.zeros((0, 0)),
         bounding_radius=_bounding_radii(scene, found, shapes, free, moments),
         shapes=shapes,
+        controlled=np.array([i for i, motion in enumerate(schedules) if motion.controlled], dtype=np.int64),
         times=tuple(np.array(motion.times, dtype=float) for motion in schedules),
         displacements=tuple(np.array(motion.displacements, dtype=float).reshape(-1, 3) for motion in schedules),
         rotations=tuple(np.array(motion.rotations, dtype=float).reshape(-1, 3) for motion in schedules),

@@ -94,7 +94,7 @@ def _symmetry(scene: SceneConfig, copy: RodCopy) -> str:
     bodies = {body.name: body.motion for body in scene.bodies}
     holders = [bodies.get(name) for name in (rod.clamp_start, rod.clamp_end)]
     grows = any(layer.eigenstrain for layer in rod.layers)
-    moved = any(isinstance(motion, Prescribed) and motion.times for motion in holders)
+    moved = any(isinstance(motion, Prescribed) and motion.moves for motion in holders)
     if all(isinstance(motion, Prescribed) for motion in holders) and (grows or moved):
         return "is clamped at both ends and " + ("grows" if grows else "its ends move")
     bent = grows or any(layer.natural_curvature or layer.natural_twist for layer in rod.layers)

@@ -39,6 +39,7 @@ class Bodies(ReadOnlyArrays):
     )
     bounding_radius: Array  # largest distance of what a body carries, or a radius of gyration [m], shape (n_body + 1,)
     shapes: tuple[Shape | None, ...]  # surface of each body
+    controlled: Array  # prescribed bodies that controllers may move, shape (n_controlled,)
     times: tuple[Array, ...]  # keyframes of each prescribed body [s]
     displacements: tuple[Array, ...]  # and its displacements there [m], shape (n_keyframe, 3)
     rotations: tuple[Array, ...]  # and its rotation vectors [rad], shape (n_keyframe, 3)

@@ -145,7 +145,8 @@ def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
     ends = rod.frames_at(np.array([0.0, rod.path.length]))[0]
     regions: list[Region | None] = []
     for copy in rod.copies:
-        held = [name for name in (copy.rod.clamp_start, copy.rod.clamp_end) if name in bodies]
+        names = [name for name in (copy.rod.clamp_start, copy.rod.clamp_end) if name in bodies]
+        held = [name for name in names if not bodies[name].motion.controlled]
         if not held:
             regions.append(None)
             continue

@@ -11,6 +11,8 @@ from .fingerprint import FREE, difference
 from .model import Model
 
 Array = np.ndarray
+POSE_GOAL = 26
+"""Values that say how a body goes to a pose."""
 LAST_STEP = 1e-3
 """Length of a step that ends at time 0, for the value of a schedule before a jump there [s]."""
 
@@ -58,6 +60,7 @@ class State:
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value of each channel, then factor of each load, set from outside; NaN where schedules act
+    pose_goal: Array  # of controlled bodies; see `simulation.poses`, shape (n_controlled, 26), zeros where none acts
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
 
     def __post_init__(self):
@@ -103,7 +106,10 @@ class State:
             raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}{why}")
         if differs:
             raise InputError(f"saved state: is of another scene, with other {differs}; allowed to differ are {FREE}")
-        bad = np.flatnonzero(~np.isfinite(flat[: size - marks - self.override.size]))
+        may_be_nan = size - marks - self.pose_goal.size - self.override.size
+        finite = np.isfinite(flat)
+        finite[may_be_nan : may_be_nan + self.override.size] = True
+        bad = np.flatnonzero(~finite)
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
         self.values[:] = flat
@@ -181,5 +187,6 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         law_force=np.zeros(len(model.law_channel)),
         transduction=before[model.law_channel] if len(channels) else np.zeros(0),
         override=np.full(len(channels) + len(model.scene.loads), np.nan),
+        pose_goal=np.zeros((len(bodies.controlled), POSE_GOAL)),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),
     )

@@ -15,8 +15,10 @@ from bilayer_core.scene.units import (
     NonNegativeLength,
     NonNegativeMass,
     NonNegativeTime,
+    PositiveAngularSpeed,
     PositiveInertia,
     PositiveLength,
+    PositiveSpeed,
     Speed,
 )
 
@@ -93,7 +95,9 @@ class Guided(Part):
 
 
 class Prescribed(Part):
-    """A body on a schedule: at rest, or through poses with a rest at each (cubic smoothstep between them)."""
+    """A body on a schedule: at rest, or through poses with a rest at each (cubic smoothstep between them), until a
+    controller takes it over.
+    """
 
     type: Literal["prescribed"]
     times: list[NonNegativeTime] = []
@@ -102,24 +106,33 @@ class Prescribed(Part):
     """From the body's position, at each of the times; the first is zero."""
     rotations: list[RotationVector] = []
     """From the body's rotation at the start, about the axes of the world, at each of the times; the first is zero."""
+    top_speed: PositiveSpeed | None = None
+    """With which controllers may move it at most, by `set_pose` or the topic `mount_pose`; without one they may not."""
+    top_angular_speed: PositiveAngularSpeed | None = None
+    """With which they may turn it at most; without one they may not."""
 
     def breakpoint_after(self, t: float) -> float:
         """First of the times after `t` [s], infinity if there is none: there the acceleration jumps."""
         return first_after(t, self.times)
 
     @property
+    def controlled(self) -> bool:
+        """Whether controllers may move or turn it."""
+        return self.top_speed is not None or self.top_angular_speed is not None
+
+    @property
     def turns(self) -> bool:
-        """Whether it ever does."""
-        return any(map(any, self.rotations))
+        """Whether it ever does, or may."""
+        return self.top_angular_speed is not None or any(map(any, self.rotations))
 
     def describe(self) -> str:
         """What it is, in a few words."""
-        return "prescribed body"
+        return "prescribed body, which controllers may move" if self.controlled else "prescribed body"
 
     @property
     def moves(self) -> bool:
-        """Whether it is ever elsewhere than at the start."""
-        return any(any(part) for part in (*self.displacements, *self.rotations))
+        """Whether it is ever elsewhere than at the start, or may be."""
+        return self.controlled or any(any(part) for part in (*self.displacements, *self.rotations))
 
     @model_validator(mode="after")
     def _check(self) -> Prescribed:

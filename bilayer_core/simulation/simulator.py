@@ -27,6 +27,7 @@ from .equilibrium import StaticReport, solve_static
 from .frame import Description, Frame
 from .observers import Observer, Schedule
 from .plane_watch import PlaneWatch
+from .poses import LEAST_TIME, new_goal
 from .result import RunResult, Termination
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
@@ -275,6 +276,41 @@ class Simulator:
         if self._override(len(self.scene.stimuli) + names.index(name), math.nan if factor is None else float(factor)):
             self._state.has_history.fill(0.0)  # accelerations jump with a load
 
+    def set_pose(
+        self,
+        name: str,
+        position: Sequence[float] | None = None,
+        quaternion: Sequence[float] | None = None,
+        *,
+        over: float = LEAST_TIME,
+    ) -> None:
+        """Have a prescribed body go to a pose from the next step on, and rest there; see `simulation.poses`.
+
+        It gets there in the time `over`, or in the time that its `top_speed` and `top_angular_speed` demand if that is
+        longer, with a continuous velocity from where and however fast it moves now. Its schedule acts no more, until
+        `reset`.
+
+        Parameters
+        ----------
+        name : str
+            A prescribed body with a `top_speed` or a `top_angular_speed`.
+        position : sequence of float, optional
+            Of its mass centre, in the world [m]; without one that of its present goal, or the present one.
+        quaternion : sequence of float, optional
+            Orientation x y z w, of any length above 0, likewise; reached by at most half a turn.
+        over : float
+            The least time until it is there [s].
+
+        Raises
+        ------
+        InputError
+            If there is no such body, or it may not move or turn, or not in this way; nothing is changed then.
+        """
+        goal = new_goal(self.model, self._state, name, position, quaternion, over)
+        if goal is not None:
+            self._state.pose_goal[goal[0]] = goal[1]
+            self._state.has_history.fill(0.0)  # accelerations jump
+
     def _override(self, index: int, value: float) -> bool:
         """Set a value of `State.override`; whether it was another."""
         override = self._state.override
@@ -485,7 +521,7 @@ class Simulator:
         self._begin_budget()
 
     def reset(self) -> None:
-        """Go back to the start of the scene; stimuli set from outside are forgotten."""
+        """Go back to the start of the scene; stimuli, loads and poses set from outside are forgotten."""
         self.load_state(self._initial_state().flat())
 
     def summary(self) -> dict:

@@ -182,7 +182,7 @@ class Stepper:
         """As many steps as succeed, with the capacity and the inputs that they need."""
         found: IntegrationReport | None = None
         while True:
-            self.surroundings.cover(float(state.time[0]), state.override)
+            self.surroundings.cover(float(state.time[0]), state.override, state.pose_goal)
             self.engine.actuation = self.surroundings.actuation
             more = self.engine.integrate(state, until, due, most - (found.done if found else 0))
             found = more if found is None else found.followed_by(more)

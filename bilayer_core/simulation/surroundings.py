@@ -9,10 +9,11 @@ import numpy as np
 from ..engine.actuation import Actuation, Paths
 from ..model.model import Model
 from ..model.rest_strains import RestStrains
-from ..model.state import State
+from ..model.state import POSE_GOAL, State
 from ..scene.body import Prescribed
 from ..scene.piece import Piece, Pieces
 from ..scene.transduction import free_strain
+from .poses import BEGIN, DURATION, MOVE, POSITION, ROTATION, ROTATION_VECTOR, SPIN, VELOCITY
 
 Array = np.ndarray
 PIECES_AT_ONCE = 8
@@ -40,8 +41,9 @@ class Surroundings:
         self._channels = [channel.schedule for channel in scene.stimuli.values()]
         self._loads = [load.factor for load in scene.loads]
         self._ranges = np.array([c.maximum - c.minimum for c in scene.stimuli.values()], dtype=float)
-        self._paths = paths_of(model)
         self._begin, self._override = 0.0, np.full(len(self._channels) + len(self._loads), math.nan)
+        self._pose_goal = np.zeros((len(model.bodies.controlled), POSE_GOAL))
+        self._paths = paths_of(model, self._pose_goal)
         self.actuation: Actuation | None = None
         self.actuation = self._pieces_about(0.0)
 
@@ -71,7 +73,7 @@ class Surroundings:
         scheduled = [load.value_before(time, ended) if ended else load.value(time) for load in self._loads]
         return _overridden(scheduled, state.override[len(self._channels) :])
 
-    def cover(self, time: float, override: Array) -> None:
+    def cover(self, time: float, override: Array, pose_goal: Array) -> None:
         """Have `actuation` hold what acts from `time` [s] on, and a little before, where something may jump.
 
         Parameters
@@ -79,13 +81,20 @@ class Surroundings:
         time : float
         override : Array
             Values of channels and factors of loads set from outside, NaN where schedules act (`State.override`).
+        pose_goal : Array
+            How controlled bodies go to where they are asked to be (`State.pose_goal`).
         """
+        if not np.array_equal(pose_goal, self._pose_goal):
+            self._pose_goal = pose_goal.copy()
+            self._paths = paths_of(self.model, pose_goal)
+            self.actuation = self._pieces_about(time, afresh=True)
+            self._begin, self._override = time, override.copy()
         known = self._begin <= time and time + self._ahead < self.actuation.horizon[0]
         if not (known and np.array_equal(override, self._override, equal_nan=True)):
             self._begin, self._override = time, override.copy()
             self.actuation = self._pieces_about(time)
 
-    def _pieces_about(self, time: float) -> Actuation:
+    def _pieces_about(self, time: float, afresh: bool = False) -> Actuation:
         schedules = zip([*self._channels, *self._loads], self._override.tolist(), strict=True)
         acting = [schedule if math.isnan(value) else value for schedule, value in schedules]
         rows = [_next_pieces(of, time - self._ahead, time + self._ahead) for of in acting]
@@ -96,7 +105,7 @@ class Surroundings:
         stimulus, load = np.split(table, [len(self._channels)])
         horizon = min((row[-1].until for row in rows), default=math.inf)
         present = self.actuation
-        if present is None or present.stimulus.shape != stimulus.shape or present.load.shape != load.shape:
+        if afresh or present is None or present.stimulus.shape != stimulus.shape or present.load.shape != load.shape:
             return Actuation(
                 stimulus=stimulus, load=load, ranges=self._ranges, horizon=np.array([horizon]), paths=self._paths
             )
@@ -121,23 +130,39 @@ def _next_pieces(schedule: Pieces | float, begin: float, end: float) -> list[Pie
     return pieces
 
 
-def paths_of(model: Model) -> Paths:
-    """The keyframes of prescribed bodies that move; absent if none does."""
-    bodies = model.bodies
-    motions = [body.motion for body in model.scene.bodies]
-    moving = [b for b, motion in enumerate(motions) if isinstance(motion, Prescribed) and motion.moves]
+def paths_of(model: Model, pose_goal: Array) -> Paths:
+    """The keyframes of prescribed bodies that move, those of controlled ones from their goals if they have one; absent
+    if none moves.
+    """
+    bodies, scene = model.bodies, model.scene.bodies
+    moving = [b for b, body in enumerate(scene) if isinstance(body.motion, Prescribed) and body.motion.moves]
     if not moving:
         return Paths.absent()
-
-    def keyframes(values: tuple[Array, ...]) -> Array:
-        return np.concatenate([values[b] if len(values[b]) else np.zeros((len(bodies.times[b]), 3)) for b in moving])
-
+    goals = {b: goal for b, goal in zip(bodies.controlled.tolist(), pose_goal, strict=True) if goal[DURATION] > 0.0}
+    position, rotation = bodies.start_position.copy(), bodies.start_rotation.copy()
+    columns: list[tuple[Array, ...]] = []
+    for b in moving:
+        if b in goals:
+            goal = goals[b]
+            position[b], rotation[b] = goal[POSITION], goal[ROTATION].reshape(3, 3)
+            ends = goal[BEGIN] + np.array([0.0, goal[DURATION]])
+            steps = (MOVE, ROTATION_VECTOR, VELOCITY, SPIN)
+            reached, turned, velocity, spin = (np.array([np.zeros(3), goal[part]]) for part in steps)
+            columns.append((ends, reached, turned, velocity[::-1], spin[::-1]))
+            continue
+        times = bodies.times[b] if len(bodies.times[b]) else np.zeros(1)
+        rest = np.zeros((len(times), 3))
+        keyframes = (of[b] if len(of[b]) else rest for of in (bodies.displacements, bodies.rotations))
+        columns.append((times, *keyframes, rest, rest))
+    time, displacement, rotation_vector, velocity, rotation_rate = map(np.concatenate, zip(*columns, strict=True))
     return Paths(
         body=np.array(moving, dtype=np.int64),
-        first=np.cumsum([0, *(len(bodies.times[b]) for b in moving)]),
-        time=np.concatenate([bodies.times[b] for b in moving]),
-        displacement=keyframes(bodies.displacements),
-        rotation_vector=keyframes(bodies.rotations),
-        position=bodies.start_position,
-        rotation=bodies.start_rotation,
+        first=np.cumsum([0, *(len(column[0]) for column in columns)]),
+        time=time,
+        displacement=displacement,
+        rotation_vector=rotation_vector,
+        velocity=velocity,
+        rotation_rate=rotation_rate,
+        position=position,
+        rotation=rotation,
     )

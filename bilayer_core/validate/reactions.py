@@ -58,6 +58,29 @@ def _blocked(model: str, dimension: int) -> np.ndarray:
     return simulator.bodies["right"].clamp_wrench
 
 
+@cache
+def _held_tip(model: str, dimension: int, stations: int) -> float:
+    """Force across [N] on a joint that slides along the strip and turns, at the tip of a bilayer that would bend."""
+    layers = [layer("bottom", THICK), layer("top", THIN, eigenstrain={"stimulus": "humidity", "gain": SMALL})]
+    strip = rod(layers, LENGTH, stations, width=WIDTH, clamp_start="wall", clamp_end="tip")
+    tip = {"type": "guided", "axis": [1, 0, 0], "hinge": [0, 1, 0]}
+    content = scene(
+        [strip],
+        bodies=[fixed("wall"), {"name": "tip", "position": [LENGTH, 0, 0], "motion": tip}],
+        stimuli={"humidity": {"schedule": {"type": "hold", "value": 1.0}}},
+        materials={"gel": SOFT},
+    )
+    simulator = Simulator(load_scene(content), model=model, dimension=dimension)
+    simulator.solve_static()
+    return -float(simulator.bodies["tip"].clamp_wrench[2])
+
+
+SMALL, LENGTH = 1e-4, 0.06
+CURVATURE = 6.0 * SMALL * THICK * THIN * (THICK + THIN) / (
+    THICK**4 + THIN**4 + 4.0 * THICK**3 * THIN + 4.0 * THICK * THIN**3 + 6.0 * THICK**2 * THIN**2
+)
+"""Of the free bilayer, of one modulus (Timoshenko 1925) [1/m]."""
+BENDING_STIFFNESS = SOFT["youngs_modulus"] * WIDTH * (THICK + THIN) ** 3 / 12.0
 FORCE = SOFT["youngs_modulus"] * WIDTH * THIN * STRAIN
 CASES = [
     *(
@@ -89,5 +112,18 @@ CASES = [
             ("force", 0, FORCE, "mN", "E w h₂ η"),
             ("moment", 4, 0.5 * THIN * FORCE, "mN m", "E w h₂ η h₂/2 about the interface"),
         )
+    ),
+    *(
+        Case(
+            f"reactions/blocked tip/{dimension}-D {model}",
+            "3 EI κ/2L: a clamped bilayer that would bend by κ, its tip kept in line by a joint",
+            1e-3,
+            lambda model=model, dimension=dimension: (
+                1e3 * _held_tip(model, dimension, 61),
+                1e3 * 1.5 * BENDING_STIFFNESS * CURVATURE / LENGTH,
+            ),
+            unit="mN",
+        )
+        for model, dimension in SIZES
     ),
 ]
