@@ -9,6 +9,7 @@ import numpy as np
 
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
+from bilayer_core.scene.limits import faults_of_size
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.rod import Rod
 
@@ -27,6 +28,9 @@ class SceneConfig(Protocol):
 
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
     """Names that refer to other parts, names that occur twice, and parts that need another."""
+    too_large = faults_of_size(scene)
+    if too_large:
+        return too_large
     references = list(_references(scene))
     rest_lengths = [] if references else _rest_lengths(scene)
     parts = _clamps(scene), _joints(scene), _surfaces(scene), _points(scene)

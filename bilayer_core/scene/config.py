@@ -205,9 +205,9 @@ class Solver(Part):
     newton_tolerance: PositiveSpeed | None = None
     """Newton ends with a correction of velocities, which it still takes, no larger than this; by default the speed that
     makes 1/100 of `tolerance` (1e-4 with fixed steps) in the longest adaptive step (`max_step`)."""
-    max_newton_iterations: whole(1) = 50
+    max_newton_iterations: whole(1, 10_000) = 50
     """After which a step counts as failed and is shortened."""
-    max_halvings: whole(0) | None = None
+    max_halvings: whole(0, 1000) | None = None
     """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why. By default 10;
     adaptive steps may then be as short as a thousandth of the time in which sound passes an edge, or in which the
     fastest point covers what `tolerance` allows."""

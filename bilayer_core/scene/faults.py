@@ -27,6 +27,7 @@ Fault = tuple[Location, Any, str]
 _DEMANDS = {
     "missing": "is missing",
     "string_type": "must be text",
+    "string_too_long": "must be a name of at most 100 characters",
     "string_pattern_mismatch": "must be a name: letters, digits and single underscores, a letter first",
     "bool_type": "must be true or false",
     "bool_parsing": "must be true or false",

@@ -12,6 +12,7 @@ from bilayer_core.errors import SceneError
 from bilayer_core.scene.bundled import bundled_scene
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.faults import tell
+from bilayer_core.scene.limits import LARGEST_FILE, check_content, read_text
 from bilayer_core.scene.overrides import apply_override
 from bilayer_core.scene.text import read_yaml, write_yaml
 
@@ -39,6 +40,9 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     SceneError
         One line for each fault: file, key path, the value found, what is allowed.
     """
+    if not isinstance(scene, Mapping | str | Path):
+        demand = "must be the path of a scene file, the name of a bundled scene, or a mapping"
+        raise SceneError(f"scene: found {type(scene).__name__}; {demand}")
     if isinstance(scene, Mapping):
         return _validated(dict(scene), "scene", overrides, Path())
     path = find_scene(scene)
@@ -48,11 +52,9 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] =
 def read_scene_file(path: Path) -> str:
     """Text of a scene file. SceneError if it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise SceneError(f"{path}: is not UTF-8 text: {error.reason} at byte {error.start}") from None
+        return read_text(path, LARGEST_FILE)
+    except ValueError as error:
+        raise SceneError(f"{str(path)!r}: {error}" if "\0" in str(path) else f"{path}: {error}") from None
 
 
 def parse_scene(text: str, source: str, overrides: Sequence[str] = (), directory: Path = Path()) -> SceneConfig:
@@ -80,16 +82,20 @@ def find_scene(scene: str | Path) -> Path:
 
 
 def _validated(data: Any, source: str, overrides: Sequence[str], directory: Path) -> SceneConfig:
+    if data is None:
+        raise SceneError(f"{source}: is empty; `bilayer new FILE` writes a scene to start from")
     if not isinstance(data, dict):
         raise SceneError(
             f"{source}: found {type(data).__name__}; must be a mapping of keys to values, see the bundled scenes"
         )
+    check_content(data, source)
     config = _validate(data, source, directory)
     if not overrides:
         return config
     data = _content(config)
     for override in overrides:
         apply_override(data, override)
+    check_content(data, source)
     return _validate(data, f"{source} with {' '.join(overrides)}", directory)
 
 

@@ -27,7 +27,7 @@ def unit_vector(vector: tuple[float, float, float]) -> tuple[float, float, float
     return tuple(component / length for component in vector)
 
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$")]
+Name = Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$")]
 """Fit for key paths, for ROS topics and for file names."""
 Point = tuple[Length, Length, Length]
 Direction = Annotated[tuple[Number, Number, Number], AfterValidator(unit_vector)]

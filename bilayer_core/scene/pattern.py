@@ -14,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.scene.faults import Fault, Location, refuse, refuse_all
+from bilayer_core.scene.limits import MOST_COPIES
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.units import Angle, Number, whole
 
@@ -122,7 +123,7 @@ class Rotation(Pattern):
     """About which copies are turned."""
     center: Point = (0.0, 0.0, 0.0)
     """A point of the axis."""
-    count: whole(1)
+    count: whole(1, MOST_COPIES)
     """Rods in all; they are called `NAME_0`, `NAME_1` and so on."""
     angle: Angle | None = None
     """Between a copy and the next; by default they are even over a full turn."""
@@ -145,7 +146,7 @@ class Translation(Pattern):
     type: Literal["translation"]
     step: Step
     """From a copy to the next."""
-    count: whole(1)
+    count: whole(1, MOST_COPIES)
     """Rods in all; they are called `NAME_0`, `NAME_1` and so on."""
 
     def places(self) -> list[Placement]:
@@ -159,7 +160,7 @@ class Grid(Pattern):
     type: Literal["grid"]
     steps: list[Step] = Field(min_length=2, max_length=3)
     """From a copy to the next in its row, from a row to the next, and from a layer to the next."""
-    counts: list[whole(1)] = Field(min_length=2, max_length=3)
+    counts: list[whole(1, MOST_COPIES)] = Field(min_length=2, max_length=3)
     """Along each step. Copies are called `NAME_0`, `NAME_1` and so on along the first row, then along the next."""
 
     @property
@@ -176,6 +177,8 @@ class Grid(Pattern):
     def _faults(self) -> Iterator[Fault]:
         if len(self.counts) != len(self.steps):
             yield ("counts",), f"{len(self.counts)} entries", f"must be as many as `steps`, {len(self.steps)}"
+        elif self.copies > MOST_COPIES:
+            yield ("counts",), self.counts, f"must make at most {MOST_COPIES} copies, not {self.copies}"
 
 
 class Mirror(Pattern):

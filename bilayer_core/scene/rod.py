@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, field_serializer, model_validator
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, refuse_all, repeated
 from bilayer_core.scene.imperfection import Imperfection
+from bilayer_core.scene.limits import MOST_NODES
 from bilayer_core.scene.part import Direction, Name, Part
 from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
 from bilayer_core.scene.pattern import Patterns, Placement, placed
@@ -85,7 +86,7 @@ class Rod(Part):
     """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path. Of a
     path through points only its part across the path counts.
     """
-    stations: whole(3)
+    stations: whole(3, MOST_NODES)
     """Cross-sections along the path, both ends included."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
     """Bottom first."""

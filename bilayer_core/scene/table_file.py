@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import math
 from itertools import pairwise
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from bilayer_core.scene.faults import one_of, refuse_all
+from bilayer_core.scene.limits import LARGEST_TABLE, longest, read_text, refused_file_name
 
 
 class TableFile(BaseModel):
@@ -50,15 +52,17 @@ class CsvFile:
 
     def __init__(self, title: str, file: str, directory: str | Path):
         self._title, self.name = title, file
+        outside = refused_file_name(file)
+        if outside:
+            self.refuse(outside)
         try:
-            with open(Path(directory, file), newline="", encoding="utf-8-sig") as opened:
-                reader = csv.DictReader(opened)
-                self._rows = [(reader.line_num, row) for row in reader]
-                self.columns = list(reader.fieldnames or [])
-        except OSError as error:
-            self.refuse(f"must be a readable file: {error.strerror}")
-        except (UnicodeDecodeError, csv.Error) as error:
-            self.refuse(f"must be csv in UTF-8: {error}")
+            reader = csv.DictReader(io.StringIO(read_text(Path(directory, file), LARGEST_TABLE), newline=""))
+            self._rows = [(reader.line_num, row) for row in reader]
+            self.columns = list(reader.fieldnames or [])
+        except csv.Error as error:
+            self.refuse(f"must be csv: {error}")
+        except ValueError as error:
+            self.refuse(f"must be a readable csv file; it {error}")
 
     def refuse(self, demand: str) -> None:
         """Raise the fault that the file does not meet a demand."""
@@ -72,7 +76,7 @@ class CsvFile:
     def numbers(self, column: str) -> list[float]:
         """The numbers of a column."""
         if column not in self.columns:
-            self.refuse(f"must have a column {column}; its columns are {', '.join(self.columns) or 'none'}")
+            self.refuse(f"must have a column {column}; its columns are {longest(self.columns) or 'none'}")
         if not self._rows:
             self.refuse("must hold one line or more below the names of its columns")
         return [self._number(line, row[column], column) for line, row in self._rows]

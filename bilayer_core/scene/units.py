@@ -22,6 +22,10 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _UNIT = r"(?:1?\s*/\s*)?[A-Za-zµμ°%][\w°%*/^ ().-]*?"
 _TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>{_UNIT})?\s*")
 
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Of what must be above 0, and of all numbers: products of several are numbers yet."""
+LARGEST_COUNT = 2**53
+"""Of all whole numbers: larger ones are no floating-point numbers."""
 _DEGREE = Decimal("0.01745329251994329576923690768")
 """π/180, to as many digits as decimals are computed with."""
 USUAL_UNITS = {
@@ -132,14 +136,16 @@ class Quantity:
     def __call__(self, value: Any) -> float:
         """The number in SI, or a fault that says what is allowed."""
         number = self._number(value)
+        tiny = 0.0 < abs(number) < SMALLEST
         inside = (
-            math.isfinite(number)
+            abs(number) <= LARGEST
             and (self.above is None or number > self.above)
+            and not (tiny and self.above == 0.0)
             and (self.at_least is None or number >= self.at_least)
             and (self.at_most is None or number <= self.at_most)
         )
         if not inside:
-            raise refuse(f"must be {self.describe()}")
+            raise refuse(f"must be {self.describe()}", f"which is below {SMALLEST:g}, as good as 0" if tiny else "")
         return number
 
     def _number(self, value: Any) -> float:
@@ -158,17 +164,20 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Count:
-    """Validator of a whole number of at least `at_least`."""
+    """Validator of a whole number from `at_least` to `at_most`."""
 
     at_least: int
+    at_most: int = LARGEST_COUNT
 
     def describe(self) -> str:
         """What is allowed."""
-        return f"a whole number of at least {self.at_least}"
+        text = f"a whole number of at least {self.at_least}"
+        return text if self.at_most == LARGEST_COUNT else f"{text} and at most {self.at_most}"
 
     def __call__(self, value: Any) -> int:
         """The number, or a fault that says what is allowed."""
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < self.at_least:
+        whole_number = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+        if not (whole_number and self.at_least <= value <= self.at_most):
             raise refuse(f"must be {self.describe()}")
         return int(value)
 
@@ -182,9 +191,9 @@ def real(*arguments: Any, **limits: float) -> Any:
     ]
 
 
-def whole(at_least: int) -> Any:
+def whole(at_least: int, at_most: int = LARGEST_COUNT) -> Any:
     """Annotation of a whole number."""
-    count = Count(at_least)
+    count = Count(at_least, at_most)
     return Annotated[int, BeforeValidator(count, json_schema_input_type=int), Field(description=count.describe())]
 
 

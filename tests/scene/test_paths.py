@@ -264,7 +264,7 @@ FIGURE_EIGHT = [[0, 0, 0], [0.05, 0, 0.05], [0.1, 0, 0], [0.05, 0, -0.05], [0, 0
             {},
             'path.file: found "bend.csv"; must be left out where `points` are given',
         ),
-        ({"shape": "spline", "file": "none.csv"}, {}, 'path.file: found "none.csv"; must be a readable file: No such'),
+        ({"shape": "spline", "file": "none.csv"}, {}, 'path.file: found "none.csv"; must be a readable csv file'),
         (
             {"shape": "spline", "file": "two.csv"},
             {},

@@ -52,7 +52,7 @@ def test_the_text_states_the_values_that_the_scene_left_out():
         ("solver:\n  {dt: 1, dt: 2}\n", "scene.yaml:2:11: is not readable YAML: the key 'dt' occurs twice"),
         ("rods: [1, 2\nname: x\n", "scene.yaml:2:5: is not readable YAML"),
         ("a: !!python/object:os.system {}\n", "scene.yaml:1:4: is not readable YAML"),
-        ("", "scene.yaml: found NoneType; must be a mapping"),
+        ("", "scene.yaml: is empty; `bilayer new FILE`"),
         ("- 1\n", "scene.yaml: found list; must be a mapping"),
     ],
 )
@@ -72,7 +72,7 @@ def test_keys_merged_from_an_anchor_do_not_occur_twice():
 
 @pytest.mark.parametrize(
     ("content", "message"),
-    [(None, "No such file"), (b"\xff\xfe", "is not UTF-8 text"), ("directory", "Is a directory")],
+    [(None, "No such file"), (b"\xff\xfe", "is not UTF-8 text"), ("directory", "is a directory, not a file")],
 )
 def test_a_file_that_cannot_be_read_is_named_with_the_reason(tmp_path, content, message):
     path = tmp_path / "robot.yaml"

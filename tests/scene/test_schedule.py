@@ -121,8 +121,8 @@ def test_a_csv_of_a_scene_that_is_no_file_is_relative_to_the_working_directory(t
 @pytest.mark.parametrize(
     ("text", "changes", "fault"),
     [
-        (None, {}, '.file: found "drive.csv"; must be a readable file: No such file or directory'),
-        (b"\xff\xfe\x00", {}, '.file: found "drive.csv"; must be csv in UTF-8'),
+        (None, {}, '.file: found "drive.csv"; must be a readable csv file; it cannot be read'),
+        (b"\xff\xfe\x00", {}, '.file: found "drive.csv"; must be a readable csv file; it is not UTF-8 text'),
         (
             MEASURED,
             {"value_column": "humidty"},

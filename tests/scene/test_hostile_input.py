@@ -1,0 +1,205 @@
+"""Input that means no scene: each ends with one clear message, soon, and never with a crash or a traceback."""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from bilayer_core import load_scene
+from bilayer_core.errors import SceneError
+from bilayer_core.scene.limits import DEEPEST, LARGEST_FILE, MOST_COPIES, MOST_NODES, MOST_VALUES
+from bilayer_core.scene.text import read_yaml
+from bilayer_core.validate.parts import layer, rod, scene
+
+BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
+    f"{name}: &{name} [{', '.join(['*' + last] * 9)}]\n" for last, name in zip("abcdefghi", "bcdefghij", strict=True)
+)
+LONGEST = 10.0
+"""Time until an answer [s]."""
+
+
+def refusal(data, overrides=()):
+    begin = time.monotonic()
+    with pytest.raises(SceneError) as refused:
+        load_scene(data, overrides)
+    assert time.monotonic() - begin < LONGEST
+    return str(refused.value)
+
+
+def written(directory, text):
+    path = directory / "scene.yaml"
+    if isinstance(text, bytes):
+        path.write_bytes(text)
+    else:
+        path.write_text(text)
+    return path
+
+
+TEXTS = {
+    "brackets": ("[" * 100_000, f"more than {DEEPEST} deep"),
+    "balanced brackets": ("a: " + "[" * 900 + "]" * 900, f"more than {DEEPEST} deep"),
+    "braces": ("{a: " * 100_000, f"more than {DEEPEST} deep"),
+    "dashes": ("- " * 100_000, f"more than {DEEPEST} deep"),
+    "questions": ("? " * 100_000, f"more than {DEEPEST} deep"),
+    "bomb": (BOMB, f"more than {MOST_VALUES} values"),
+    "bomb under a key": ("rods:\n" + re.sub("^", "  ", BOMB, flags=re.M), f"more than {MOST_VALUES} values"),
+    "alias in itself": ("rods: &a [*a]", "deep inside each other"),
+    "mapping in itself": ("rods: &a {rods: *a}", "deep inside each other"),
+    "set": ("rods: !!set {a, b}", "the tag 'tag:yaml.org,2002:set' means nothing in a scene"),
+    "binary": ("title: !!binary aGk=", "means nothing in a scene"),
+    "python": ("title: !!python/object/apply:os.getcwd []", "means nothing in a scene"),
+    "no integer": ("duration: !!int foo", ":1:11: is not readable YAML: 'foo' is not a whole number"),
+    "no number": ("duration: !!float foo", "'foo' is not a number"),
+    "no truth": ("duration: !!bool foo", "'foo' is not true or false"),
+    "long integer": ("duration: " + "1" * 5000, "is not a whole number that can be read"),
+    "empty": ("", "is empty; `bilayer new FILE` writes a scene"),
+    "comment": ("# nothing\n", "is empty"),
+    "two documents": ("a: 1\n---\na: 2\n", "begins another document"),
+    "list key": ("[a, b]: 1", "a key must be plain text"),
+    "twice": ("a: 1\na: 2", "the key 'a' occurs twice"),
+    "a number": ("7", "found int; must be a mapping"),
+    "control characters": ("title: \x07", "is not readable YAML"),
+    "not utf-8": (b"title: \xff\xfe", "is not UTF-8 text"),
+    "a log": (b"\x89MCAP0\r\n\xff\xfe", "is an MCAP log, not a scene"),
+    "too large": ("# " + "x" * LARGEST_FILE, "is larger than 2 MB"),
+    "many values": ("gravity: [" + "0," * (MOST_VALUES + 1) + "]", f"more than {MOST_VALUES} values"),
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_text_that_is_no_scene_is_refused_with_the_reason(name, tmp_path):
+    text, reason = TEXTS[name]
+    assert reason in refusal(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("override", "reason"),
+    [
+        ("title=" + "[" * 100_000, "deep"),
+        ("rods=&a [*a]", "deep inside each other"),
+        ("duration=1e-300", "below 1e-100, as good as 0"),
+        ("duration=" + "9" * 5000, "is not a whole number that can be read"),
+        ("rods.strip.stations=100000000", f"at most {MOST_NODES}"),
+        ("rods.strip.stations=1" + "0" * 400, f"at most {MOST_NODES}"),
+        ("rods.strip.path.length=1e-320", "as good as 0"),
+        ("rods.strip.path.length=1e200", "must be a length [m]"),
+        ("materials={on: 1}", "materials.on"),
+        ("rods.strip.name=" + "x" * 1000, "at most 100 characters"),
+    ],
+)
+def test_an_override_that_cannot_be_is_refused(override, reason):
+    assert reason in refusal("cantilever", [override])
+
+
+@pytest.mark.parametrize("given", [None, 7, 1.5, ["cantilever"], b"cantilever", np.zeros(3)])
+def test_what_is_no_path_name_or_mapping_is_refused(given):
+    assert f"found {type(given).__name__}; must be the path of a scene file" in refusal(given)
+
+
+NO_FILES = ["nothing\0here", "nothing\0here.yaml", "x" * 5000 + ".yaml", "/dev/zero", "/proc/self/mem"]
+
+
+@pytest.mark.parametrize("given", NO_FILES)
+def test_a_path_that_is_no_file_is_refused(given):
+    assert refusal(given)
+
+
+def test_directories_and_pipes_are_not_read(tmp_path):
+    assert "is a directory, not a file" in refusal(tmp_path)
+    pipe = tmp_path / "pipe.yaml"
+    os.mkfifo(pipe)
+    assert "is a device or a pipe, not a file" in refusal(pipe)
+
+
+def test_a_mapping_that_contains_itself_is_refused():
+    content = scene([rod([layer()])])
+    content["rods"][0]["layers"] = content["rods"]
+    assert "deep inside each other" in refusal(content)
+
+
+def test_dates_and_words_for_true_are_text_where_text_is_meant(tmp_path):
+    assert read_yaml("title: 2020-13-45", "x") == {"title": "2020-13-45"}
+    assert read_yaml("{on: 1, yes: 2, 3: 4, =: 5}", "x") == {"on": 1, "yes": 2, "3": 4, "=": 5}
+    assert read_yaml("a: &a {x: 1, y: 2}\nb: {<<: *a, y: 3}", "x") == {"a": {"x": 1, "y": 2}, "b": {"x": 1, "y": 3}}
+
+
+@pytest.mark.parametrize(
+    ("pattern", "reason"),
+    [
+        ({"type": "rotation", "count": 100_000}, f"at most {MOST_COPIES}"),
+        ({"type": "grid", "counts": [1000, 1000], "steps": [[0, 1, 0], [0, 0, 1]]}, "must make at most 2000 copies"),
+    ],
+)
+def test_too_many_copies_are_refused(pattern, reason):
+    assert reason in refusal(scene([rod([layer()]) | {"pattern": pattern}]))
+
+
+def test_too_many_nodes_are_refused_with_the_memory_that_they_would_take():
+    rods = [rod([layer("a"), layer("b")], stations=60_000, name=name) for name in ("left", "right")]
+    text = refusal(scene(rods))
+    assert "rods.left.stations: found 60000; must be fewer" in text and "240000 nodes, and take about 1.2 GB" in text
+    rods = [rod([layer()], stations=3) | {"name": f"r_{k}", "pattern": {"count": 1500}} for k in range(2)]
+    assert "found \"3000 rods\"; must be at most 2000" in refusal(scene(rods))
+
+
+def test_as_many_nodes_as_are_allowed_are_built_in_time_and_memory():
+    code = (
+        "import resource, sys\n"
+        "from bilayer_core import Simulator, load_scene\n"
+        "from bilayer_core.validate.parts import layer, rod, scene\n"
+        "strip = rod([layer('a'), layer('b')], length=1e4, stations=100_000)\n"
+        "Simulator(load_scene(scene([strip])), model='two_rod')\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+    )
+    begin = time.process_time()
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < 3 * LONGEST
+    assert time.process_time() - begin < LONGEST
+    assert int(done.stdout) * 1024 < 2e9
+
+
+def with_table(directory, file):
+    content = scene([rod([layer(eigenstrain={"stimulus": "lamp", "gain": 0.01})])])
+    content["stimuli"] = {"lamp": {"schedule": {"type": "csv", "file": file, "value_column": "value"}}}
+    import yaml
+
+    return written(directory, yaml.safe_dump(content))
+
+
+@pytest.mark.parametrize("file", ["/etc/passwd", "../other.csv", "a/../../other.csv", "", "a\0b"])
+def test_a_table_outside_of_the_scenes_folder_is_neither_read_nor_quoted(tmp_path, file):
+    (tmp_path / "other.csv").write_text("unheard_of,time\n1,2\n")
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    text = refusal(with_table(inside, file))
+    assert "unheard_of" not in text and "root:" not in text
+    assert "stimuli.lamp.schedule.file" in text
+
+
+def test_a_table_below_the_scenes_folder_is_read(tmp_path):
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data" / "lamp.csv").write_text("time,value\n0,0\n1,1\n")
+    assert load_scene(with_table(tmp_path, "data/../data/lamp.csv")).stimuli["lamp"].schedule.values == [0.0, 1.0]
+
+
+def test_a_table_that_is_a_directory_or_too_large_is_refused(tmp_path):
+    (tmp_path / "data").mkdir()
+    assert "it is a directory, not a file" in refusal(with_table(tmp_path, "data"))
+    (tmp_path / "large.csv").write_text("time,value\n" + "0,0\n" * 800_000)
+    assert "it is larger than 3 MB" in refusal(with_table(tmp_path, "large.csv"))
+
+
+def test_the_largest_table_is_read_in_time(tmp_path):
+    lines = "".join(f"{k},0.5\n" for k in range(250_000))
+    (tmp_path / "lamp.csv").write_text("time,value\n" + lines)
+    begin = time.monotonic()
+    assert len(load_scene(with_table(tmp_path, "lamp.csv")).stimuli["lamp"].schedule.values) == 250_000
+    assert time.monotonic() - begin < LONGEST
