@@ -95,8 +95,9 @@ def _parts(scene) -> dict[str, list[str]]:
             if (names := {name: None for copy in rod.copies if (name := getattr(copy.rod, key))})
         ]
         shape = f"{rod.path.describe()}, " if rod.path.describe() else ""
+        free = "no ends" if rod.closed else "both ends free"
         lines = [
-            f"{copies}{shape}{section}, {stations}; {', '.join(held) or 'both ends free'}",
+            f"{copies}{shape}{section}, {stations}; {', '.join(held) or free}",
             f"bottom to top: {layers}",
         ]
         if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):

@@ -33,6 +33,8 @@ class RodSearch:
     edge_radius: Vector
     edge_rod: Indices
     edge_first: Flags
+    edge_before: Indices  # on the same strand, −1 without one
+    edge_after: Indices
     edge_arc: Matrix
     first_point: Indices  # points of edge k are first_point[k] … first_point[k + 1] − 1
     point_edge: Indices
@@ -41,6 +43,7 @@ class RodSearch:
     rod_can_collide: FlagTable
     rod_joined: FlagTable
     rod_exclusion: Vector
+    rod_length: Vector  # once round, infinite for rods with ends [m]
     box: Matrix  # scratch: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last
     sweep: Matrix  # of edges: middle, its motion, half of the length and, where ends move differently, the difference
     met: IndexTable  # scratch: edges
@@ -67,12 +70,21 @@ def _sees(search, a, p, k, touch):
     if this is its own, and where bodies join the two they do not touch by construction.
     """
     own, other, arc = search.edge_rod[a], search.edge_rod[k], search.point_arc[p]
-    if own == other and max(search.edge_arc[k, 0] - arc, arc - search.edge_arc[k, 1]) < search.rod_exclusion[own]:
+    if own == other and _arc_between(search, own, arc, arc, k) < search.rod_exclusion[own]:
         return False
     if not search.rod_joined[own, other]:
         return True
     i, j, radii = search.edge_node[a], search.edge_node[k], search.edge_radius[a] + search.edge_radius[k]
     return _square_distance(search.start_position, i, search.point_fraction[p], j) > (radii + touch) ** 2
+
+
+@kernel
+def _arc_between(search, rod, first, last, k):
+    """No less than the arc distance of any place from `first` to `last` along a rod from its edge k [m]; round a closed
+    rod the shorter way.
+    """
+    begin, end, once_round = search.edge_arc[k, 0], search.edge_arc[k, 1], search.rod_length[rod]
+    return min(max(begin - first, last - end), once_round - max(end - last, first - begin))
 
 
 def scratch(edges: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -185,7 +197,7 @@ def near_pairs(search, touch, distance):
     """
     position, tip, edge_node, edge_radius = search.base, search.tip, search.edge_node, search.edge_radius
     edge_rod, edge_arc, box, sweep, met = search.edge_rod, search.edge_arc, search.box, search.sweep, search.met
-    first_point, edge_first = search.first_point, search.edge_first
+    first_point, edge_before, edge_after = search.first_point, search.edge_before, search.edge_after
     edges = edge_node.shape[0]
     leaves = box.shape[0] // 2
     for k in range(leaves):
@@ -227,8 +239,7 @@ def near_pairs(search, touch, distance):
             if not search.rod_can_collide[own, edge_rod[k]]:
                 continue
             if own == edge_rod[k]:
-                along = max(edge_arc[k, 0] - edge_arc[a, 0], edge_arc[a, 1] - edge_arc[k, 1])
-                if along < search.rod_exclusion[own]:
+                if _arc_between(search, own, edge_arc[a, 0], edge_arc[a, 1], k) < search.rod_exclusion[own]:
                     continue
             away, moved = 0.0, 0.0
             for c in range(3):
@@ -265,8 +276,8 @@ def near_pairs(search, touch, distance):
                 if found < capacity:
                     search.point[found], search.edge[found] = p, k
                     search.until[found] = away - radii - touch
-                    before = not edge_first[k] and _sees(search, a, p, k - 1, touch)
-                    after = k + 1 < edges and not edge_first[k + 1] and _sees(search, a, p, k + 1, touch)
+                    before = edge_before[k] >= 0 and _sees(search, a, p, edge_before[k], touch)
+                    after = edge_after[k] >= 0 and _sees(search, a, p, edge_after[k], touch)
                     search.before[found], search.after[found] = before, after
                 found += 1
     search.count[0] = found

@@ -100,7 +100,7 @@ def facing_contacts(rods, position, path):
         at_start = 1 if along <= 0.0 else 0
         if search.before[c]:
             at_start -= 1
-            if fraction_along(p0, p1, p2, position, j - 1) >= 1.0:
+            if fraction_along(p0, p1, p2, position, edge_node[search.edge_before[k]]) >= 1.0:
                 at_start += 1
         for kind in range(3):  # the segment's inside, its start, its end where no other has that for its start
             if kind == 0:

@@ -135,7 +135,7 @@ def _by_axis(name: str, vector: np.ndarray) -> dict[str, float]:
 
 
 def _tips(simulator: Simulator) -> dict[str, int]:
-    return {s.name: s.first_node + s.node_count - 1 for s in simulator.model.strands}
+    return {s.name: s.last_node for s in simulator.model.strands}
 
 
 def peak(times: np.ndarray, heights: np.ndarray) -> tuple[float, float]:

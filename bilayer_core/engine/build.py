@@ -21,6 +21,7 @@ from ..model.records.parts import (
     Drives,
     Flow,
     Fluid,
+    Joins,
     Moments,
     OffAxis,
     Plane,
@@ -95,6 +96,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             ),
         ),
         border=Border.zeros(sizes) if free else Border.absent(),
+        joins=_joins(model),
         constrained=_constrained(model),
         attachments=_attachments(model) if free else Attachments.absent(),
         flow=_flow(model, sizes) if scene.fluid is not None else Flow.absent(),
@@ -133,6 +135,17 @@ def _attachments(model: Model) -> Attachments:
         clamp_edge_free=model.clamp_edge_free,
         clamp_edge_joint=model.clamp_edge_joint,
     )
+
+
+def _joins(model: Model) -> Joins:
+    """Absent where no rod is closed."""
+    unknowns = model.joined_unknowns(model.solved_layout)
+    if not len(unknowns):
+        return Joins.absent()
+    column = np.full(model.solved_layout.size, -1, dtype=np.int64)
+    column[unknowns] = np.arange(len(unknowns))[:, None]
+    first, copy = columns(unknowns)
+    return Joins(first=first, copy=copy, column=column)
 
 
 def _constrained(model: Model) -> Constrained:
@@ -278,6 +291,7 @@ def contact_columns_of(model: Model, sizes: dict[str, int], capacity: int) -> Co
         sizes | {"contact": capacity},
         strand=np.repeat(np.arange(len(model.strands)), [s.node_count for s in model.strands]),
         attached=attached,
+        joined=np.isin(np.arange(model.node_count), model.joined_node),
     )
 
 

@@ -17,6 +17,7 @@ OF_RODS = {
     *("bound_between_rods", "find_rod_contacts", "list_near_rods", "near_pairs"),
     *("take_rod_contacts", "move_to_border"),
 }
+OF_JOINS = {"move_joins_to_border"}
 OF_FRICTION = {"limit_by_friction"}
 
 
@@ -25,7 +26,9 @@ def calls_of(model: Model) -> Calls:
     rods, friction = model.rod_surfaces is not None, model.scene.contact and model.scene.contact.friction
     skipped = IN_SPACE if model.plane is not None else IN_PLANE
     skipped = skipped | (OF_BODIES if model.free_count == 0 else set())
-    skipped |= OF_BORDER if model.free_count == 0 and not rods else set()
+    closed = len(model.joined_node) > 0
+    skipped |= OF_BORDER if model.free_count == 0 and not rods and not closed else set()
+    skipped |= set() if closed else OF_JOINS
     skipped |= set() if model.has_surface_contact else OF_SURFACES
     skipped |= set() if rods else OF_RODS
     skipped |= set() if friction and friction.acts else OF_FRICTION

@@ -71,7 +71,8 @@ class Storage:
         self._model, self._sizes = model, sizes_of(model)
         points = len(model.rod_surfaces.point_edge) if model.rod_surfaces is not None else 0
         near = self._sizes["contact_point"] if model.has_surface_contact and self._sizes["surface"] else 0
-        self._capacity = Capacity(near, points, points, model.bodies.freedom.shape[1])
+        columns = model.bodies.freedom.shape[1] + model.joined_unknowns(model.solved_layout).shape[0]
+        self._capacity = Capacity(near, points, points, columns)
         self._pairs: NearPairs | None = None
         if points:
             geometry = model.rod_surfaces, model.edge_node, model.start_position
@@ -115,7 +116,7 @@ class Storage:
             "slip": capacity.near + capacity.sliding,
             "path": PATH_SIZE,
         }
-        border = rods or model.free_count
+        border = rods or capacity.columns > 0
         same = before is not None and surfaces and len(before.surfaces.near_contact_point) == capacity.near
         records = dict(
             **self._groups,

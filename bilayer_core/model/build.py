@@ -88,6 +88,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         start_position=found.column("position", width=3),
         start_director1=np.concatenate([found.column(name, width=3) for name in ("director1", "clamp_edge_director1")]),
         clamp_edge_tangent=clamp_edges,
+        joined_node=found.column("joined_node", np.int64, 2),
+        joined_edge=found.column("joined_edge", np.int64, 2),
         attached_node=attached,
         attached_body=found.column("attached_body", np.int64),
         attached_position=found.column("attached_position", width=3),

@@ -7,7 +7,7 @@ import numpy as np
 from ..scene.config import Fluid
 from ..scene.rod import Rod
 from .section import outline
-from .strands import Collected, Span
+from .strands import Collected, Span, stations_of
 
 Array = np.ndarray
 
@@ -33,9 +33,9 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[Span]) -> No
     """Drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts at
     the middle.
     """
-    length = np.full(rod.stations, rod.edge_length)
-    length[[0, -1]] *= 0.5
-    width, layers = outline(rod, np.arange(rod.stations))
+    length = np.full(stations_of(rod)[1] + 1, rod.edge_length)
+    length[[0, -1]] *= 0.0 if rod.closed else 0.5
+    width, layers = outline(rod, np.arange(len(length)))
     thickness, shares = _shares(spans, layers)
     whole = np.stack([fluid.drag_along * width, fluid.drag_across * width, fluid.drag_across * thickness], axis=1)
     for (first, last, first_node, first_edge), own in zip(spans, shares, strict=True):
@@ -52,11 +52,14 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[Span]) -> No
 
 def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, spans: list[Span]) -> None:
     """Added mass of the whole section along each edge, shared by its layers in proportion to their thickness."""
-    width, layers = outline(rod, np.arange(rod.stations - 1) + 0.5)
+    edges = stations_of(rod)[1]
+    width, layers = outline(rod, np.arange(edges) + 0.5)
     thickness, shares = _shares(spans, layers)
     per_area, law = 0.25 * np.pi * fluid.density * rod.edge_length, fluid.added_mass
     through, sideways = law.through * width**2, law.sideways * thickness**2
     turning = law.turning * (width**2 - thickness**2) ** 2 / 32.0
     whole = per_area * np.stack([through, sideways, turning], axis=1)
+    if rod.closed:
+        whole[-1] = 0.0
     for (first, last, _, _), own in zip(spans, shares, strict=True):
         found.add(fluid_mass=(own[:, None] * whole)[first:last])

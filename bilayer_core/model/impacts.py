@@ -32,7 +32,8 @@ def stiffness_that_holds(energy_per_length: float, distance: float) -> float:
 
 def heaviest(model: Model) -> float:
     """Largest mass per length of contact, of free bodies and of nodes [kg/m]."""
-    points, found = model.contact_points, [float((model.node_mass / model.node_length).max())]
+    own = model.node_length > 0.0
+    points, found = model.contact_points, [float((model.node_mass[own] / model.node_length[own]).max())]
     for slot, body in enumerate(model.bodies.body_of_free):
         weights = points.weight[points.body == body]
         found += [float(model.bodies.mass[slot] / weights.max())] if weights.size else []

@@ -12,6 +12,7 @@ Shapes f(x) of a rod along x = s/L from 0 to 1, the n-th of those that leave pos
     both ends free       sin nπx
     clamped at x = 0     1 − cos (n − ½)πx        the buckling of a column with a free end
     both ends clamped    sin πx sin nπx           n = 1: ½ (1 − cos 2πx), that of a clamped column
+    closed               cos 4πx, sin 4πx, cos 6πx …      an oval: the buckling of a ring under pressure
 """
 
 from __future__ import annotations
@@ -61,6 +62,9 @@ def _weights(imperfection: Imperfection) -> Array:
 def _modes(rod: Rod, x: Array) -> tuple[Array, Array]:
     """f and df/dx, shapes (n, MODES)."""
     n, pi, x = np.arange(1, MODES + 1), np.pi, x[:, None]
+    if rod.closed:
+        rate, phase = 2.0 * pi * (1 + (n + 1) // 2), 0.5 * pi * (1 - n % 2)
+        return np.cos(rate * x - phase), -rate * np.sin(rate * x - phase)
     start, end = rod.clamp_start is not None, rod.clamp_end is not None
     if start and end:
         rate = n * pi * np.sin(pi * x) * np.cos(n * pi * x) + pi * np.cos(pi * x) * np.sin(n * pi * x)

@@ -15,7 +15,7 @@ from .immersed import add_fluid
 from .laminate_section import LayerHalves, WholeSection, layer_halves, side
 from .section import Section, outline, sections
 from .strand_arrays import StrandArrays
-from .strands import Collected, StrandElements, add_strand, strand_shape
+from .strands import Collected, StrandElements, add_strand, is_closed, stations_of, strand_shape, with_copies
 from .validity import Figure
 
 Array = np.ndarray
@@ -48,7 +48,8 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
     rod, name = copy.rod, copy.name
     layers = _placed(scene, rod)
     axis = _axis(layers)
-    shape = strand_shape(rod, np.full(rod.stations, axis), 0, rod.stations - 1, copy.place)
+    nodes = np.arange(stations_of(rod)[1] + 1)
+    shape = strand_shape(rod, np.full(len(nodes), axis), 0, nodes[-1], copy.place)
     halves = [
         layer_halves(scene, rod, slot, axis, shape, layer.length / shape.lengths, layer.present)
         for slot, layer in enumerate(layers)
@@ -62,12 +63,13 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
         layer=strand_name,
         first_station=0,
         first_node=found.node_count,
-        node_count=rod.stations,
+        node_count=len(nodes),
         first_edge=found.edge_count,
-        width=values_at(rod.width, rod.edge_length * np.arange(rod.stations)),
+        width=outline(rod, nodes)[0],
         thickness=high - low,
         offset=0.5 * (high + low),
         curvature=shape.curvature,
+        closed=shape.closed,
     )
     if len(rod.layers) > 1:
         strand = replace(strand, layers=_drawn_layers(rod, axis, strand))
@@ -82,8 +84,10 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
         node_radius=np.maximum(high, -low),
         retardation_time=scene.materials[rod.layers[0].material].retardation_time,
     )
-    found.add(mass_moment=sum(layer.mass * (layer.height - axis) for layer in layers))
-    found.rods.append([(0, rod.stations - 1, strand.first_node, strand.first_edge)])
+    moment = sum(layer.mass * (layer.height - axis) for layer in layers)
+    moment[-1] *= not strand.closed
+    found.add(mass_moment=moment)
+    found.rods.append([(0, int(nodes[-1]), strand.first_node, strand.first_edge)])
     found.path_height.append(-axis)
     joints = add_strand(found, scene, rod, strand, shape, elements, body_index)
     coupling = whole.strain_coupling()
@@ -95,7 +99,9 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
 
 
 def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
-    nodes, edges = np.arange(rod.stations), np.arange(rod.stations - 1)
+    last_node = stations_of(rod)[1]
+    nodes, edges = rod.on_path(np.arange(last_node + 1)), np.arange(last_node)
+    own = edges % (rod.stations - 1)
     layers = []
     for slot, layer in enumerate(rod.layers):
         first, last = rod.covered_stations(layer)
@@ -104,8 +110,8 @@ def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
         layers.append(
             _Placed(
                 section,
-                (first <= edges) & (edges < last),
-                strand_shape(rod, height, 0, rod.stations - 1, placed()).lengths,
+                (first <= own) & (own < last),
+                strand_shape(rod, height, 0, last_node, placed()).lengths,
                 side(rod, slot) * section.thickness,
             )
         )
@@ -128,7 +134,7 @@ def _axis(layers: list[_Placed]) -> float:
 
 def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
     """Heights of the two faces over the curve at each node [m]."""
-    _, layers = outline(rod, np.arange(rod.stations))
+    _, layers = outline(rod, np.arange(stations_of(rod)[1] + 1))
     if len(layers) == 1:
         return -0.5 * layers[0] - axis, 0.5 * layers[0] - axis
     return -layers[0] - axis, layers[1] - axis
@@ -136,10 +142,10 @@ def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
 
 def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandArrays, ...]:
     """Each layer on those nodes of a laminate's strand where it is."""
-    _, thickness = outline(rod, np.arange(rod.stations))
+    _, thickness = outline(rod, np.arange(strand.node_count))
     layers = []
     for slot, layer in enumerate(rod.layers):
-        first, last = rod.covered_stations(layer)
+        first, last = stations_of(rod, layer)
         own = slice(first, last + 1)
         layers.append(
             replace(
@@ -154,6 +160,7 @@ def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandAr
                 thickness=thickness[slot, own],
                 offset=side(rod, slot) * thickness[slot, own] - axis,
                 curvature=strand.curvature[own],
+                closed=is_closed(rod, first, last),
             )
         )
     return tuple(layers)
@@ -188,7 +195,7 @@ def _add_eigenstrain(
 ) -> None:
     """The rest strains of edges and joints that follow the laws of a layer."""
     for law in layer.eigenstrain:
-        number, edges = found.law(scene, law), np.array(rod.driven_edges(layer, law))
+        number, edges = found.law(scene, law), with_copies(rod, np.array(rod.driven_edges(layer, law)))
         of_edges, of_nodes = whole.driven(half, edges)
         bent = np.flatnonzero((of_nodes != 0.0) & (joints >= 0))
         found.add(

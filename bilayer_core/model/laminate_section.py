@@ -75,9 +75,9 @@ def layer_halves(
 ) -> LayerHalves:
     """A layer in the halves of edges; `stretch` is λ, shape (n_edge,)."""
     layer = rod.layers[slot]
-    stations = (np.arange(rod.stations - 1)[:, None] + [0.25, 0.75]).ravel()
+    stations = (np.arange(len(shape.lengths))[:, None] + [0.25, 0.75]).ravel()
     section = sections(rod, layer, scene.materials[layer.material], stations)
-    along = rod.edge_length * stations
+    along = rod.edge_length * rod.on_path(stations)
 
     def halves(values: Array) -> Array:
         return present[:, None] * values.reshape(-1, 2)
@@ -107,7 +107,7 @@ def _bond_twist(scene: SceneConfig, rod: Rod, halves: list[LayerHalves]) -> Arra
     """k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_edge, 2)."""
     if len(halves) == 1:
         return 0.0
-    stations = (np.arange(rod.stations - 1)[:, None] + [0.25, 0.75]).ravel()
+    stations = (np.arange(len(halves[0].ratio))[:, None] + [0.25, 0.75]).ravel()
     bottom, top = (sections(rod, layer, scene.materials[layer.material], stations) for layer in rod.layers)
     law = bond(bottom, top, scene.coupling, rod.torsion)
     stiffness = (law.tilt * (0.5 * (bottom.thickness + top.thickness)) ** 2).reshape(-1, 2)

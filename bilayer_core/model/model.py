@@ -142,6 +142,8 @@ class Model(ReadOnlyArrays):
         Array  # of edges, and of clamp edges in their bodies' frames, unit, shape (n_edge + n_clamp_edge, 3)
     )
     clamp_edge_tangent: Array  # in the frame of its body, unit, shape (n_clamp_edge, 3)
+    joined_node: Array  # nodes of closed strands, each with its copy, shape (n_joined, 2); see `model.strand_arrays`
+    joined_edge: Array  # likewise of edges, shape (n_joined_edge, 2)
     attached_node: Array  # nodes held by bodies, shape (n_attached,)
     attached_body: Array  # shape (n_attached,)
     attached_position: Array  # in the body's frame [m], shape (n_attached, 3)
@@ -241,7 +243,14 @@ class Model(ReadOnlyArrays):
         bodies.
         """
         solved = self.solved_layout
-        return solved.size - solved.dimension * len(self.attached_node) + self.bodies.freedom.shape[1]
+        twice = len(self.joined_unknowns(solved))
+        return solved.size - solved.dimension * len(self.attached_node) - twice + self.bodies.freedom.shape[1]
+
+    def joined_unknowns(self, layout: Layout) -> Array:
+        """Unknowns of nodes and edges that closed strands have twice, each with its copy, shape (n, 2)."""
+        of_nodes = layout.node[self.joined_node][:, None] + np.arange(layout.dimension)[:, None]
+        edges = layout.edge[self.joined_edge] if layout.dimension == 3 else self.joined_edge[:0]
+        return np.concatenate([of_nodes.reshape(-1, 2), edges])
 
     @property
     def directions(self) -> Array:

@@ -73,6 +73,8 @@ def _shares(rod: Rod, spans: list[Span], position: float) -> tuple[np.ndarray, n
     for station, part in ((before, before + 1.0 - along), (before + 1, along - before)):
         if part == 0.0:
             continue
+        if rod.closed and station == 0:
+            station = rod.stations - 1  # the node with both edges next to it
         thickness = outline(rod, np.array([station]))[1][:, 0] if len(spans) > 1 else np.ones(1)
         covering = np.flatnonzero(thickness)
         for k in covering:

@@ -60,6 +60,7 @@ def rod_points(found: Collected, in_plane: bool) -> RodPoints:
     border = np.zeros_like(half) if in_plane else 0.5 * width - half
     border[border <= NO_ARM * thickness] = 0.0
     height = np.where(np.abs(offset) <= NO_ARM * thickness, 0.0, offset)
+    height[length == 0.0] = border[length == 0.0] = 0.0  # copies of other nodes
     middle = np.where(border > 0.0, 1.0 - 2.0 * OF_BORDER, 1.0)
     parts = [
         (np.flatnonzero(height), 0.0, middle),

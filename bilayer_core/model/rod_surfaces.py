@@ -22,17 +22,21 @@ FEW_EDGES = 2  # that a point is away from the nearest edge of its own rod that 
 class RodSurfaces(ReadOnlyArrays):
     """Points of rods that can meet, and the segments that they face.
 
-    The points of an edge divide it evenly, its first node among them (and its last at the end of a strand), no farther
+    The points of an edge divide it evenly, its first node among them (and its last where a strand ends), no farther
     apart than the strand's radius: no other rod fits between them, whatever the mesh. A point stands for the
     length between the middles to its neighbours, at the ends for half of it.
 
     A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of
     `FEW_EDGES` edges and π/2 (H + d̂), with H the thickness of the rod. A rod that met itself nearer than that would be
     bent more sharply than half its thickness.
+
+    Edges that are copies (`model.strand_arrays`) have no points, and belong to one rod more that meets nothing.
     """
 
     edge_rod: Array  # expanded rod of each edge, shape (n_edge,)
-    edge_first: Array  # whether the edge is the first of its strand, shape (n_edge,)
+    edge_first: Array  # whether the edge is the first of its strand in memory, shape (n_edge,)
+    edge_before: Array  # the edge that ends where it begins, −1 without one, shape (n_edge,)
+    edge_after: Array  # the edge that begins where it ends, likewise
     edge_arc: Array  # from and to along the path of its rod [m], shape (n_edge, 2)
     edge_radius: Array  # largest radius of its strand's nodes [m], shape (n_edge,)
     first_point: Array  # of each edge, shape (n_edge + 1,)
@@ -43,6 +47,7 @@ class RodSurfaces(ReadOnlyArrays):
     rod_can_collide: Array  # whether two rods, or one and itself, can meet, shape (n_rod, n_rod)
     rod_joined: Array  # whether one body holds both, or both ends of one, shape (n_rod, n_rod)
     rod_exclusion: Array  # arc distance from which on a rod sees itself [m], shape (n_rod,)
+    rod_length: Array  # once round a closed rod along its path [m], infinite for others, shape (n_rod,)
 
 
 def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | None:
@@ -74,20 +79,32 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     for strand in found.strands:
         number = names.index(strand.rod)
         rod = rods[number]
-        length = found.column("rest_length")[strand.first_edge : strand.first_edge + strand.node_count - 1]
+        edges = strand.shown - 1
+        length = found.column("rest_length")[strand.first_edge : strand.first_edge + edges]
         radius = float(node_radius[strand.first_node : strand.first_node + strand.node_count].max())
         per_edge = max(1, math.ceil(float(length.max()) / radius * (1.0 - 1e-9)))
         if not can_collide[number].any():
             per_edge = 0
-        for name, values in _strand_points(rod.edge_length, strand.first_station, length, per_edge).items():
+        own = _strand_points(rod.edge_length, strand.first_station, length, per_edge, strand.closed)
+        order = strand.first_edge + np.arange(edges)
+        before, after = np.append(-1, order[:-1]), np.append(order[1:], -1)
+        if strand.closed:
+            before[0], after[-1] = order[[-1, 0]]
+        own |= {
+            "edge_rod": np.full(edges, number),
+            "edge_first": np.arange(edges) == 0,
+            "edge_before": before,
+            "edge_after": after,
+            "edge_radius": np.full(edges, radius),
+            "point_edge": np.repeat(order, own["points_of_edge"]),
+        }
+        if strand.closed:
+            own |= _with_copy(own, len(rods))
+        for name, values in own.items():
             parts.setdefault(name, []).append(values)
-        edges = len(length)
-        parts.setdefault("edge_rod", []).append(np.full(edges, number))
-        parts.setdefault("edge_first", []).append(np.arange(edges) == 0)
-        parts.setdefault("edge_radius", []).append(np.full(edges, radius))
-        parts.setdefault("point_edge", []).append(
-            strand.first_edge + np.repeat(np.arange(edges), parts["points_of_edge"][-1])
-        )
+    spare = int(any(strand.closed for strand in found.strands))  # the rod of copies
+    can_collide, joined = np.pad(can_collide, (0, spare)), np.pad(joined, (0, spare))
+    exclusion += [max(exclusion)] * spare
     arrays = {name: np.ascontiguousarray(np.concatenate(values)) for name, values in parts.items()}
     counts = arrays.pop("points_of_edge")
     return RodSurfaces(
@@ -96,7 +113,15 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         rod_can_collide=can_collide,
         rod_joined=joined,
         rod_exclusion=np.array(exclusion),
+        rod_length=np.array([rod.path.length if rod.closed else math.inf for rod in rods] + [math.inf] * spare),
     )
+
+
+def _with_copy(own: dict[str, Array], rod: int) -> dict[str, Array]:
+    """What edges of a strand have, with the copy of its first edge, which belongs to a rod of its own."""
+    found = {name: np.append(own[name], own[name][:1], axis=0) for name in ("edge_arc", "edge_radius")}
+    of_copy = {"edge_rod": rod, "edge_first": False, "edge_before": -1, "edge_after": -1, "points_of_edge": 0}
+    return found | {name: np.append(own[name], value) for name, value in of_copy.items()}
 
 
 def _joined(first, second, itself: bool) -> bool:
@@ -107,7 +132,7 @@ def _joined(first, second, itself: bool) -> bool:
     return bool(ends[0] & ends[1])
 
 
-def _strand_points(spacing: float, start: int, length: Array, per_edge: int) -> dict[str, Array]:
+def _strand_points(spacing: float, start: int, length: Array, per_edge: int, closed: bool) -> dict[str, Array]:
     """Points of a strand whose edges have the lengths `length` [m] and lie `spacing` apart on the path, from station
     `start` on.
     """
@@ -123,6 +148,9 @@ def _strand_points(spacing: float, start: int, length: Array, per_edge: int) -> 
     points = np.full(edges, per_edge)
     if per_edge == 0:
         edge, fraction, weight = edge[:0], fraction[:0], weight[:0]
+    elif closed:
+        weight[0] += weight[-1]
+        edge, fraction, weight = edge[:-1], fraction[:-1], weight[:-1]
     else:
         points[-1] += 1
     return {
@@ -146,8 +174,9 @@ class NearPairs:
     def __init__(self, surfaces: RodSurfaces, edge_node: Array, start_position: Array, capacity: int = 0):
         box, sweep, met = scratch(len(edge_node))
         base, tip = np.zeros((2, *start_position.shape))
-        names = ("edge_radius", "edge_rod", "edge_first", "edge_arc", "first_point", "point_edge", "point_fraction")
-        names += ("point_arc", "rod_can_collide", "rod_joined", "rod_exclusion")
+        names = ("edge_radius", "edge_rod", "edge_first", "edge_before", "edge_after", "edge_arc", "first_point")
+        names += ("point_edge", "point_fraction", "point_arc")
+        names += ("rod_can_collide", "rod_joined", "rod_exclusion", "rod_length")
         self._geometry = dict(
             start_position=np.array(start_position),
             base=base,

@@ -13,7 +13,16 @@ from ..scene.rod import Layer, Rod, RodCopy
 from .immersed import add_fluid
 from .section import Section, bond, sections
 from .strand_arrays import StrandArrays
-from .strands import Collected, Span, StrandElements, StrandShape, add_strand, strand_shape
+from .strands import (
+    Collected,
+    Span,
+    StrandElements,
+    StrandShape,
+    add_strand,
+    stations_of,
+    strand_shape,
+    with_copies,
+)
 
 Array = np.ndarray
 
@@ -23,7 +32,7 @@ def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_in
     rod, name = copy.rod, copy.name
     strands: list[_Bonded] = []
     for slot, layer in enumerate(rod.layers):
-        first, last = rod.covered_stations(layer)
+        first, last = stations_of(rod, layer)
         at_nodes, at_edges = _sections(scene, rod, layer, first, last)
         side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
         shape = strand_shape(rod, side * at_nodes.thickness, first, last, copy.place)
@@ -39,6 +48,7 @@ def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_in
             thickness=at_nodes.thickness,
             offset=np.zeros(last - first + 1),
             curvature=shape.curvature,
+            closed=shape.closed,
         )
         _add_eigenstrain(found, scene, rod, layer, strand)
         time = scene.materials[layer.material].retardation_time
@@ -99,8 +109,8 @@ def _elements(
 
 def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     """κ̄₁ κ̄₂ ψ̄ of a layer at its nodes [rad]: its natural shape, by default that at the start, shape (n_node, 3)."""
-    first, last = rod.covered_stations(layer)
-    along, voronoi = rod.edge_length * np.arange(first, last + 1), shape.voronoi
+    first, last = stations_of(rod, layer)
+    along, voronoi = rod.edge_length * rod.on_path(np.arange(first, last + 1)), shape.voronoi
     rest = shape.strains()
     if layer.natural_curvature is not None:
         rest[:, 0] = shape.imperfection[:, 0] + values_at(layer.natural_curvature, along) * voronoi
@@ -111,14 +121,15 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
 def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, layer: Layer, strand: StrandArrays) -> None:
     """The edges of a layer that follow its laws."""
     for law in layer.eigenstrain:
-        edges = strand.first_edge - strand.first_station + np.array(rod.driven_edges(layer, law))
+        edges = np.array(rod.driven_edges(layer, law))
+        edges = strand.first_edge - strand.first_station + (with_copies(rod, edges) if strand.closed else edges)
         number = found.law(scene, law)
         found.add(driven_edge=edges, driven_law=np.full(len(edges), number), driven_weight=np.ones(len(edges)))
 
 
 def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, top: _Bonded) -> None:
     """Bonds of paired edges; the rest values are those of the initial shape."""
-    first, last = max(bottom.first, top.first), min(bottom.last, top.last)
+    first, last = max(bottom.first, top.first), min(bottom.last, top.last, rod.stations - 1)
     (_, below), (_, above) = (_sections(scene, rod, layer, first, last) for layer in rod.layers)
     law = bond(below, above, scene.coupling, rod.torsion)
     position, tangent, m1 = (found.column(name, width=3) for name in ("position", "tangent", "director1"))
@@ -150,6 +161,8 @@ def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, t
         pair_rest=rest,
         pair_time=np.zeros((last - first, 3)),
     )
+    if bottom.shape.closed and top.shape.closed:
+        return
     for station, pair, side in ((first, 0, 1.0), (last, -1, -1.0)):
         for slot in range(2):
             _add_end(found, (top, bottom), slot, station, bonds[pair], rest[pair, 0], side)

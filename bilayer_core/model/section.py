@@ -52,7 +52,7 @@ class Section:
 
 def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Section:
     """Sections of a layer at stations of its rod, which may be whole numbers or lie between."""
-    along = rod.edge_length * stations
+    along = rod.edge_length * rod.on_path(stations)
     return rectangle(
         material,
         values_at(rod.width, along),
@@ -65,6 +65,7 @@ def outline(rod: Rod, stations: Array) -> tuple[Array, Array]:
     """Width of a rod and thickness of its layers [m] at stations, which may be whole numbers or lie between; shapes
     (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not.
     """
+    stations = rod.on_path(stations)
     along = rod.edge_length * stations
     thickness = np.zeros((len(rod.layers), len(stations)))
     for own, layer in zip(thickness, rod.layers, strict=True):

@@ -1,4 +1,11 @@
-"""Where the nodes and edges of a layer stand among all of them."""
+"""Where the nodes and edges of a layer stand among all of them.
+
+A strand without ends, of a closed rod of N edges, is one with ends in memory: after its nodes 0 … N − 1 come copies
+of the first two, N and N + 1, and after its edges a copy of the first, N. So every joint, at the nodes 1 … N, lies
+between two edges that follow each other, and no force needs to know that the strand is closed. Of what is there twice
+only one has mass, stiffness and contact: nodes 1 … N and edges 0 … N − 1. That copies move as what they are copies of
+is left to the Newton matrix (`engine.linear.joins`); they begin alike, take the same steps and stay so bit for bit.
+"""
 
 from __future__ import annotations
 
@@ -26,4 +33,17 @@ class StrandArrays(ReadOnlyArrays):
     thickness: Array  # likewise
     offset: Array  # of the middle between its faces from its nodes, along m1 [m], likewise
     curvature: Array  # of its nodes' curve at the start [1/m], likewise
+    closed: bool = False  # whether its last two nodes, and its last edge, are copies of the first
     layers: tuple[StrandArrays, ...] = ()  # of a strand that stands for several: each on those nodes where it is
+
+    @property
+    def shown(self) -> int:
+        """Number of its nodes from the first to the last, which are at one place if it is closed: those that are drawn,
+        and of which the edges between them are.
+        """
+        return self.node_count - int(self.closed)
+
+    @property
+    def last_node(self) -> int:
+        """Node at its end, or where it closes."""
+        return self.first_node + self.shown - 1

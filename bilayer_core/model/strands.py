@@ -12,7 +12,7 @@ from ..kinematics.rotation import rotation_matrix
 from ..scene.config import SceneConfig
 from ..scene.eigenstrain import Eigenstrain
 from ..scene.pattern import Placement
-from ..scene.rod import Rod
+from ..scene.rod import Layer, Rod
 from .imperfection import departure
 from .strand_arrays import StrandArrays
 
@@ -70,11 +70,18 @@ class StrandShape:
     end_normals: Array  # likewise
     imperfection: Array  # κ₁ κ₂ ψ [rad], shape (n_node, 3)
     handedness: float  # −1 of a mirror image, 1 of any other
+    closed: bool = False  # see `model.strand_arrays`
 
     @property
     def voronoi(self) -> Array:
         """Half the lengths of the edges at each node [m], shape (n_node,)."""
-        return halves_to_nodes(self.lengths)
+        return self._round(halves_to_nodes(self.lengths))
+
+    def _round(self, of_nodes: Array) -> Array:
+        """What nodes have, that of a closed strand's first and last node as that of the nodes that they stand for."""
+        if self.closed:
+            of_nodes[0], of_nodes[-1] = of_nodes[-2], of_nodes[1]
+        return of_nodes
 
     @property
     def curvature(self) -> Array:
@@ -85,7 +92,25 @@ class StrandShape:
         """κ₁ κ₂ ψ [rad] at each node: between the edges at it, at the ends between path and edge, shape (n_node, 3)."""
         tangents = np.concatenate([self.end_tangents[:1], self.tangents, self.end_tangents[1:]])
         normals = np.concatenate([self.end_normals[:1], self.normals, self.end_normals[1:]])
-        return rest_strains(tangents[:-1], normals[:-1], tangents[1:], normals[1:])
+        return self._round(rest_strains(tangents[:-1], normals[:-1], tangents[1:], normals[1:]))
+
+
+def stations_of(rod: Rod, layer: Layer | None = None) -> tuple[int, int]:
+    """First and last station of the strand of a layer, or of the whole rod: one beyond those of the path if it is
+    closed.
+    """
+    first, last = (0, rod.stations - 1) if layer is None else rod.covered_stations(layer)
+    return first, last + int(is_closed(rod, first, last))
+
+
+def is_closed(rod: Rod, first: int, last: int) -> bool:
+    """Whether the strand over these stations of a rod has no ends."""
+    return rod.closed and first == 0 and last >= rod.stations - 1
+
+
+def with_copies(rod: Rod, edges: Array) -> Array:
+    """Edges of the path of a rod, and the copy of the first one of a closed rod if that is among them."""
+    return np.append(edges, rod.stations - 1) if rod.closed and 0 in edges else edges
 
 
 def strand_shape(rod: Rod, height: Array, first: int, last: int, place: Placement) -> StrandShape:
@@ -127,10 +152,13 @@ def _shape(
     place: Placement,
     frames_at: Callable[[Rod, Array], tuple[Array, Array, Array]],
 ) -> StrandShape:
-    arc = rod.edge_length * np.arange(first, last + 1)
+    arc = rod.edge_length * rod.on_path(np.arange(first, last + 1))
     points, tangents, normals = frames_at(rod, arc)
-    _, _, middle_normals = frames_at(rod, rod.edge_length * (np.arange(first, last) + 0.5))
+    _, _, middle_normals = frames_at(rod, rod.edge_length * rod.on_path(np.arange(first, last) + 0.5))
     positions = place.points(points + height[:, None] * normals)
+    closed = is_closed(rod, first, last)
+    if closed:  # to the last digit
+        positions[-2:], middle_normals[-1] = positions[:2], middle_normals[0]
     edges = np.diff(positions, axis=0)
     lengths = np.linalg.norm(edges, axis=1)
     edge_tangents = edges / lengths[:, None]
@@ -149,6 +177,7 @@ def _shape(
         _across(place.directions(normals[ends]), end_tangents),
         np.zeros((len(positions), 3)),
         place.handedness,
+        closed,
     )
 
 
@@ -192,22 +221,29 @@ def add_strand(
     nodes, edges = strand.node_count, strand.node_count - 1
     first_edge, first_node = strand.first_edge, strand.first_node
     voronoi, index = shape.voronoi, np.arange(nodes)
+    own_nodes, own_edges = np.ones(nodes), np.ones(edges)
+    if strand.closed:
+        own_nodes[[0, -1]] = own_edges[-1] = 0.0
+        found.add(
+            joined_node=first_node + np.array([[0, nodes - 2], [1, nodes - 1]]),
+            joined_edge=np.array([[first_edge, first_edge + edges - 1]]),
+        )
     found.strands.append(strand)
     found.add(
         position=shape.positions,
         tangent=shape.tangents,
         director1=shape.normals,
-        edge_mass=elements.edge_mass,
-        node_mass=halves_to_nodes(elements.edge_mass),
-        node_length=voronoi,
+        edge_mass=own_edges * elements.edge_mass,
+        node_mass=own_nodes * halves_to_nodes(elements.edge_mass),
+        node_length=own_nodes * voronoi,
         node_radius=elements.node_radius,
         node_edges=first_edge + np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1),
         node_axis=np.full(nodes, {"path": 0, "normal": 1, "across": 2 * int(shape.handedness)}[rod.friction_axis]),
-        spin_inertia=elements.spin_inertia,
+        spin_inertia=own_edges * elements.spin_inertia,
         half_width=elements.half_width,
         edge_node=first_node + np.arange(edges),
         rest_length=shape.lengths,
-        axial_stiffness=elements.axial_stiffness,
+        axial_stiffness=own_edges * elements.axial_stiffness,
         rest_strain=elements.rest_strain,
         edge_time=np.full(edges, elements.retardation_time),
     )

@@ -23,7 +23,7 @@ def _shape(values: dict) -> ShapeInfo:
 
 
 def _strand(values: dict) -> Strand:
-    """A strand from its attributes; older logs have neither offset nor curvature nor layers."""
+    """A strand from its attributes; older logs have neither offset nor curvature nor layers nor closed ones."""
     none = np.zeros(len(values["width"]))
     return Strand(
         **{name: values[name] for name in ("name", "rod", "layer")},
@@ -31,6 +31,7 @@ def _strand(values: dict) -> Strand:
         **{name: np.array(values[name]) for name in ("width", "thickness")},
         **{name: np.array(values.get(name, none)) for name in ("offset", "curvature")},
         layers=tuple(map(_strand, values.get("layers", ()))),
+        closed=values.get("closed", False),
     )
 
 

@@ -46,8 +46,8 @@ class NodeFrames:
         for strand in description.strands:
             size = len(edges[strand.edges]) + 1
             own = edge_count + np.arange(size - 1)
-            before += [own[0], *own]
-            after += [*own, own[-1]]
+            before += [own[-1] if strand.closed else own[0], *own]
+            after += [*own, own[0] if strand.closed else own[-1]]
             start += list(node_count + np.arange(size - 1))
             node_count += size
             edge_count += size - 1

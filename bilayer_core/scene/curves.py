@@ -3,6 +3,11 @@
 Normals. The normal at the start is carried along without any twist (parallel transport). Where points have normals of
 their own, made perpendicular to the curve, the angle between the two is interpolated between the points: linearly on
 segments, by a cubic spline on a smooth curve. Its rate is the twist.
+
+Closed curves. The normal that was carried once round comes back turned by the *closing* angle, between −180° and 180°
+and zero in a plane. Without normals of its own a closed curve spreads that angle evenly, so that frames close with the
+least twist; with them they close because the last normal is the first. Their twist, less the closing angle, is a whole
+number of turns.
 """
 
 from __future__ import annotations
@@ -29,10 +34,14 @@ Vectors = tuple[tuple[float, float, float], ...]
 
 
 @lru_cache(CURVES_KEPT)
-def curve_through(shape: str, points: Vectors, normals: Vectors | None) -> Curve:
-    """The `polyline` or `spline` through points [m] with normals at them, or with none."""
+def curve_through(shape: str, points: Vectors, normals: Vectors | None, closed: bool = False) -> Curve:
+    """The `polyline` or `spline` through points [m] with normals at them, or with none; a closed one leads from the
+    last point back to the first.
+    """
     kind = {"polyline": Polyline, "spline": Spline}[shape]
-    return kind(np.array(points), None if normals is None else np.array(normals))
+    once_more = slice(None, 1 if closed else 0)
+    points, normals = (None if part is None else (*part, *part[once_more]) for part in (points, normals))
+    return kind(np.array(points), None if normals is None else np.array(normals), closed)
 
 
 class Curve(ABC):
@@ -41,7 +50,7 @@ class Curve(ABC):
     Attributes
     ----------
     points : ndarray
-        [m], shape (n_point, 3).
+        [m], shape (n_point, 3); of a closed curve the last is the first.
     normals : ndarray or None
         At the points, shape (n_point, 3).
     knots : ndarray
@@ -56,8 +65,8 @@ class Curve(ABC):
     sharpest: Array
     turn: float
 
-    def __init__(self, points: Array, normals: Array | None):
-        self.points, self.normals = points, normals
+    def __init__(self, points: Array, normals: Array | None, closed: bool):
+        self.points, self.normals, self.closed = points, normals, closed
 
     @abstractmethod
     def carried(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
@@ -80,36 +89,58 @@ class Curve(ABC):
         sines = (self.normals * np.cross(tangents, carried)).sum(axis=1)
         return np.unwrap(np.arctan2(sines, (self.normals * carried).sum(axis=1)))
 
+    @cached_property
+    def closing(self) -> float:
+        """Angle from the normal carried once round to that at the start [rad]; 0 of an open curve."""
+        if not self.closed:
+            return 0.0
+        tangent = self.carried(np.eye(3)[0], np.zeros(1))[1]
+        start = across(np.eye(3)[[np.abs(tangent[0]).argmin()]], tangent)[0]
+        _, tangents, (first, last) = self.carried(start, self.knots[[0, -1]])
+        return float(np.arctan2(first @ np.cross(tangents[0], last), first @ last))
+
     def frames(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
         """Points [m], tangents and normals at lengths `arc` [m] from the start, shapes (n, 3)."""
-        if self.normals is None:
+        if self.normals is None and not self.closed:
             return self.carried(normal, arc)
-        points, tangents, carried = self.carried(self.normals[0], arc)
-        angle = self.angle(arc)[:, None]
+        if self.normals is None:
+            points, tangents, carried = self.carried(normal, arc)
+            angle = (self.closing * arc / self.knots[-1])[:, None]
+        else:
+            points, tangents, carried = self.carried(self.normals[0], arc)
+            angle = self.angle(arc)[:, None]
         return points, tangents, np.cos(angle) * carried + np.sin(angle) * np.cross(tangents, carried)
 
     def curvatures(self, normal: Array, arc: Array, over: float) -> Array:
         """Curvature towards the normal and across, and twist [1/m] there, shape (n, 3)."""
         _, tangents, normals = self.frames(normal, arc)
         bend, across = self.bend(arc, over), np.cross(tangents, normals)
-        twist = np.zeros(len(arc)) if self.normals is None else self.angle(arc, 1)
+        even = np.full(len(arc), self.closing / self.knots[-1])
+        twist = even if self.normals is None else self.angle(arc, 1)
         return np.stack([(bend * normals).sum(axis=1), (bend * across).sum(axis=1), twist], axis=1)
 
 
 class Polyline(Curve):
     """Straight segments."""
 
-    def __init__(self, points: Array, normals: Array | None):
-        super().__init__(points, normals)
+    def __init__(self, points: Array, normals: Array | None, closed: bool):
+        super().__init__(points, normals, closed)
         segments = np.diff(points, axis=0)
         length = np.linalg.norm(segments, axis=1)
         self.knots = np.concatenate([[0.0], np.cumsum(length)])
         self._tangents = segments / length[:, None]
-        before, after = self._tangents[:-1], self._tangents[1:]
+        before, after = self._beside_corners
         self.corners = 2.0 * np.arctan2(
             np.linalg.norm(after - before, axis=1), np.linalg.norm(after + before, axis=1)
-        )  # angle by which the curve turns at each inner point [rad], shape (n_point − 2,)
-        self.turn, self.sharpest = float(self.corners.sum()), self.knots[1:-1]
+        )  # angle by which the curve turns at each inner point, and at the last of a closed one [rad]
+        self.turn, self.sharpest = float(self.corners.sum()), self.knots[1 : 1 + len(self.corners)]
+
+    @property
+    def _beside_corners(self) -> tuple[Array, Array]:
+        """Tangents of the segments before and after each corner, shape (n_corner, 3)."""
+        if self.closed:
+            return self._tangents, np.roll(self._tangents, -1, axis=0)
+        return self._tangents[:-1], self._tangents[1:]
 
     @cached_property
     def _transport(self) -> Array:
@@ -127,6 +158,11 @@ class Polyline(Curve):
         before, after = self._segment(arc - near), self._segment(arc + near)
         points = self.points[after] + (arc - self.knots[after])[:, None] * self._tangents[after]
         tangents, normals = (unit(part[before] + part[after]) for part in (self._tangents, own))
+        if self.closed:  # at the join from either side: one is not the other carried on, see `closing`
+            middle = unit(self._tangents[-1:] + self._tangents[:1])
+            for side, there in ((0, arc <= near), (-1, arc >= self.knots[-1] - near)):
+                tangents[there] = middle
+                normals[there] = _rotations(self._tangents[[side]], middle)[0] @ own[side]
         return points, tangents, normals
 
     def angle(self, arc: Array, derivative: int = 0) -> Array:
@@ -137,9 +173,11 @@ class Polyline(Curve):
 
     def bend(self, arc: Array, over: float) -> Array:
         """t′ [1/m]: of each corner less than half of `over` away 2 tan(θ/2) over that length, as a joint has it."""
-        before, after = self._tangents[:-1], self._tangents[1:]
+        before, after = self._beside_corners
         kinks = (after - before) / np.cos(0.5 * self.corners)[:, None]
-        distance = arc[:, None] - self.knots[None, 1:-1]
+        distance = arc[:, None] - self.sharpest
+        if self.closed:
+            distance -= self.knots[-1] * np.round(distance / self.knots[-1])
         inside = (-0.5 * over <= distance) & (distance < 0.5 * over)
         return inside @ kinks / over
 
@@ -147,18 +185,21 @@ class Polyline(Curve):
 class Spline(Curve):
     """A cubic spline over the distances between the points."""
 
-    def __init__(self, points: Array, normals: Array | None):
+    def __init__(self, points: Array, normals: Array | None, closed: bool):
         from scipy.interpolate import CubicSpline
 
-        super().__init__(points, normals)
+        super().__init__(points, normals, closed)
         distance = np.linalg.norm(np.diff(points, axis=0), axis=1)
-        self._curve = CubicSpline(np.concatenate([[0.0], np.cumsum(distance)]), points)
+        ends = "periodic" if closed else "not-a-knot"
+        self._curve = CubicSpline(np.concatenate([[0.0], np.cumsum(distance)]), points, bc_type=ends)
         x = self._curve.x
         inside = x[:-1, None] + np.diff(x)[:, None] * np.arange(CELLS) / CELLS
         self._grid = np.append(inside, x[-1])  # ends of all cells, of the curve's parameter, shape (n_cell + 1,)
         self.sharpest = np.concatenate([[0.0], np.cumsum(self._length_between(self._grid[:-1], self._grid[1:]))])
         self.knots = self.sharpest[::CELLS]
         self._tangents = unit(self._curve(self._grid, 1))
+        if closed:
+            self._tangents[-1] = self._tangents[0]
         halves = np.minimum(0.5 * np.linalg.norm(np.diff(self._tangents, axis=0), axis=1), 1.0)
         self.turn = float(2.0 * np.arcsin(halves).sum())
 
@@ -197,11 +238,20 @@ class Spline(Curve):
         """Angle from carried normals [rad] over the length along the curve [m]."""
         from scipy.interpolate import CubicSpline
 
-        return CubicSpline(self.knots, self.angles)
+        if not self.closed:
+            return CubicSpline(self.knots, self.angles)
+        about_ramp = self.angles - self._ramp * self.knots
+        about_ramp[-1] = about_ramp[0]
+        return CubicSpline(self.knots, about_ramp, bc_type="periodic")
+
+    @property
+    def _ramp(self) -> float:
+        """Mean rate of that angle along a closed curve [rad/m]; 0 of an open one."""
+        return float(self.angles[-1] - self.angles[0]) / self.knots[-1] if self.closed else 0.0
 
     def angle(self, arc: Array, derivative: int = 0) -> Array:
         """Angle from carried normals [rad], or its derivative."""
-        return self._turning(arc, derivative)
+        return self._turning(arc, derivative) + self._ramp * (arc if derivative == 0 else 1.0)
 
     def bend(self, arc: Array, over: float) -> Array:
         """t′ [1/m], but for a part along t."""

@@ -43,6 +43,11 @@ class Path(Part):
         """χ, ξ, τ [1/m] there, shape (n, 3). Corners have a mean `over` a length [m] alone."""
 
     @property
+    def is_closed(self) -> bool:
+        """Whether it ends where it starts, and a rod on it has no ends."""
+        return bool(getattr(self, "closed", False))
+
+    @property
     def sharpest(self) -> Array:
         """Lengths along it [m] of which one has the largest curvature."""
         return np.array([0.0, self.length])
@@ -116,6 +121,13 @@ class ArcPath(Path):
     """How far round; the length is radius times angle."""
     toward: Literal["normal", "opposite"] = "normal"
     """Side on which the centre lies: that of the rod's normal at the start, or the other."""
+    closed: bool = False
+    """Of a full circle, `angle: 360 deg`: the rod is a ring without ends, and its last station is the first."""
+
+    @model_validator(mode="after")
+    def _check(self) -> ArcPath:
+        refuse_all("ArcPath", faults_of_arc(self))
+        return self
 
     @property
     def length(self) -> float:
@@ -148,6 +160,17 @@ class ArcPath(Path):
     def describe(self) -> str:
         """Its shape in words."""
         return f"arc of radius {1e3 * self.radius:.4g} mm over {math.degrees(self.angle):.4g}°"
+
+
+def faults_of_arc(path: ArcPath) -> list[Fault]:
+    """Whether a closed one closes."""
+    if not path.closed or abs(path.angle - 2.0 * math.pi) <= ROUNDING:
+        return []
+    gap = 2.0 * path.radius * abs(math.sin(0.5 * path.angle))
+    demand = f"must be 360 deg of a closed path: its ends are {gap:.3g} m apart"
+    if path.angle > 2.0 * math.pi:
+        demand = "must be 360 deg of a closed path"
+    return [(("angle",), path.angle, demand)]
 
 
 class SpiralPath(Path):

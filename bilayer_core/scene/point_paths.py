@@ -19,6 +19,11 @@ STEEP = math.radians(10.0)
 """Least angle between a normal and its tangent [rad]: a smaller one does not say where the top is."""
 AGREE = math.radians(1.0)
 """Most that the rod's normal may be off the first one of the points [rad]."""
+MOST_BACK = math.radians(90.0)
+"""Most that the normals of a closed path may turn from its last point to the first [rad]."""
+CLOSED_BY = 0.1
+"""Part of the shortest other segment: a shorter one from the last point to the first is a gap."""
+CLOSE = "Each face of a rod meets itself: whole turns close, half ones (a Moebius band) do not"
 SHARPEST_CORNER = math.radians(170.0)
 """Largest turn of a corner [rad]: beyond it the path folds back on itself."""
 
@@ -35,6 +40,10 @@ class PointPath(Path):
     file: str | None = None
     """Instead of points: csv file, relative to the scene file, with columns `x`, `y`, `z` [m] and perhaps `nx`, `ny`,
     `nz`, the normals.
+    """
+    closed: bool = False
+    """Whether the path leads from the last point back to the first, which may stand once more at the end: the rod has
+    no ends, and its last station is the first. Without normals its frame closes with the least twist.
     """
 
     @model_validator(mode="before")
@@ -63,7 +72,14 @@ class PointPath(Path):
     @property
     def curve(self) -> Curve:
         """The curve itself."""
-        return curve_through(self.shape, tuple(self.points), None if self.normals is None else tuple(self.normals))
+        own = slice(self.own_points)
+        normals = None if self.normals is None else tuple(self.normals[own])
+        return curve_through(self.shape, tuple(self.points[own]), normals, self.closed)
+
+    @property
+    def own_points(self) -> int:
+        """Number of points, without the first one where a closed path has it at its end once more."""
+        return len(self.points) - int(self.closed and _are_one(self.points[0], self.points[-1]))
 
     @property
     def length(self) -> float:
@@ -108,7 +124,8 @@ class PointPath(Path):
     def describe(self) -> str:
         """Its shape in words."""
         normals = "" if self.normals is None else " with normals"
-        return f"{self.shape} through {len(self.points)} points{normals}"
+        closed = "closed " if self.closed else ""
+        return f"{closed}{self.shape} through {self.own_points} points{normals}"
 
 
 class PolylinePath(PointPath):
@@ -142,17 +159,19 @@ def points_of_file(table: CsvFile) -> dict[str, list[list[float]]]:
 
 def faults_of_points(path: PointPath) -> list[Fault]:
     """Points that make no curve, and normals that make no frame."""
-    least = 3 if path.shape == "spline" else 2
+    least = 3 if path.shape == "spline" or path.closed else 2
     if path.points is None:
         return [(("points",), None, "must be given, or `file`")]
     count = len(path.points)
-    if count < least:
-        return [(("points",), f"{count} points", f"must be at least {least} points for a {path.shape}")]
+    if count < least or path.own_points < least:
+        kind = f"closed {path.shape}" if path.closed else path.shape
+        return [(("points",), f"{path.own_points} points", f"must be at least {least} points for a {kind}")]
     faults: list[Fault] = [
         (("points", index), after, "must be another point than the one before it")
         for index, (before, after) in enumerate(pairwise(path.points), start=1)
-        if math.dist(before, after) <= ROUNDING * max(math.hypot(*before), math.hypot(*after))
+        if _are_one(before, after)
     ]
+    faults += _faults_of_gap(path) if path.closed and not faults else ()
     if path.normals is not None and len(path.normals) != count:
         faults.append((("normals",), f"{len(path.normals)} entries", f"must be as many as points, {count}"))
     if faults:
@@ -160,18 +179,42 @@ def faults_of_points(path: PointPath) -> list[Fault]:
     if isinstance(path, PolylinePath):
         faults += [
             (("points", index), path.points[index], "must not be a corner where the path folds back on itself")
-            for index, corner in enumerate(path.curve.corners, start=1)
+            for index, corner in ((k % path.own_points, c) for k, c in enumerate(path.curve.corners, start=1))
             if corner > SHARPEST_CORNER
         ]
     if faults or path.normals is None:
         return faults
     _, tangents, _ = path.curve.carried(np.array(path.normals[0]), path.curve.knots)
-    for index, (normal, tangent) in enumerate(zip(path.normals, tangents, strict=True)):
+    for index, (normal, tangent) in enumerate(zip(path.normals[: path.own_points], tangents, strict=False)):
         steepness = _angle_between(np.array(normal), tangent)
         if min(steepness, math.pi - steepness) < STEEP:
             demand = f"must be across the path, is {math.degrees(steepness):.3g} deg from its tangent"
             faults.append((("normals", index), normal, f"{demand} {_rounded(tangent)}"))
+    last = path.own_points - 1
+    if last + 1 < count and _angle_between(np.array(path.normals[-1]), np.array(path.normals[0])) > AGREE:
+        faults.append((("normals", last + 1), path.normals[-1], f"must be the first normal, as the point is. {CLOSE}"))
+    back = abs(float(np.diff(path.curve.angles)[-1])) if path.closed and not faults else 0.0
+    if back > MOST_BACK:
+        demand = (
+            f"must turn by at most {math.degrees(MOST_BACK):g} deg from the last point back to the first, turns by "
+            f"{math.degrees(back):.0f} deg. {CLOSE}"
+        )
+        faults.append((("normals", last), path.normals[last], demand))
     return faults
+
+
+def _are_one(first: Point, second: Point) -> bool:
+    return math.dist(first, second) <= ROUNDING * max(math.hypot(*first), math.hypot(*second))
+
+
+def _faults_of_gap(path: PointPath) -> list[Fault]:
+    """Whether the last point of a closed path is meant to be the first, but is not quite."""
+    own = path.points[: path.own_points]
+    gap, others = math.dist(own[-1], own[0]), [math.dist(before, after) for before, after in pairwise(own)]
+    if gap >= CLOSED_BY * min(others):
+        return []
+    demand = f"must be the first point or well apart from it: the path does not close by {gap:.3g} m"
+    return [(("points", path.own_points - 1), own[-1], demand)]
 
 
 def _rounded(vector: Array) -> str:

@@ -17,8 +17,8 @@ from bilayer_core.scene.limits import MOST_NODES
 from bilayer_core.scene.part import Direction, Name, Part
 from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
 from bilayer_core.scene.pattern import Patterns, Placement, placed
-from bilayer_core.scene.point_paths import PointPath, PolylinePath, SplinePath
-from bilayer_core.scene.profile import Profile, extremes, varying
+from bilayer_core.scene.point_paths import PolylinePath, SplinePath
+from bilayer_core.scene.profile import Profile, extremes, values_at, varying
 from bilayer_core.scene.units import (
     Curvature,
     NonNegativeLength,
@@ -87,7 +87,7 @@ class Rod(Part):
     path through points only its part across the path counts.
     """
     stations: whole(3, MOST_NODES)
-    """Cross-sections along the path, both ends included."""
+    """Cross-sections along the path, both ends included; the last one of a closed path is the first again."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
     """Bottom first."""
     torsion: Literal["laminate", "layers"] = "laminate"
@@ -107,6 +107,16 @@ class Rod(Part):
     def edge_length(self) -> float:
         """Distance of two stations [m]."""
         return self.path.length / (self.stations - 1)
+
+    @property
+    def closed(self) -> bool:
+        """Whether it has no ends."""
+        return self.path.is_closed
+
+    def on_path(self, stations: np.ndarray) -> np.ndarray:
+        """Stations, whole or not; on a closed path those beyond the last one as they are on the first round."""
+        last = self.stations - 1
+        return np.where(stations > last, stations - last, stations) if self.closed else stations
 
     def frames_at(self, arc: np.ndarray) -> Frames:
         """Points [m], tangents and normals of the path at lengths `arc` [m] along it, shapes (n, 3)."""
@@ -190,6 +200,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     """Its normal, and where its layers begin and end."""
     demand = rod.path.demand_of_normal(np.array(rod.normal))
     faults: list[Fault] = [(("normal",), rod.normal, demand)] if demand else []
+    faults += _faults_of_closed(rod) if rod.closed else ()
     names = [(("layers", index, "name"), layer.name) for index, layer in enumerate(rod.layers)]
     faults += repeated(names, "layers of a rod")
     ordered = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
@@ -233,6 +244,37 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         faults.append((("layers",), [layer.interval for layer in rod.layers], demand))
     faults += _faults_of_copies(rod) if rod.pattern is not None else ()
     return faults
+
+
+LEAST_CLOSED = 5
+"""Stations of a closed rod: four edges."""
+
+
+def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
+    """What a rod without ends cannot have."""
+    if rod.stations < LEAST_CLOSED:
+        yield ("stations",), rod.stations, f"must be at least {LEAST_CLOSED} on a closed path"
+    for end in ("clamp_start", "clamp_end"):
+        for where, holder in ((), rod), (("pattern",), rod.pattern):
+            if getattr(holder, end, None) is not None:
+                yield (*where, end), getattr(holder, end), "must be left out: a closed path has no ends to hold"
+    parts = [((), rod, ("width",))]
+    names = ("thickness", "stiffness", "natural_curvature", "natural_twist")
+    parts += [(("layers", index), layer, names) for index, layer in enumerate(rod.layers)]
+    for where, part, keys in parts:
+        for key in keys:
+            first, last = values_at(getattr(part, key) or 0.0, np.array([0.0, rod.path.length]))
+            if abs(first - last) > ROUNDING * max(abs(first), abs(last)):
+                demand = f"must be the same where a closed path starts and ends, is {first:g} and {last:g} there"
+                yield (*where, key), "a profile", demand
+    for index, layer in enumerate(rod.layers):
+        covered = rod.covered_stations(layer)
+        if covered[0] < 1 and covered != (0, rod.stations - 1):
+            demand = (
+                f"must begin an edge, {rod.edge_length:g} m, or more after the start of a closed path: let the path "
+                "start where the layer is not"
+            )
+            yield ("layers", index, "interval"), layer.interval, demand
 
 
 POINTS_COMPARED = 9
@@ -300,26 +342,30 @@ def _crossings(rod: Rod) -> Iterator[Fault]:
     """Whether a path comes nearer to itself than the thickness of its rod, but for the two sides of a bend no sharper
     than half the thickness.
 
-    One that turns by less than half a turn cannot. Arcs and spirals may be wound up more densely; contact refuses them.
+    One that turns by less than half a turn cannot.
     """
-    if not isinstance(rod.path, HelixPath | PointPath) or rod.path.turn < math.pi:
+    if rod.path.turn < math.pi:
         return
     from scipy.spatial import cKDTree
 
     thickness = sum(extremes(layer.thickness)[1] for layer in rod.layers)
-    arc = np.linspace(0.0, rod.path.length, math.ceil(SAMPLES_PER_THICKNESS * rod.path.length / thickness) + 1)
+    samples = math.ceil(SAMPLES_PER_THICKNESS * rod.path.length / thickness)
+    arc = np.linspace(0.0, rod.path.length, samples + 1)[: samples if rod.closed else None]
     points = rod.frames_at(arc)[0]
     near = cKDTree(points).query_pairs(thickness * (1.0 - ROUNDING), output_type="ndarray")
-    near = near[np.abs(np.subtract(*arc[near].T)) > 0.5 * math.pi * thickness]
+    along = np.abs(np.subtract(*arc[near].T))
+    if rod.closed:
+        along = np.minimum(along, rod.path.length - along)
+    near = near[along > 0.5 * math.pi * thickness]
     if not len(near):
         return
     apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
-    first, second = arc[near[apart.argmin()]]
-    yield (
-        ("path",),
-        f"{apart.min():.3g} m between {first:.4g} m and {second:.4g} m along it",
-        f"must not come nearer to itself than the thickness of the rod, {thickness:g} m",
-    )
+    first, second = np.sort(arc[near[apart.argmin()]])
+    demand = f"must not come nearer to itself than the thickness of the rod, {thickness:g} m"
+    ends_meet = not rod.closed and first <= thickness and rod.path.length - second <= thickness
+    if ends_meet and hasattr(rod.path, "closed"):
+        demand += "; a ring without ends is `closed: true`"
+    yield ("path",), f"{apart.min():.3g} m between {first:.4g} m and {second:.4g} m along it", demand
 
 
 def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:

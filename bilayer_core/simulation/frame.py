@@ -28,6 +28,8 @@ class Strand:
     layers : tuple of Strand
         The layers of a strand that stands for several, bottom first: each with those of its nodes where it is, its
         own cross-section there, and the offset of its own middle. Empty for a strand of one layer.
+    closed : bool
+        Whether it has no ends: its first and its last node are one, and all that they have is the same.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Strand:
     offset: np.ndarray
     curvature: np.ndarray
     layers: tuple[Strand, ...] = ()
+    closed: bool = False
 
     def strain_of(self, strain: np.ndarray, curvature: np.ndarray) -> np.ndarray:
         """Axial strain in the middle of its section, which stays plane: (1 + ε − yχ)/(1 − yχ₀) − 1 at y = `offset`.

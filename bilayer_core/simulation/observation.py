@@ -68,13 +68,11 @@ def _strand(s: StrandArrays) -> Strand:
         s.name,
         s.rod,
         s.layer,
-        slice(s.first_node, s.first_node + s.node_count),
-        slice(s.first_edge, s.first_edge + s.node_count - 1),
-        s.width,
-        s.thickness,
-        s.offset,
-        s.curvature,
+        slice(s.first_node, s.first_node + s.shown),
+        slice(s.first_edge, s.first_edge + s.shown - 1),
+        *(part[: s.shown] for part in (s.width, s.thickness, s.offset, s.curvature)),
         tuple(map(_strand, s.layers)),
+        s.closed,
     )
 
 
@@ -161,6 +159,7 @@ def node_strain(model: Model, stepper: Stepper) -> Array:
         nodes = strain[s.first_node : s.first_node + s.node_count]
         nodes[0], nodes[-1] = own[0], own[-1]
         nodes[1:-1] = 0.5 * (own[:-1] + own[1:])
+    _copy_closed(model, strain)
     return strain
 
 
@@ -180,7 +179,16 @@ def node_curvature(model: Model, stepper: Stepper) -> Array:
         for end, neighbour in ((first, first + 1), (last, last - 1)):
             if end not in model.attached_node:
                 curvature[end] = curvature[neighbour]
+    _copy_closed(model, curvature)
     return curvature
+
+
+def _copy_closed(model: Model, of_nodes: Array) -> None:
+    """Give the first and the last node of closed strands in memory what those have that they stand for."""
+    for s in model.strands:
+        if s.closed:
+            own = of_nodes[s.first_node : s.first_node + s.node_count]
+            own[0], own[-1] = own[-2], own[1]
 
 
 def energies(stepper: Stepper, state: State) -> dict[str, float]:

@@ -79,7 +79,7 @@ def summarise(simulator: Any) -> dict:
         "com_max_height": statistics.com_max_height,
         "max_curvature": statistics.max_curvature,
         "mean_curvature": float(np.average(curvature, weights=model.node_length)),
-        "tip_positions": {s.name: positions[s.first_node + s.node_count - 1].tolist() for s in model.strands},
+        "tip_positions": {s.name: positions[s.last_node].tolist() for s in model.strands},
         "max_strain": statistics.max_strain,
         "contact_stiffness": model.contact_stiffness or None,
         "min_gap": min_gap if np.isfinite(min_gap) else None,

@@ -326,8 +326,8 @@ def test_whatever_can_touch_needs_contact_settings(part):
     ("path", "place", "radius"),
     [
         ({"shape": "arc", "radius": 0.001, "angle": 1.0}, "radius", 0.001),
-        ({"shape": "spiral", "start_radius": 0.02, "end_radius": 0.001, "angle": 300.0}, "end_radius", 0.001),
-        ({"shape": "spiral", "start_radius": 0.001, "end_radius": 0.02, "angle": 300.0}, "start_radius", 0.001),
+        ({"shape": "spiral", "start_radius": 0.02, "end_radius": 0.001, "angle": 50.0}, "end_radius", 0.001),
+        ({"shape": "spiral", "start_radius": 0.001, "end_radius": 0.02, "angle": 50.0}, "start_radius", 0.001),
     ],
 )
 def test_a_path_whose_inner_face_would_have_no_length_is_refused(path, place, radius):

@@ -9,7 +9,8 @@ the unknowns of these nodes and R all others,
     [ A_SR  A_SS ]        border: U = A_RS,   corner: D = A_SS
 
 Of each two strands in contact the nodes that are fewer have such *contact columns*. So the border has three columns for
-each of some contacting nodes, and the cost stays linear in the number of nodes.
+each of some contacting nodes, and the cost stays linear in the number of nodes. Nodes where a closed rod closes have
+columns in the border anyhow (`engine.linear.joins`).
 """
 
 from __future__ import annotations
@@ -102,6 +103,7 @@ def _choose_nodes(columns, strands):
     """Of each two strands in contact (or halves of one) the nodes that are fewer have contact columns."""
     count, dimension, row = columns.counts[CONTACTS], strands.dimension, strands.row
     node, strand, attached, mark, met = columns.node, columns.strand, columns.attached, columns.mark, columns.met
+    joined = columns.joined
     mark[:] = -1
     met[:] = 0
     columns.column[:] = -1
@@ -118,7 +120,7 @@ def _choose_nodes(columns, strands):
                 continue
             for i in range(low, low + 2):
                 for j in range(high, high + 2):
-                    if attached[i] < 0 and attached[j] < 0:
+                    if attached[i] < 0 and attached[j] < 0 and not joined[i] and not joined[j]:
                         lower += mark[i, 0] != c
                         upper += mark[j, 1] != c
                         mark[i, 0] = mark[j, 1] = c
@@ -180,7 +182,7 @@ def move_to_border(p):
     """
     columns, bordered, strands = p.contact_columns, p.bordered, p.strands
     nodes, base = columns.counts[NODES], bordered.width[0]
-    if nodes == 0:
+    if columns.counts[CONTACTS] == 0 or (nodes == 0 and not p.joins.exists):
         return True
     bordered.width[0] += strands.dimension * nodes
     if bordered.width[0] > bordered.load.shape[0]:
@@ -194,7 +196,7 @@ def move_to_border(p):
         for b in range(base, bordered.width[0]):
             bordered.schur[a, b] = 0.0
     _move_from_band(columns, bordered, strands, base, p.system.band)
-    _add_between(columns, bordered, strands.row, base)
+    _add_between(columns, p.joins, p.bodies.freedom, bordered, strands.row, base)
     return True
 
 
@@ -219,9 +221,17 @@ def _move_from_band(columns, bordered, strands, base, band):
 
 
 @kernel
-def _add_between(columns, bordered, node_row, base):
+def _column(columns, joins, freedom, base, row):
+    """The border's column of a row of the band, −1 without one."""
+    if joins.exists and joins.column[row] >= 0:
+        return freedom.shape[1] + joins.column[row]
+    return base + columns.column[row] if columns.column[row] >= 0 else -1
+
+
+@kernel
+def _add_between(columns, joins, freedom, bordered, node_row, base):
     """Add the blocks between the edges of contacts, of nodes that no body holds; one node of each has columns."""
-    dimension, slot, attached = columns.matrix.shape[1], columns.column, columns.attached
+    dimension, attached = columns.matrix.shape[1], columns.attached
     for c in range(columns.counts[CONTACTS]):
         for pair in range(4):
             m, n = pair // 2, pair % 2
@@ -231,15 +241,16 @@ def _add_between(columns, bordered, node_row, base):
             for x in range(dimension):
                 for y in range(dimension):
                     row, column = node_row[i] + x, node_row[j] + y
-                    a, b = slot[row], slot[column]
+                    a = _column(columns, joins, freedom, base, row)
+                    b = _column(columns, joins, freedom, base, column)
                     value = _block(columns, c, m, 2 + n, x, y)
                     if a >= 0 and b >= 0:
-                        bordered.schur[base + a, base + b] += value
-                        bordered.schur[base + b, base + a] += value
+                        bordered.schur[a, b] += value
+                        bordered.schur[b, a] += value
                     elif a >= 0:
-                        bordered.border[base + a, column] += value
+                        bordered.border[a, column] += value
                     else:
-                        bordered.border[base + b, row] += value
+                        bordered.border[b, row] += value
 
 
 @kernel

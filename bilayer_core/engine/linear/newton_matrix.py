@@ -5,7 +5,8 @@
 
 A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the
 motions that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
-Some nodes of rods that touch have their columns in the border, too (`engine.linear.contact_columns`).
+Some nodes of rods that touch have their columns in the border, too (`engine.linear.contact_columns`), and those where
+closed rods close (`engine.linear.joins`).
 
 If a pivot is not positive the matrix is not convex there; what is negative in the contact of rods is left out, then
 multiples of the mass matrix are added until it is, so that the step is a descent direction.
@@ -27,6 +28,7 @@ from ..modes import SLOWEST_GROWTH, WITHOUT_INERTIA
 from . import arms, bordered_system, planar_assembly  # noqa: F401 (declare pieces)
 from .assembly import hold_unknowns
 from .contact_columns import gather_columns, scatter_columns
+from .joins import gather_joins, scatter_joins
 
 FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
 SHIFT_GROWTH = 10.0
@@ -94,6 +96,8 @@ def factorise(p, at, stage, counts):
         of_bodies = factor if at_rest else shift * factor
         if p.border.exists:
             call(p.calls.restrict_bodies, (p, of_bodies))
+        if p.joins.exists:
+            call(p.calls.move_joins_to_border, (p,))
         if p.contact_columns.exists and not call(p.calls.move_to_border, (p,)):
             return BORDER_CAPACITY_EXCEEDED
         negative = call_factor(p.calls.factor_band, (band, strands.size, counts))
@@ -128,11 +132,13 @@ def solve(p):
         right[j] = -right[j]
     for j in range(size, right.shape[0]):
         right[j] = 0.0
+    gather_joins(p.joins, p.bodies.freedom, p.bordered, right)
     gather_columns(p.contact_columns, p.bordered, right)
     call_solve(p.calls.forward_band, (system.band, size, right))
     if p.bordered.exists:
         call(p.calls.solve_bordered, (p,))
     call_solve(p.calls.backward_band, (system.band, size, right))
+    scatter_joins(p.joins, p.bodies.freedom, p.bordered, right)
     scatter_columns(p.contact_columns, p.bordered, right)
     if p.space.exists:
         for j in range(system.step.shape[0]):

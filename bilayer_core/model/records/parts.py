@@ -151,6 +151,15 @@ class Attachments:
 
 
 @record
+class Joins:
+    """Unknowns of nodes and edges that closed rods have twice; see `engine.linear.joins`."""
+
+    first: Indices  # rows of the matrix
+    copy: Indices  # that move as these
+    column: Indices  # of each row among the join columns, −1 without one
+
+
+@record
 class RodPoints:
     """Contact points with arms from nodes, the last of all contact points; see `model.rod_points`."""
 
@@ -297,6 +306,7 @@ class ContactColumns:
     foot_gradient: Stack = ("contact", 4, "dimension")  # a_m along the unknowns of nodes
     strand: Indices  # of each node
     attached: Indices  # index of each node among those that bodies hold, which are in the border already, or −1
+    joined: Flags  # whether a node is in the border because a rod closes there
     mark: IndexTable = ("node", 3)  # scratch
     met: IndexTable = ("strand", "strand")  # scratch
     row: Indices = ("node",)  # in the band, of each node that has columns, ascending

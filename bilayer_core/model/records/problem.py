@@ -12,6 +12,7 @@ from .parts import (
     Drives,
     Flow,
     Fluid,
+    Joins,
     Moments,
     OffAxis,
     Plane,
@@ -89,7 +90,8 @@ class Border:
 
 @record
 class BorderedSystem:
-    """The border as it is eliminated: of bodies their freedom, then the columns of contacts of rods.
+    """The border as it is eliminated: of bodies their freedom, then where closed rods close, then the columns of
+    contacts of rods.
 
     There is capacity for more columns than are in use.
     """
@@ -151,6 +153,7 @@ class Calls:
     take_rod_contacts: Address
     assemble_bodies: Address
     restrict_bodies: Address
+    move_joins_to_border: Address
     move_to_border: Address
     solve_bordered: Address
     gradient_in_plane: Address
@@ -214,6 +217,7 @@ class Problem:
     bordered: BorderedSystem
     constrained: Constrained
     attachments: Attachments
+    joins: Joins
     surfaces: Surfaces
     restitution: Restitution
     sliding: Sliding

@@ -1,0 +1,194 @@
+"""Closed rods: rings without a seam, whatever acts on them and wherever in memory they close."""
+
+import numpy as np
+import pytest
+from evaluations import Problem, dense
+from sample_scenes import contact, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.model.laminate import NAME
+
+RADIUS, EDGES = 0.03, 40
+LENGTH = 2.0 * np.pi * RADIUS
+ONE, TWO = [layer()], [layer("bottom"), layer("top", thickness=0.7e-3, natural_curvature=60.0)]
+MODELS = pytest.mark.parametrize("model", ["two_rod", "laminate"])
+DIMENSIONS = pytest.mark.parametrize("dimension", [2, 3])
+EXACT = {"newton_tolerance": 1e-11}
+
+
+def ring(layers, start=0, edges=EDGES, **more):
+    """A ring in the x-z plane that closes `start` edges further round."""
+    angle = 2.0 * np.pi * start / edges
+    outward, along = np.array([np.cos(angle), 0, np.sin(angle)]), np.array([-np.sin(angle), 0, np.cos(angle)])
+    path = {"shape": "arc", "start": (RADIUS * outward).tolist(), "direction": along.tolist(), "closed": True}
+    path |= {"radius": RADIUS, "angle": "360 deg"}
+    return rod(layers, stations=edges + 1, width=4e-3, **more) | {"path": path, "normal": (-outward).tolist()}
+
+
+def place(part, start, edges=EDGES):
+    """Length along the ring of the station nearest to a part of the circumference of one that closes elsewhere [m]."""
+    return float(round((part * edges - start) % edges) * LENGTH / edges)
+
+
+def nodes_of(simulator, start=0, edges=EDGES):
+    """Positions of nodes in their order from angle 0 on, of each strand, shape (n_strand, edges, 3)."""
+    return np.array(
+        [
+            np.roll(simulator.positions[s.first_node + 1 : s.first_node + edges + 1], start, axis=0)
+            for s in simulator.model.strands
+        ]
+    )
+
+
+@MODELS
+@DIMENSIONS
+@pytest.mark.parametrize("layers", [ONE, TWO[:1] + [layer("top", thickness=0.7e-3)]], ids=["one", "two"])
+def test_a_ring_starts_without_stress_and_stays(layers, model, dimension):
+    simulator = Simulator(load_scene(scene([ring(layers)])), model=model, dimension=dimension)
+    start = simulator.positions.copy()
+    assert sum(simulator.energy().values()) < 1e-25
+    simulator.run(0.02)
+    assert np.abs(simulator.positions - start).max() < 1e-14
+
+
+LIGHT = {"light": {"minimum": 0, "maximum": 1, "schedule": {"type": "hold", "value": 1.0}}}
+LIT = layer("bottom", eigenstrain={"stimulus": "light", "gain": 0.05, "time_constant": 0.01})
+GROUND = {"name": "ground", "type": "plane", "point": [0, 0, -RADIUS - 2.2e-3], "normal": [0.05, 0, 1]}
+SURROUNDINGS = {
+    "weight, masses and loads": {},
+    "eigenstrain": {"stimuli": LIGHT},
+    "ground with friction": {"contact": contact(barrier_distance=1e-3, coefficient=0.3), "obstacles": [GROUND]},
+    "a stream": {"fluid": {"drag_along": 0.1, "drag_across": 2.0, "velocity": [0.1, 0, 0.05], "added_mass": True}},
+    "itself": {"contact": contact(barrier_distance=1e-3, coefficient=0.3) | {"rods": True}, "damping": {"mass": 300.0}},
+    "viscosity": {"damping": {"mass": 1.0}},
+}
+
+
+def loaded_ring(start, what, model, dimension, **choices):
+    """A ring under unlike loads at some places, which closes `start` edges further round."""
+    layers = [LIT, TWO[1]] if what == "eigenstrain" else TWO
+    loads = [
+        {"name": "pull", "rod": "rod", "position": place(0.3, start), "force": [3e-4, 0, -2e-4]},
+        {"name": "jet", "rod": "rod", "position": place(0.55, start), "force": [1e-4, 2e-4, 0], "frame": "material"},
+    ]
+    if what == "itself":
+        ends = ((0.25, -2.0), (0.75, 2.0))
+        loads = [
+            {"name": f"press{k}", "rod": "rod", "position": place(part, start), "force": [0, 0, force]}
+            for k, (part, force) in enumerate(ends)
+        ]
+    cargo = {"name": "cargo", "rod": "rod", "position": place(0.8, start), "mass": 1e-4}
+    more = dict(SURROUNDINGS[what])
+    if dimension == 3 and what != "itself":
+        loads[0]["force"][1] = 1e-4
+    content = scene([ring(layers, start)], gravity=[0, 0, -5], loads=loads, masses=[cargo], solver=EXACT, **more)
+    if what == "viscosity":
+        content["materials"]["gel"] = content["materials"]["gel"] | {"retardation_time": 5e-3}
+    return Simulator(load_scene(content), model=model, dimension=dimension, **choices)
+
+
+@MODELS
+@DIMENSIONS
+@pytest.mark.parametrize("what", SURROUNDINGS)
+def test_where_a_ring_closes_changes_nothing(what, model, dimension):
+    ends = []
+    for start in (0, 12, 10, 29):  # at 12, or 10, a force acts where it closes
+        simulator = loaded_ring(start, what, model, dimension, dt=2e-3)
+        simulator.run(0.03 if what == "itself" else 0.08)
+        ends.append(nodes_of(simulator, start))
+    before = nodes_of(Simulator(load_scene(scene([ring(TWO)])), model=model, dimension=dimension))
+    assert np.abs(ends[0] - before).max() > 1e-3
+    for end in ends[1:]:
+        assert end == pytest.approx(ends[0], abs=1e-12)
+    if what == "itself":
+        assert simulator.summary()["min_gap"] is not None  # its sides have met
+
+
+@pytest.mark.parametrize("integrator", ["implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha"])
+def test_where_a_ring_closes_changes_nothing_with_any_integrator_and_adaptive_steps(integrator):
+    ends = []
+    for start in (0, 7):
+        simulator = loaded_ring(start, "eigenstrain", "laminate", 3, tolerance=1e-4, integrator=integrator)
+        simulator.run(0.05)
+        ends.append(nodes_of(simulator, start))
+    assert ends[1] == pytest.approx(ends[0], abs=1e-12)
+
+
+@MODELS
+@DIMENSIONS
+def test_a_layer_on_a_part_of_a_ring_may_be_anywhere_on_it(model, dimension):
+    ends = []
+    for start in (0, 9):
+        part = [place(0.4, start), place(0.8, start)]
+        varying = {"at": [0.0, LENGTH], "value": [1e-3, 1e-3]}
+        layers = [layer("bottom", thickness=varying), layer("top", interval=part, natural_curvature=50.0)]
+        pull = {"name": "pull", "rod": "rod", "position": place(0.1, start), "force": [1e-3, 0, 5e-4]}
+        content = scene([ring(layers, start)], loads=[pull], solver=EXACT)
+        simulator = Simulator(load_scene(content), model=model, dimension=dimension, dt=2e-3)
+        simulator.run(0.05)
+        ends.append(nodes_of(simulator, start)[0] if model == "laminate" else simulator.com)
+        energy = simulator.energy()["bending"]
+    assert energy > 0.0
+    assert ends[1] == pytest.approx(ends[0], abs=1e-12)
+
+
+@MODELS
+@DIMENSIONS
+def test_the_step_of_newton_is_that_of_the_whole_matrix_of_a_ring(model, dimension):
+    """P (PᵀKP)⁻¹ Pᵀg, with K that of the strand with ends and P what gives copies the step of what they are of."""
+    content = scene([ring(TWO, edges=8)], gravity=[0, 0, -5])
+    problem = Problem(content, np.random.default_rng(3), model, dimension, noise=1e-7, origin_noise=1e-9, turns=1e-3)
+    gradient, hessian = problem.derivatives()
+    twice = problem.model.joined_unknowns(problem.model.solved_layout)
+    size = len(hessian)
+    joined = np.eye(size)
+    joined[twice[:, 1]] = joined[twice[:, 0]]
+    joined = np.delete(joined, twice[:, 1], axis=1)
+    assert joined.shape[1] == problem.model.unknowns
+    expected = -joined @ np.linalg.solve(joined.T @ hessian @ joined, joined.T @ gradient)
+    evaluator = problem.evaluator
+    assert evaluator.factorise(problem.at) == (0.0, 0)
+    step, _ = evaluator.newton_step(evaluator.sums.gradient.copy(), evaluator.sums.body.copy())
+    found = np.linalg.lstsq(problem.basis, step, rcond=None)[0] / problem.scale
+    assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
+    assert dense(problem.evaluator.problem.system.band, 4)[0, 1:].any() is np.False_  # rows of joins are the identity's
+
+
+@MODELS
+def test_a_saved_state_of_a_ring_goes_on_bit_for_bit_and_its_copies_stay_alike(model):
+    first = loaded_ring(5, "ground with friction", model, 3, tolerance=1e-3)
+    first.run(0.05)
+    second = loaded_ring(5, "ground with friction", model, 3, tolerance=1e-3)
+    second.load_state(first.save_state())
+    for simulator in (first, second):
+        simulator.run(0.05)
+    assert np.array_equal(first.positions, second.positions)
+    for node, copy in first.model.joined_node:
+        assert np.array_equal(first.positions[node], first.positions[copy])
+        assert np.array_equal(first.velocities[node], first.velocities[copy])
+    for edge, copy in first.model.joined_edge:
+        assert np.array_equal(first.frame().directors[edge], first.frame().directors[copy])
+
+
+@MODELS
+def test_a_free_ring_keeps_its_momentum_and_its_energy_budget_closes(model):
+    simulator = loaded_ring(3, "eigenstrain", model, 3, dt=1e-3)
+    mass = simulator.model.node_mass
+    assert mass.sum() == pytest.approx(1.7e-3 * 4e-3 * LENGTH * 1000.0 + 1e-4, rel=2e-2)
+    content = scene([ring([LIT, TWO[1]])], stimuli=LIGHT, solver=EXACT)
+    simulator = Simulator(load_scene(content), model=model, dimension=3, dt=1e-3, budget=True)
+    simulator.run(0.1)
+    mass = simulator.model.node_mass
+    assert np.abs(mass @ simulator.velocities) == pytest.approx(np.zeros(3), abs=1e-14)
+    assert sum(simulator.energy().values()) > 1e-4
+
+
+def test_frames_at_the_join_are_those_of_a_node_like_any_other():
+    simulator = Simulator(load_scene(scene([ring(TWO)])), model="laminate", dimension=3)
+    frame = simulator.frame()
+    (strand,) = simulator.description.strands
+    assert strand.closed and strand.nodes.stop - strand.nodes.start == EDGES + 1
+    assert strand.name.endswith(NAME)
+    for of_nodes in (frame.strain[strand.nodes], frame.curvature[strand.nodes], strand.curvature):
+        assert of_nodes == pytest.approx(np.full(EDGES + 1, of_nodes[7]), rel=1e-12, abs=1e-13)
+    assert np.array_equal(frame.positions[strand.nodes][0], frame.positions[strand.nodes][-1])
