@@ -79,6 +79,11 @@ def backward_band(band, n, bandwidth, right):
         right[j] = value
 
 
+AT_ONCE = 16
+"""Columns of a border that are eliminated together: one waits for what the row before has left in it, several do not.
+More would not stay in the nearest cache."""
+
+
 @kernel
 def eliminate_band(band, n, b, m, border, scaled_out, corner):
     """Eliminate the factorised band A = L D Lᵀ from a matrix with m more columns and rows,
@@ -103,16 +108,22 @@ def eliminate_band(band, n, b, m, border, scaled_out, corner):
     x = (D Lᵀ)⁻¹ (z − (L⁻¹ U) y), S being the Schur complement. Most of U is zero, and so is much of L⁻¹ U: a column
     begins where U does, and blocks of A that it does not touch stay zero.
     """
-    for a in range(m):
-        begin, end = n, 0
+    for first in range(0, m, AT_ONCE):
+        last = min(first + AT_ONCE, m)
         for j in range(n):
-            value = border[a, j]
-            scaled_out[a, j] = value / band[j, 0]
-            if value == 0.0:
-                continue
-            begin, end = min(begin, j), j + 1
-            for r in range(1, b + 1):
-                border[a, j + r] -= band[j, r] * value
+            inverse = 1.0 / band[j, 0]
+            for a in range(first, last):
+                value = border[a, j]
+                scaled_out[a, j] = value * inverse
+                if value != 0.0:
+                    for r in range(1, b + 1):
+                        border[a, j + r] -= band[j, r] * value
+    for a in range(m):
+        begin, end = 0, n
+        while begin < n and border[a, begin] == 0.0:
+            begin += 1
+        while end > begin and border[a, end - 1] == 0.0:
+            end -= 1
         for c in range(a + 1):
             total = 0.0
             for j in range(begin, end):
