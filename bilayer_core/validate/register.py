@@ -24,6 +24,7 @@ from . import (
     poses,
     profiles,
     reactions,
+    rings,
     torsion,
     viscosity,
 )
@@ -44,6 +45,7 @@ FAMILIES = (
     reactions,
     poses,
     paths,
+    rings,
     contacts,
     friction,
     motion,
