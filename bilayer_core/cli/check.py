@@ -59,7 +59,7 @@ def _report(simulator) -> dict[str, Any]:
         "integrator": plan.integrator,
         "stepping": str(simulator.steps),
         "reasons": simulator.reasons,
-        "nodes": model.node_count + model.point_count,
+        "nodes": model.node_count - len(model.joined_node) + model.point_count,
         "dof": model.unknowns,
         "contact_stiffness": model.contact_stiffness or None,
         "dt": simulator.dt,

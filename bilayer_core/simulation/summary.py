@@ -46,7 +46,7 @@ def summarise(simulator: Any) -> dict:
         "integrator": plan.integrator,
         "stepping": str(simulator.steps),
         "reasons": simulator.reasons,
-        "nodes": len(positions),
+        "nodes": len(positions) - len(model.joined_node),
         "dof": model.unknowns,
         "dt": simulator.dt,
         "tolerance": simulator.tolerance,
