@@ -286,3 +286,21 @@ def test_frames_at_the_join_are_those_of_a_node_like_any_other():
     assert (nodes.normals[:-1] * tangents).sum(axis=1) == pytest.approx(np.zeros(EDGES), abs=1e-15)
     read = from_text(to_text(simulator.description), simulator.description.scene_text)
     assert read.strands[0].closed and all(layer.closed for layer in read.layers)
+
+
+@pytest.mark.parametrize(("part", "leaves"), [(0.85, False), (1.25, True)])
+def test_a_twisted_ring_leaves_its_plane_above_the_torque_of_michell(part, leaves):
+    side = 1e-3
+    bending, torsion = 1e8 * side**4 / 12.0, 1e8 / 3.0 * 0.1406 * side**4
+    twist = part * np.sqrt(3.0) * bending / (torsion * RADIUS)
+    twisted = layer(thickness=side, natural_curvature=0.0, natural_twist=float(twist))
+    uneven = {"shape": "bow", "size": 1e-5, "direction": "across"}
+    circle = ring([twisted], imperfection=uneven) | {"width": side}
+    content = scene([circle], {"integrator": "sdirk2"}, damping={"mass": 2.0})
+    simulator = Simulator(load_scene(content), model="laminate", dimension=3, dt=2e-3)
+    heights = []
+    for _ in range(20):  # it then passes through itself, which nothing forbids here, and unwinds
+        simulator.run(0.05)
+        heights.append(np.ptp(simulator.positions[:, 1]))
+    assert (max(heights) > 0.2 * RADIUS) == leaves
+    assert leaves or max(heights) < 10.0 * 2e-5
