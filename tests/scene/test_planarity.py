@@ -22,6 +22,11 @@ BUNDLED = {
     "helix": (3, "rods.strip.layers.helical.natural_twist turns the rod out of the plane y = 0"),
     "jumping": (2, "all stays in the plane y = 0"),
     "lattice": (2, "all stays in the plane y = 0"),
+    "six_finger_gripper": (3, "rods.finger_1 leaves the plane y = 0"),
+    "steered_walker": (
+        3,
+        "rods.fore_1 leaves the plane with normal (0.342, -0.9397, 0) through (0.005, 0.025, 0.0182) m",
+    ),
     "swimming": (3, "rods.arm_1 leaves the plane y = 0"),
 }
 
