@@ -44,7 +44,9 @@ class Plane(ReadOnlyArrays):
         if len(axis):
             offset = self.point[axis[0]]
             return f"the plane {COORDINATES[axis[0]]} = {offset:.6g}{' m' if offset else ''}"
-        normal, point = (", ".join(f"{value:.6g}" for value in vector) for vector in (self.normal, self.point))
+        normal, point = (
+            ", ".join(f"{value:.6g}" for value in np.round(vector, 9) + 0.0) for vector in (self.normal, self.point)
+        )
         return f"the plane with normal ({normal}) through ({point}) m"
 
 
