@@ -117,10 +117,29 @@ def _parts(scene) -> dict[str, list[str]]:
         parts[rod.name] = lines
     for body in scene.bodies:
         surface = f", {body.surface.shape}" if body.surface else ""
-        parts[body.name] = [f"{body.motion.describe()}{surface}"]
+        parts[body.name] = [f"{body.motion.describe()}{surface}{_grain(scene, body.surface)}"]
     parts |= {f"joint {joint.name}": [f"{joint.type} of {' and '.join(joint.bodies)}"] for joint in scene.joints}
-    parts |= {obstacle.name: [f"{obstacle.type}, fixed"] for obstacle in scene.obstacles}
+    parts |= {obstacle.name: [f"{obstacle.type}, fixed{_grain(scene, obstacle)}"] for obstacle in scene.obstacles}
     return parts
+
+
+def _grain(scene, surface) -> str:
+    """How friction on a surface differs with the direction, as the rest of a sentence."""
+    law = scene.contact.friction if scene.contact is not None else None
+    if surface is None or law is None or not law.acts:
+        return ""
+    if surface.grain is not None:
+        axis = f"its grain, {_vector(surface.grain)} in its frame"
+    elif law.axis is not None:
+        axis = f"{_vector(law.axis)} in the world"
+    else:
+        return ""
+    forward, backward, sideways = law.of_rods
+    return f", friction {forward:g} along {axis}, {backward:g} against it, {sideways:g} sideways"
+
+
+def _vector(components) -> str:
+    return f"({', '.join(f'{component:.3g}' for component in components)})"
 
 
 def _own_laws(pattern) -> str:

@@ -239,12 +239,19 @@ def _arm_factor(model: Model) -> float:
 def sliding_of(model: Model, sizes: dict[str, int]) -> Sliding:
     """Without contacts."""
     contact_points, law = model.contact_points, model.scene.contact.friction
+    axis = np.zeros(3) if law is None or law.axis is None else np.array(law.axis)
     return Sliding.zeros(
         sizes,
         acts=law is not None and law.acts,
         threshold=law.speed_threshold if law is not None else 0.0,
         coefficient=contact_points.friction,
         node_axis=contact_points.node_axis,
+        grained=bool(axis.any() or model.surfaces.grain.any() or contact_points.grain.any()),
+        along_grain=np.array(law.of_rods if law is not None else (0.0, 0.0, 0.0)),
+        across_all=law.coefficient if law is not None else 0.0,
+        world_axis=axis,
+        surface_grain=model.surfaces.grain,
+        point_grain=contact_points.grain,
     )
 
 

@@ -14,6 +14,11 @@ continuously differentiable:
     ∂D/∂u = λ κ q =: G,   κ = f₁/(w μ h)
     ∂²D/∂u² = λ [κ (μ±² a aᵀ + μ_s² s sᵀ) + (f₁′ − f₁/w)/(w² (μ h)³) q qᵀ] =: F
 
+The forward direction is that of the rod at its node, unless the surface has a grain, which turns with its body, or the
+world an axis: these hold for all that slides, with a of the frozen contact. Points of a grained body on a plain
+surface have u·(−a): there the surface slides on the grain. Where the grain is along the normal, friction is the same
+every way.
+
 A contact point on a body moves with it: y = X + a, where the arm a from the body's position turns with the body,
 δa = δφ × a + ½ δφ × (δφ × a). So u, the motion of the contact point relative to that of the surface below it, depends
 on the motion of both (`forces.contact_on_bodies`), and the force on one side is opposite to that on the other. Both
@@ -40,6 +45,7 @@ from ..jit import kernel, piece
 from ..jit.stack import stack_matrix, stack_vector
 from ..kinematics.copying import copy_matrix
 from ..kinematics.rotating import product_transposed
+from ..kinematics.vector import row
 from ..model.force_slots import slot_of
 from ..model.records.parts import Sliding
 from ..model.records.problem import Problem
@@ -50,6 +56,8 @@ from .restitution import damping_at
 from .rod_arms import add_motion_of_arm, add_step_of_arm, add_to_edges, copy_rate, new_arm, node_of, write_rate
 
 FRICTION = slot_of("friction")
+NO_DIRECTION = 1e-6
+"""Sine of the angle between a grain and the normal below which it has no direction in the tangent plane."""
 LEAST_RELAXATION, LARGEST_RELAXATION = 0.3, 3.0
 
 
@@ -72,6 +80,12 @@ def _forward(sliding, edges, start, on_rod, i, n0, n1, n2):
         elif axis != 0:
             side = 0.5 * axis  # −1 where the rod is a mirror image
             x, y, z = side * (t1 * m2 - t2 * m1), side * (t2 * m0 - t0 * m2), side * (t0 * m1 - t1 * m0)
+    return _tangential(x, y, z, n0, n1, n2)
+
+
+@kernel
+def _tangential(x, y, z, n0, n1, n2):
+    """Unit vector along the part of (x, y, z) in the plane across the unit vector n."""
     for _ in range(2):
         along = x * n0 + y * n1 + z * n2
         x, y, z = x - along * n0, y - along * n1, z - along * n2
@@ -81,6 +95,52 @@ def _forward(sliding, edges, start, on_rod, i, n0, n1, n2):
         else:
             x, y, z = n1, n2, n0  # parallel to n only if its three components are equal
     return x, y, z
+
+
+@kernel
+def _axis_of_grain(sliding, at, i, s, a, b):
+    """Forward direction for contact point i, on body a or −1, on surface s of body b: that of the surface's grain, or
+    of the grain that the point's own surface slides with, or of the world; a unit vector, or 0 without any.
+    """
+    x, y, z = row(sliding.surface_grain, s)
+    if x != 0.0 or y != 0.0 or z != 0.0:
+        return _turned(at.rotation, b, x, y, z, 1.0)
+    x, y, z = row(sliding.point_grain, i)
+    if a >= 0 and (x != 0.0 or y != 0.0 or z != 0.0):
+        return _turned(at.rotation, a, x, y, z, -1.0)
+    x, y, z = sliding.world_axis[0], sliding.world_axis[1], sliding.world_axis[2]
+    sign = -1.0 if a == at.rotation.shape[0] - 1 else 1.0  # an obstacle's point: what moves is the surface
+    return sign * x, sign * y, sign * z
+
+
+@kernel
+def _turned(rotation, b, x, y, z, sign):
+    """± rotation[b] (x, y, z)"""
+    return (
+        sign * (rotation[b, 0, 0] * x + rotation[b, 0, 1] * y + rotation[b, 0, 2] * z),
+        sign * (rotation[b, 1, 0] * x + rotation[b, 1, 1] * y + rotation[b, 1, 2] * z),
+        sign * (rotation[b, 2, 0] * x + rotation[b, 2, 1] * y + rotation[b, 2, 2] * z),
+    )
+
+
+@kernel
+def _write_axis(sliding, surfaces, at, k, i, s, node, n):
+    """Write the forward direction of contact k in its tangent plane, and its coefficients."""
+    a, b = surfaces.contact_point_body[i], surfaces.body[s]
+    for c in range(3):
+        sliding.mu[k, c] = sliding.coefficient[i, c]
+    x = y = z = 0.0
+    if sliding.grained:
+        x, y, z = _axis_of_grain(sliding, at, i, s, a, b)
+    if x != 0.0 or y != 0.0 or z != 0.0:
+        along = x * n[0] + y * n[1] + z * n[2]
+        directed = 1.0 - along * along > NO_DIRECTION * NO_DIRECTION
+        for c in range(3):
+            sliding.mu[k, c] = sliding.along_grain[c] if directed else sliding.across_all
+        axis = _tangential(x, y, z, n[0], n[1], n[2])
+    else:
+        axis = _forward(sliding, surfaces.node_edges, at, a < 0, node, n[0], n[1], n[2])
+    sliding.axis[k, 0], sliding.axis[k, 1], sliding.axis[k, 2] = axis
 
 
 @kernel
@@ -133,7 +193,7 @@ def _add_motion(motion, body, arm, sign, rate):
 def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
     """Write the slip paths of the lagged contacts in the present step, see `forces.friction_limit`."""
     arm, lever, slip, rate, s = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
-    a, coefficient, step_length = sliding.axis, sliding.coefficient, stage.lengths[0]
+    a, mu, step_length = sliding.axis, sliding.mu, stage.lengths[0]
     for k in range(sliding.count[0]):
         i, node = sliding.first[k], sliding.node[k]
         body, under = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
@@ -152,8 +212,8 @@ def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
         path_out[k, 3] = rate[0] * s[0] + rate[1] * s[1] + rate[2] * s[2]
         largest = 0.0
         for c in range(3):
-            path_out[k, 4 + c] = coefficient[i, c] ** 2
-            largest = max(largest, coefficient[i, c])
+            path_out[k, 4 + c] = mu[k, c] ** 2
+            largest = max(largest, mu[k, c])
         path_out[k, 7] = sliding.load[k] if largest > 0.0 else 0.0
         path_out[k, 8] = largest * step_length if largest > 0.0 else step_length
 
@@ -166,14 +226,14 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         return math.inf
     for b in range(at.rotation.shape[0]):
         product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
-    axis, coefficient, threshold = sliding.axis, sliding.coefficient, sliding.threshold
+    axis, mu, threshold = sliding.axis, sliding.mu, sliding.threshold
     arm, lever, u = stack_vector(3), stack_vector(3), stack_vector(3)
     g, q, across, hessian = stack_vector(3), stack_vector(3), stack_vector(3), stack_matrix(3, 3)
     arm[0] = arm[1] = arm[2] = 0.0
     energy = lost = 0.0
     for k in range(sliding.count[0]):
         i, node, normal_force = sliding.first[k], sliding.node[k], sliding.load[k]
-        largest = max(coefficient[i, 0], coefficient[i, 1], coefficient[i, 2])
+        largest = max(mu[k, 0], mu[k, 1], mu[k, 2])
         if largest == 0.0:
             continue
         a, b = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
@@ -181,8 +241,8 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         _across(sliding, k, across)
         forward = u[0] * axis[k, 0] + u[1] * axis[k, 1] + u[2] * axis[k, 2]
         sideways = u[0] * across[0] + u[1] * across[1] + u[2] * across[2]
-        ca = (coefficient[i, 0] if forward >= 0.0 else coefficient[i, 1]) ** 2
-        cs = coefficient[i, 2] ** 2
+        ca = (mu[k, 0] if forward >= 0.0 else mu[k, 1]) ** 2
+        cs = mu[k, 2] ** 2
         scale = largest * stage.lengths[0]
         speed = math.sqrt(ca * forward * forward + cs * sideways * sideways) / scale
         energy += normal_force * scale * friction_potential(speed, threshold)
@@ -245,8 +305,7 @@ def _freeze(sliding, p, at, stage):
             sliding.lever[count, c] = touched - at.pose_position[b, c]
         if a < 0:
             write_rate(surfaces, p.strands, at, node, arm, count, sliding.arm_rate)
-        axis = _forward(sliding, surfaces.node_edges, at, a < 0, node, n[0], n[1], n[2])
-        sliding.axis[count, 0], sliding.axis[count, 1], sliding.axis[count, 2] = axis
+        _write_axis(sliding, surfaces, at, count, i, s, node, n)
         count += 1
     same &= count == sliding.count[0]
     sliding.count[0] = count

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import PenetrationError
 from ..scene.config import SceneConfig
+from ..scene.shape import Obstacle, Surface
 from .colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
 from .model import Bodies, ContactPoints, Model, Surfaces
 from .rod_points import RodPoints, rod_points
@@ -25,6 +26,7 @@ class _Owned:
     body: int
     position: np.ndarray
     rotation: np.ndarray
+    grain: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,7 @@ class _Point:
     length: float
     body: int
     can_collide: list[bool]
+    grain: np.ndarray
 
 
 def build_contact(
@@ -48,7 +51,12 @@ def build_contact(
     owners = [surface.collider for surface in surfaces]
     points = [
         _Point(
-            np.array(p.position), p.offset, p.length, index, [points_can_collide(of_bodies[index], s) for s in owners]
+            np.array(p.position),
+            p.offset,
+            p.length,
+            index,
+            [points_can_collide(of_bodies[index], s) for s in owners],
+            _grain(body.surface),
         )
         for index, body in enumerate(scene.bodies)
         for p in body.contact_points
@@ -75,6 +83,7 @@ def build_contact(
         weight=np.concatenate([of_rods.node_weight, [p.length for p in others], of_rods.weight]),
         radius=np.concatenate([of_rods.node_radius, [p.radius for p in others], of_rods.radius]),
         friction=_friction_of_contact_points(scene, nodes, len(others), len(of_rods.node)),
+        grain=np.concatenate([np.zeros((nodes, 3)), *(p.grain[None] for p in others), np.zeros((len(free), 3))]),
         node_edges=found.column("node_edges", np.int64, 2),
         node_axis=found.column("node_axis", np.int64),
         body=np.concatenate([np.full(nodes, -1), own, free]).astype(np.int64),
@@ -95,21 +104,27 @@ def build_contact(
         body=np.array([s.body for s in surfaces], dtype=np.int64),
         position=np.array([s.position for s in surfaces]).reshape(-1, 3),
         rotation=np.array([s.rotation @ s.shape.rotation for s in surfaces]).reshape(-1, 3, 3),
+        grain=np.array([s.grain for s in surfaces]).reshape(-1, 3),
         can_collide=np.ascontiguousarray(groups.T),
     )
+
+
+def _grain(surface: Surface | Obstacle | None) -> np.ndarray:
+    """In the frame of the body or the obstacle, 0 without one, shape (3,)."""
+    return np.zeros(3) if surface is None or surface.grain is None else np.array(surface.grain)
 
 
 def _shapes(scene: SceneConfig, bodies: Bodies) -> list[_Owned]:
     """Shapes of obstacles, then of bodies."""
     of_bodies, of_obstacles = colliders(scene)
     world = len(scene.bodies)
-    found = [
-        _Owned(collider, shape_of(obstacle), world, *obstacle_pose(obstacle))
-        for collider, obstacle in zip(of_obstacles, scene.obstacles, strict=True)
-    ]
+    found = []
+    for collider, obstacle in zip(of_obstacles, scene.obstacles, strict=True):
+        position, rotation = obstacle_pose(obstacle)
+        found.append(_Owned(collider, shape_of(obstacle), world, position, rotation, rotation @ _grain(obstacle)))
     return found + [
-        _Owned(collider, shape, collider.order, np.zeros(3), np.eye(3))
-        for collider, shape in zip(of_bodies, bodies.shapes, strict=True)
+        _Owned(collider, shape, collider.order, np.zeros(3), np.eye(3), _grain(body.surface))
+        for collider, shape, body in zip(of_bodies, bodies.shapes, scene.bodies, strict=True)
         if shape is not None
     ]
 
@@ -120,7 +135,8 @@ def _points_of(part: _Owned, owners: list[Collider]) -> list[_Point]:
     if not any(can_collide):
         return []
     points, radius, length = part.shape.points()
-    return [_Point(part.position + part.rotation @ point, radius, length, part.body, can_collide) for point in points]
+    positions = part.position + points @ part.rotation.T
+    return [_Point(position, radius, length, part.body, can_collide, part.grain) for position in positions]
 
 
 def _nodes_can_collide(

@@ -53,9 +53,9 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
         "materials": {name: scene.materials[name].model_dump(mode="json") for name in sorted(used)},
         "stimuli": [(name, c.unit, c.minimum, c.maximum) for name, c in scene.stimuli.items()],
         "rods": [rod.model_dump(mode="json", exclude={"friction_axis"}) for rod in scene.rods],
-        "bodies": [body.model_dump(mode="json") for body in scene.bodies],
+        "bodies": [body.model_dump(mode="json", exclude={"surface": {"grain"}}) for body in scene.bodies],
         "masses": [mass.model_dump(mode="json") for mass in scene.masses],
-        "obstacles": [obstacle.model_dump(mode="json") for obstacle in scene.obstacles],
+        "obstacles": [obstacle.model_dump(mode="json", exclude={"grain"}) for obstacle in scene.obstacles],
         "coupling": scene.coupling.model_dump(mode="json") if model == "two_rod" else None,
         "added_mass": fluid and (fluid.density, fluid.added_mass.model_dump(mode="json")),
     }

@@ -141,12 +141,28 @@ class _Survey:
                 yield f"joints.{joint.name}.axis"
             if not self._is_on(joint.point):
                 yield f"joints.{joint.name}.point"
+        for what, axis in self._friction_axes():
+            if not (self._lies_in(axis) or self._along_normal(axis)):
+                yield what
         for load in scene.loads:
             force, moment = self._of_load(load)
             if not self._lies_in(force):
                 yield f"loads.{load.name}.force"
             if not self._along_normal(moment):
                 yield f"loads.{load.name}.moment"
+
+    def _friction_axes(self) -> Iterator[tuple[str, Array]]:
+        """Directions by which friction differs, in the world at the start."""
+        scene = self._scene
+        law = scene.contact.friction if scene.contact is not None else None
+        if law is not None and law.axis is not None:
+            yield "contact.friction.axis", np.array(law.axis)
+        for body in scene.bodies:
+            if body.surface is not None and body.surface.grain is not None:
+                yield f"bodies.{body.name}.surface.grain", self._place(body, body.surface.grain) - body.position
+        for obstacle in scene.obstacles:
+            if obstacle.grain is not None:
+                yield f"obstacles.{obstacle.name}.grain", obstacle_pose(obstacle)[1] @ np.array(obstacle.grain)
 
     def _motions(self, body: Body) -> Iterator[str]:
         """Keys of a body's motion that leave the plane."""

@@ -11,7 +11,7 @@ from bilayer_core.scene.body import Body
 from bilayer_core.scene.faults import Fault, refuse, refuse_all
 from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
-from bilayer_core.scene.part import Name, Part
+from bilayer_core.scene.part import Direction, Name, Part
 from bilayer_core.scene.rod import Rod
 from bilayer_core.scene.schedule import Schedule
 from bilayer_core.scene.shape import Obstacle
@@ -82,7 +82,7 @@ class Friction(Part):
     """Coulomb friction, smoothed below a speed.
 
     Rods may slide more easily one way than the other along their axis (`Rod.friction_axis`), and sideways; bodies feel
-    `coefficient`.
+    `coefficient`. Where `axis` or the `grain` of a surface is given, that is the axis of all that slides, bodies too.
     """
 
     coefficient: NonNegativeNumber
@@ -95,6 +95,9 @@ class Friction(Part):
     """Of rods sliding along − of their axis."""
     sideways: NonNegativeNumber | None = None
     """Of rods sliding across their axis."""
+    axis: Direction | None = None
+    """A direction in the world that is forward for rods and bodies alike, whatever way they lie; by default that of
+    each rod, and none for bodies. The `grain` of a surface goes before it."""
 
     @property
     def of_rods(self) -> tuple[float, float, float]:

@@ -15,21 +15,29 @@ RotationVector = tuple[Angle, Angle, Angle]
 """Axis times angle."""
 
 
-class _Plane(Part):
+class _Grained(Part):
+    """A surface on which things may slide more easily one way than another."""
+
+    grain: Direction | None = None
+    """Forward direction of friction for all that slides on it (`contact.friction.forward`, `backward`, `sideways`), in
+    the frame of the body or the obstacle, with which it turns; by default it has none."""
+
+
+class _Plane(_Grained):
     """A half space; rods and bodies stay on the side to which the normal points."""
 
     normal: Direction
     """Out of the half space, towards the robot."""
 
 
-class _Sphere(Part):
+class _Sphere(_Grained):
     """A ball."""
 
     radius: PositiveLength
     """About its position."""
 
 
-class _Box(Part):
+class _Box(_Grained):
     """A box."""
 
     size: tuple[PositiveLength, PositiveLength, PositiveLength]
@@ -43,7 +51,7 @@ class _Box(Part):
         return self
 
 
-class _Cylinder(Part):
+class _Cylinder(_Grained):
     """A cylinder with flat ends."""
 
     axis: Direction = (0.0, 0.0, 1.0)

@@ -139,6 +139,71 @@ def error_on_a_belt(solver: dict) -> tuple[float, float]:
     return float(np.abs(on_a_belt(solver) - _swing()).max() / np.abs(_swing()).max()), 0.0
 
 
+GRAIN = (0.2, 0.6, 0.4)
+"""Coefficients along a grain, against it, and across it."""
+PULL = 0.5
+"""Force along the ground on the block on a grain, as a part of its weight: between the first two of these."""
+
+
+def pulled_over_grain(
+    angle: float, off: float, solver: dict, grain: dict | None = None, time: float = 0.5
+) -> np.ndarray:
+    """Velocity of a block after `time` [s], turned back by `angle` [m/s], shape (3,).
+
+    Ground and pull are turned by `angle` about the normal together: the pull is at `off` [rad] from the grain. `grain`
+    says what has the grain, in keys of the ground; by default the ground itself.
+    """
+    spectator = rod([layer()], length=0.02, stations=3, start=FAR, clamp_start="wall")
+    axis = [math.cos(angle), math.sin(angle), 0.0]
+    law = contact(coefficient=GRAIN[2], speed_threshold=1e-5)
+    law["friction"] |= dict(zip(("forward", "backward", "sideways"), GRAIN, strict=True))
+    pull = PULL * GRAVITY * np.array([math.cos(angle + off), math.sin(angle + off)])
+    content = scene(
+        [spectator],
+        gravity=[*pull.tolist(), -GRAVITY],
+        obstacles=[GROUND | ({"grain": axis} if grain is None else {})],
+        contact=law,
+        bodies=[fixed(position=FAR), block((0, 0, SIZE[2]))],
+    )
+    if grain == {"of": "block"}:  # the block slides with it: forward is where the ground goes
+        content["bodies"][1]["surface"]["grain"] = [-c for c in axis]
+    elif grain == {"of": "world"}:
+        content["contact"]["friction"]["axis"] = axis
+    content["solver"] = solver
+    simulator = at_rest(content)
+    simulator.run(time)
+    x, y, z = simulator.frame().body_velocities[1, :3]
+    return np.array([axis[0] * x + axis[1] * y, axis[0] * y - axis[1] * x, z])
+
+
+def acceleration_on_grain(off: float) -> np.ndarray:
+    """Of a block from rest, along the grain and across it [m/s²], shape (2,).
+
+    It goes straight on, along a unit vector d at which pull and friction M² d/|M d| leave nothing across d; M has the
+    coefficients along and across the grain.
+    """
+    pull = PULL * np.array([math.cos(off), math.sin(off)])
+
+    def left(angle: float) -> np.ndarray:
+        d = np.array([math.cos(angle), math.sin(angle)])
+        m = np.array([GRAIN[0] if d[0] >= 0.0 else GRAIN[1], GRAIN[2]])
+        return pull - m * m * d / np.linalg.norm(m * d)
+
+    if abs(math.sin(off)) < 1e-12:
+        angle = off
+    else:
+        ends = off - 0.5 * math.pi, off + 0.5 * math.pi
+        angle = brentq(lambda a: float(left(a) @ [-math.sin(a), math.cos(a)]), *ends, xtol=1e-15)
+    along = float(left(angle) @ [math.cos(angle), math.sin(angle)])
+    return GRAVITY * max(along, 0.0) * np.array([math.cos(angle), math.sin(angle)])
+
+
+def speed_over_grain(angle: float, off: float, solver: dict) -> tuple[float, float]:
+    """Error of the velocity after half a second [m/s], and 0."""
+    error = pulled_over_grain(angle, off, solver)[:2] - 0.5 * acceleration_on_grain(off)
+    return float(np.linalg.norm(error)), 0.0
+
+
 def _named(solver: dict) -> str:
     if "integrator" in solver:
         return f"{solver['integrator']}, {1e3 * solver['dt']:g} ms"
@@ -173,5 +238,17 @@ CASES = [
             ({"tolerance": 1e-6}, 1e-3),
             *(({"integrator": name, "dt": 1e-3}, 2e-3) for name in SECOND_ORDER),
         )
+    ),
+    *(
+        Case(
+            f"friction/grain at {angle:g}°/{what}",
+            "velocity after 0.5 s, m a = pull − N M² d/|M d|, a along d; M: 0.2 along, 0.6 against, 0.4 across grain",
+            2e-5,
+            lambda angle=angle, off=off: speed_over_grain(math.radians(angle), math.radians(off), {}),
+            "m/s",
+            scale=1.0,
+        )
+        for angle in (0.0, 77.0)
+        for what, off in (("along it", 0.0), ("against it, stuck", 180.0), ("40° off it", 40.0), ("100° off it", 100.0))
     ),
 ]

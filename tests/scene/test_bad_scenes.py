@@ -129,6 +129,11 @@ def faults_of(content) -> list[str]:
         ("rods.arm.width", {"at": [0, "6 mm"], "value": [1, 1]}, "at[1]: found 0.006; must be a length [m] along the"),
         ("rods.arm.layers.active.natural_twist", {"at": [1], "value": [0]}, "at[0]: found 1.0; must be a length [m]"),
         ("rods.arm.layers.active.stiffness", 0, "found 0; must be a number above 0, such as 10"),
+        # directions of friction
+        ("contact.friction.axis", [0, 0, 0], "found [0, 0, 0]; must be a direction, with a length above 0"),
+        ("contact.friction.axis", "rod", 'found "rod"; must be a list'),
+        ("obstacles.ground.grain", [0, 0, 0], "found [0, 0, 0]; must be a direction, with a length above 0"),
+        ("bodies.ball.surface", {"shape": "box", "size": [1, 1, 1], "grain": "x"}, 'grain: found "x"; must be a list'),
         # masses and loads
         ("masses.cargo.mass", 0, "found 0; must be a mass [kg] above 0, such as 2.7 g"),
         ("masses.cargo.rod", "arms", 'found "arms"; must be one of the rods or their copies (arm, arm_0, arm_1), did'),

@@ -45,6 +45,7 @@ def with_load(**load):
 
 
 CUBE = {"shape": "box", "size": [0.01, 0.01, 0.01]}
+FAR = {"name": "ground", "type": "plane", "point": [0, 0, -1], "normal": [0, 0, 1]}
 LEAVES = {
     "gravity leaves": {"gravity": [0, 1, -10]},
     "fluid.velocity leaves": {"fluid": {"drag_along": 1, "drag_across": 1, "velocity": [0, 1, 0]}},
@@ -65,6 +66,11 @@ LEAVES = {
         motion=FREE, contact_points=[{"position": [0, 1e-3, 0], "length": 0.01, "offset": 1e-3}]
     ),
     "bodies.thing.surface is not": with_body(surface=CUBE, rotation=[0.3, 0, 0]),
+    "contact.friction.axis leaves": {
+        "contact": {**contact(), "friction": {"coefficient": 1, "speed_threshold": 1e-4, "axis": [1, 0.1, 0]}}
+    },
+    "obstacles.ground.grain leaves": {"obstacles": [FAR | {"grain": [1, 1, 0]}]},
+    "bodies.thing.surface.grain leaves": with_body(surface=CUBE | {"grain": [1, 0, 0]}, rotation=[0, 0, 0.1]),
     "obstacles.hill is not": {
         "obstacles": [{"name": "hill", "type": "plane", "point": [0, 0, -1], "normal": [0, 1, 3]}]
     },
@@ -98,6 +104,10 @@ STAYS = {
         motion=FREE,
         contact_points=[{"position": [0, y, 0], "length": 0.01, "offset": 1e-3} for y in (-1e-3, 1e-3)],
     ),
+    "grain along the slope, and across": {
+        "obstacles": [FAR | {"grain": [1, 0, 0]}],
+        "contact": {**contact(), "friction": {"coefficient": 1, "speed_threshold": 1e-4, "axis": [0, 1, 0]}},
+    },
     "a slope": {"obstacles": [{"name": "hill", "type": "plane", "point": [0, 5, -1], "normal": [1, 0, 3]}]},
     "a log that runs on": {
         "obstacles": [{"name": "log", "type": "cylinder", "position": [0, 0.04, -1], "axis": [0, 1, 0]} | {

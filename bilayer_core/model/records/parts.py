@@ -228,6 +228,13 @@ class Sliding:
     threshold: float
     coefficient: Matrix
     node_axis: Indices
+    grained: bool  # whether a surface has a grain, or the world an axis; its coefficients, and the same every way:
+    along_grain: Vector  # shape (3,)
+    across_all: float
+    world_axis: Vector  # 0 without one, shape (3,)
+    surface_grain: Matrix  # in their bodies' frames, 0 without one, shape (n_surface, 3)
+    point_grain: Matrix  # likewise of contact points, shape (n_contact_point, 3)
+    mu: Matrix = ("near", 3)  # coefficients of contacts: forward, backward, sideways
     count: Indices = (1,)
     first: Indices = ("near",)
     node: Indices = ("near",)  # of contacts of rods
