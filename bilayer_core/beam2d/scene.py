@@ -87,6 +87,7 @@ def _only_rod(scene: SceneConfig) -> Rod:
     layers = rod.layers
     needs = {
         "rods: must be one, without a pattern": len(scene.rods) == 1 and rod.pattern is None,
+        "stimuli: must be no light": all(channel.light is None for channel in scene.stimuli.values()),
         "rods[0].path: must be straight": isinstance(rod.path, StraightPath),
         "rods[0].layers: must be two over the whole path": len(layers) == 2
         and all(layer.interval is None for layer in layers),

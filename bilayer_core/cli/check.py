@@ -51,8 +51,8 @@ def _report(simulator) -> dict[str, Any]:
         "title": scene.title,
         "robot": _parts(scene),
         "stimuli": {
-            name: f"{channel.minimum:g} to {channel.maximum:g} [{channel.unit}], {channel.schedule.type}"
-            for name, channel in scene.stimuli.items()
+            name: f"{c.minimum:g} to {c.maximum:g} [{c.unit}], {c.schedule.type}{_light(c)}"
+            for name, c in scene.stimuli.items()
         },
         "model": plan.model,
         "dimension": plan.dimension,
@@ -121,6 +121,14 @@ def _parts(scene) -> dict[str, list[str]]:
     parts |= {f"joint {joint.name}": [f"{joint.type} of {' and '.join(joint.bodies)}"] for joint in scene.joints}
     parts |= {obstacle.name: [f"{obstacle.type}, fixed{_grain(scene, obstacle)}"] for obstacle in scene.obstacles}
     return parts
+
+
+def _light(channel) -> str:
+    """Where a channel shines from, as the rest of a sentence."""
+    if channel.light is None:
+        return ""
+    hidden = "hidden by rods, bodies and obstacles" if channel.light.shadow else "hidden by nothing: shadow is false"
+    return f", light from {_vector(channel.light.from_direction)}; faces turned away are dark, others {hidden}"
 
 
 def _grain(scene, surface) -> str:

@@ -11,6 +11,7 @@ from ..forces.added_mass import fluid_momentum
 from ..forces.restitution import damping_of
 from ..model.force_slots import slot_of
 from ..model.layout import columns
+from ..model.lit import light_of
 from ..model.model import Model, PointLoads
 from ..model.records.parts import (
     Attachments,
@@ -74,6 +75,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
             else Viscosity.absent()
         ),
         drives=Drives(**{name: getattr(model, name) for name in Drives.names}),
+        light=light_of(model),
         off_axis=OffAxis.absent() if len(model.pair_joint) else _off_axis(model, sizes),
         bonds=(
             Bonds(**{name: getattr(model, f"pair_{name}") for name in Bonds.names})

@@ -18,6 +18,7 @@ OF_RODS = {
     *("take_rod_contacts", "move_to_border"),
 }
 OF_JOINS = {"move_joins_to_border"}
+OF_LIGHT = {"begin_light", "shine", "end_light"}
 OF_FRICTION = {"limit_by_friction"}
 
 
@@ -32,6 +33,7 @@ def calls_of(model: Model) -> Calls:
     skipped |= set() if model.has_surface_contact else OF_SURFACES
     skipped |= set() if rods else OF_RODS
     skipped |= set() if friction and friction.acts else OF_FRICTION
+    skipped |= set() if len(model.lit_law) else OF_LIGHT
     pieces = {name for name in Calls.names if name not in NAMES}
     return Calls(
         **{name: 0 if name in skipped else PIECES[name].address for name in pieces},

@@ -22,6 +22,7 @@ from ..model.records.outcome import (
     GAINS,
     GAP,
     ITERATIONS,
+    LIGHT_ERROR,
     PAIR,
     RESIDUAL,
     SETTLINGS,
@@ -262,7 +263,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                 error = 0.0
                 if not fixed:
                     defect = call(p.calls.step_defect, (run.error_norm, start_state, state, h))
-                    error = method.estimate * defect / control.tolerance
+                    error = max(method.estimate * defect, figures[LIGHT_ERROR]) / control.tolerance
                     of_contact = figures[CONTACT_ERROR] / (CONTACT_SHARE * state.account[LARGEST] * control.tolerance)
                 gains = found[GAINS]
                 if gains == SOME and h <= GROWTH_LIMIT * shortest:

@@ -12,6 +12,7 @@ from ..model.records.outcome import (
     GAINS,
     GAP,
     ITERATIONS,
+    LIGHT_ERROR,
     PAIR,
     RESIDUAL,
     SETTLINGS,
@@ -22,6 +23,7 @@ from ..model.records.status import BEYOND, BLOCKED, CONVERGED, MAX_ITERATIONS, R
 from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of, lagged
 from .ends import write_twist
+from .light import see_light
 from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, VALUE, WITHOUT_INERTIA
 
 configuration_at = record_at(Configuration)
@@ -54,9 +56,13 @@ def _compare_touched(sums, touched):
 def drive_stage(p, state, inputs, n, work):
     """What acts from outside at stage n of a step."""
     drives, stage, transduction, strain = p.drives, work.stage, work.transduction, work.strain
+    if p.light.exists:
+        see_light(p.light, state, inputs.elapsed[n])
     for i in range(drives.law_channel.shape[0]):
         channel = drives.law_channel[i]
         first, last = inputs.first[channel], inputs.stimulus[n, channel]
+        if p.light.exists:
+            first, last = first * p.light.seen[i, 0], last * p.light.seen[i, 1]
         lags = drives.law_rising[i], drives.law_falling[i]
         transduction[i] = lagged(state.transduction[i], first, last, lags[0], lags[1], inputs.elapsed[n])
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
@@ -136,6 +142,8 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
     call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), work.first))
     call(p.calls.begin_step_account, (p, state, work, method.works[0] * h))
+    if p.light.exists:
+        call(p.calls.begin_light, (p, state))
     stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
     work.start_angle[:] = 0.0
     worst = 0.0
@@ -184,7 +192,9 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     if status != READY:
         copy(start_state.values, state.values)
         return _leave(p, status, -1, e)
-    figures[RESIDUAL] = worst
+    figures[RESIDUAL], figures[LIGHT_ERROR] = worst, 0.0
+    if p.light.exists:
+        figures[LIGHT_ERROR] = call(p.calls.end_light, (p, state, inputs, ends - 1, h))
     last = configuration_at(work.configurations[e])
     p.outcome.counts[GAINS] = call(p.calls.close_step_account, (p, state, work, h, ends > stages, last))
     return _leave(p, CONVERGED, -1, e)

@@ -18,7 +18,7 @@ from .strands import Collected
 
 
 @dataclass(frozen=True)
-class _Owned:
+class Owned:
     """A shape and what it belongs to: its collider, its body or the world, and its pose in that frame."""
 
     collider: Collider
@@ -46,7 +46,7 @@ def build_contact(
 ) -> tuple[ContactPoints, Surfaces]:
     """Contact points, and the surfaces that they can meet."""
     of_bodies, _ = colliders(scene)
-    owned = _shapes(scene, bodies)
+    owned = owned_shapes(scene, bodies)
     surfaces = owned if scene.contact is not None else []
     owners = [surface.collider for surface in surfaces]
     points = [
@@ -114,22 +114,22 @@ def _grain(surface: Surface | Obstacle | None) -> np.ndarray:
     return np.zeros(3) if surface is None or surface.grain is None else np.array(surface.grain)
 
 
-def _shapes(scene: SceneConfig, bodies: Bodies) -> list[_Owned]:
+def owned_shapes(scene: SceneConfig, bodies: Bodies) -> list[Owned]:
     """Shapes of obstacles, then of bodies."""
     of_bodies, of_obstacles = colliders(scene)
     world = len(scene.bodies)
     found = []
     for collider, obstacle in zip(of_obstacles, scene.obstacles, strict=True):
         position, rotation = obstacle_pose(obstacle)
-        found.append(_Owned(collider, shape_of(obstacle), world, position, rotation, rotation @ _grain(obstacle)))
+        found.append(Owned(collider, shape_of(obstacle), world, position, rotation, rotation @ _grain(obstacle)))
     return found + [
-        _Owned(collider, shape, collider.order, np.zeros(3), np.eye(3), _grain(body.surface))
+        Owned(collider, shape, collider.order, np.zeros(3), np.eye(3), _grain(body.surface))
         for collider, shape, body in zip(of_bodies, bodies.shapes, scene.bodies, strict=True)
         if shape is not None
     ]
 
 
-def _points_of(part: _Owned, owners: list[Collider]) -> list[_Point]:
+def _points_of(part: Owned, owners: list[Collider]) -> list[_Point]:
     """Centre, corners or rims of a shape, if they meet a surface."""
     can_collide = [shapes_can_collide(part.collider, surface) for surface in owners]
     if not any(can_collide):
@@ -144,7 +144,7 @@ def _nodes_can_collide(
     points: RodPoints,
     bodies: Bodies,
     of_bodies: list[Collider],
-    surfaces: list[_Owned],
+    surfaces: list[Owned],
     held_by: np.ndarray,
     clear: float,
 ) -> np.ndarray:

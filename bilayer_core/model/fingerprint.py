@@ -51,7 +51,10 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
         "model": model,
         "history": history,
         "materials": {name: scene.materials[name].model_dump(mode="json") for name in sorted(used)},
-        "stimuli": [(name, c.unit, c.minimum, c.maximum) for name, c in scene.stimuli.items()],
+        "stimuli": [
+            (name, c.unit, c.minimum, c.maximum, *(("light",) if c.light is not None else ()))
+            for name, c in scene.stimuli.items()
+        ],
         "rods": [rod.model_dump(mode="json", exclude={"friction_axis"}) for rod in scene.rods],
         "bodies": [body.model_dump(mode="json", exclude={"surface": {"grain"}}) for body in scene.bodies],
         "masses": [mass.model_dump(mode="json") for mass in scene.masses],

@@ -13,6 +13,7 @@ from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod, RodCopy
 from .immersed import add_fluid
 from .laminate_section import LayerHalves, WholeSection, layer_halves, side
+from .lit import add_lit_elements, is_light
 from .section import Section, outline, sections
 from .strand_arrays import StrandArrays
 from .strands import Collected, StrandElements, add_strand, is_closed, stations_of, strand_shape, with_copies
@@ -94,7 +95,7 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
     coupled = coupling.any(axis=1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
     for layer, half in zip(rod.layers, halves, strict=True):
-        _add_eigenstrain(found, scene, rod, layer, whole, half, strand.first_edge, joints)
+        _add_eigenstrain(found, scene, rod, layer, whole, half, strand.first_edge, axis, joints)
     add_fluid(found, scene.fluid, rod, found.rods[-1])
 
 
@@ -191,18 +192,28 @@ def _add_eigenstrain(
     whole: WholeSection,
     half: LayerHalves,
     first_edge: int,
+    axis: float,
     joints: Array,
 ) -> None:
-    """The rest strains of edges and joints that follow the laws of a layer."""
+    """The rest strains of edges and joints that follow the laws of a layer, or where that is a light, of each edge."""
     for law in layer.eigenstrain:
-        number, edges = found.law(scene, law), with_copies(rod, np.array(rod.driven_edges(layer, law)))
-        of_edges, of_nodes = whole.driven(half, edges)
-        bent = np.flatnonzero((of_nodes != 0.0) & (joints >= 0))
-        found.add(
-            driven_edge=first_edge + edges,
-            driven_law=np.full(len(edges), number),
-            driven_weight=of_edges[edges],
-            driven_joint=joints[bent],
-            driven_joint_law=np.full(len(bent), number),
-            driven_joint_weight=of_nodes[bent],
-        )
+        edges = np.array(rod.driven_edges(layer, law))
+        if is_light(scene, law):
+            heights = np.full(rod.stations - 1, axis)
+            laws = add_lit_elements(found, scene, rod, layer, law, first_edge, heights)
+            groups = [
+                (number, with_copies(rod, own)) for number, own in zip(laws.tolist(), edges[:, None], strict=True)
+            ]
+        else:
+            groups = [(found.law(scene, law), with_copies(rod, edges))]
+        for number, driven in groups:
+            of_edges, of_nodes = whole.driven(half, driven)
+            bent = np.flatnonzero((of_nodes != 0.0) & (joints >= 0))
+            found.add(
+                driven_edge=first_edge + driven,
+                driven_law=np.full(len(driven), number),
+                driven_weight=of_edges[driven],
+                driven_joint=joints[bent],
+                driven_joint_law=np.full(len(bent), number),
+                driven_joint_weight=of_nodes[bent],
+            )

@@ -180,6 +180,12 @@ class Model(ReadOnlyArrays):
     law_gain: Array  # eigenstrain per unit of stimulus near the reference, shape (n_law,)
     law_reference: Array  # stimulus without eigenstrain, in its unit, shape (n_law,)
     law_saturation: Array  # largest magnitude of the eigenstrain, or infinite, shape (n_law,)
+    lit_law: Array  # laws that follow a light, each of an element of its own, shape (n_lit,)
+    lit_edge: Array  # edge of each, likewise
+    lit_side: Array  # ±1: its outer face is towards ± m1; 0: it has two, likewise
+    lit_height: Array  # of that face over the strand along m1, or of the layer's middle if it has two [m], likewise
+    lit_half: Array  # half the layer's thickness [m], likewise
+    lit_reach: Array  # length over thickness of its rod, likewise
 
     joint_a: Array  # first edge of each joint, shape (n_joint,)
     joint_b: Array  # second edge

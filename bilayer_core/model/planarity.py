@@ -132,6 +132,9 @@ class _Survey:
                     yield f"rods.{copy.name}"
         if not self._lies_in(scene.gravity):
             yield "gravity"
+        for name, channel in scene.stimuli.items():
+            if channel.light is not None and not self._lies_in(channel.light.from_direction):
+                yield f"stimuli.{name}.light.from"
         if scene.fluid is not None and not self._lies_in(scene.fluid.velocity):
             yield "fluid.velocity"
         for body in scene.bodies:

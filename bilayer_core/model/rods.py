@@ -11,7 +11,8 @@ from ..scene.config import SceneConfig
 from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod, RodCopy
 from .immersed import add_fluid
-from .section import Section, bond, sections
+from .lit import add_lit_elements, is_light
+from .section import Section, bond, outline, sections
 from .strand_arrays import StrandArrays
 from .strands import (
     Collected,
@@ -25,6 +26,8 @@ from .strands import (
 )
 
 Array = np.ndarray
+_OUTWARD = (-1.0, 1.0)
+"""Which way along the normal the outer face of each of two layers looks."""
 
 
 def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: dict[str, int]) -> None:
@@ -34,7 +37,7 @@ def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_in
     for slot, layer in enumerate(rod.layers):
         first, last = stations_of(rod, layer)
         at_nodes, at_edges = _sections(scene, rod, layer, first, last)
-        side = 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
+        side = 0.0 if len(rod.layers) == 1 else 0.5 * _OUTWARD[slot]
         shape = strand_shape(rod, side * at_nodes.thickness, first, last, copy.place)
         strand = StrandArrays(
             name=f"{name}/{layer.name}",
@@ -50,7 +53,7 @@ def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_in
             curvature=shape.curvature,
             closed=shape.closed,
         )
-        _add_eigenstrain(found, scene, rod, layer, strand)
+        _add_eigenstrain(found, scene, rod, slot, strand)
         time = scene.materials[layer.material].retardation_time
         elements = _elements(rod, layer, at_nodes, at_edges, shape, time)
         joints = add_strand(found, scene, rod, strand, shape, elements, body_index)
@@ -118,13 +121,21 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     return rest
 
 
-def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, layer: Layer, strand: StrandArrays) -> None:
+def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, slot: int, strand: StrandArrays) -> None:
     """The edges of a layer that follow its laws."""
+    layer = rod.layers[slot]
+    first_edge = strand.first_edge - strand.first_station
     for law in layer.eigenstrain:
         edges = np.array(rod.driven_edges(layer, law))
-        edges = strand.first_edge - strand.first_station + (with_copies(rod, edges) if strand.closed else edges)
-        number = found.law(scene, law)
-        found.add(driven_edge=edges, driven_law=np.full(len(edges), number), driven_weight=np.ones(len(edges)))
+        if is_light(scene, law):
+            _, thickness = outline(rod, np.arange(rod.stations - 1) + 0.5)
+            axis = 0.0 * thickness[0] if len(rod.layers) == 1 else _OUTWARD[slot] * 0.5 * thickness[slot]
+            laws = add_lit_elements(found, scene, rod, layer, law, first_edge, axis)
+        else:
+            laws = np.full(len(edges), found.law(scene, law))
+        driven = with_copies(rod, edges) if strand.closed else edges
+        laws = np.append(laws, laws[edges == 0])[: len(driven)]
+        found.add(driven_edge=first_edge + driven, driven_law=laws, driven_weight=np.ones(len(driven)))
 
 
 def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, top: _Bonded) -> None:

@@ -43,6 +43,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         "force": len(NAMES),
         "channel": len(scene.stimuli),
         "law": len(model.law_channel),
+        "lit": len(model.lit_law),
         "load": len(scene.loads),
         "wet": model.node_count if in_fluid else 0,
         "dragged": len(model.drag_node),

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from .fingerprint import FREE, difference
+from .lit import light_of, part_seen
 from .model import Model
 
 Array = np.ndarray
@@ -58,6 +59,7 @@ class State:
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
     account: Array  # of energy; see `engine.energy_account`, shape (12,)
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
+    light_rate: Array  # of m1·l and V of each lit element over the last step [1/s], shape (n_lit, 2)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     override: Array  # value of each channel, then factor of each load, set from outside; NaN where schedules act
     pose_goal: Array  # of controlled bodies; see `simulation.poses`, shape (n_controlled, 26), zeros where none acts
@@ -146,6 +148,15 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
             )
 
 
+def _settled(model: Model, stimulus: Array) -> Array:
+    """What each law has reached at the start where channels have had their values for long, shape (n_law,)."""
+    light, settled = light_of(model), stimulus[model.law_channel]
+    if not light.exists:
+        return settled
+    bodies, frames = model.bodies, model.start_director1[: model.edge_count]
+    return settled * part_seen(light, model.start_position, frames, bodies.start_position, bodies.start_rotation)
+
+
 def initial_state(model: Model, with_history: bool = False, fingerprint: Array | None = None, memory: int = 0) -> State:
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
 
@@ -185,7 +196,8 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         strain_acceleration=np.zeros(with_history * strains),
         account=np.zeros(12),
         law_force=np.zeros(len(model.law_channel)),
-        transduction=before[model.law_channel] if len(channels) else np.zeros(0),
+        light_rate=np.zeros((len(model.lit_law), 2)),
+        transduction=_settled(model, before) if len(channels) else np.zeros(0),
         override=np.full(len(channels) + len(model.scene.loads), np.nan),
         pose_goal=np.zeros((len(bodies.controlled), POSE_GOAL)),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),

@@ -50,10 +50,20 @@ class Collected:
 
     def law(self, scene: SceneConfig, law: Eigenstrain) -> int:
         """Number of an eigenstrain law; equal laws are one."""
-        numbers = (list(scene.stimuli).index(law.stimulus), *law.lags, law.gain, law.reference, law.limit)
+        numbers = _numbers_of(scene, law)
         if numbers not in self.laws:
             self.laws.append(numbers)
         return self.laws.index(numbers)
+
+    def laws_of_elements(self, scene: SceneConfig, law: Eigenstrain, count: int) -> Array:
+        """Numbers of laws of their own for so many elements of a layer, which light reaches differently."""
+        first = len(self.laws)
+        self.laws += [_numbers_of(scene, law)] * count
+        return first + np.arange(count)
+
+
+def _numbers_of(scene: SceneConfig, law: Eigenstrain) -> tuple[float, ...]:
+    return (list(scene.stimuli).index(law.stimulus), *law.lags, law.gain, law.reference, law.limit)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,11 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
                 if law.stimulus not in scene.stimuli:
                     demand = one_of("stimuli", law.stimulus, scene.stimuli)
                     yield (*where, "eigenstrain", place, "stimulus"), law.stimulus, demand
+                names = {variant.layers[index].eigenstrain[place].stimulus for variant in rod.variants}
+                lights = [name for name in sorted(names & scene.stimuli.keys()) if scene.stimuli[name].light]
+                if lights and min(law.lags) == 0.0:
+                    demand = f"must be a time [s] above 0, rising and falling: `{lights[0]}` is a light"
+                    yield (*where, "eigenstrain", place, "time_constant"), law.time_constant, demand
         for name, channels in rod.pattern.stimuli.items() if rod.pattern else ():
             for copy, channel in enumerate(channels):
                 if channel not in scene.stimuli:

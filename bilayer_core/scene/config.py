@@ -60,6 +60,15 @@ class Material(Part):
     """Viscosity over stiffness (Kelvin–Voigt); a vibration ω loses energy at the damping ratio ω × this / 2."""
 
 
+class Light(Part):
+    """Parallel light: a layer sees of its channel what its outer face catches, which changes with the shape."""
+
+    from_direction: Direction = Field(alias="from")
+    """Where it comes from: a direction in the world, from the robot to the light."""
+    shadow: bool = False
+    """Whether rods, bodies and obstacles hide it from layers behind them. Faces turned away are dark in any case."""
+
+
 class Stimulus(Part):
     """A stimulus channel: its unit, its range, and how the scene itself drives it."""
 
@@ -71,6 +80,9 @@ class Stimulus(Part):
     """Largest value."""
     schedule: Schedule
     """Value over time, as long as no topic and no `set_stimulus` overrides it."""
+    light: Light | None = None
+    """Makes the channel the brightness of a light with a direction. Layers then follow it with a lag, element by
+    element."""
 
     @model_validator(mode="after")
     def _check(self) -> Stimulus:
@@ -278,6 +290,8 @@ class SceneConfig(Part):
 def faults_of_range(stimulus: Stimulus) -> list[Fault]:
     """The range of a channel, and the values that its schedule takes."""
     low, high = stimulus.minimum, stimulus.maximum
+    if stimulus.light is not None and low != 0.0:
+        return [(("minimum",), low, "must be 0 for a light: that is what layers in the dark see")]
     if high <= low:
         return [(("maximum",), high, f"must be above `minimum` ({low:g})")]
     return [

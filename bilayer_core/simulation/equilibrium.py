@@ -4,7 +4,8 @@ Each round minimises V(q) + ½ |q − q_k|²_M/h² from the shape q_k of the rou
 that forgets all velocity (the proximal point method). Whatever h is, V falls in every round, and the rounds end only
 where ∂V/∂q = 0; h grows tenfold while Newton's method succeeds, so that the last rounds are Newton's method on V alone.
 What depends on velocities vanishes there: friction, mass damping, and drag but for that of a fluid which flows.
-Forces that turn with what they act on, and moments on bodies, are taken at q_k and agree with the shape in the end.
+Forces that turn with what they act on, moments on bodies and light are taken at q_k and agree with the shape in the
+end. Whether the equilibrium is stable is asked of V with these as they are there.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 from ..engine.modes import COUNT, SETTLE
 from ..engine.report import FAILURES
 from ..errors import InputError, SimulationError
+from ..model.lit import light_of, part_seen
 from ..model.records.status import MAX_ITERATIONS
 from ..model.state import State
 from .stepper import Stepper
@@ -105,8 +107,6 @@ class _Search:
         self.time = float(state.time[0])
         self.size = max(rod.path.length for rod in model.scene.rods)
         self.tolerance = RELATIVE_TOLERANCE * self.size if tolerance is None else tolerance
-        if len(state.transduction):
-            state.transduction[:] = stepper.surroundings.stimulus_at(state, self.time)[model.law_channel]
         for still in (
             state.velocity,
             state.spin,
@@ -115,13 +115,22 @@ class _Search:
             state.body_angular_velocity,
             state.has_history,
             state.account,
+            state.light_rate,
         ):
             still.fill(0.0)
+        self.light = light_of(model)
         self._drive(stepper)
         self.rounds = self.iterations = self.factorisations = 0
 
     def _drive(self, stepper: Stepper) -> None:
-        """Have the rest strains and the loads of now in a stepper."""
+        """Have the rest strains and the loads of now, and the light on the present shape, in a stepper."""
+        state, model = self.state, self.stepper.model
+        if len(state.transduction):
+            settled = self.stepper.surroundings.stimulus_at(state, self.time)[model.law_channel]
+            if self.light.exists:
+                place = state.position, state.director1, state.body_position, state.body_rotation
+                settled = settled * part_seen(self.light, *place)
+            state.transduction[:] = settled
         rest = self.stepper.surroundings.rest_strains_of(self.state.transduction)
         stepper.engine.set_drive(rest, self.stepper.surroundings.load_factor(self.state))
 
@@ -130,6 +139,8 @@ class _Search:
         first_position, start = state.position.copy(), state.copy()
         length, moved, settled = FIRST, math.inf, 0
         while self.rounds < MAX_ROUNDS:
+            if self.light.exists:
+                self._drive(self.stepper)
             attempt = engine.do_once(state, SETTLE, length, self.tolerance / length)
             self.rounds += 1
             self.iterations += attempt.iterations

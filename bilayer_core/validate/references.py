@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -277,3 +278,24 @@ def stick_slip(p: StickSlip, times: np.ndarray) -> np.ndarray:
         rate, (0.0, p.duration), [0.0, 0.0], "Radau", t_eval=times, rtol=1e-10, atol=1e-13, max_step=1e-3 * p.duration
     )
     return solved.y[0]
+
+
+def strip_towards_light(angle: float, curvature: float, length: float, strain: float) -> tuple[float, float]:
+    """Tip of a strip clamped along x that bends away from light by κ₀ max(0, n·l) [m].
+
+    With θ the angle of the tangent and light at `angle` α from the normal, ψ = θ + α has ψ′ = −κ₀ cos ψ, so sin ψ =
+    tanh(artanh(sin α) − κ₀ s): it tends to −π/2 and never looks away from the light. Its middle grows by n·l times
+    `strain`.
+    """
+
+    def direction(s: float, _: np.ndarray) -> np.ndarray:
+        theta = math.asin(math.tanh(math.atanh(math.sin(angle)) - curvature * s)) - angle
+        return (1.0 + strain * math.cos(theta + angle)) * np.array([math.cos(theta), math.sin(theta)])
+
+    return tuple(solve_ivp(direction, (0.0, length), np.zeros(2), rtol=1e-11, atol=1e-14).y[:, -1])
+
+
+def lag_behind(seen: Callable[[float], float], lag: float, time: float) -> float:
+    """y at a time [s] where T y′ = u − y follows u, from where it has settled."""
+    found = solve_ivp(lambda t, y: (seen(t) - y) / lag, (0.0, time), [seen(0.0)], rtol=1e-12, atol=1e-14, max_step=1e-3)
+    return float(found.y[0, -1])

@@ -17,6 +17,7 @@ from . import (
     impacts,
     joints,
     laminate,
+    light,
     loads,
     motion,
     paths,
@@ -51,6 +52,7 @@ FAMILIES = (
     motion,
     viscosity,
     fluid,
+    light,
 )
 CASES = tuple(case for family in FAMILIES for case in family.CASES)
 

@@ -129,6 +129,16 @@ def faults_of(content) -> list[str]:
         ("rods.arm.width", {"at": [0, "6 mm"], "value": [1, 1]}, "at[1]: found 0.006; must be a length [m] along the"),
         ("rods.arm.layers.active.natural_twist", {"at": [1], "value": [0]}, "at[0]: found 1.0; must be a length [m]"),
         ("rods.arm.layers.active.stiffness", 0, "found 0; must be a number above 0, such as 10"),
+        # light
+        ("stimuli.humidity.light", {"from": [0, 0, 0]}, "from: found [0, 0, 0]; must be a direction, with a length"),
+        ("stimuli.humidity.light", {}, "from: is missing; must be a list"),
+        ("stimuli.humidity.light", {"from": [0, 0, 1], "shadows": True}, "shadows: unknown key, did you mean shadow?"),
+        ("stimuli.humidity.light", True, "found true; must be a mapping of keys to values"),
+        (
+            "stimuli.humidity",
+            {"minimum": -1, "light": {"from": [0, 0, 1]}, "schedule": RAMP},
+            "minimum: found -1.0; must be 0 for a light: that is what layers in the dark see",
+        ),
         # directions of friction
         ("contact.friction.axis", [0, 0, 0], "found [0, 0, 0]; must be a direction, with a length above 0"),
         ("contact.friction.axis", "rod", 'found "rod"; must be a list'),
@@ -414,3 +424,23 @@ def test_a_box_that_starts_in_a_cylinder_is_refused_by_name():
     content["bodies"].append({"name": "crate", "position": [0.1, 0, 0.07], "motion": motion, "surface": BOX})
     with pytest.raises(PenetrationError, match=r"\(crate\) .* behind the surface of post"):
         build_model(load_scene(content))
+
+
+@pytest.mark.parametrize("lags", [{}, {"time_constant_rising": 1}, {"time_constant": 0}])
+def test_a_layer_that_follows_light_at_once_is_refused(lags):
+    content = everything()
+    content["stimuli"]["humidity"]["light"] = {"from": [0, 0, 1]}
+    content["rods"][0]["layers"][1]["eigenstrain"] |= lags
+    found = "0.0" if "time_constant" in lags else "null"
+    assert faults_of(content) == [
+        f"scene: rods.arm.layers.active.eigenstrain.time_constant: found {found}; must be a time [s] above 0, "
+        "rising and falling: `humidity` is a light"
+    ]
+
+
+def test_a_copy_that_follows_light_at_once_is_refused():
+    content = everything()
+    lit = {"schedule": {"type": "hold", "value": 0.5}, "light": {"from": [0, 0, 1]}}
+    content["stimuli"]["sun"] = lit
+    content["rods"][0]["pattern"]["stimuli"] = {"humidity": ["humidity", "sun"]}
+    assert "must be a time [s] above 0, rising and falling: `sun` is a light" in faults_of(content)[0]

@@ -66,6 +66,9 @@ LEAVES = {
         motion=FREE, contact_points=[{"position": [0, 1e-3, 0], "length": 0.01, "offset": 1e-3}]
     ),
     "bodies.thing.surface is not": with_body(surface=CUBE, rotation=[0.3, 0, 0]),
+    "stimuli.sun.light.from leaves": {
+        "stimuli": {"sun": {"schedule": {"type": "hold", "value": 1}, "light": {"from": [0, 0.1, 1]}}}
+    },
     "contact.friction.axis leaves": {
         "contact": {**contact(), "friction": {"coefficient": 1, "speed_threshold": 1e-4, "axis": [1, 0.1, 0]}}
     },

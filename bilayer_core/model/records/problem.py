@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...jit.record import Address, Flags, Indices, Matrix, Stack, Vector, record
+from .light import Light
 from .parts import (
     Attachments,
     Bodies,
@@ -165,6 +166,9 @@ class Calls:
     set_origin: Address
     add_history_to_origin: Address
     drive_stage: Address
+    begin_light: Address
+    shine: Address
+    end_light: Address
     predict_stage: Address
     predict_end: Address
     stand_still_stage: Address
@@ -208,6 +212,7 @@ class Problem:
     strands: Strands
     viscosity: Viscosity
     drives: Drives
+    light: Light
     space: Space
     plane: Plane
     off_axis: OffAxis

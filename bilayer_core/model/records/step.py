@@ -198,4 +198,5 @@ class StateArrays:
     strain_acceleration: Vector
     account: Vector
     law_force: Vector
+    light_rate: Matrix
     transduction: Vector
