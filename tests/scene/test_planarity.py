@@ -23,6 +23,7 @@ BUNDLED = {
     "jumping": (2, "all stays in the plane y = 0"),
     "knot": (3, "rods.thread leaves the plane with normal (0.0703485, -0.997522, 0) through (-0.15, 0, -0.012) m"),
     "lattice": (2, "all stays in the plane y = 0"),
+    "ring": (2, "all stays in the plane y = 0"),
     "six_finger_gripper": (3, "rods.finger_1 leaves the plane y = 0"),
     "steered_walker": (
         3,
