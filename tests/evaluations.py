@@ -104,7 +104,7 @@ class Problem:
         origin.displacement[:] += origin_noise * draw(model.node_count)
         strains = model.strain_count
         origin.strain[:strains] += 1e-3 * np.random.default_rng(7).standard_normal(strains)
-        origin.strain[strains:] += origin_noise * np.random.default_rng(8).standard_normal(len(model.impact_pairs))
+        origin.strain[strains:] += origin_noise * np.random.default_rng(8).standard_normal(len(origin.strain) - strains)
         turned = 0.0
         if in_space:
             origin.body_displacement[:] += origin_noise * draw(len(origin.body_displacement))

@@ -63,7 +63,24 @@ def everything_in_plane(ahead, hub="prescribed", stations=6):
                 "axis": list(across),
                 "stiffness": 2.0,
                 "torsional_stiffness": 1e-3,
-            }
+                "turning": {
+                    "spring": 1e-3,
+                    "rest_angle": 0.1,
+                    "damping": 1e-7,
+                    "friction": 1e-6,
+                    "friction_speed": 1.0,
+                },
+            },
+            {
+                "name": "strut",
+                "type": "slide",
+                "bodies": ["ball", "hub"],
+                "point": in_plane(ahead, -0.004, 0.032),
+                "axis": in_plane(ahead, 0.3, 0.9),
+                "stiffness": 2.0,
+                "torsional_stiffness": 1e-3,
+                "sliding": {"spring": 1.0, "limits": [-1e-3, 1e-5], "limit_stiffness": 1.0, "friction": 1e-4},
+            },
         ],
         masses=[{"name": "cargo", "rod": "arm", "position": 2.3 * spacing, "mass": 1e-5}],
         loads=[

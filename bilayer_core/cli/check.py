@@ -81,6 +81,7 @@ def _parts(scene) -> dict[str, list[str]]:
     """What the robot and its surroundings are made of, by name."""
     from bilayer_core.model.findings import few
     from bilayer_core.model.validity import EdgeFigures
+    from bilayer_core.scene.mechanism import resistance
     from bilayer_core.scene.profile import extremes
 
     parts = {}
@@ -118,7 +119,9 @@ def _parts(scene) -> dict[str, list[str]]:
     for body in scene.bodies:
         surface = f", {body.surface.shape}" if body.surface else ""
         parts[body.name] = [f"{body.motion.describe()}{surface}{_grain(scene, body.surface)}"]
-    parts |= {f"joint {joint.name}": [f"{joint.type} of {' and '.join(joint.bodies)}"] for joint in scene.joints}
+    for joint in scene.joints:
+        resisted = resistance(joint.turning, joint.sliding)
+        parts[f"joint {joint.name}"] = [f"{joint.type} of {' and '.join(joint.bodies)}{resisted}"]
     parts |= {obstacle.name: [f"{obstacle.type}, fixed{_grain(scene, obstacle)}"] for obstacle in scene.obstacles}
     return parts
 

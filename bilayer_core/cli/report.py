@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -57,5 +58,16 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     if summary["joints"]:
         worst = [max(joint[key] for joint in summary["joints"].values()) for key in ("distance", "angle")]
         yield f"  {'joints give way by':22}{1e6 * worst[0]:.2g} um and {1e6 * worst[1]:.2g} urad at most at the end"
+    for name, part in [*summary["bodies"].items(), *summary["joints"].items()]:
+        yield from _motions(name, part)
     for warning in summary["warnings"]:
         yield f"  {'WARNING':22}{warning}"
+
+
+def _motions(name: str, part: dict) -> Iterator[str]:
+    """How far a hinge, a rail or a joint has turned and slid, where something resists that."""
+    for key, word, unit, factor in (("turning", "turned", "deg", 180.0 / math.pi), ("sliding", "slid", "mm", 1e3)):
+        if key in part:
+            beyond = part.get(f"{key}_beyond_limit", 0.0)
+            more = f", {factor * beyond:.2g} {unit} beyond its limit at most" if beyond > 0.0 else ""
+            yield f"  {f'{name} {word} by':22}{factor * part[key]:.4g} {unit}{more}"

@@ -106,7 +106,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
         loads=_forces(model, "loads", model.dead_loads) if scene.loads else PointForces.absent(),
         followers=_forces(model, "followers", model.follower_loads) if scene.loads else PointForces.absent(),
         moments=_moments(model) if scene.loads else Moments.absent(),
-        has_contact=model.has_surface_contact or model.rod_surfaces is not None or bool(scene.joints),
+        has_contact=model.has_surface_contact or model.rod_surfaces is not None or "joints" in model.forces,
         system=System.zeros(sizes),
     )
 

@@ -10,6 +10,7 @@ import math
 
 from ..forces.added_mass import momentum_at
 from ..forces.inertia import moment_of_rotation
+from ..forces.mechanisms import measure_mechanisms, remember_mechanisms
 from ..forces.restitution import measure_gaps
 from ..forces.viscosity import measure_strains
 from ..jit import kernel, piece
@@ -60,6 +61,7 @@ def end_stage(p, state, work, inputs, n, end):
         point.spin[k] = (end.total_angle[k] - stage.origin_angle[k]) / length
     measure_strains(p, end, point.strain)
     measure_gaps(p, end, point.strain)
+    measure_mechanisms(p, end, point.strain)
     for k in range(point.strain.shape[0]):
         point.strain_rate[k] = (point.strain[k] - stage.origin_strain[k]) / length
     momentum_at(p.fluid, end, point.velocity, point.fluid_momentum)
@@ -112,6 +114,7 @@ def write_shape(p, at, state):
     for f in range(bodies.mass.shape[0]):
         copy_row(at.body_position, f, state.body_position, bodies.body_of_free[f])
     _write_frames(bodies, p.strands, at, state)
+    remember_mechanisms(p, at, state.memory)
     return READY
 
 

@@ -14,6 +14,7 @@ from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES
 from ..model.model import Model
 from ..model.records.outcome import CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS
+from ..model.records.parts import Mechanisms
 from ..model.records.problem import Sums
 from ..model.records.step import RunExtrema, StageInputs, StateArrays
 from ..model.rest_strains import RestStrains
@@ -177,6 +178,11 @@ class Engine:
     def joints(self) -> Joints:
         """Joints between bodies, with what they exerted there; without any, absent."""
         return next((own for own in self._storage.problem.forces.holds if isinstance(own, Joints)), Joints.absent())
+
+    @property
+    def mechanisms(self) -> Mechanisms:
+        """Turns and ways that something resists, likewise."""
+        return self._storage.problem.mechanisms
 
     @property
     def energies(self) -> dict[str, float]:

@@ -16,6 +16,7 @@ Positions and momenta advance as `integrators.method` says. What is no vector ne
 from __future__ import annotations
 
 from ..forces.added_mass import momentum_at
+from ..forces.mechanisms import measure_mechanisms
 from ..forces.restitution import measure_gaps
 from ..forces.viscosity import measure_strains
 from ..jit import kernel, piece
@@ -63,6 +64,7 @@ def start_step_point(p, state, start, first):
             first.angular_momentum[f, c] = momentum[c]
     measure_strains(p, start, first.strain)
     measure_gaps(p, start, first.strain)
+    measure_mechanisms(p, start, first.strain)
     copy(state.strain_rate, first.strain_rate)
     momentum_at(p.fluid, start, state.velocity, first.fluid_momentum)
     add_scaled(first.fluid_momentum, 1.0, state.fluid_excess)
@@ -282,6 +284,7 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     add_scaled(stage.origin_angle, -length, state.spin)
     measure_strains(p, start, stage.origin_strain)
     measure_gaps(p, start, stage.origin_strain)
+    measure_mechanisms(p, start, stage.origin_strain)
     add_scaled(stage.origin_strain, -length, state.strain_rate)
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..forces.friction_limit import PATH_SIZE
+from ..forces.mechanisms import mechanisms_record
 from ..forces.register import force_table, memory_size, require_computed
 from ..jit import shapes_of, zeros_in_one
 from ..model.model import Model
@@ -123,6 +124,7 @@ class Storage:
             bordered=BorderedSystem.zeros(sizes, width=self._width) if border else BorderedSystem.absent(),
             surfaces=Surfaces.absent() if not surfaces else before.surfaces if same else surfaces_of(model, sizes),
             restitution=restitution_of(model, sizes),
+            mechanisms=mechanisms_record(model),
             sliding=self._sliding(before, sizes) if surfaces else Sliding.absent(),
             rod_contact=self._rod_contact(before) if rods else RodContact.absent(),
             slips=slips_of(model, sizes) if surfaces or rods else Slips.absent(),

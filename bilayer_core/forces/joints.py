@@ -1,9 +1,12 @@
 """Joints: stiff springs between points and directions of two bodies.
 
 With the arms ρ = R r from the bodies' positions, the distance d = X_A + ρ_A − X_B − ρ_B of the two points, and unit
-vectors u_A, u_B that were one at the start (none on a pin, the axis on a hinge, two on a weld),
+vectors u_A, u_B that were one at the start (none on a pin, the axis on a hinge and a cylinder, two on a weld and a
+slide),
 
-    E = ½ k |d|² + ½ k_θ Σ |u_A − u_B|²
+    E = ½ k |d|² + ½ k_θ Σ |u_A − u_B|²                     pin, hinge, weld
+    E = ½ k (|d|² − (a·d)²) + ½ k_θ Σ |u_A − u_B|²          slide, cylinder: the point of B stays on the axis a of A
+    E = ½ k |d|² + ½ k_θ (a·b)²                             universal: the axis b of B stays across the axis a of A
 
 Arms and vectors turn by x → x + φ×x + ½ φ×(φ×x), see `engine.linear.attachments`. With g = k d,
 
@@ -14,7 +17,11 @@ Arms and vectors turn by x → x + φ×x + ½ φ×(φ×x), see `engine.linear.at
                                  by (φ_A, φ_B)                 −k_θ ((u_A·u_B) 1 − u_B u_Aᵀ)
 
 and T(a, b) = ½ (a bᵀ + b aᵀ) − (a·b) 1. Since |u_A − u_B|² = 2 − 2 u_A·u_B, only the product acts; the energy is taken
-from the difference, which keeps its digits. A joint gives way by d = F/k, which `sim.joints` and summaries state.
+from the difference, which keeps its digits. The way along an axis, s = −a·d, and its derivatives are those of
+`forces.mechanisms`: −½ k s² has −k s ∇s and −k (∇s ∇sᵀ + s ∇²s). Of c = a·b, ½ k_θ c² has k_θ c ∇c and
+k_θ (∇c ∇cᵀ + c ∇²c), with the derivatives of u_A·u_B. (The energy of a slide is taken from what d has across the axis.)
+
+A joint gives way by d = F/k and by angles M/k_θ, which `sim.joints` and summaries state.
 """
 
 from __future__ import annotations
@@ -24,18 +31,20 @@ import math
 import numpy as np
 
 from ..jit import kernel, piece, record
-from ..jit.record import Indices, Matrix, Stack, Vector
+from ..jit.record import Flags, Indices, Matrix, Stack, Vector
 from ..jit.stack import stack_matrix, stack_vector
+from ..kinematics.vector import cross, dot
 from ..model.force_slots import slot_of
 from ..model.model import Model
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
+from ..scene.joint import SLIDES, Joint
 from .contact_on_bodies import add_force
+from .joint_stiffness import across, scatter_pair, stiffness_of_joints
+from .mechanisms import add_product, add_way
 
 JOINTS = slot_of("joints")
-STIFFER = 100.0
-"""Than the stiffest edge and the stiffest bend of a rod."""
-ACROSS = {"pin": 0, "hinge": 1, "weld": 2}
+ALIGNED = {"pin": 0, "universal": 0, "hinge": 1, "cylinder": 1, "slide": 2, "weld": 2}
 """How many directions a joint keeps."""
 
 
@@ -46,11 +55,14 @@ class Joints:
     body: Indices  # A and B of each in turn, among all bodies, shape (2 n_joint,)
     free: Indices  # likewise among the free ones, −1 for a prescribed one
     arm: Matrix  # r in the axes of the body, A and B in turn [m], shape (2 n_joint, 3)
-    direction: Stack  # u in the axes of the body, likewise, shape (2 n_joint, 2, 3)
+    direction: Stack  # u in the axes of the body, likewise, the axis first, shape (2 n_joint, 2, 3)
     aligned: Indices  # how many directions each aligns, shape (n_joint,)
+    slides: Flags  # whether along the first direction of A, shape (n_joint,)
+    crossed: Flags  # whether it keeps the first directions of A and B perpendicular, shape (n_joint,)
     stiffness: Vector  # k [N/m], shape (n_joint,)
     torsional: Vector  # k_θ [N m], shape (n_joint,)
     gradient: Matrix  # ∂E/∂(X, φ) of A and B in turn [N, N m], shape (2 n_joint, 6)
+    apart: Matrix  # distance [m], and largest angle of directions [rad], that it gives way by, shape (n_joint, 2)
 
 
 @kernel
@@ -93,81 +105,90 @@ def _add_point(stiffness, arms, g, hessian):
 
 
 @kernel
-def _add_direction(stiffness, u, v, hessian):
-    """Likewise of the difference of two unit vectors."""
-    _add_turning(u, v, -stiffness, hessian, 3)
-    _add_turning(u, v, -stiffness, hessian, 9)
-    product = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-    for i in range(3):
-        for j in range(3):
-            value = stiffness * v[i] * u[j]
-            hessian[3 + i, 9 + j] += value
-            hessian[9 + j, 3 + i] += value
-        hessian[3 + i, 9 + i] -= stiffness * product
-        hessian[9 + i, 3 + i] -= stiffness * product
+def _add_alignment(stiffness, u, v, with_hessian, own, k, hessian):
+    """Add ½ k_θ |u − v|² of joint k: the energy."""
+    energy, moment = 0.0, cross(u, v)
+    for c in range(3):
+        energy += 0.5 * stiffness * (u[c] - v[c]) ** 2
+        own[2 * k, 3 + c] -= stiffness * moment[c]
+        own[2 * k + 1, 3 + c] += stiffness * moment[c]
+    if with_hessian:
+        add_product(u, v, -stiffness, hessian)
+    return energy
+
+
+@kernel
+def _add_crossing(stiffness, u, v, with_hessian, own, k, hessian):
+    """Add ½ k_θ (u·v)² of joint k: the energy."""
+    cosine, slope = dot(u, v), cross(u, v)
+    for c in range(3):
+        own[2 * k, 3 + c] += stiffness * cosine * slope[c]
+        own[2 * k + 1, 3 + c] -= stiffness * cosine * slope[c]
+    if with_hessian:
+        add_product(u, v, stiffness * cosine, hessian)
+        for m in range(3):
+            for n in range(3):
+                square = stiffness * slope[m] * slope[n]
+                hessian[3 + m, 3 + n] += square
+                hessian[9 + m, 9 + n] += square
+                hessian[3 + m, 9 + n] -= square
+                hessian[9 + m, 3 + n] -= square
+    return 0.5 * stiffness * cosine * cosine
 
 
 @piece(float, Joints, Problem, Configuration, Stage, bool)
 def add_joints(joints, p, at, stage, with_hessian):
     """Energy and derivatives of all joints."""
-    sums, total = p.sums, 0.0
+    sums, total, own, apart = p.sums, 0.0, joints.gradient, joints.apart
+    own[:] = 0.0
     if not sums.selected[JOINTS]:
         return math.inf
-    arms, u, v, g, zero = stack_matrix(2, 3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
-    zero[0] = zero[1] = zero[2] = 0.0
-    hessian = stack_matrix(12, 12)
+    arms, u, v, d, g = stack_matrix(2, 3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    along, hessian = stack_vector(12), stack_matrix(12, 12)
     for k in range(joints.aligned.shape[0]):
-        a, b = joints.body[2 * k], joints.body[2 * k + 1]
-        own = joints.gradient
-        for s in range(2):
-            for n in range(6):
-                own[2 * k + s, n] = 0.0
+        a, b, stiffness = joints.body[2 * k], joints.body[2 * k + 1], joints.stiffness[k]
         if with_hessian:
-            for m in range(12):
-                for n in range(12):
-                    hessian[m, n] = 0.0
+            hessian[:] = 0.0
         _turned(at.rotation, a, joints.arm, 2 * k, arms[0])
         _turned(at.rotation, b, joints.arm, 2 * k + 1, arms[1])
         for c in range(3):
-            apart = (at.pose_position[a, c] - at.pose_position[b, c]) + (arms[0, c] - arms[1, c])
-            g[c] = joints.stiffness[k] * apart
-            total += 0.5 * g[c] * apart
+            d[c] = (at.pose_position[a, c] - at.pose_position[b, c]) + (arms[0, c] - arms[1, c])
+            g[c] = stiffness * d[c]
         add_force(own, 2 * k, 1.0, arms[0], g)
         add_force(own, 2 * k + 1, -1.0, arms[1], g)
         if with_hessian:
-            _add_point(joints.stiffness[k], arms, g, hessian)
+            _add_point(stiffness, arms, g, hessian)
+        if joints.slides[k]:
+            _turned(at.rotation, a, joints.direction[2 * k], 0, u)
+            way = -(u[0] * d[0] + u[1] * d[1] + u[2] * d[2])
+            add_way(at, a, b, u, arms[1], -stiffness * way, -stiffness, with_hessian, along, hessian)
+            for c in range(6):
+                own[2 * k, c] -= stiffness * way * along[c]
+                own[2 * k + 1, c] -= stiffness * way * along[6 + c]
+            for c in range(3):
+                d[c] += way * u[c]
+        square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+        total += 0.5 * stiffness * square
+        apart[k, 0], apart[k, 1] = math.sqrt(square), 0.0
         for j in range(joints.aligned[k]):
             _turned(at.rotation, a, joints.direction[2 * k], j, u)
             _turned(at.rotation, b, joints.direction[2 * k + 1], j, v)
-            for c in range(3):
-                total += 0.5 * joints.torsional[k] * (u[c] - v[c]) ** 2
-                m, n = (c + 1) % 3, (c + 2) % 3
-                moment = joints.torsional[k] * (u[m] * v[n] - u[n] * v[m])
-                own[2 * k, 3 + c] -= moment
-                own[2 * k + 1, 3 + c] += moment
-            if with_hessian:
-                _add_direction(joints.torsional[k], u, v, hessian)
+            energy = _add_alignment(joints.torsional[k], u, v, with_hessian, own, k, hessian)
+            apart[k, 1] = max(apart[k, 1], math.sqrt(2.0 * energy / joints.torsional[k]))
+            total += energy
+        if joints.crossed[k]:
+            _turned(at.rotation, a, joints.direction[2 * k], 0, u)
+            _turned(at.rotation, b, joints.direction[2 * k + 1], 0, v)
+            energy = _add_crossing(joints.torsional[k], u, v, with_hessian, own, k, hessian)
+            apart[k, 1] = math.sqrt(2.0 * energy / joints.torsional[k])
+            total += energy
         for n in range(6):
             sums.contact[a, n] += own[2 * k, n]
             sums.contact[b, n] += own[2 * k + 1, n]
         if with_hessian:
-            _scatter(joints.free[2 * k], joints.free[2 * k + 1], hessian, sums.body_hessian)
-    sums.energy[JOINTS] = total
+            scatter_pair(joints.free[2 * k], joints.free[2 * k + 1], hessian, sums.body_hessian)
+    sums.energy[JOINTS] += total
     return math.inf
-
-
-@kernel
-def _scatter(first, second, block, out):
-    """Add a block by (X_A, φ_A, X_B, φ_B) to the second derivatives of free bodies."""
-    for m in range(12):
-        f = first if m < 6 else second
-        if f < 0:
-            continue
-        row = 6 * f + m % 6
-        for n in range(12):
-            other = first if n < 6 else second
-            if other >= 0:
-                out[row, 6 * other + n % 6] += block[m, n]
 
 
 def joints_of(model: Model) -> Joints:
@@ -178,23 +199,25 @@ def joints_of(model: Model) -> Joints:
     body = np.array([[bodies.names.index(name) for name in joint.bodies] for joint in joints])
     turned = bodies.start_rotation[body]  # (n, 2, 3, 3), columns: axes of the body
     arms = np.array([joint.point for joint in joints])[:, None] - bodies.start_position[body]
-    directions = np.array([_directions(joint.axis) for joint in joints])
-    edge = float((model.axial_stiffness / model.rest_length).max())
-    bend = float(model.joint_stiffness.max())
+    directions = np.array([_directions(joint) for joint in joints])
+    edge, bend = stiffness_of_joints(model)
     return Joints(
         body=body.reshape(-1),
         free=bodies.free_index[body].reshape(-1),
         arm=np.einsum("ksij,ksi->ksj", turned, arms).reshape(-1, 3),
-        direction=np.einsum("ksij,kni->ksnj", turned, directions).reshape(-1, 2, 3),
-        aligned=np.array([ACROSS[joint.type] for joint in joints]),
-        stiffness=np.array([joint.stiffness or STIFFER * edge for joint in joints], dtype=float),
-        torsional=np.array([joint.torsional_stiffness or STIFFER * bend for joint in joints], dtype=float),
+        direction=np.einsum("ksij,ksni->ksnj", turned, directions).reshape(-1, 2, 3),
+        aligned=np.array([ALIGNED[joint.type] for joint in joints]),
+        slides=np.array([joint.type in SLIDES for joint in joints]),
+        crossed=np.array([joint.type == "universal" for joint in joints]),
+        stiffness=np.array([joint.stiffness or edge for joint in joints], dtype=float),
+        torsional=np.array([joint.torsional_stiffness or bend for joint in joints], dtype=float),
         gradient=np.zeros((2 * len(joints), 6)),
+        apart=np.zeros((len(joints), 2)),
     )
 
 
-def _directions(axis: tuple[float, float, float] | None) -> np.ndarray:
-    """The axis of a hinge, or that of a weld, which may be any, and a direction across, shape (2, 3)."""
-    first = np.array(axis if axis is not None else (1.0, 0.0, 0.0))
-    across = np.cross(first, np.eye(3)[np.argmin(np.abs(first))])
-    return np.stack([first, across / np.linalg.norm(across)])
+def _directions(joint: Joint) -> np.ndarray:
+    """Of either body: the axis, which of a weld or a pin may be any, and a direction across, shape (2, 2, 3)."""
+    first = np.array(joint.axis if joint.axis is not None else (1.0, 0.0, 0.0))
+    second = np.array(joint.second_axis if joint.second_axis is not None else first)
+    return np.stack([[axis, across(axis)] for axis in (first, second)])

@@ -23,6 +23,7 @@ from .drag import add_drag, update_directions_of_drag
 from .inertia import add_inertial_forces
 from .joints import add_joints, joints_of
 from .loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
+from .mechanisms import REMEMBERED, add_mechanisms, end_mechanisms, memory_at
 from .planar import add_elasticity_in_plane
 from .restitution import add_restitution, end_restitution, start_restitution, with_memory
 from .rod_contact import (
@@ -90,6 +91,13 @@ TERMS: tuple[Term, ...] = (
     Term(("bond",), lambda model, of: of["space"], add_bonds),
     Term(("stretching", "bending", "bond"), lambda model, of: of["plane"], add_elasticity_in_plane),
     Term(("joints",), lambda model, of: joints_of(model), add_joints),
+    Term(
+        ("joints", "joint friction"),
+        lambda model, of: memory_at(of["mechanisms"], of["memory"]),
+        add_mechanisms,
+        end=end_mechanisms,
+        memory=lambda model: REMEMBERED * len(model.mechanisms),
+    ),
     Term(("stretching", "viscosity"), lambda model, of: None, add_viscosity, start_elements),
     Term(("inertia", "damping", "gravity"), lambda model, of: None, add_inertial_forces),
     Term(("loads",), lambda model, of: of["loads"], add_point_forces, start_dead_loads),

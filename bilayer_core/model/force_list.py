@@ -17,6 +17,7 @@ from ..scene.config import SceneConfig
 from ..scene.load import Load
 from .colliders import ContactPair, contact_pairs
 from .findings import few
+from .mechanisms import mechanisms_of
 from .rod_pairs import RodPair, rod_pairs
 
 
@@ -105,6 +106,15 @@ def _viscosity(q: Question) -> str | None:
     return _unless(viscous, "no retardation_time of a material is above zero")
 
 
+def _joints(q: Question) -> str | None:
+    return _unless(bool(q.scene.joints or mechanisms_of(q.scene)), "no joints")
+
+
+def _joint_friction(q: Question) -> str | None:
+    resisted = any(mechanism.dissipates for mechanism in mechanisms_of(q.scene))
+    return _unless(resisted, "no damping and no friction of a hinge or a slide")
+
+
 def _bodies(q: Question) -> str | None:
     return _unless(any(not isinstance(body.motion, Prescribed) for body in q.scene.bodies), "no free body")
 
@@ -155,7 +165,8 @@ FORCES: tuple[Force, ...] = (
     Force("bending", CONSERVATIVE, "bend_twist.py", _always),
     Force("twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")),
     Force("bond", CONSERVATIVE, "bond.py", _bond),
-    Force("joints", CONSERVATIVE, "joints.py", lambda q: _unless(bool(q.scene.joints), "no joints")),
+    Force("joints", CONSERVATIVE, "joints.py", _joints),
+    Force("joint friction", DISSIPATIVE, "mechanisms.py", _joint_friction),
     Force("eigenstrain", None, "stretch.py", _eigenstrain),
     Force("viscosity", DISSIPATIVE, "viscosity.py", _viscosity),
     Force("inertia", INERTIAL, "inertia.py", _always),

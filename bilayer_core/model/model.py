@@ -8,6 +8,7 @@ import numpy as np
 
 from ..scene.config import SceneConfig
 from .layout import Layout, ReadOnlyArrays
+from .mechanisms import Mechanism, mechanisms_of
 from .plane import InPlane
 from .rod_surfaces import RodSurfaces
 from .shapes import Shape
@@ -230,10 +231,15 @@ class Model(ReadOnlyArrays):
 
     @property
     def strain_count(self) -> int:
-        """How many strains viscosity acts on; the gaps of `impact_pairs` come after them."""
+        """How many strains viscosity acts on; gaps of `impact_pairs`, then values of `mechanisms`, come after them."""
         if "viscosity" not in self.forces:
             return 0
         return self.edge_count + 3 * (len(self.joint_a) + len(self.pair_joint))
+
+    @property
+    def mechanisms(self) -> tuple[Mechanism, ...]:
+        """Turns and ways of hinges, rails and joints that something resists."""
+        return mechanisms_of(self.scene)
 
     @property
     def has_surface_contact(self) -> bool:

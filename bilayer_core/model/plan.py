@@ -13,6 +13,7 @@ from .findings import few, told
 from .force_list import planned
 from .imperfection import advice
 from .laminate import uneven_faces
+from .mechanisms import mechanisms_of
 from .planarity import find_plane, require_plane
 from .rod_pairs import RodPair, passing_warnings, rod_pairs
 from .twisted import HELIX, helix_error, twist_figures
@@ -25,6 +26,8 @@ RECOMMENDED = "sdirk2", "second order, L-stable; least CPU time to an error of 1
 """The integrator that `auto` takes, and why."""
 WITH_VISCOSITY = "tr_bdf2", "second order where viscosity makes motions stiff, too: its stages are of order 2"
 """The same for scenes with viscosity."""
+WITH_JOINTS = "tr_bdf2", "second order where stiff joints guide bodies that turn, too: its stages are of order 2"
+"""The same for scenes with joints between bodies."""
 
 FEW_PAIRS = 4
 """Contact pairs of one kind that are told one by one."""
@@ -83,6 +86,12 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
             "integrator: implicit_midpoint does not follow viscosity (retardation_time of a material): the rates of "
             f"strains at its ends are of first order; allowed: {', '.join(INTEGRATORS[:-1])}"
         )
+    for mechanism in mechanisms_of(scene):
+        if mechanism.dissipates and chosen_integrator == "implicit_midpoint":
+            raise SceneError(
+                f"integrator: implicit_midpoint does not follow damping and friction of {mechanism.owner}: rates at "
+                f"its ends are of first order; allowed: {', '.join(INTEGRATORS[:-1])}"
+            )
     return Plan(
         chosen_model,
         chosen_dimension,
@@ -142,6 +151,8 @@ def _is_viscous(scene: SceneConfig) -> bool:
 
 
 def _recommended(scene: SceneConfig) -> tuple[str, str]:
+    if scene.joints:
+        return WITH_JOINTS
     return WITH_VISCOSITY if _is_viscous(scene) else RECOMMENDED
 
 

@@ -16,6 +16,7 @@ from ..errors import SceneError
 from ..kinematics.rotation import rotation_matrix
 from ..scene.body import Body, Free, Guided, Prescribed
 from ..scene.config import SceneConfig
+from ..scene.joint import TURNS
 from ..scene.profile import extremes
 from ..scene.rod import RodCopy
 from .plane import Plane
@@ -140,8 +141,11 @@ class _Survey:
         for body in scene.bodies:
             yield from (f"bodies.{body.name}.{key}" for key in self._motions(body))
         for joint in scene.joints:
-            if joint.axis is not None and not self._along_normal(joint.axis):
-                yield f"joints.{joint.name}.axis"
+            for key, axis in (("axis", joint.axis), ("second_axis", joint.second_axis)):
+                if axis is None or self._along_normal(axis):
+                    continue
+                if joint.type in TURNS or not self._lies_in(axis):
+                    yield f"joints.{joint.name}.{key}"
             if not self._is_on(joint.point):
                 yield f"joints.{joint.name}.point"
         for what, axis in self._friction_axes():

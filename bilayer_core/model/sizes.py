@@ -23,7 +23,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         "edge+clamp": edges,
         "joint": joints,
         "pair": pairs,
-        "strain": model.strain_count + impacts,
+        "strain": model.strain_count + impacts + len(model.mechanisms),
         "impact": impacts,
         "strand": len(model.strands),
         "attached": len(model.attached_node),

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from .fingerprint import FREE, difference
 from .lit import light_of, part_seen
+from .mechanisms import start_rates
 from .model import Model
 
 Array = np.ndarray
@@ -55,7 +56,7 @@ class State:
     body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
     body_moment: Array  # on free bodies [N m], shape (n_free, 3)
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
-    strain_rate: Array  # of all elements with viscosity [1/s], and of gaps with damped impacts [m/s]
+    strain_rate: Array  # of elements with viscosity [1/s], gaps with damped impacts, and mechanisms [m/s, rad/s]
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
     account: Array  # of energy; see `engine.energy_account`, shape (12,)
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
@@ -165,7 +166,8 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
     `fingerprint` says what the state belongs to (`model.fingerprint`).
     """
     bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
-    strains = model.strain_count + len(model.impact_pairs)
+    rates = start_rates(model.scene, bodies.start_velocity, bodies.start_angular_velocity)
+    strain_rate = np.concatenate([np.zeros(model.strain_count + len(model.impact_pairs)), rates])
     channels = list(model.scene.stimuli.values())
     before = np.array([channel.schedule.value_before(0.0, LAST_STEP) for channel in channels])
     return State(
@@ -192,8 +194,8 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         body_acceleration=np.zeros((with_history * model.free_count, 3)),
         body_moment=np.zeros((with_history * model.free_count, 3)),
         fluid_force=np.zeros((with_history * in_fluid, 3)),
-        strain_rate=np.zeros(strains),
-        strain_acceleration=np.zeros(with_history * strains),
+        strain_rate=strain_rate,
+        strain_acceleration=np.zeros(with_history * len(strain_rate)),
         account=np.zeros(12),
         law_force=np.zeros(len(model.law_channel)),
         light_rate=np.zeros((len(model.lit_law), 2)),

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from bilayer_core.scene.faults import ROUNDING, Fault, refuse_all
+from bilayer_core.scene.mechanism import Sliding, Turning, resistance
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.schedule import faults_of_times, first_after
 from bilayer_core.scene.shape import RotationVector, Surface
@@ -77,6 +78,10 @@ class Guided(Part):
     """At the start, along the axis."""
     angular_speed: AngularSpeed = 0.0
     """At the start, about the hinge."""
+    turning: Turning | None = None
+    """What resists its turn about the hinge."""
+    sliding: Sliding | None = None
+    """What resists its way along the rail."""
 
     @property
     def turns(self) -> bool:
@@ -85,7 +90,11 @@ class Guided(Part):
 
     def describe(self) -> str:
         """What it is, in a few words."""
-        ways = {"on a rail": self.axis is not None, "on a hinge": self.hinge is not None, "on a pin": self.pinned}
+        ways = {
+            f"on a rail{resistance(self.sliding)}": self.axis is not None,
+            f"on a hinge{resistance(self.turning)}": self.hinge is not None,
+            "on a pin": self.pinned,
+        }
         return f"guided body, {' and '.join(way for way, has in ways.items() if has)}"
 
     @model_validator(mode="after")
@@ -190,6 +199,12 @@ def faults_of_guided(motion: Guided) -> list[Fault]:
         faults.append((("hinge",), motion.hinge, "must be left out: a pinned body turns in all directions"))
     if motion.hinge is None and motion.angular_speed:
         faults.append((("angular_speed",), motion.angular_speed, "must be left out: without a hinge it has no axis"))
+    if motion.hinge is None and motion.turning is not None:
+        found = motion.turning.model_dump(exclude_defaults=True)
+        faults.append((("turning",), found, "must be left out: without a hinge it has no axis"))
+    if motion.axis is None and motion.sliding is not None:
+        found = motion.sliding.model_dump(exclude_defaults=True)
+        faults.append((("sliding",), found, "must be left out: without an axis it does not slide"))
     if motion.inertia is not None and not motion.turns:
         faults.append((("inertia",), motion.inertia, "must be left out: it does not turn"))
     return [*faults, *faults_of_inertia(motion)]

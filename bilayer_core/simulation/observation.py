@@ -113,10 +113,11 @@ def contact_forces(stepper: Stepper) -> Array:
 
 def contact_wrenches(stepper: Stepper) -> Array:
     """Contact force [N] and moment about its position [N m] on every body, shape (n_body, 6)."""
-    joints, wrenches = stepper.engine.joints, -stepper.engine.sums.contact[:-1]
-    if joints.exists:  # they are in these sums too
-        np.add.at(wrenches, joints.body, joints.gradient)
-    return wrenches
+    wrenches = -stepper.engine.sums.contact
+    for joints in (stepper.engine.joints, stepper.engine.mechanisms):
+        if joints.exists:  # they are in these sums too
+            np.add.at(wrenches, joints.body, joints.gradient)
+    return wrenches[:-1]
 
 
 def clamp_wrenches(stepper: Stepper) -> Array:

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from ..engine.modes import COUNT, EVALUATE_STATE
+from ..forces.mechanisms import REMEMBERED
 from ..forces.register import memory_size
 from ..model.planarity import require_plane
 from ..model.rest_strains import RestStrains
@@ -99,6 +100,8 @@ class PlaneWatch:
             mine, part = getattr(self._copy, name), getattr(state, name)
             if name != "memory" and mine.shape == part.shape:  # one without history or fingerprint is enough
                 mine[...] = part
+        turned = REMEMBERED * len(self._space.model.mechanisms)  # first of the memory of both
+        self._copy.memory[:turned] = state.memory[:turned]
         for stepper in (self._space, self._plane):
             stepper.engine.set_drive(rest, load_factor)
         time, rate = float(state.time[0]), self._largest_rate(state)

@@ -14,6 +14,7 @@ from ..model.validity import LARGE_STRAIN
 from . import observation as observe
 from .plane_watch import PlaneWatch
 from .result import Termination
+from .views import BodyView, JointView
 
 LARGE_NUMERICAL = 0.1
 """Part of the largest energy of a run that its steps may make or lose without a warning."""
@@ -89,7 +90,9 @@ def summarise(simulator: Any) -> dict:
         "numerical_energy": numerical,
         **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
-        "joints": {name: {"distance": at.distance, "angle": at.angle} for name, at in simulator.joints.items()},
+        "joints": {
+            name: {"distance": at.distance, "angle": at.angle, **_motions(at)} for name, at in simulator.joints.items()
+        },
         "warnings": [
             *_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
@@ -125,6 +128,17 @@ def _of_contact(model: Model, unresolved: int, energy: float) -> Iterator[str]:
     yield f"{unresolved} steps, as short as allowed, did not resolve an impact on the barrier: {remedy}, holds it"
 
 
+def _motions(view: JointView | BodyView) -> dict[str, float]:
+    """What has been done about and along an axis, and the most beyond a limit."""
+    found = {}
+    for key, motion in (("turning", view.turning), ("sliding", view.sliding)):
+        if motion is not None:
+            found[key] = motion.value
+            if motion.beyond > 0.0:
+                found[f"{key}_beyond_limit"] = motion.beyond
+    return found
+
+
 def _bodies(simulator: Any) -> dict:
     """Where each body began and is, and how nodes touched it."""
     found = {}
@@ -137,6 +151,7 @@ def _bodies(simulator: Any) -> dict:
             "lift": simulator.statistics.body_tops[name] - float(start[2]),
             "lift_end": float(end[2] - start[2]),
             "first_contact": contact.first_contact if contact else None,
+            **_motions(simulator.bodies[name]),
             "contact_nodes": contact.nodes if contact else 0,
             "most_contact_nodes": contact.most_nodes if contact else 0,
         }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..forces.mechanisms import REMEMBERED
 from ..model.model import Model
 from ..model.state import State
 from . import observation as observe
@@ -38,13 +39,15 @@ class BodyView:
     clamp_wrench : Array
         Likewise, what the rods that it holds exert on it; see `observation.clamp_wrenches`. At the end of the last
         step: with the inertia of the held nodes, which `implicit_midpoint` does not give at the ends of its steps.
+    turning, sliding : Motion or None
+        About the hinge and along the rail of a guided body, where the scene has `turning` or `sliding`.
     """
 
     def __init__(self, present: Present, index: int):
         self._present, self._index = present, index
 
     def __repr__(self) -> str:
-        return f"{self._present.model.bodies.names[self._index]} at {self.position.tolist()}"
+        return f"{self._name} at {self.position.tolist()}"
 
     @property
     def position(self) -> Array:
@@ -61,6 +64,18 @@ class BodyView:
     @property
     def clamp_wrench(self) -> Array:
         return observe.clamp_wrenches(self._present.evaluated())[self._index]
+
+    @property
+    def turning(self) -> Motion | None:
+        return _motion(self._present, self._name, slides=False, guides=True)
+
+    @property
+    def sliding(self) -> Motion | None:
+        return _motion(self._present, self._name, slides=True, guides=True)
+
+    @property
+    def _name(self) -> str:
+        return self._present.model.bodies.names[self._index]
 
 
 class ClampView:
@@ -96,6 +111,26 @@ class ClampView:
         return wrench
 
 
+@dataclass(frozen=True)
+class Motion:
+    """What a hinge, a rail or a joint has done along or about its axis, where something resists that.
+
+    Attributes
+    ----------
+    value : float
+        Angle since the start, whole turns too [rad], or way along the axis [m].
+    exerted : float
+        Moment about the axis [N m], or force along it [N], of spring, damping, friction and limits together, on the
+        guided body or the second body of the joint.
+    beyond : float
+        Largest angle or way beyond a limit at the end of any step [rad, m].
+    """
+
+    value: float
+    exerted: float
+    beyond: float
+
+
 class JointView:
     """A joint between two bodies as it is at present.
 
@@ -105,40 +140,74 @@ class JointView:
         The two that it joins.
     wrench : Array
         Force [N] that it exerts on the first of them, and moment about the joint [N m], in the world's axes, shape
-        (6,); on the second the opposite.
+        (6,); on the second the opposite. What resists its turn or its way is part of it.
     distance, angle : float
-        By how much it gives way: of the two points [m], and of the directions that it keeps [rad].
+        By how much it gives way: distance of the two points, on a slide or a cylinder across the axis [m], and the
+        largest angle of a direction that it keeps [rad].
+    turning, sliding : Motion or None
+        About and along its axis, where the scene has `turning` or `sliding`.
     """
 
-    def __init__(self, present: Present, bodies: tuple[str, str], index: int):
-        self._present, self.bodies, self._index = present, bodies, index
+    def __init__(self, present: Present, name: str, bodies: tuple[str, str], index: int):
+        self._present, self._name, self.bodies, self._index = present, name, bodies, index
 
     def __repr__(self) -> str:
         return f"joint of {self.bodies[0]} and {self.bodies[1]}, {self.distance:.2g} m and {self.angle:.2g} rad apart"
 
     @property
     def wrench(self) -> Array:
-        joints, first = self._present.evaluated().engine.joints, 2 * self._index
+        engine, first = self._present.evaluated().engine, 2 * self._index
+        joints = engine.joints
         body, wrench = joints.body[first], -joints.gradient[first]
+        for index in _of_owner(self._present, self._name, guides=False).values():
+            wrench = wrench - engine.mechanisms.gradient[2 * index]
         arm = self._present.state.body_rotation[body] @ joints.arm[first]
         wrench[3:] -= np.cross(arm, wrench[:3])
         return wrench
 
     @property
     def distance(self) -> float:
-        joints = self._present.evaluated().engine.joints
-        return float(np.linalg.norm(self.wrench[:3]) / joints.stiffness[self._index])
+        return float(self._present.evaluated().engine.joints.apart[self._index, 0])
 
     @property
     def angle(self) -> float:
-        joints = self._present.evaluated().engine.joints
-        return float(np.linalg.norm(self.wrench[3:]) / joints.torsional[self._index])
+        return float(self._present.evaluated().engine.joints.apart[self._index, 1])
+
+    @property
+    def turning(self) -> Motion | None:
+        return _motion(self._present, self._name, slides=False, guides=False)
+
+    @property
+    def sliding(self) -> Motion | None:
+        return _motion(self._present, self._name, slides=True, guides=False)
+
+
+def _of_owner(present: Present, owner: str, guides: bool) -> dict[bool, int]:
+    """Slots of the mechanisms of a joint or of a guided body, by whether they slide."""
+    return {
+        mechanism.slides: index
+        for index, mechanism in enumerate(present.model.mechanisms)
+        if mechanism.owner == owner and mechanism.is_guide == guides
+    }
+
+
+def _motion(present: Present, owner: str, slides: bool, guides: bool) -> Motion | None:
+    index = _of_owner(present, owner, guides).get(slides)
+    if index is None:
+        return None
+    mechanisms = present.evaluated().engine.mechanisms
+    first, gradient, axis = mechanisms.body[2 * index], -mechanisms.gradient[2 * index + 1], mechanisms.axis[index]
+    if first < len(present.state.body_rotation):  # not the world
+        axis = present.state.body_rotation[first] @ axis
+    exerted = (gradient[:3] if slides else gradient[3:]) @ axis
+    beyond = present.state.memory[mechanisms.memory[0] + REMEMBERED * index + 1]
+    return Motion(float(mechanisms.value[index]), float(exerted), float(beyond))
 
 
 def joint_views(present: Present) -> dict[str, JointView]:
     """Every joint by name."""
     joints = enumerate(present.model.scene.joints)
-    return {joint.name: JointView(present, joint.bodies, index) for index, joint in joints}
+    return {joint.name: JointView(present, joint.name, joint.bodies, index) for index, joint in joints}
 
 
 def body_views(present: Present) -> dict[str, BodyView]:

@@ -15,6 +15,14 @@ from bilayer_core.validate.joints import layers_of, swinging
 
 MODELS, GRAVITY = ["laminate", "two_rod"], [0, 0, -9.81]
 STEPS = {"integrator": "sdirk2", "dt": 5e-4}
+AXES = {
+    "pin": {},
+    "hinge": {"axis": [0, 1, 0]},
+    "universal": {"axis": [0, 1, 0], "second_axis": [0, 0, 1]},
+    "slide": {"axis": [1, 0, 0]},
+    "cylinder": {"axis": [0, 1, 0]},
+    "weld": {},
+}
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -163,9 +171,9 @@ def test_a_stiffer_joint_gives_way_less_and_changes_nothing_else():
     np.testing.assert_allclose(stiff[1], usual[1], atol=1e-7)
 
 
-@pytest.mark.parametrize("kind", ["pin", "hinge", "weld"])
+@pytest.mark.parametrize("kind", AXES)
 def test_joints_keep_momentum_and_the_energy_budget(kind):
-    content = two_links(kind, **({"axis": [0, 1, 0]} if kind == "hinge" else {}))
+    content = two_links(kind, **AXES[kind])
     content |= {"gravity": [0, 0, 0]}
     content["rods"][0].pop("clamp_start")
     content["bodies"] = content["bodies"][1:]
@@ -193,6 +201,31 @@ def test_joints_keep_momentum_and_the_energy_budget(kind):
         ({"torsional_stiffness": 1.0}, "joints.knee.torsional_stiffness: .*a pin turns freely"),
         ({"stiffness": 0}, "joints.knee.stiffness: found 0; must be a stiffness"),
         ({"type": "slider"}, "joints.knee.type: .*pin"),
+        ({"type": "slide"}, "joints.knee.axis: .*must be given for a slide"),
+        ({"type": "universal", "axis": [0, 1, 0]}, "joints.knee.second_axis: .*must be given for a universal joint"),
+        (
+            {"type": "universal", "axis": [0, 1, 0], "second_axis": [0, 1, 1]},
+            "joints.knee.second_axis: .*must be perpendicular to `axis`",
+        ),
+        ({"second_axis": [0, 1, 0]}, "joints.knee.second_axis: .*must be left out: a pin has none"),
+        ({"turning": {"spring": 1.0}}, "joints.knee.turning: .*must be left out: a pin has no axis about which alone"),
+        ({"type": "hinge", "axis": [0, 1, 0], "sliding": {}}, "joints.knee.sliding: .*a hinge does not slide"),
+        (
+            {"type": "hinge", "axis": [0, 1, 0], "turning": {"limits": [0.1, 1.0]}},
+            r"joints.knee.turning.limits: .*must be \[least, greatest\] with the start, 0, between them",
+        ),
+        (
+            {"type": "hinge", "axis": [0, 1, 0], "turning": {"rest_angle": 1.0}},
+            "joints.knee.turning.rest_angle: .*there is no `spring`",
+        ),
+        (
+            {"type": "hinge", "axis": [0, 1, 0], "turning": {"limit_stiffness": 1.0}},
+            "joints.knee.turning.limit_stiffness: .*there are no `limits`",
+        ),
+        (
+            {"type": "hinge", "axis": [0, 1, 0], "turning": {"friction": "1 N"}},
+            r"joints.knee.turning.friction: .*a moment \[N\*m\]",
+        ),
     ],
 )
 def test_a_joint_between_bodies_that_cannot_be_is_refused(keys, fault):
@@ -248,18 +281,19 @@ def test_a_hinge_that_leaves_the_plane_is_told():
 
 
 def test_check_says_what_turns_and_what_is_joined(tmp_path, capsys):
-    content = two_links("hinge", axis=[0, 1, 0])
+    content = two_links("hinge", axis=[0, 1, 0], turning={"spring": 1e-4, "friction": 1e-6, "limits": [-1, 1]})
     content["bodies"] += [{"name": "pin", "position": [0, 0, 0.1], "motion": {"type": "guided", "pinned": True}}]
     content["rods"] += [rod([layer()], 0.02, 5, start=(0, 0, 0.1), name="third", clamp_start="pin")]
     content["bodies"][0]["motion"] = {"type": "guided", "axis": [1, 0, 0], "hinge": [0, 1, 0]}
+    content["bodies"][0]["motion"]["sliding"] = {"damping": 1.0}
     path = tmp_path / "linkage.yaml"
     path.write_text(yaml.safe_dump(content))
     assert main(["check", str(path)]) == 0
     found = capsys.readouterr().out
     for line in (
-        r"wall +guided body, on a rail and on a hinge",
+        r"wall +guided body, on a rail with damping and on a hinge",
         r"inner +junction without mass",
         r"pin +guided body, on a pin",
-        r"joint knee +hinge of inner and outer",
+        r"joint knee +hinge of inner and outer with a spring, friction and limits",
     ):
         assert re.search(line, found), found

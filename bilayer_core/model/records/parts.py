@@ -221,6 +221,31 @@ class Restitution:
 
 
 @record
+class Mechanisms:
+    """Turns and ways between two bodies that something resists; see `forces.mechanisms`."""
+
+    first: int  # of them among strains
+    memory: Indices  # where in `Problem.memory` they begin, two values each, shape (1,)
+    slides: Flags  # whether it is a way along the axis, not a turn about it, shape (n_mechanism,)
+    body: Indices  # A and B of each in turn, among all bodies and the world, shape (2 n_mechanism,)
+    free: Indices  # likewise among the free ones, −1 for others
+    arm: Matrix  # from the position of the body in its axes, A and B in turn [m], shape (2 n_mechanism, 3)
+    axis: Matrix  # a in the axes of A, shape (n_mechanism, 3)
+    mark: Matrix  # a direction across it in the axes of A and of B in turn, shape (2 n_mechanism, 3)
+    spring: Vector  # k [N m, N/m], shape (n_mechanism,)
+    rest: Vector  # [rad, m]
+    damping: Vector  # c [N m s, N s/m]
+    friction: Vector  # M [N m, N]
+    threshold: Vector  # ε [rad/s, m/s]
+    lower: Vector  # [rad, m], −∞ without
+    upper: Vector  # likewise
+    limit_stiffness: Vector  # K [N m, N/m]
+    margin: Vector  # w over which it comes in [rad, m]
+    value: Vector  # q at the last evaluation [rad, m]
+    gradient: Matrix  # ∂E/∂(X, φ) of A and B in turn [N, N m], shape (2 n_mechanism, 6)
+
+
+@record
 class Sliding:
     """Friction of the contacts at the start of a stage; see `forces.surface_friction`."""
 

@@ -14,6 +14,7 @@ from .parts import (
     Flow,
     Fluid,
     Joins,
+    Mechanisms,
     Moments,
     OffAxis,
     Plane,
@@ -225,6 +226,7 @@ class Problem:
     joins: Joins
     surfaces: Surfaces
     restitution: Restitution
+    mechanisms: Mechanisms
     sliding: Sliding
     rod_contact: RodContact
     slips: Slips
