@@ -28,7 +28,7 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
         else:
             velocity[index] = motion.speed * np.array(motion.axis or (0.0, 0.0, 0.0))
             angular_velocity[index] = motion.angular_speed * np.array(motion.hinge or (0.0, 0.0, 0.0))
-            own = _guided_motions(motion, motions)
+            own = guided_motions(motion, motions)
         allowed = np.zeros((6 * len(free), own.shape[1]))
         allowed[6 * slot : 6 * slot + 6] = own
         freedom.append(allowed)
@@ -79,7 +79,7 @@ def _bounding_radii(
     return bounding_radius
 
 
-def _guided_motions(motion: Guided, motions: np.ndarray) -> np.ndarray:
+def guided_motions(motion: Guided, motions: np.ndarray) -> np.ndarray:
     """What a rail, a hinge and a pin leave of the motions (X, φ) of a body, a column each, shape (6, ·)."""
     columns = []
     if motion.axis is not None:

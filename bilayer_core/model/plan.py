@@ -15,6 +15,7 @@ from .imperfection import advice
 from .laminate import uneven_faces
 from .mechanisms import mechanisms_of
 from .planarity import find_plane, require_plane
+from .redundancy import redundant_joints, require_possible_motion
 from .rod_pairs import RodPair, passing_warnings, rod_pairs
 from .twisted import HELIX, helix_error, twist_figures
 from .validity import Figure, validity_warnings
@@ -92,6 +93,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
                 f"integrator: implicit_midpoint does not follow damping and friction of {mechanism.owner}: rates at "
                 f"its ends are of first order; allowed: {', '.join(INTEGRATORS[:-1])}"
             )
+    require_possible_motion(scene)
     return Plan(
         chosen_model,
         chosen_dimension,
@@ -113,6 +115,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
 def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[Figure]:
     """Warnings that depend on the model."""
     yield from (figure for figure in twist_figures(scene, model, dimension) if figure.outside)
+    yield from redundant_joints(scene, require_plane(scene) if dimension == 2 else None)
     if model == "laminate":
         in_contact = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
         yield from (figure for rod in sorted(in_contact) for figure in uneven_faces(scene.rods[rod], scene))

@@ -158,12 +158,14 @@ def _joints(scene: SceneConfig) -> Iterator[Fault]:
 
 
 def _surfaces(scene: SceneConfig) -> Iterator[Fault]:
+    holding = {name for rod in scene.rods for copy in rod.copies for name in (copy.rod.clamp_start, copy.rod.clamp_end)}
     for index, body in enumerate(scene.bodies):
         motion = body.motion
         if motion.type == "prescribed":
             continue
-        if motion.mass == 0.0 and not any(body.name in (rod.clamp_start, rod.clamp_end) for rod in scene.rods):
-            yield ("bodies", index, "motion", "mass"), 0.0, "must be a mass [kg] above 0 for a body that holds no rod"
+        if motion.mass == 0.0 and body.name not in holding:
+            demand = "must be a mass [kg] above 0 for a body that holds no rod: nothing has stiffness or inertia there"
+            yield ("bodies", index, "motion", "mass"), 0.0, demand
         if not motion.turns:
             continue
         shape = body.surface.shape if body.surface is not None else None
