@@ -7,6 +7,10 @@
 ``bodies/<name>``                SPHERE, CUBE or CYLINDER (edges sharp, whatever their rounding); a small CUBE for a
                                  body without a surface
 ``obstacles/<name>``             the same; a plane is a CUBE of `PLANE_SIZE`, its upper face on the plane
+``joints/<name>``                SPHERE for pins and universal joints, CYLINDER along an axis, CUBE for a weld; those of
+                                 guided bodies are ``guides/<body>`` and ``rails/<body>``
+``clamp_forces``                 LINE_LIST of arrows: the force of rods on each body that holds some, from its position,
+``clamp_moments``                and their moment about it, as long as `ARROW_MOMENT` says; like contact forces
 ``contact_forces``               LINE_LIST of arrows from nodes and contact points. Contact forces of one scene
                                  differ by decades, so length is logarithmic: `ARROW_DECADE` times
                                  log10(1 + force / `ARROW_FORCE`). Deleted while nothing touches.
@@ -29,6 +33,7 @@ PLANE_SIZE = 1.0  # edge of the square drawn for a plane [m]
 PLANE_THICKNESS = 1e-3  # [m]
 ARROW_DECADE = 0.01  # length of an arrow for each power of ten [m]
 ARROW_FORCE = 1e-4  # force from which arrows grow [N]
+ARROW_MOMENT = 1e-6  # moment from which arrows of moments grow [N m]
 ARROW_SHOWN = 1e-6  # forces below this have no arrow [N]
 ARROW_WIDTH = 6e-4  # [m]
 HEAD_SHARE = 0.25  # of an arrow's length
@@ -37,19 +42,29 @@ HEAD_HALF_WIDTH = 0.1  # of an arrow's length
 BODY_COLOUR = (0.93, 0.62, 0.13, 1.0)
 OBSTACLE_COLOUR = (0.42, 0.45, 0.50, 0.6)
 ARROW_COLOUR = (0.10, 0.75, 0.35, 1.0)
+JOINT_COLOUR = (0.80, 0.82, 0.86, 1.0)
+CLAMP_FORCE_COLOUR = (0.20, 0.55, 0.95, 1.0)
+CLAMP_MOMENT_COLOUR = (0.75, 0.35, 0.90, 1.0)
 
+CLAMP_ARROWS = (
+    ("clamp_forces", CLAMP_FORCE_COLOUR, slice(0, 3), ARROW_FORCE),
+    ("clamp_moments", CLAMP_MOMENT_COLOUR, slice(3, 6), ARROW_MOMENT),
+)
+"""Namespace and colour of arrows, what of a wrench they show, and from which size they grow [N, N m]."""
 CUBE, SPHERE, CYLINDER, LINE_LIST = 1, 2, 3, 5
 ADD, DELETE = 0, 2
 _IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def force_arrows(origins: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Ends of the lines of arrows: a shaft and two barbs each.
+def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float = ARROW_FORCE) -> np.ndarray:
+    """Ends of the lines of arrows: a shaft and two barbs each; those of a zero force are all where it acts.
 
     Parameters
     ----------
     origins, forces : ndarray
-        [m, N], shape (arrows, 3); no force is zero.
+        [m, N], shape (arrows, 3).
+    unit : float
+        Force from which arrows grow [N].
 
     Returns
     -------
@@ -57,8 +72,8 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray) -> np.ndarray:
         Pairs of points [m], shape (6 arrows, 3).
     """
     size = np.linalg.norm(forces, axis=1, keepdims=True)
-    direction = forces / size
-    length = ARROW_DECADE * np.log10(1 + size / ARROW_FORCE)
+    direction = np.divide(forces, size, out=np.tile([0.0, 0.0, 1.0], (len(forces), 1)), where=size > 0.0)
+    length = ARROW_DECADE * np.log10(1 + size / unit)
     x, y, z = direction.T
     zero = np.zeros_like(x)
     # Across the arrow: direction × z, or direction × x if it is upright.
@@ -92,7 +107,10 @@ class MarkerEncoder:
         self._nodes = node_frames
         template = Template()
         self._layers = list(zip(description.layers, layer_rows(description), strict=True))
-        template.put("<u4", len(self._layers) + len(description.bodies) + len(description.obstacles) + 1)
+        self._holding = np.flatnonzero([body.holds_rods for body in description.bodies])
+        arrows = CLAMP_ARROWS if len(self._holding) else ()
+        shapes = len(description.bodies) + len(description.obstacles) + len(description.joints)
+        template.put("<u4", len(self._layers) + shapes + len(arrows) + 1)
         for index, (layer, rows) in enumerate(self._layers):
             count = 2 * (rows.stop - rows.start)
             _head(template, f"strands/{layer.name}", LINE_LIST, (1.0, 1.0, 1.0, 1.0), scale_field=f"spacing{index}")
@@ -116,6 +134,20 @@ class MarkerEncoder:
             _head(template, f"obstacles/{obstacle.name}", shape, OBSTACLE_COLOUR, size, pose)
             template.put("<u4", 0, 0)
             _tail(template)
+        self._joints: list[tuple[int, np.ndarray]] = []
+        for index, joint in enumerate(description.joints):
+            shape, size, pose = shape_marker(joint.shape)
+            self._joints.append((joint.body, pose))
+            _head(template, joint.name, shape, JOINT_COLOUR, size, pose, pose_field=f"joint{index}")
+            template.put("<u4", 0, 0)
+            _tail(template)
+        for name, colour, _, _ in arrows:
+            count = 6 * len(self._holding)
+            _head(template, name, LINE_LIST, colour, (ARROW_WIDTH, 0.0, 0.0))
+            template.put("<u4", count)
+            template.array(name, "<f8", (count, 3))
+            template.put("<u4", 0)
+            _tail(template)
         _head(template, "contact_forces", LINE_LIST, ARROW_COLOUR, (ARROW_WIDTH, 0.0, 0.0), action_field="arrows")
         template.array("arrow_count", "<u4", (1,))
         self._arrows_offset = len(template)
@@ -131,6 +163,8 @@ class MarkerEncoder:
         self._points = [views[f"points{i}"].reshape(-1, 2, 3) for i in layers]
         self._colours = [views[f"colours{i}"].reshape(-1, 2, 4) for i in layers]
         self._spacings = [views[f"spacing{i}"] for i in layers]
+        self._clamp_arrows = [(views[name], part, unit) for name, _, part, unit in arrows]
+        self._joint_poses = [views[f"joint{i}"] for i in range(len(description.joints))]
         self._body_poses = [views[f"pose{i}"] for i in range(len(description.bodies))]
 
     def encode(self, frame: Frame) -> bytes:
@@ -148,11 +182,15 @@ class MarkerEncoder:
             self._colours[index][:] = strain_colours(strain, STRAIN_LIMIT)[:, None, :]
             self._spacings[index][0] = lengths[rows.start : rows.stop - 1].mean()
         for index, pose in enumerate(self._body_poses):
-            own, quaternion = self._own_poses[index], frame.body_quaternions[index]
-            pose[:3] = frame.body_positions[index]
-            if own[:3].any():
-                pose[:3] += matrix_from_quaternion(quaternion) @ own[:3]
-            pose[3:] = quaternion if own[6] == 1.0 else quaternion_product(quaternion, own[3:])
+            _place(pose, frame.body_positions[index], frame.body_quaternions[index], self._own_poses[index])
+        for (body, own), pose in zip(self._joints, self._joint_poses, strict=True):
+            if body < 0:
+                pose[:] = own
+            else:
+                _place(pose, frame.body_positions[body], frame.body_quaternions[body], own)
+        for points, part, unit in self._clamp_arrows:
+            wrenches = frame.clamp_wrenches[self._holding, part]
+            points[:] = force_arrows(frame.body_positions[self._holding], wrenches, unit)
         self._template.set_time(frame.time)
 
         forces = frame.contact_forces
@@ -164,6 +202,14 @@ class MarkerEncoder:
             return message[: self._arrows_offset] + message[self._arrows_start :]
         arrows = force_arrows(frame.positions[touching], forces[touching])
         return message[: self._arrows_start] + arrows.astype("<f8").tobytes() + message[self._arrows_start :]
+
+
+def _place(pose_out: np.ndarray, position: np.ndarray, quaternion: np.ndarray, own: np.ndarray) -> None:
+    """Pose in the world of what has a pose of its own in the frame of a body."""
+    pose_out[:3] = position
+    if own[:3].any():
+        pose_out[:3] += matrix_from_quaternion(quaternion) @ own[:3]
+    pose_out[3:] = quaternion if own[6] == 1.0 else quaternion_product(quaternion, own[3:])
 
 
 def _head(

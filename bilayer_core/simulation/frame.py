@@ -103,6 +103,25 @@ class ObstacleInfo:
 
 
 @dataclass(frozen=True)
+class JointInfo:
+    """How a joint, or the hinge or rail of a guided body, is drawn: a small shape on a body.
+
+    Attributes
+    ----------
+    name : str
+        ``"joints/<name>"``, or ``"guides/<body>"`` and ``"rails/<body>"``.
+    body : int
+        Which one carries the shape, −1 for the world.
+    shape : ShapeInfo
+        A ball where it turns in all directions or about two axes, a cylinder along its axis, or a box.
+    """
+
+    name: str
+    body: int
+    shape: ShapeInfo
+
+
+@dataclass(frozen=True)
 class Description:
     """What does not change during a run: names, shapes and settings.
 
@@ -125,6 +144,7 @@ class Description:
         Name and shape of each part of `Frame.state`, in order.
     settings : dict
         Solver settings and versions, as flat text values.
+    joints : tuple of JointInfo
     """
 
     scene_name: str
@@ -139,6 +159,7 @@ class Description:
     channel_ranges: tuple[tuple[float, float], ...]
     state_layout: tuple[tuple[str, tuple[int, ...]], ...]
     settings: dict[str, str] = field(default_factory=dict)
+    joints: tuple[JointInfo, ...] = ()
 
     @property
     def layers(self) -> tuple[Strand, ...]:

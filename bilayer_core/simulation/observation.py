@@ -13,6 +13,7 @@ from ..model.state import State
 from ..model.strand_arrays import StrandArrays
 from .fluid_energy import energy_of_fluid
 from .frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
+from .joint_shapes import joint_shapes
 from .kinetic_energy import kinetic_energy
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper
@@ -60,6 +61,7 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         channel_ranges=tuple((channel.minimum, channel.maximum) for channel in scene.stimuli.values()),
         state_layout=state.layout(),
         settings=settings,
+        joints=joint_shapes(model),
     )
 
 

@@ -23,6 +23,7 @@ SIDE_SHADE = 0.55  # brightness of the narrow faces of ribbons
 GROUND_COLOURS = ((74, 79, 88), (62, 66, 74), (28, 30, 34))
 OBSTACLE_COLOURS = ((112, 122, 138), (98, 107, 122))
 BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
+JOINT_COLOURS = ((205, 210, 218), (150, 156, 166))
 HUB_COLOUR = (128, 140, 160)
 ARROW_COLOUR = (64, 224, 148)
 LEGEND_HEIGHT = 14  # pixels of the colour bar
@@ -46,6 +47,7 @@ def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = bluepri
     _log_obstacles(recording, run, scales)
     _send_strands(recording, run, scales)
     _send_bodies(recording, run, scales)
+    _send_joints(recording, run)
     _send_forces(recording, run, scales)
     _send_series(recording, run)
     recording.flush()
@@ -141,6 +143,19 @@ def _send_bodies(recording: rr.RecordingStream, run: RunData, scales: Scales) ->
                     translation=run.body_positions[part, index], quaternion=run.body_quaternions[part, index]
                 ),
             )
+
+
+def _send_joints(recording: rr.RecordingStream, run: RunData) -> None:
+    """Joints and guides, each on the body that carries it."""
+    for joint in run.description.joints:
+        path = f"world/{joint.name}"
+        recording.log(path, _mesh(geometry.shape_mesh(joint.shape, JOINT_COLOURS)), static=True)
+        if joint.body < 0:
+            continue
+        for part in _chunks(len(run.times)):
+            poses = run.body_positions[part, joint.body], run.body_quaternions[part, joint.body]
+            moved = rr.Transform3D.columns(translation=poses[0], quaternion=poses[1])
+            recording.send_columns(path, _time(run.times[part]), moved)
 
 
 def _send_forces(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:

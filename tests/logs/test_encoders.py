@@ -149,7 +149,7 @@ def test_markers_tile_ribbons_with_bars_and_show_forces_only_while_there_are_any
 
     closed, free = markers(2.0), markers(0.5)
     assert list(closed) == list(free)
-    assert len(closed) == 8 + 2 + 1 + 1
+    assert len(closed) == 8 + 2 + 1 + 2 + 1
     ribbon = closed["strands/arm_2/active"]
     assert ribbon.type == LINE_LIST
     ends = np.array([[p.x, p.y, p.z] for p in ribbon.points]).reshape(-1, 2, 3)
