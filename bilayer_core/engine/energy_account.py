@@ -16,11 +16,11 @@ much by itself, which is what rounding and a loose tolerance of Newton's method 
 ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
-itself. Its change beyond the work that the motion has done on them by the powers at the stages is an error of the step
-beside that of positions (`engine.integrate`), over the largest energy of the run. It is of the same order, says what of
-an impact's energy a step makes or loses, and nothing where contacts rest. (An error relative to the present gap would
-not see a step that crosses the barrier forth and back: its gaps are large at both ends.) Where a barrier cannot hold
-an impact, no step resolves it: the shortest are taken, and counted.
+itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
+powers at the stages is an error of the step beside that of positions (`engine.integrate`), over the largest energy of
+the run. It is of the same order, says what of an impact's energy a step makes or loses, and nothing where contacts
+rest. (An error relative to the present gap would not see a step that crosses the barrier forth and back: its gaps are
+large at both ends.) Where a barrier cannot hold an impact, no step resolves it: the shortest are taken, and counted.
 
 The account is part of the state, so that a run that is continued makes the same steps.
 """
@@ -101,8 +101,10 @@ def _kinetic(p, state, at):
 
 
 @kernel
-def _in_barriers(sums):
-    return sums.energy[BARRIER] + sums.energy[ROD_BARRIER]
+def _in_barriers(p):
+    """Energy in what stops impacts: barriers, and limits of hinges and slides [J]."""
+    energy = p.sums.energy[BARRIER] + p.sums.energy[ROD_BARRIER]
+    return energy + p.mechanisms.in_limits[0] if p.mechanisms.exists else energy
 
 
 @kernel
@@ -117,7 +119,7 @@ def _energies(p, state, at):
         potential += energy
         rounding += abs(energy)
         size += abs(energy - state.account[GRAVITY_AT_START]) if k == GRAVITY else energy
-    barriers = _in_barriers(p.sums)
+    barriers = _in_barriers(p)
     measure = kinetic + size + ROUNDING / LARGEST_GAIN * rounding + p.least_energy
     return kinetic + potential, barriers, measure
 
@@ -233,8 +235,10 @@ def _add_velocity(rates, b, x, at, sign, velocity_out):
 
 @kernel
 def _power_of_barriers(p, at, point, rates):
-    """What barriers take up at the velocities of a stage's end [W]: ∂V/∂d times the rates of gaps."""
-    surfaces, rods, sums, power = p.surfaces, p.rod_contact, p.sums, 0.0
+    """What barriers and limits take up at the velocities of a stage's end [W]: ∂V/∂d times the rates of gaps."""
+    surfaces, rods, sums, mechanisms, power = p.surfaces, p.rod_contact, p.sums, p.mechanisms, 0.0
+    for k in range(mechanisms.slides.shape[0]):
+        power += mechanisms.limit_slope[k] * point.strain_rate[mechanisms.first + k]
     velocity = stack_vector(3)
     if surfaces.exists:
         scratch = sums.arm_rate.shape[0] - 1
@@ -297,7 +301,7 @@ def add_powers(p, work, inputs, n, weight, at):
         supplied += sums.supplied[k]
         lost += sums.lost[k]
     _write_rates(p.bodies, inputs, n, at, work.end, work.rates)
-    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if _in_barriers(sums) != 0.0 else 0.0
+    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if _in_barriers(p) != 0.0 else 0.0
     done[TAKEN_UP] += weight * done[TAKING_UP]
     driven = p.followers.exists or p.moments.exists
     if flow.exists:

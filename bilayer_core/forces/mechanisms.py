@@ -214,6 +214,7 @@ def add_mechanisms(mechanisms, p, at, stage, with_hessian):
     """Energy and derivatives of springs, limits, damping and friction."""
     sums, h, own = p.sums, stage.lengths[0], mechanisms.gradient
     own[:] = 0.0
+    mechanisms.in_limits[0], mechanisms.limit_slope[:] = 0.0, 0.0
     conserved, resists = sums.selected[JOINTS], sums.selected[FRICTION]
     if not (conserved or resists):
         return math.inf
@@ -231,7 +232,9 @@ def add_mechanisms(mechanisms, p, at, stage, with_hessian):
             above = limit_energy(q - mechanisms.upper[k], mechanisms.limit_stiffness[k], mechanisms.margin[k])
             below = limit_energy(mechanisms.lower[k] - q, mechanisms.limit_stiffness[k], mechanisms.margin[k])
             energy += above[0] + below[0]
-            slope += above[1] - below[1]
+            mechanisms.in_limits[0] += above[0] + below[0]
+            mechanisms.limit_slope[k] = above[1] - below[1]
+            slope += mechanisms.limit_slope[k]
             slope_of_slope += above[2] + below[2]
         if resists:
             rate = (q - stage.origin_strain[mechanisms.first + k]) / h
@@ -312,5 +315,7 @@ def mechanisms_record(model: Model) -> Mechanisms:
         limit_stiffness=np.array([law.limit_stiffness or least for law, least in zip(laws, usual, strict=True)]),
         margin=MARGIN * (limits[:, 1] - limits[:, 0]),
         value=np.zeros(len(found)),
+        limit_slope=np.zeros(len(found)),
+        in_limits=np.zeros(1),
         gradient=np.zeros((2 * len(found), 6)),
     )

@@ -232,3 +232,17 @@ def test_a_joint_costs_a_scene_without_mechanisms_nothing():
     simulator = Simulator(load_scene(scene([rod([layer()], clamp_start="wall")], bodies=[fixed()])))
     assert not simulator._stepper.engine.mechanisms.exists
     assert simulator.plan.terms["joint friction"].startswith("skipped")
+
+
+@pytest.mark.parametrize("speed", [1.0, 10.0, 100.0])
+def test_adaptive_steps_resolve_rebounds_from_a_limit(speed):
+    def lost(tolerance):
+        content = wheel(limits=[-1.0, 1.0])
+        content["bodies"][1]["motion"]["angular_speed"] = speed
+        simulator = Simulator(load_scene(content), dimension=2, integrator="tr_bdf2", tolerance=tolerance)
+        simulator.run(10.0 / speed)  # five rebounds
+        assert simulator.bodies["wheel"].turning.beyond > 0.0
+        return -simulator.summary()["numerical_energy"] / (0.5e-6 * speed**2)
+
+    assert 0.0 < lost(1e-4) < 0.03
+    assert abs(lost(1e-5)) < 0.003

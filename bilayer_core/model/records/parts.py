@@ -242,6 +242,8 @@ class Mechanisms:
     limit_stiffness: Vector  # K [N m, N/m]
     margin: Vector  # w over which it comes in [rad, m]
     value: Vector  # q at the last evaluation [rad, m]
+    limit_slope: Vector  # ∂E/∂q of the limits there [N m, N]
+    in_limits: Vector  # their energy there [J], shape (1,)
     gradient: Matrix  # ∂E/∂(X, φ) of A and B in turn [N, N m], shape (2 n_mechanism, 6)
 
 
