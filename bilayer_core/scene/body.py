@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from bilayer_core.scene.faults import ROUNDING, Fault, refuse_all
 from bilayer_core.scene.mechanism import Sliding, Turning, resistance
 from bilayer_core.scene.part import Direction, Name, Part, Point
-from bilayer_core.scene.schedule import faults_of_times, first_after
+from bilayer_core.scene.schedule import faults_of_times
 from bilayer_core.scene.shape import RotationVector, Surface
 from bilayer_core.scene.units import (
     AngularSpeed,
@@ -119,10 +119,6 @@ class Prescribed(Part):
     """With which controllers may move it at most, by `set_pose` or the topic `mount_pose`; without one they may not."""
     top_angular_speed: PositiveAngularSpeed | None = None
     """With which they may turn it at most; without one they may not."""
-
-    def breakpoint_after(self, t: float) -> float:
-        """First of the times after `t` [s], infinity if there is none: there the acceleration jumps."""
-        return first_after(t, self.times)
 
     @property
     def controlled(self) -> bool:

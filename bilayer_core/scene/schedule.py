@@ -165,9 +165,3 @@ def faults_of_times(times: list[float], key: tuple[str], values: list) -> list[F
     if len(times) != len(values):
         faults.append((key, f"{len(values)} entries", f"must be as many as `times`, {len(times)}"))
     return faults
-
-
-def first_after(t: float, times: list[float] | tuple[float, ...]) -> float:
-    """The first of increasing times after `t` [s], infinity if there is none."""
-    place = bisect_right(times, t)
-    return times[place] if place < len(times) else math.inf

@@ -5,7 +5,6 @@ import math
 import pytest
 from pydantic import TypeAdapter
 
-from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.load import Load
 from bilayer_core.scene.schedule import Schedule
 
@@ -97,9 +96,7 @@ def test_a_sine_is_seen_four_times_a_period_from_its_start_on():
     assert found == pytest.approx([1.0 + 0.005 * k for k in range(13)], abs=1e-12)
 
 
-def test_loads_and_prescribed_bodies_have_those_of_what_drives_them():
+def test_loads_have_those_of_what_drives_them():
     load = {"name": "pull", "rod": "arm", "position": 0.0, "force": [0, 0, 1]}
     assert Load(**load).factor.breakpoint_after(0.0) == math.inf
     assert Load(**load, schedule=RAMP).factor.breakpoint_after(0.3) == 1.1
-    path = Prescribed(type="prescribed", times=[0.0, 0.2, 0.5], displacements=[[0, 0, 0], [0, 0, 1], [0, 0, 0]])
-    assert [path.breakpoint_after(t) for t in (0.0, 0.2, 0.5)] == [0.2, 0.5, math.inf]
