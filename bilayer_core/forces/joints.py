@@ -1,20 +1,20 @@
 """Joints: stiff springs between points and directions of two bodies.
 
 With the arms ρ = R r from the bodies' positions, the distance d = X_A + ρ_A − X_B − ρ_B of the two points, and unit
-vectors u_A, u_B that were one at the start (none on a pin, the axis on a hinge and a cylinder, two on a weld and a
-slide),
+vectors u_A, u_B that were one at the start (none on a pin, the axis on a hinge and a cylinder, and on a weld and a
+slide three, one across the other, so that they resist every turn alike, whatever their axes are),
 
-    E = ½ k |d|² + ½ k_θ Σ |u_A − u_B|²                     pin, hinge, weld
-    E = ½ k (|d|² − (a·d)²) + ½ k_θ Σ |u_A − u_B|²          slide, cylinder: the point of B stays on the axis a of A
+    E = ½ k |d|² + ½ κ Σ |u_A − u_B|²                       pin, hinge, weld; κ = k_θ, with three directions k_θ/2
+    E = ½ k (|d|² − (a·d)²) + ½ κ Σ |u_A − u_B|²            slide, cylinder: the point of B stays on the axis a of A
     E = ½ k |d|² + ½ k_θ (a·b)²                             universal: the axis b of B stays across the axis a of A
 
 Arms and vectors turn by x → x + φ×x + ½ φ×(φ×x), see `engine.linear.attachments`. With g = k d,
 
-    ∂E/∂(X_A, φ_A) = (g, ρ_A×g − k_θ Σ u_A×u_B),      ∂E/∂(X_B, φ_B) = (−g, −ρ_B×g + k_θ Σ u_A×u_B)
+    ∂E/∂(X_A, φ_A) = (g, ρ_A×g − κ Σ u_A×u_B),        ∂E/∂(X_B, φ_B) = (−g, −ρ_B×g + κ Σ u_A×u_B)
 
     Hessian of the first term    k JᵀJ + T(ρ_A, g) − T(ρ_B, g),    J = (1, −[ρ_A]×, −1, [ρ_B]×)
-    of the second                by (φ_A, φ_A) and (φ_B, φ_B)  −k_θ T(u_A, u_B),
-                                 by (φ_A, φ_B)                 −k_θ ((u_A·u_B) 1 − u_B u_Aᵀ)
+    of the second                by (φ_A, φ_A) and (φ_B, φ_B)  −κ T(u_A, u_B),
+                                 by (φ_A, φ_B)                 −κ ((u_A·u_B) 1 − u_B u_Aᵀ)
 
 and T(a, b) = ½ (a bᵀ + b aᵀ) − (a·b) 1. Since |u_A − u_B|² = 2 − 2 u_A·u_B, only the product acts; the energy is taken
 from the difference, which keeps its digits. The way along an axis, s = −a·d, and its derivatives are those of
@@ -44,7 +44,7 @@ from .joint_stiffness import across, scatter_pair, stiffness_of_joints
 from .mechanisms import add_product, add_way
 
 JOINTS = slot_of("joints")
-ALIGNED = {"pin": 0, "universal": 0, "hinge": 1, "cylinder": 1, "slide": 2, "weld": 2}
+ALIGNED = {"pin": 0, "universal": 0, "hinge": 1, "cylinder": 1, "slide": 3, "weld": 3}
 """How many directions a joint keeps."""
 
 
@@ -55,7 +55,7 @@ class Joints:
     body: Indices  # A and B of each in turn, among all bodies, shape (2 n_joint,)
     free: Indices  # likewise among the free ones, −1 for a prescribed one
     arm: Matrix  # r in the axes of the body, A and B in turn [m], shape (2 n_joint, 3)
-    direction: Stack  # u in the axes of the body, likewise, the axis first, shape (2 n_joint, 2, 3)
+    direction: Stack  # u in the axes of the body, likewise, the axis first, shape (2 n_joint, 3, 3)
     aligned: Indices  # how many directions each aligns, shape (n_joint,)
     slides: Flags  # whether along the first direction of A, shape (n_joint,)
     crossed: Flags  # whether it keeps the first directions of A and B perpendicular, shape (n_joint,)
@@ -170,12 +170,14 @@ def add_joints(joints, p, at, stage, with_hessian):
         square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
         total += 0.5 * stiffness * square
         apart[k, 0], apart[k, 1] = math.sqrt(square), 0.0
+        bending = 0.0
         for j in range(joints.aligned[k]):
             _turned(at.rotation, a, joints.direction[2 * k], j, u)
             _turned(at.rotation, b, joints.direction[2 * k + 1], j, v)
-            energy = _add_alignment(joints.torsional[k], u, v, with_hessian, own, k, hessian)
-            apart[k, 1] = max(apart[k, 1], math.sqrt(2.0 * energy / joints.torsional[k]))
-            total += energy
+            part = joints.torsional[k] if joints.aligned[k] == 1 else 0.5 * joints.torsional[k]
+            bending += _add_alignment(part, u, v, with_hessian, own, k, hessian)
+        apart[k, 1] = math.sqrt(2.0 * bending / joints.torsional[k])
+        total += bending
         if joints.crossed[k]:
             _turned(at.rotation, a, joints.direction[2 * k], 0, u)
             _turned(at.rotation, b, joints.direction[2 * k + 1], 0, v)
@@ -205,7 +207,7 @@ def joints_of(model: Model) -> Joints:
         body=body.reshape(-1),
         free=bodies.free_index[body].reshape(-1),
         arm=np.einsum("ksij,ksi->ksj", turned, arms).reshape(-1, 3),
-        direction=np.einsum("ksij,ksni->ksnj", turned, directions).reshape(-1, 2, 3),
+        direction=np.einsum("ksij,ksni->ksnj", turned, directions).reshape(-1, 3, 3),
         aligned=np.array([ALIGNED[joint.type] for joint in joints]),
         slides=np.array([joint.type in SLIDES for joint in joints]),
         crossed=np.array([joint.type == "universal" for joint in joints]),
@@ -217,7 +219,7 @@ def joints_of(model: Model) -> Joints:
 
 
 def _directions(joint: Joint) -> np.ndarray:
-    """Of either body: the axis, which of a weld or a pin may be any, and a direction across, shape (2, 2, 3)."""
+    """Of either body: the axis, which of a weld or a pin may be any, and two across, shape (2, 3, 3)."""
     first = np.array(joint.axis if joint.axis is not None else (1.0, 0.0, 0.0))
     second = np.array(joint.second_axis if joint.second_axis is not None else first)
-    return np.stack([[axis, across(axis)] for axis in (first, second)])
+    return np.stack([[axis, across(axis), np.cross(axis, across(axis))] for axis in (first, second)])

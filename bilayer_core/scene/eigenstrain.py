@@ -48,10 +48,16 @@ LAWS: dict[str, dict[str, float]] = {
 """Keys of an eigenstrain that a law stands for, each of which a scene may state otherwise."""
 
 
+def _gain_or_law(schema: dict[str, Any]) -> None:
+    """Tell editors that one of the two is enough."""
+    schema["required"].remove("gain")
+    schema["anyOf"] = [{"required": ["gain"]}, {"required": ["law"]}]
+
+
 class Eigenstrain(BaseModel):
     """Free strain of a layer: gain times the stimulus, which the material follows with a first-order lag."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_gain_or_law)
 
     stimulus: str
     """One of the channels in `stimuli`."""
