@@ -17,6 +17,7 @@ GIF_PICTURES = 40
 @click.option("--gif", metavar="OUT.gif", help=f"A moving picture; {GIF_PICTURES} pictures take about a minute.")
 @click.option("--at", "times", type=Duration(from_zero=True), multiple=True, help="Simulated time; may be repeated.")
 @click.option("--frames", type=click.IntRange(min=1), metavar="N", help="How many pictures, evenly over the run.")
+@click.option("--reactions", is_flag=True, help="Draw the forces and moments that rods exert on bodies.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 def render(
     file: str,
@@ -25,6 +26,7 @@ def render(
     gif: str | None,
     times: tuple[float, ...],
     frames: int | None,
+    reactions: bool,
     force: bool,
 ) -> None:
     """Draw a run without a screen: the robot alone, as large as its motion allows."""
@@ -47,7 +49,7 @@ def render(
         raise InputError("--frames: says how many pictures, --at of which times; give one of the two")
     if png and (len(times) > 1 or frames is not None):
         raise InputError("--png: is one picture; give one --at, or a sheet")
-    with Studio(file) as studio:
+    with Studio(file, reactions) as studio:
         if png:
             studio.picture(png, times[0] if times else None)
             click.echo(f"picture    {png}")

@@ -6,6 +6,7 @@ import rerun.blueprint as rrb
 
 from bilayer_core.record.run_data import RunData
 from bilayer_core.simulation.observation import versions
+from bilayer_core.view.arrows import REACTIONS, reaction_arrows
 from bilayer_core.view.scales import Scales
 
 TIMELINE = "sim_time"
@@ -24,7 +25,7 @@ CHANNEL_COLOURS = (
 
 def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
     """The robot at the left, large, over its legend; curves at the right."""
-    robot = _robot(scales)
+    robot = _robot(scales, reactions=True)
     legend = rrb.Spatial2DView(
         name="Strain",
         origin="legend",
@@ -48,18 +49,22 @@ def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
     return _whole(content, time_panel="collapsed")
 
 
-def robot_alone(run: RunData, scales: Scales) -> rrb.Blueprint:
-    """The robot for pictures; the viewer's notices, at the upper right, appear over the text beside it."""
+def robot_alone(run: RunData, scales: Scales, reactions: bool = False) -> rrb.Blueprint:
+    """The robot for pictures, with or without what its clamps bear; the viewer's notices, at the upper right, appear
+    over the text beside it.
+    """
     text = rrb.TextDocumentView(name="Run", origin="summary")
-    return _whole(rrb.Horizontal(_robot(scales), text, column_shares=[4, 1]), time_panel="hidden")
+    return _whole(rrb.Horizontal(_robot(scales, reactions), text, column_shares=[4, 1]), time_panel="hidden")
 
 
-def _robot(scales: Scales) -> rrb.Spatial3DView:
+def _robot(scales: Scales, reactions: bool) -> rrb.Spatial3DView:
+    hidden = {} if reactions else {f"world/{name}": rrb.EntityBehavior(visible=False) for name in REACTIONS}
     return rrb.Spatial3DView(
         name="Robot",
         origin="world",
         background=BACKGROUND,
         line_grid=False,
+        overrides=hidden,
         eye_controls=rrb.EyeControls3D(
             kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
         ),
@@ -92,6 +97,10 @@ def summary(run: RunData, scales: Scales) -> str:
     ]
     if run.contact_forces.any():
         lines.append(f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.")
+    for name, arrows in reaction_arrows(run, scales).items():
+        colour, unit = ("Blue", "mN") if name == "clamp_forces" else ("Purple", "mN m")
+        size = f"{10 / arrows.metres_per_unit:.4g} {unit} for 10 mm"
+        lines.append(f"- **{colour}:** {name.split('_')[1]} of rods on bodies, {size}.")
     if any(obstacle.shape.kind == "plane" for obstacle in description.obstacles):
         lines.append(f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.")
     lines.append(f"- **Computed with:** {', '.join(settings)}.")

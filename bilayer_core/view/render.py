@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,6 +35,8 @@ class Studio:
     ----------
     path : str or Path
         MCAP log.
+    reactions : bool
+        Whether to draw the forces and moments of rods on the bodies that hold them.
 
     Raises
     ------
@@ -41,8 +44,9 @@ class Studio:
         The log cannot be read or holds no frame, or the viewer or a Vulkan driver is missing.
     """
 
-    def __init__(self, path: str | Path):
+    def __init__(self, path: str | Path, reactions: bool = False):
         require_rerun()
+        self._reactions = reactions
         self._path = Path(path)
         self._run = read_log(path)
         self._stack = ExitStack()
@@ -57,7 +61,7 @@ class Studio:
             directory = tempfile.mkdtemp(prefix="bilayer_render_")
             stack.callback(shutil.rmtree, directory, ignore_errors=True)
             recording = Path(directory) / "run.rrd"
-            write_recording(self._run, recording, robot_alone)
+            write_recording(self._run, recording, partial(robot_alone, reactions=self._reactions))
             self._scales = choose_scales(self._run)
             self._viewer = stack.enter_context(HeadlessViewer(WINDOW_SIZE))
             self._viewer.open(recording)
@@ -140,6 +144,8 @@ class Studio:
         parts = [f"{run.description.scene_name}: axial strain from -{percent:g} % (blue) to +{percent:g} % (red)"]
         if run.contact_forces.any():
             parts.append("contact forces (green)")
+        if self._reactions and run.clamp_wrenches.any():
+            parts.append("force (blue) and moment (purple) of rods on bodies")
         if any(obstacle.shape.kind == "plane" for obstacle in run.description.obstacles):
             parts.append(f"squares of {1e3 * self._scales.cell:g} mm")
         return ", ".join(parts)

@@ -15,6 +15,7 @@ from bilayer_core.record.node_frames import layer_rows
 from bilayer_core.record.run_data import RunData
 from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
+from bilayer_core.view.arrows import Arrows, contact_arrows, reaction_arrows
 from bilayer_core.view.layout import CHANNEL_COLOURS, TIMELINE, blueprint, summary
 from bilayer_core.view.scales import Scales, choose_scales
 
@@ -26,6 +27,7 @@ BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
 JOINT_COLOURS = ((205, 210, 218), (150, 156, 166))
 HUB_COLOUR = (128, 140, 160)
 ARROW_COLOUR = (64, 224, 148)
+REACTION_COLOURS = {"clamp_forces": (80, 160, 255), "clamp_moments": (200, 110, 235)}
 LEGEND_HEIGHT = 14  # pixels of the colour bar
 Layout = Callable[[RunData, Scales], rrb.Blueprint]
 
@@ -48,7 +50,9 @@ def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = bluepri
     _send_strands(recording, run, scales)
     _send_bodies(recording, run, scales)
     _send_joints(recording, run)
-    _send_forces(recording, run, scales)
+    _send_arrows(recording, "world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
+    for name, arrows in reaction_arrows(run, scales).items():
+        _send_arrows(recording, f"world/{name}", REACTION_COLOURS[name], arrows, scales)
     _send_series(recording, run)
     recording.flush()
     recording.disconnect()
@@ -158,19 +162,16 @@ def _send_joints(recording: rr.RecordingStream, run: RunData) -> None:
             recording.send_columns(path, _time(run.times[part]), moved)
 
 
-def _send_forces(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
-    path = "world/contact_forces"
-    style = rr.Arrows3D.from_fields(colors=ARROW_COLOUR, radii=0.005 * scales.size)
-    recording.log(path, style, static=True)
-    shown = np.linalg.norm(run.contact_forces, axis=2) > scales.shown_force
-    for part in _chunks(len(run.shape_times)):
+def _send_arrows(recording: rr.RecordingStream, path: str, colour: tuple, arrows: Arrows, scales: Scales) -> None:
+    recording.log(path, rr.Arrows3D.from_fields(colors=colour, radii=0.005 * scales.size), static=True)
+    shown = np.linalg.norm(arrows.forces, axis=2) > arrows.shown
+    for part in _chunks(len(arrows.times)):
         which = shown[part]
         recording.send_columns(
             path,
-            _time(run.shape_times[part]),
+            _time(arrows.times[part]),
             rr.Arrows3D.columns(
-                origins=run.positions[part][which],
-                vectors=run.contact_forces[part][which] * scales.metres_per_newton,
+                origins=arrows.origins[part][which], vectors=arrows.forces[part][which] * arrows.metres_per_unit
             ).partition(which.sum(axis=1)),
         )
 

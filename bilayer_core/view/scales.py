@@ -62,10 +62,7 @@ def choose_scales(run: RunData) -> Scales:
     """Scales that suit a run."""
     size = float(np.ptp(run.positions[0], axis=0).max())
     strain = max(*(float(np.abs(run.strain_of(layer)).max()) for layer in run.description.layers), SMALLEST_STRAIN)
-    # A few frames of impact would make all other arrows invisible.
-    largest = np.linalg.norm(run.contact_forces, axis=2).max(axis=1)
-    largest = largest[largest > 0]
-    reference = float(np.percentile(largest, 95)) if len(largest) else 1.0
+    reference = reference_of(run.contact_forces)
     metres_per_newton = 1.0 / rounded_up(reference / (ARROW_SHARE * size))
     every = slice(None, None, max(1, len(run.shape_times) // VIEW_FRAMES))
     seen = visible_points(run, every, slice(None), metres_per_newton)
@@ -81,6 +78,19 @@ def choose_scales(run: RunData) -> Scales:
         target=target,
         extent=extent,
     )
+
+
+def reference_of(forces: np.ndarray) -> float:
+    """The size that arrows are scaled by: a few frames of impact would make all others invisible; 1 without any.
+
+    Parameters
+    ----------
+    forces : ndarray
+        [N] or [N m], shape (times, places, 3).
+    """
+    largest = np.linalg.norm(forces, axis=2).max(axis=1, initial=0.0)
+    largest = largest[largest > 0.0]
+    return float(np.percentile(largest, 95)) if len(largest) else 1.0
 
 
 def visible_points(

@@ -1,5 +1,7 @@
 """Pictures without a screen: what is cut out, how sheets are laid out, and a look at their pixels."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 import synthetic_run
@@ -7,12 +9,14 @@ from PIL import Image
 
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
+from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.view import sheet
+from bilayer_core.view.arrows import reaction_arrows
 from bilayer_core.view.layout import BACKGROUND
 from bilayer_core.view.render import Studio
 from bilayer_core.view.rrd_writer import BALL_COLOURS
-from bilayer_core.view.scales import seen_from
+from bilayer_core.view.scales import ARROW_SHARE, choose_scales, seen_from
 
 TIMES = np.arange(0, 101) * 0.04
 
@@ -117,6 +121,32 @@ def test_one_picture_is_cut_closer_than_a_sheet_of_the_whole_motion(studio, tmp_
     studio.picture(tmp_path / "end.png")
     image = pixels(tmp_path / "end.png")
     assert is_ball(image).mean() > 0.05 and is_red(image).mean() > 0.05
+
+
+def is_blue(image):
+    r, g, b = np.moveaxis(image, -1, 0)
+    return (b > r + 60) & (b > g + 20)
+
+
+def test_reactions_are_drawn_where_they_are_asked_for(log, studio, tmp_path):
+    studio.picture(tmp_path / "without.png")
+    with Studio(log, reactions=True) as other:
+        other.picture(tmp_path / "with.png")
+    assert not is_blue(pixels(tmp_path / "without.png")).any()
+    assert is_blue(pixels(tmp_path / "with.png")).sum() > 100
+
+
+def test_arrows_of_forces_and_moments_have_scales_of_their_own(log):
+    run = read_log(log)
+    wrenches = np.zeros((len(run.times), 2, 6))
+    wrenches[:, 0, 2], wrenches[:, 0, 4] = 2.0, -3e-3
+    run = dataclasses.replace(run, clamp_wrenches=wrenches)
+    scales = choose_scales(run)
+    force, moment = (reaction_arrows(run, scales)[name] for name in ("clamp_forces", "clamp_moments"))
+    longest = [np.linalg.norm(of.forces, axis=2).max() * of.metres_per_unit for of in (force, moment)]
+    assert all(0.5 * ARROW_SHARE * scales.size < length <= ARROW_SHARE * scales.size for length in longest)
+    assert np.array_equal(moment.origins, run.body_positions)
+    assert reaction_arrows(dataclasses.replace(run, clamp_wrenches=0.0 * wrenches), scales) == {}
 
 
 @pytest.mark.slow

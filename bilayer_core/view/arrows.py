@@ -1,0 +1,55 @@
+"""Arrows over time: contact forces on nodes, forces and moments on the bodies that hold rods."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bilayer_core.record.run_data import RunData
+from bilayer_core.view.scales import ARROW_SHARE, SHOWN_SHARE, Scales, reference_of, rounded_up
+
+REACTIONS = {"clamp_forces": slice(0, 3), "clamp_moments": slice(3, 6)}
+"""What is drawn of the force and moment of rods on a body."""
+
+
+@dataclass(frozen=True)
+class Arrows:
+    """Forces or moments, each with its place.
+
+    Attributes
+    ----------
+    times : ndarray
+        [s], shape (n,).
+    origins : ndarray
+        [m], shape (n, m, 3).
+    forces : ndarray
+        [N] or [N m], shape (n, m, 3).
+    metres_per_unit : float
+        Length of an arrow by its size [m/N] or [1/N].
+    shown : float
+        Size from which there is an arrow.
+    """
+
+    times: np.ndarray
+    origins: np.ndarray
+    forces: np.ndarray
+    metres_per_unit: float
+    shown: float
+
+
+def contact_arrows(run: RunData, scales: Scales) -> Arrows:
+    """Of contact forces on nodes and contact points."""
+    return Arrows(run.shape_times, run.positions, run.contact_forces, scales.metres_per_newton, scales.shown_force)
+
+
+def reaction_arrows(run: RunData, scales: Scales) -> dict[str, Arrows]:
+    """Of what rods exert on each body that holds some, by `REACTIONS`; those alone that ever act."""
+    found = {}
+    for name, part in REACTIONS.items():
+        wrenches = run.clamp_wrenches[:, :, part]
+        if wrenches.any():
+            reference = reference_of(wrenches)
+            scale = 1.0 / rounded_up(reference / (ARROW_SHARE * scales.size))
+            found[name] = Arrows(run.times, run.body_positions, wrenches, scale, SHOWN_SHARE * reference)
+    return found
