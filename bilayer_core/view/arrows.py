@@ -11,6 +11,8 @@ from bilayer_core.view.scales import ARROW_SHARE, SHOWN_SHARE, Scales, reference
 
 REACTIONS = {"clamp_forces": slice(0, 3), "clamp_moments": slice(3, 6)}
 """What is drawn of the force and moment of rods on a body."""
+NOISE = 1e-6
+"""Part of the other, over the size of the robot, below which a force or a moment is what rounding leaves."""
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,13 @@ def contact_arrows(run: RunData, scales: Scales) -> Arrows:
 
 def reaction_arrows(run: RunData, scales: Scales) -> dict[str, Arrows]:
     """Of what rods exert on each body that holds some, by `REACTIONS`; those alone that ever act."""
-    found = {}
-    for name, part in REACTIONS.items():
-        wrenches = run.clamp_wrenches[:, :, part]
-        if wrenches.any():
-            reference = reference_of(wrenches)
+    found, arms = {}, {"clamp_forces": 1.0, "clamp_moments": scales.size}
+    acting = {name: run.clamp_wrenches[:, :, part] for name, part in REACTIONS.items()}
+    references = {name: reference_of(of) for name, of in acting.items() if of.any()}
+    largest = max((reference / arms[name] for name, reference in references.items()), default=0.0)
+    for name, reference in references.items():
+        wrenches = acting[name]
+        if reference / arms[name] > NOISE * largest:
             scale = 1.0 / rounded_up(reference / (ARROW_SHARE * scales.size))
             found[name] = Arrows(run.times, run.body_positions, wrenches, scale, SHOWN_SHARE * reference)
     return found

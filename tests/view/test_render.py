@@ -146,6 +146,8 @@ def test_arrows_of_forces_and_moments_have_scales_of_their_own(log):
     longest = [np.linalg.norm(of.forces, axis=2).max() * of.metres_per_unit for of in (force, moment)]
     assert all(0.5 * ARROW_SHARE * scales.size < length <= ARROW_SHARE * scales.size for length in longest)
     assert np.array_equal(moment.origins, run.body_positions)
+    rounded = dataclasses.replace(run, clamp_wrenches=wrenches * (1.0, 1.0, 1.0, 1.0, 1e-9, 1.0))
+    assert list(reaction_arrows(rounded, scales)) == ["clamp_forces"]
     assert reaction_arrows(dataclasses.replace(run, clamp_wrenches=0.0 * wrenches), scales) == {}
 
 
