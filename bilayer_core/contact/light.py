@@ -61,8 +61,8 @@ def _covered_by_edge(light, e, x, toward, soft):
     r = 0.5 * (a[0] + b[0]) - x[0], 0.5 * (a[1] + b[1]) - x[1], 0.5 * (a[2] + b[2]) - x[2]
     half, width, along = 0.5 * light.length[e], light.half_width[e], dot(r, toward)
     off = dot(r, r) - along * along
-    reach = half + width + soft
-    if along < -reach or off > reach * reach:
+    radius = half + width + soft
+    if along < -radius or off > radius * radius:
         return 0.0
     t, m1 = row(light.tangent, e), row(light.director1, e)
     cosine = dot(toward, m1)
@@ -87,16 +87,16 @@ def _covered_by_edge(light, e, x, toward, soft):
 def _covered_by_shape(light, s, x, toward, soft):
     """What the surface s hides from x."""
     b, kind, rounding = light.body[s], light.kind[s], light.rounding[s]
-    p, turn = light.position[s], light.body_rotation
+    p, axes = light.position[s], light.body_rotation
     r = (
-        light.body_position[b, 0] + turn[b, 0, 0] * p[0] + turn[b, 0, 1] * p[1] + turn[b, 0, 2] * p[2] - x[0],
-        light.body_position[b, 1] + turn[b, 1, 0] * p[0] + turn[b, 1, 1] * p[1] + turn[b, 1, 2] * p[2] - x[1],
-        light.body_position[b, 2] + turn[b, 2, 0] * p[0] + turn[b, 2, 1] * p[1] + turn[b, 2, 2] * p[2] - x[2],
+        light.body_position[b, 0] + axes[b, 0, 0] * p[0] + axes[b, 0, 1] * p[1] + axes[b, 0, 2] * p[2] - x[0],
+        light.body_position[b, 1] + axes[b, 1, 0] * p[0] + axes[b, 1, 1] * p[1] + axes[b, 1, 2] * p[2] - x[1],
+        light.body_position[b, 2] + axes[b, 2, 0] * p[0] + axes[b, 2, 1] * p[1] + axes[b, 2, 2] * p[2] - x[2],
     )
     along = dot(r, toward)
     if kind != PLANE:
-        reach = light.bound[s] + soft
-        if along < -reach or dot(r, r) - along * along > reach * reach:
+        radius = light.bound[s] + soft
+        if along < -radius or dot(r, r) - along * along > radius * radius:
             return 0.0
     y, v = _in_frame(light, s, b, r), _in_frame(light, s, b, toward)
     if kind == PLANE:

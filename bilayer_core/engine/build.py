@@ -13,12 +13,21 @@ from ..model.force_slots import slot_of
 from ..model.layout import columns
 from ..model.lit import light_of
 from ..model.model import Model, PointLoads
+from ..model.records.contacts import (
+    ContactColumns,
+    Restitution,
+    RodContact,
+    RodContactList,
+    RodPoints,
+    Sliding,
+    Slips,
+    Surfaces,
+)
 from ..model.records.parts import (
     Attachments,
     Bodies,
     Bonds,
     Constrained,
-    ContactColumns,
     Drives,
     Flow,
     Fluid,
@@ -27,14 +36,7 @@ from ..model.records.parts import (
     OffAxis,
     Plane,
     PointForces,
-    Restitution,
-    RodContact,
-    RodContactList,
-    RodPoints,
-    Sliding,
-    Slips,
     Strands,
-    Surfaces,
     Viscosity,
 )
 from ..model.records.problem import Border, System

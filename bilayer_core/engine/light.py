@@ -87,7 +87,7 @@ def end_light(p, state, inputs, n, h):
         missed = brightness(light.side[k], light.facing[k, 1], light.visible[k, 1]) - light.seen[i, 1]
         lag = min(drives.law_rising[i], drives.law_falling[i])
         missed = lagged(0.0, 0.0, missed * inputs.stimulus[n, drives.law_channel[i]], lag, lag, h)
-        square += (light.reach[k] * drives.law_gain[i] * missed) ** 2
+        square += (light.slenderness[k] * drives.law_gain[i] * missed) ** 2
         rate[k, 0] = (light.facing[k, 1] - light.facing[k, 0]) / h
         rate[k, 1] = (light.visible[k, 1] - light.visible[k, 0]) / h
     return math.sqrt(square / light.law.shape[0])

@@ -11,8 +11,9 @@ from ..forces.mechanisms import mechanisms_record
 from ..forces.register import force_table, memory_size, require_computed
 from ..jit import shapes_of, zeros_in_one
 from ..model.model import Model
+from ..model.records.contacts import ContactColumns, RodContact, RodContactList, Sliding, Slips, Surfaces
 from ..model.records.outcome import COUNTS, FIGURES
-from ..model.records.parts import ContactColumns, Plane, RodContact, RodContactList, Sliding, Slips, Space, Surfaces
+from ..model.records.parts import Plane, Space
 from ..model.records.problem import BorderedSystem, Outcome, Problem, Sums
 from ..model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEEDED, ROD_CAPACITY_EXCEEDED
 from ..model.records.step import Configuration, Point, Stage, Work

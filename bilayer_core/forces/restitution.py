@@ -30,7 +30,7 @@ from ..contact.barrier import barrier
 from ..contact.near import gap_normal
 from ..jit import kernel, piece
 from ..model.force_slots import slot_of
-from ..model.records.parts import Restitution
+from ..model.records.contacts import Restitution
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage

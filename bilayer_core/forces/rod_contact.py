@@ -47,8 +47,8 @@ from ..jit import call, kernel, piece
 from ..jit.record import Matrix
 from ..jit.stack import stack_vector
 from ..model.force_slots import slot_of
+from ..model.records.contacts import RodContact
 from ..model.records.outcome import STATUS
-from ..model.records.parts import RodContact
 from ..model.records.problem import Problem
 from ..model.records.status import READY, ROD_CAPACITY_EXCEEDED
 from ..model.records.step import Configuration, Stage

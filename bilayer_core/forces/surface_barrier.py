@@ -28,7 +28,7 @@ from ..contact.shapes import shape_curvature
 from ..jit import call, kernel, piece
 from ..jit.stack import stack_matrix, stack_vector
 from ..model.force_slots import slot_of
-from ..model.records.parts import Surfaces
+from ..model.records.contacts import Surfaces
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative

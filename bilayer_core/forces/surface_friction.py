@@ -47,7 +47,7 @@ from ..kinematics.copying import copy_matrix
 from ..kinematics.rotating import product_transposed
 from ..kinematics.vector import row
 from ..model.force_slots import slot_of
-from ..model.records.parts import Sliding
+from ..model.records.contacts import Sliding
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage

@@ -8,8 +8,8 @@ from __future__ import annotations
 from ..contact.near import list_near, moved_since
 from ..contact.step_bound import motion_of_points, motion_of_surfaces, step_bound
 from ..jit import call, piece
+from ..model.records.contacts import Surfaces
 from ..model.records.outcome import PAIR, STATUS
-from ..model.records.parts import Surfaces
 from ..model.records.problem import Problem
 from ..model.records.status import PAIR_CAPACITY_EXCEEDED, READY
 from ..model.records.step import Configuration

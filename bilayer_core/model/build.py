@@ -125,7 +125,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         lit_side=found.column("lit_side"),
         lit_height=found.column("lit_height"),
         lit_half=found.column("lit_half"),
-        lit_reach=found.column("lit_reach"),
+        lit_slenderness=found.column("lit_slenderness"),
         joint_a=np.concatenate([clamp_a, found.column("bond_joint_a", np.int64)]),
         joint_b=np.concatenate([clamp_b, found.column("bond_joint_b", np.int64)]),
         joint_stiffness=joined("joint_stiffness", width=3),

@@ -50,7 +50,7 @@ def add_lit_elements(
         lit_side=np.where(alone, 0.0, outward),
         lit_height=middle + np.where(alone, 0.0, 0.5 * outward * own) - axis[edges],
         lit_half=0.5 * own,
-        lit_reach=rod.path.length / thickness.sum(axis=0),
+        lit_slenderness=rod.path.length / thickness.sum(axis=0),
     )
     return numbers
 
@@ -72,7 +72,7 @@ def light_of(model: Model) -> Light:
         side=model.lit_side,
         height=model.lit_height,
         half=model.lit_half,
-        reach=model.lit_reach,
+        slenderness=model.lit_slenderness,
         source=np.array([number[channel] for channel in model.law_channel[model.lit_law]], dtype=np.int64),
         direction=np.array([scene.stimuli[name].light.from_direction for name in lights]),
         casts=casts,

@@ -186,7 +186,7 @@ class Model(ReadOnlyArrays):
     lit_side: Array  # ±1: its outer face is towards ± m1; 0: it has two, likewise
     lit_height: Array  # of that face over the strand along m1, or of the layer's middle if it has two [m], likewise
     lit_half: Array  # half the layer's thickness [m], likewise
-    lit_reach: Array  # length over thickness of its rod, likewise
+    lit_slenderness: Array  # length over thickness of its rod, likewise
 
     joint_a: Array  # first edge of each joint, shape (n_joint,)
     joint_b: Array  # second edge

@@ -8,7 +8,8 @@ from bilayer_core.contact.near import gap_normal, list_near
 from bilayer_core.contact.step_bound import KEPT_FRACTION, motion_of_points, step_bound
 from bilayer_core.jit import kernel, record_at
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.model.records.parts import Bodies, RodPoints, Strands, Surfaces
+from bilayer_core.model.records.contacts import RodPoints, Surfaces
+from bilayer_core.model.records.parts import Bodies, Strands
 from bilayer_core.model.records.problem import System
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.shapes import NUMBER

@@ -20,6 +20,7 @@ from ...model.records.problem import Problem
 from ...model.records.status import READY
 from .assembly import hold_unknowns
 from .attachments import arm_jacobian
+from .new_columns import add_columns
 
 CONTACTS, NODES = 0, 1
 """Places in `ContactColumns.counts`."""
@@ -184,17 +185,10 @@ def move_to_border(p):
     nodes, base = columns.counts[NODES], bordered.width[0]
     if columns.counts[CONTACTS] == 0 or (nodes == 0 and not p.joins.exists):
         return True
-    bordered.width[0] += strands.dimension * nodes
-    if bordered.width[0] > bordered.load.shape[0]:
+    if base + strands.dimension * nodes > bordered.load.shape[0]:
+        bordered.width[0] = base + strands.dimension * nodes
         return False
-    cleared = base if bordered.coupled[0] == 1 else 0
-    bordered.coupled[0] = 1
-    for a in range(cleared, bordered.width[0]):
-        for i in range(bordered.border.shape[1]):
-            bordered.border[a, i] = 0.0
-    for a in range(bordered.width[0]):
-        for b in range(base, bordered.width[0]):
-            bordered.schur[a, b] = 0.0
+    add_columns(bordered, strands.dimension * nodes)
     _move_from_band(columns, bordered, strands, base, p.system.band)
     _add_between(columns, p.joins, p.bodies.freedom, bordered, strands.row, base)
     return True

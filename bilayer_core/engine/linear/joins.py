@@ -17,6 +17,7 @@ from ...jit import kernel, piece
 from ...model.records.problem import Problem
 from ...model.records.status import READY
 from .assembly import hold_unknowns
+from .new_columns import add_columns
 
 
 @piece(int, Problem)
@@ -24,15 +25,7 @@ def move_joins_to_border(p):
     """Move what is in the band twice to columns of the border, after those of bodies, and add the two up."""
     joins, bordered, band, strands = p.joins, p.bordered, p.system.band, p.strands
     count, base, bandwidth = joins.first.shape[0], bordered.width[0], strands.bandwidth
-    bordered.width[0] += count
-    cleared = base if bordered.coupled[0] == 1 else 0
-    bordered.coupled[0] = 1
-    for a in range(cleared, bordered.width[0]):
-        for i in range(bordered.border.shape[1]):
-            bordered.border[a, i] = 0.0
-    for a in range(bordered.width[0]):
-        for b in range(base, bordered.width[0]):
-            bordered.schur[a, b] = bordered.schur[b, a] = 0.0
+    add_columns(bordered, count)
     for k in range(count):
         _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.first[k])
         _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.copy[k])

@@ -14,7 +14,7 @@ class Light:
     side: Vector  # ±1: its outer face is towards ± m1; 0: it has two, shape (n_lit,)
     height: Vector  # of its outer face over the strand along m1, or of its middle if it has two [m], shape (n_lit,)
     half: Vector  # half its thickness [m], shape (n_lit,)
-    reach: Vector  # rod length over thickness: of displacement over length by free strain, shape (n_lit,)
+    slenderness: Vector  # rod length over thickness: of displacement over length by free strain, shape (n_lit,)
     source: Indices  # which light, shape (n_lit,)
     direction: Matrix  # to each light, unit, shape (n_light, 3)
     casts: Flags  # whether its shadows count, shape (n_light,)

@@ -6,8 +6,7 @@ program serves all scenes of a dimension.
 
 from __future__ import annotations
 
-from ...contact.broad_phase import RodSearch
-from ...jit.record import Address, Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
+from ...jit.record import Address, Flags, IndexTable, Indices, Matrix, Stack, Vector, record
 
 
 @record
@@ -160,67 +159,6 @@ class Joins:
 
 
 @record
-class RodPoints:
-    """Contact points with arms from nodes, the last of all contact points; see `model.rod_points`."""
-
-    first: int  # of them among contact points
-    node: Indices
-    arm: Matrix  # along m1 and m2 [m]
-    longest: float  # of the arms [m]
-
-
-@record
-class Surfaces:
-    """Contact points, surfaces, and the list of near pairs with what it was made for; see `contact.near`."""
-
-    d_hat: float
-    stiffness: float
-    radius: Vector
-    weight: Vector
-    contact_point_body: Indices
-    free_index: Indices  # indices of all bodies among the free ones; none if none is free
-    moved_by: Indices
-    node_free: Flags
-    group: Indices
-    point_position: Matrix  # of points and centres in their bodies' frames
-    point_body: Indices
-    node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
-    rod_points: RodPoints
-    arm_factor: float  # how many times farther than nodes and borders of edges a contact point of a rod moves at most
-    kind: Indices
-    size: Matrix
-    rounding: Vector
-    bound: Vector
-    body: Indices
-    position: Matrix
-    rotation: Stack
-    can_collide: FlagTable
-    near_contact_point: Indices = ("near",)
-    near_surface: Indices = ("near",)
-    near_gap: Vector = ("near",)
-    near_count: Indices = (1,)
-    margin: Vector  # shape (1,)
-    extent: Vector = ("surface",)
-    listed_contact_point: Matrix = ("contact_point", 3)
-    listed_surface_position: Matrix = ("surface", 3)
-    listed_surface_rotation: Stack = ("surface", 3, 3)
-
-
-@record
-class Restitution:
-    """Pairs of bodies' contact points and surfaces whose impacts are damped; see `forces.restitution`."""
-
-    damping: float  # z
-    slowest: float  # approach that counts [m/s]
-    first: int  # of their gaps among strains
-    memory: Indices  # where their speeds of approach begin in `Problem.memory`, shape (1,)
-    point: Indices
-    surface: Indices
-    row: IndexTable  # of a contact point and a surface, −1 without, shape (n_contact_point, n_surface)
-    rate: Vector = ("impact",)  # λ [s/m]
-
-
-@record
 class Mechanisms:
     """Turns and ways between two bodies that something resists; see `forces.mechanisms`."""
 
@@ -245,106 +183,6 @@ class Mechanisms:
     limit_slope: Vector  # ∂E/∂q of the limits there [N m, N]
     in_limits: Vector  # their energy there [J], shape (1,)
     gradient: Matrix  # ∂E/∂(X, φ) of A and B in turn [N, N m], shape (2 n_mechanism, 6)
-
-
-@record
-class Sliding:
-    """Friction of the contacts at the start of a stage; see `forces.surface_friction`."""
-
-    acts: bool
-    threshold: float
-    coefficient: Matrix
-    node_axis: Indices
-    grained: bool  # whether a surface has a grain, or the world an axis; its coefficients, and the same every way:
-    along_grain: Vector  # shape (3,)
-    across_all: float
-    world_axis: Vector  # 0 without one, shape (3,)
-    surface_grain: Matrix  # in their bodies' frames, 0 without one, shape (n_surface, 3)
-    point_grain: Matrix  # likewise of contact points, shape (n_contact_point, 3)
-    mu: Matrix = ("near", 3)  # coefficients of contacts: forward, backward, sideways
-    count: Indices = (1,)
-    first: Indices = ("near",)
-    node: Indices = ("near",)  # of contacts of rods
-    surface: Indices = ("near",)
-    load: Vector = ("near",)
-    last_load: Vector = ("near",)  # before contacts were frozen anew
-    change: Vector = ("near",)  # of normal forces then, before relaxation
-    relaxation: Vector = (1,)  # with which they were, 0 at the start of a stage
-    normal: Matrix = ("near", 3)
-    axis: Matrix = ("near", 3)
-    arm: Matrix = ("near", 3)  # of bodies
-    arm_rate: Stack = ("near", 3, 8)  # of rods, as in `forces.rod_arms`
-    lever: Matrix = ("near", 3)
-    back: Stack = ("body+world", 3, 3)
-    rotation: Stack = ("body+world", 3, 3)
-    origin_rotation: Stack = ("body+world", 3, 3)
-
-
-@record
-class Slips:
-    """Slip of all lagged contacts along a Newton step; see `forces.friction_limit`."""
-
-    threshold: float
-    path: Matrix = ("slip", "path")
-
-
-@record
-class RodContactList:
-    """Contacts of rods; see `forces.rod_contact`."""
-
-    count: Indices = (1,)
-    point: Indices = ("contact",)
-    multiplicity: Indices = ("contact",)  # +1 or −1
-    inner: Flags = ("contact",)  # whether t moves with the shape, or is that of a node
-    gap: Vector = ("contact",)  # d [m]
-    distance: Vector = ("contact",)  # D [m]
-    node: IndexTable = ("contact", 2)  # i and j
-    weight: Matrix = ("contact", 4)  # w_m
-    normal: Matrix = ("contact", 3)  # n
-    normal_force: Vector = ("contact",)  # λ [N]; those of friction alone
-    matrix: Stack = ("contact", 3, 3)  # M [N/m]
-    tangential_stiffness: Vector = ("contact",)  # κ [N/m]
-    segment_direction: Matrix = ("contact", 3)  # u
-    foot_gradient: Stack = ("contact", 4, 3)  # a_m
-
-
-@record
-class RodContact:
-    """Rods that can meet: the search for near pairs, and contacts; see `contact.rod_list`."""
-
-    d_hat: float
-    stiffness: float
-    slides: bool
-    coefficient: float
-    threshold: float
-    unit: float  # barrier distance and thickest layer together
-    point_weight: Vector
-    search: RodSearch
-    last: Matrix = ("node", 3)  # where nodes were last, their mean taken off [m]
-    ways: Vector  # of the list; see `contact.rod_list`, shape (4,)
-    no_step: Matrix = ("node", 3)  # zeros
-    gap: Vector = (1,)  # the smallest below the barrier distance
-    contacts: RodContactList  # present ones
-    sliding: RodContactList  # of the start of the stage
-
-
-@record
-class ContactColumns:
-    """Contacts of rods in the Newton matrix, and their columns in the border; see `engine.linear.contact_columns`."""
-
-    counts: Indices = (2,)  # of contacts and of nodes
-    node: IndexTable = ("contact", 2)  # of contacts of barrier and friction in one list
-    weight: Matrix = ("contact", 4)
-    matrix: Stack = ("contact", "dimension", "dimension")  # M along the unknowns of nodes
-    stiffness: Vector = ("contact",)  # κ, 0 where the nearest point is a node
-    foot_gradient: Stack = ("contact", 4, "dimension")  # a_m along the unknowns of nodes
-    strand: Indices  # of each node
-    attached: Indices  # index of each node among those that bodies hold, which are in the border already, or −1
-    joined: Flags  # whether a node is in the border because a rod closes there
-    mark: IndexTable = ("node", 3)  # scratch
-    met: IndexTable = ("strand", "strand")  # scratch
-    row: Indices = ("node",)  # in the band, of each node that has columns, ascending
-    column: Indices = ("matrix unknown",)  # of each unknown among the contact columns, −1 without one
 
 
 @record

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from ...jit.record import Address, Flags, Indices, Matrix, Stack, Vector, record
+from .contacts import ContactColumns, Restitution, RodContact, Sliding, Slips, Surfaces
 from .light import Light
 from .parts import (
     Attachments,
     Bodies,
     Bonds,
     Constrained,
-    ContactColumns,
     Drives,
     Flow,
     Fluid,
@@ -19,13 +19,8 @@ from .parts import (
     OffAxis,
     Plane,
     PointForces,
-    Restitution,
-    RodContact,
-    Sliding,
-    Slips,
     Space,
     Strands,
-    Surfaces,
     Viscosity,
 )
 
