@@ -153,22 +153,22 @@ def _follow_paths(paths, time, position, rotation, rates):
         b, first, last = paths.body[k], paths.first[k], paths.first[k + 1]
         before = _keyframe_before(paths, first, last, time)
         a, z = max(before, first), min(before + 1, last - 1)
-        part = rate = carried = kept = 0.0
+        part = rate = carried = carried_rate = 0.0
         if z > a:
             duration = paths.time[z] - paths.time[a]
             s = (time - paths.time[a]) / duration
             part, rate = s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / duration
-            carried, kept = duration * s * (1.0 - s) ** 2, (1.0 - s) * (1.0 - 3.0 * s)
+            carried, carried_rate = duration * s * (1.0 - s) ** 2, (1.0 - s) * (1.0 - 3.0 * s)
         shift, velocity, spin = paths.displacement, paths.velocity, paths.rotation_rate
         for c in range(3):
             change = shift[z, c] - shift[a, c]
             position[b, c] = paths.position[b, c] + shift[a, c] + part * change + carried * velocity[a, c]
-            rates[b, c] = rate * change + kept * velocity[a, c]
+            rates[b, c] = rate * change + carried_rate * velocity[a, c]
         v, u = stack_vector(3), stack_vector(3)
         for c in range(3):
             begun, change = paths.rotation_vector[a, c], paths.rotation_vector[z, c] - paths.rotation_vector[a, c]
             v[c] = begun + part * change + carried * spin[a, c]
-            u[c] = rate * change + kept * spin[a, c]
+            u[c] = rate * change + carried_rate * spin[a, c]
         rotate_by(v[0], v[1], v[2], paths.rotation, b, rotation, b)
         rates[b, 3], rates[b, 4], rates[b, 5] = spin_of(v[0], v[1], v[2], u[0], u[1], u[2])
 

@@ -162,7 +162,7 @@ def rotating_guide(dimension: int) -> tuple[float, float]:
 
 
 def universal_joint(bend: float) -> tuple[float, float]:
-    """Largest deviation of ω₂/ω₁ over a turn from cos β/(1 − sin²β cos²θ), above 0."""
+    """Largest difference of ω₂/ω₁ over a turn from cos β/(1 − sin²β cos²θ), above 0."""
     beta, speed = math.radians(bend), 20.0
     out = [math.cos(beta), 0.0, math.sin(beta)]
     turns = {"type": "guided", "mass": 1e-3, "turning": {}}
@@ -232,7 +232,7 @@ CASES = [
     *(
         Case(
             f"mechanisms/universal joint/{bend}°",
-            "ratio of speeds, cos β/(1 − sin²β cos²θ), largest deviation over a turn",
+            "ratio of speeds, cos β/(1 − sin²β cos²θ), largest difference over a turn",
             1e-3,
             lambda bend=bend: universal_joint(bend),
             scale=1.0,

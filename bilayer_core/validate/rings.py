@@ -159,8 +159,8 @@ STRAIN = 0.02
 
 
 @cache
-def grown(model: str, dimension: int) -> tuple[float, float, float]:
-    """Stretch, departure from a circle over the radius, and energy [J] of a ring whose inner layer has grown."""
+def strained(model: str, dimension: int) -> tuple[float, float, float]:
+    """Stretch, departure from a circle over the radius, and energy [J] of a ring whose inner layer is strained."""
     inner = layer("inner", THICKNESS / 2, eigenstrain={"stimulus": "heat", "gain": STRAIN})
     layers = [inner, layer("outer", THICKNESS / 2, stiffness=0.5)]
     heat = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
@@ -175,7 +175,7 @@ def grown(model: str, dimension: int) -> tuple[float, float, float]:
 
 
 def _energy_of_pair(model: str) -> float:
-    """That of a ring whose inner layer has grown [J]."""
+    """That of a ring whose inner layer has an eigenstrain [J]."""
     modulus, half, length = GEL["youngs_modulus"], THICKNESS / 2, 2.0 * math.pi * RADIUS
     reduced = modulus * WIDTH * half / 3.0
     if model == "two_rod":
@@ -250,7 +250,7 @@ CASES = [
             f"rings/one layer grows/{model}, {dimension}-D/{what}",
             answer,
             limit,
-            lambda m=model, d=dimension, k=k: (grown(m, d)[k], (STRAIN / 1.5, 0.0, _energy_of_pair(m))[k]),
+            lambda m=model, d=dimension, k=k: (strained(m, d)[k], (STRAIN / 1.5, 0.0, _energy_of_pair(m))[k]),
             unit,
             scale,
         )
