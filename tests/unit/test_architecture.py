@@ -32,7 +32,8 @@ ALLOWED = {
     "beam2d": {"errors", "scene", "model"},
     "validate": NUMERICS | {"beam2d"},
     "bench": NUMERICS | {"converge", "validate"},
-    "cli": NUMERICS | {"record", "view", "converge", "validate", "bench"},
+    "stress": NUMERICS | {"converge", "validate", "bench"},
+    "cli": NUMERICS | {"record", "view", "converge", "validate", "bench", "stress"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
 FACES = {"__init__": NUMERICS | {"converge"}, "__main__": {"cli"}}
