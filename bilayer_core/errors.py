@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 
 class BilayerError(Exception):
     """Base of all errors raised on purpose by this package."""
@@ -28,6 +30,29 @@ class ForceError(BilayerError):
     """A scene needs a force that is planned and that no term of the engine computes."""
 
 
+@dataclass(frozen=True)
+class Remedy:
+    """What a user can change for a run to go on.
+
+    Attributes
+    ----------
+    text : str
+        In words.
+    changes : dict
+        New values by key paths of the scene, None for a key to leave out; empty where that is not for a program to do.
+    """
+
+    text: str
+    changes: dict[str, float | str | None] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def overrides(self) -> tuple[str, ...]:
+        """The changes as ``KEY=VALUE`` for ``--set``."""
+        return tuple(f"{key}={'null' if value is None else value}" for key, value in self.changes.items())
+
+
 class SimulationError(BilayerError):
     """The simulation could not go on; the last accepted state is kept.
 
@@ -37,15 +62,18 @@ class SimulationError(BilayerError):
         What failed.
     time : float
         Simulated time of the last accepted step [s].
+    remedy : Remedy or None
+        What to change.
     """
 
     exit_code = 3
 
-    def __init__(self, reason: str, time: float):
-        super().__init__(f"stopped at t = {time:.6g} s: {reason}")
+    def __init__(self, reason: str, time: float, remedy: Remedy | None = None):
+        super().__init__(f"stopped at t = {time:.6g} s: {reason}{f'; remedy: {remedy}' if remedy else ''}")
         self.reason = reason
         self.time = time
+        self.remedy = remedy
 
     def __reduce__(self) -> tuple:
         """For its way between processes."""
-        return type(self), (self.reason, self.time)
+        return type(self), (self.reason, self.time, self.remedy)

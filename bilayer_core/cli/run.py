@@ -194,6 +194,7 @@ def _finish(
     summary = {**simulator.summary(), "duration": duration}
     if failure is not None:
         summary |= {"termination": Termination.FAILED.value, "reason": failure.reason}
+        summary |= {"remedy": str(failure.remedy)} if failure.remedy else {}
     study = judge.study if judge is not None else None
     if study is not None:
         from bilayer_core.cli.error_table import errors_of

@@ -213,7 +213,7 @@ def _make(
                     found[name] = job.result()
                 except SimulationError as error:
                     if name in NEEDED:
-                        raise SimulationError(f"{name}: {error.reason}", error.time) from error
+                        raise SimulationError(f"{name}: {error.reason}", error.time, error.remedy) from error
                     missing[name] = str(error)
                 if progress is not None:
                     progress(name)

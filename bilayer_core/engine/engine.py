@@ -106,7 +106,7 @@ class Engine:
         if done > 0 or status in FAILURES:
             self._take_end()
             self._evaluated = False
-        iterations, factorisations, settlings, rejected, inaccurate, restarts, gaining, unresolved = (
+        iterations, factorisations, settlings, rejected, inaccurate, restarts, gaining, unresolved, regularised = (
             counts.numbers.tolist()
         )
         shortest, longest, length = counts.lengths.tolist()
@@ -116,7 +116,7 @@ class Engine:
             length, residual, error, iterations = counts.failure.tolist()
         return IntegrationReport(
             *(done, status, pair, int(iterations), factorisations, settlings, residual, largest_residual),
-            *(shortest, longest, length, rejected, inaccurate, gaining, unresolved, restarts, error),
+            *(shortest, longest, length, rejected, inaccurate, gaining, unresolved, restarts, error, regularised),
         )
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:

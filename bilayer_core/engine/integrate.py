@@ -25,6 +25,7 @@ from ..model.records.outcome import (
     LIGHT_ERROR,
     PAIR,
     RESIDUAL,
+    REGULARISED,
     SETTLINGS,
     STATUS,
 )
@@ -76,7 +77,7 @@ class Counts:
 
     numbers: (
         Indices  # iterations, factorisations, settlings, attempts refused, of these for errors, restarts, for energy;
-        # last, steps that do not resolve their contact
+        # steps that do not resolve their contact, matrices that were regularised
     )
     lengths: Vector  # shortest, longest, and last step [s]
     residuals: Vector  # of the last step, and the largest [m/s]
@@ -105,7 +106,7 @@ class Integration:
 
 def empty_counts() -> Counts:
     """Counts of no steps."""
-    return Counts(numbers=np.zeros(8, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
+    return Counts(numbers=np.zeros(9, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
 
 
 def clear(counts: Counts) -> None:
@@ -258,6 +259,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             numbers[0] += iterations
             numbers[1] += found[FACTORISATIONS]
             numbers[2] += found[SETTLINGS]
+            numbers[8] += found[REGULARISED]
             error, of_contact = math.inf, 0.0
             if status == CONVERGED:
                 error = 0.0

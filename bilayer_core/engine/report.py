@@ -59,6 +59,9 @@ class IntegrationReport:
         Steps of the method that stands in for one with a history.
     error : float
         That of the attempt that failed, in tolerances.
+    regularised : int
+        Factorised matrices to which masses were added, or from which what is negative in the contact of rods was left
+        out, because the Hessian was not positive definite.
     """
 
     done: int
@@ -78,6 +81,7 @@ class IntegrationReport:
     unresolved: int = 0
     restarts: int = 0
     error: float = 0.0
+    regularised: int = 0
 
     def followed_by(self, more: IntegrationReport) -> IntegrationReport:
         """Both together; it ends as `more` does."""
@@ -112,5 +116,6 @@ SUMS = (
     "gaining",
     "unresolved",
     "restarts",
+    "regularised",
 )
 """Figures of which those of several reports add up."""

@@ -15,6 +15,7 @@ from ..model.records.outcome import (
     LIGHT_ERROR,
     PAIR,
     RESIDUAL,
+    REGULARISED,
     SETTLINGS,
     SWAPPED,
 )
@@ -77,7 +78,7 @@ def drive_stage(p, state, inputs, n, work):
 def _clear(outcome):
     """Begin to count what Newton's method needs."""
     counts, figures = outcome.counts, outcome.figures
-    counts[ITERATIONS] = counts[FACTORISATIONS] = counts[SETTLINGS] = 0
+    counts[ITERATIONS] = counts[FACTORISATIONS] = counts[SETTLINGS] = counts[REGULARISED] = 0
     figures[RESIDUAL], figures[GAP] = 0.0, math.inf
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..engine.newton import LAST_DIGITS
 from ..engine.report import IntegrationReport
+from ..errors import Remedy
 from ..model.impacts import heaviest, stiffness_that_holds
 from ..model.model import Model
 from ..model.records.status import BEYOND, BLOCKED, GAINS_ENERGY, LINE_SEARCH, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
@@ -23,7 +24,7 @@ SPENT = 1e-3
 """Part of the barrier distance: what comes so near is more than the barrier holds, 1e5 times stiffer than half way."""
 
 
-def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, speed: float) -> str:
+def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, speed: float) -> Remedy:
     """The setting to change, and to what, for a run to get past the step that failed.
 
     Parameters
@@ -40,39 +41,49 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
     scene = model.scene
     solver, usual = scene.solver, Solver.model_fields["max_newton_iterations"].default
     if found.status == BLOCKED:
-        return "a prescribed body must stop before nothing can give way: change its `motion`"
+        return Remedy("a prescribed body must stop before nothing can give way: change its `motion`")
     farthest, length = float(np.abs(model.start_position).max()), max(rod.path.length for rod in scene.rods)
     if LAST_DIGITS * farthest > (steps.tolerance or DEFAULT_TOLERANCE) * length:
         known = f"{farthest:.1g} m from it positions are known to {LAST_DIGITS * farthest:.1g} m"
-        return f"move the robot nearer to the origin: {known}"
+        return Remedy(f"move the robot nearer to the origin: {known}")
     if found.status == MAX_ITERATIONS and solver.max_newton_iterations < usual:
-        return f"set `solver.max_newton_iterations` to {usual}, or leave it out"
+        return Remedy(
+            f"set `solver.max_newton_iterations` to {usual}, or leave it out", {"solver.max_newton_iterations": usual}
+        )
     if solver.max_halvings is not None:
-        return f"leave `solver.max_halvings` out, or set it above {solver.max_halvings}"
+        return _without("solver.max_halvings", f", or set it above {solver.max_halvings}")
     if found.status == GAINS_ENERGY and solver.newton_tolerance is not None:
-        return "leave `solver.newton_tolerance` out: what it leaves undone is energy"
+        return _without("solver.newton_tolerance", ": what it leaves undone is energy")
     if found.status == BEYOND:
-        return "set `solver.integrator` to sdirk2, which ends where it has looked"
+        return Remedy("set `solver.integrator` to sdirk2, which ends where it has looked", {"solver.integrator": "sdirk2"})
     if not steps.adaptive:
-        return f"leave `solver.dt` out for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s"
+        return _without("solver.dt", f" for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s")
     if scene.contact is not None and gap < SPENT * scene.contact.barrier_distance:
-        return f"set `contact.stiffness` to {_stiffness_that_holds(model, speed):.0e} Pa"
+        return _set("contact.stiffness", f"{_stiffness_that_holds(model, speed):.0e}", "Pa")
     if found.status == TOO_INACCURATE:
         needed = _rounded_up(MARGIN * found.error * steps.tolerance)
         if needed <= LARGEST_TOLERANCE:
-            return f"set `solver.tolerance` to {needed:.1g}"
-        return "let what acts on the robot grow over a time instead of at once"
+            return _set("solver.tolerance", f"{needed:.1g}")
+        return Remedy("let what acts on the robot grow over a time instead of at once")
     friction = scene.contact.friction if scene.contact is not None else None
     if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
-        return f"set `contact.friction.speed_threshold` to {_rounded_up(MUCH_FASTER * steps.newton_tolerance):.1g} m/s"
+        return _set("contact.friction.speed_threshold", f"{_rounded_up(MUCH_FASTER * steps.newton_tolerance):.1g}", "m/s")
     stuck = found.status in (MAX_ITERATIONS, LINE_SEARCH)
     if stuck and solver.newton_tolerance is not None:
-        return "leave `solver.newton_tolerance` out"
+        return _without("solver.newton_tolerance")
     if stuck and found.residual <= NEARLY * steps.newton_tolerance:
-        return f"set `solver.newton_tolerance` to {_rounded_up(MARGIN * found.residual):.1g} m/s"
+        return _set("solver.newton_tolerance", f"{_rounded_up(MARGIN * found.residual):.1g}", "m/s")
     if found.status == UNSETTLED:
-        return f"set `contact.friction.speed_threshold` to {MUCH_FASTER * friction.speed_threshold:.1g} m/s"
-    return f"set `solver.tolerance` to {MUCH_SHORTER * steps.tolerance:.1g}"
+        return _set("contact.friction.speed_threshold", f"{MUCH_FASTER * friction.speed_threshold:.1g}", "m/s")
+    return _set("solver.tolerance", f"{MUCH_SHORTER * steps.tolerance:.1g}")
+
+
+def _set(key: str, value: str, unit: str = "") -> Remedy:
+    return Remedy(f"set `{key}` to {value} {unit}".rstrip(), {key: value})
+
+
+def _without(key: str, more: str = "") -> Remedy:
+    return Remedy(f"leave `{key}` out{more}", {key: None})
 
 
 def _stiffness_that_holds(model: Model, speed: float) -> float:

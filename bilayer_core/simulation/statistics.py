@@ -47,6 +47,7 @@ class RunStatistics:
     inaccurate: int = 0
     gaining: int = 0
     unresolved: int = 0
+    regularised: int = 0
     shortest: float = math.inf
     longest: float = 0.0
     iterations: int = 0
@@ -78,6 +79,7 @@ class RunStatistics:
         self.inaccurate += report.inaccurate
         self.gaining += report.gaining
         self.unresolved += report.unresolved
+        self.regularised += report.regularised
         self.shortest, self.longest = min(self.shortest, report.shortest), max(self.longest, report.longest)
         self.iterations += report.iterations
         self.factorisations += report.factorisations

@@ -12,7 +12,7 @@ from ..engine.engine import Engine
 from ..engine.integrate import TIME_ROUNDING, StepControl
 from ..engine.modes import EVALUATE_STATE
 from ..engine.report import FAILURES, IntegrationReport
-from ..errors import InputError, SimulationError
+from ..errors import InputError, Remedy, SimulationError
 from ..integrators.method import Method
 from ..model.model import Model
 from ..model.records.status import INPUTS_END, TOO_INACCURATE
@@ -171,7 +171,7 @@ class Stepper:
             gap = self.engine.gap
             self.evaluate(state)  # what the last attempt left is not what the state is
             if not found.done:
-                raise SimulationError(self._why(found, state, gap), begin)
+                raise SimulationError(self._why(found, begin), begin, self._remedy(found, state, gap))
         if self.ledger is not None:
             rest = self.surroundings.rest_strains_of(state.transduction)
             load_factor = self.surroundings.load_factor(state, found.length)
@@ -189,22 +189,22 @@ class Stepper:
             if found.status != INPUTS_END and not self.engine.reserve(found.status):
                 return found
 
-    def _why(self, found: IntegrationReport, state: State, gap: float) -> str:
-        """Why a step could not be made, how close it came, and what to change."""
-        begin = float(state.time[0])
+    def _why(self, found: IntegrationReport, begin: float) -> str:
+        """Why a step from a time [s] on could not be made, and how close it came."""
         end = f"the step to t = {begin + found.length:.6g} s, tried down to {found.length:.3g} s"
         if found.status == TOO_INACCURATE:
             tolerance = self.steps.tolerance
             text = f"the error of {end}, stays above the tolerance "
-            text += f"({found.error * tolerance:.3g} of the longest rod, allowed {tolerance:.3g})"
-        else:
-            text = f"{FAILURES[found.status]} in {end}"
-            if math.isfinite(found.residual):
-                text += f" (correction left {found.residual:.3g} m/s, allowed {self.steps.newton_tolerance:.3g} m/s, "
-                text += f"{found.iterations} iterations)"
-            text += f": {self.engine.who_blocks(found.pair)}" if found.pair >= 0 else ""
+            return text + f"({found.error * tolerance:.3g} of the longest rod, allowed {tolerance:.3g})"
+        text = f"{FAILURES[found.status]} in {end}"
+        if math.isfinite(found.residual):
+            text += f" (correction left {found.residual:.3g} m/s, allowed {self.steps.newton_tolerance:.3g} m/s, "
+            text += f"{found.iterations} iterations)"
+        return f"{text}: {self.engine.who_blocks(found.pair)}" if found.pair >= 0 else text
+
+    def _remedy(self, found: IntegrationReport, state: State, gap: float) -> Remedy:
         moving = np.concatenate([state.velocity, state.body_velocity])
         mass = self.model.node_mass.sum() + self.model.bodies.mass.sum()
         of_energy = math.sqrt(2.0 * state.account[LARGEST] / mass)
         speed = max(float(np.linalg.norm(moving, axis=1).max()), of_energy)
-        return f"{text}; remedy: {remedy(found, self.steps, self.model, gap, speed)}"
+        return remedy(found, self.steps, self.model, gap, speed)

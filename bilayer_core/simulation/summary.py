@@ -66,6 +66,7 @@ def summarise(simulator: Any) -> dict:
         },
         "newton_iterations": statistics.iterations,
         "factorisations": statistics.factorisations,
+        "regularised_hessians": statistics.regularised,
         "friction_updates": statistics.settlings,
         "cpu_time": cpu,
         "wall_time": simulator.wall_time,

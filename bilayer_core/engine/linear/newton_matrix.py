@@ -20,7 +20,7 @@ from numba import types
 from ...forces.rod_contact import rods_touch
 from ...jit import call, caller, piece
 from ...jit.record import Matrix, Vector
-from ...model.records.outcome import SHIFT, SIMPLIFIED
+from ...model.records.outcome import REGULARISED, SHIFT, SIMPLIFIED
 from ...model.records.problem import BorderedSystem, Problem
 from ...model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
 from ...model.records.step import Configuration, Stage
@@ -109,6 +109,7 @@ def factorise(p, at, stage, counts):
                 p.system.negative[0] = negative + of_border
                 return READY if of_border >= 0 else NOT_FINITE
             if not p.bordered.exists or call(p.calls.factor_border, (p,)):
+                p.outcome.counts[REGULARISED] += shift > 0.0 or simplified > EXACT
                 return READY
         if simplified < 2 and rods_touch(p.rod_contact):
             simplified += 1

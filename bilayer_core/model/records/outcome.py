@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-STATUS, PAIR, CONFIGURATION, SWAPPED, ITERATIONS, FACTORISATIONS, SETTLINGS, GAINS = range(8)
+STATUS, PAIR, CONFIGURATION, SWAPPED, ITERATIONS, FACTORISATIONS, SETTLINGS, GAINS, REGULARISED = range(9)
 """Of counts: how it ended, the blocking pair, the configuration that is the last, whether the scratch is
-the minimum, what Newton's method needed, and whether the step makes energy."""
+the minimum, what Newton's method needed, whether the step makes energy, and how many matrices were regularised."""
 RESIDUAL, GAP, SHIFT, FRACTION, FRICTION_FRACTION, ENERGY, SIMPLIFIED, CONTACT_ERROR, LIGHT_ERROR = range(9)
 """Of figures: Newton's [m/s], the smallest gap [m], the multiple of the masses that was added, the fractions of a step
 that keep gaps open and at which friction holds it up, energy [J], how far contacts of rods were simplified,
 the error of the energy of contacts [J], and that which light was wrong by, as a part of the longest rod."""
-COUNTS, FIGURES = 8, 9
+COUNTS, FIGURES = 9, 9

@@ -1,0 +1,61 @@
+"""All stress cases by name: the torture cases and the matrix."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from .case import StressCase
+from .matrix import MOST_STEPS, SEED, MatrixCase, matrix
+from .region import outside
+from .robots import scene_of
+from .torture import torture_cases
+
+QUICK = 100
+"""Cases of a quick run."""
+QUICK_STEPS = 400
+COMPARED = 0.2
+"""Part of the cases outside the region that are compared with a finer run; inside all are."""
+LONG_LOOKS = 500
+"""Looks of the judge at a long case."""
+LONG_LIMIT = 240.0
+"""CPU time of a long case [s]."""
+
+
+@cache
+def all_cases() -> dict[str, StressCase]:
+    """Every case by its name, in a fixed order."""
+    chosen = np.random.default_rng(SEED)
+    cases = [*torture_cases(), *(_of_matrix(case, chosen.random() < COMPARED) for case in matrix())]
+    return {case.name: case for case in cases}
+
+
+def _of_matrix(case: MatrixCase, compared: bool) -> StressCase:
+    why = tuple(outside(case.parameters))
+    is_long = case.most_steps > MOST_STEPS
+    return StressCase(
+        name=case.name,
+        content=lambda: scene_of(case.parameters),
+        outside=why,
+        most_steps=case.most_steps,
+        look_every=max(1, case.most_steps // LONG_LOOKS) if is_long else 1,
+        compared=(compared or not why) and not is_long,
+        axis=case.axis,
+        **({"cpu_limit": LONG_LIMIT} if is_long else {}),
+    )
+
+
+@cache
+def quick_names() -> frozenset[str]:
+    """A seeded choice of cases that are short, some of every group."""
+    chosen, groups = np.random.default_rng(SEED), {}
+    for name, case in all_cases().items():
+        if case.most_steps <= MOST_STEPS and case.group not in ("stations", "long"):
+            groups.setdefault(case.group, []).append(name)
+    total = sum(map(len, groups.values()))
+    names = []
+    for group in groups.values():
+        count = max(1, round(QUICK * len(group) / total))
+        names += chosen.choice(group, size=min(count, len(group)), replace=False).tolist()
+    return frozenset(names)

@@ -1,0 +1,206 @@
+"""The smallest gap of a scene, and whether anything passed through anything: found anew from positions alone.
+
+Nothing here is shared with the solver but the geometry of the scene: what has which thickness, which radius, which
+half edges. All pairs are looked at, without lists of near ones; distances are computed by other formulas.
+
+- Rods are capsules about their edges, with half the thickness as radius. On one rod, edges count that are at least as
+  far apart along it as the model's own exclusion (`model.rod_surfaces`).
+- Surfaces are met by rods, by balls and by the corners and rims of bodies (`stress.surfaces`).
+
+A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
+look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
+than half way inside another in between has *crossed* it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from ..model.model import Model
+from ..simulation.frame import Frame
+from .surfaces import MeetingPoints, surfaces_of
+
+Array = np.ndarray
+MOST_PAIRS = 45_000
+"""Pairs of edges that every step is checked for: those of 300 nodes."""
+MOST_PARTS = 24
+"""Into which the way of a step is cut."""
+LARGEST_TURN = 0.3
+"""Of a surface from look to look [rad], up to which straight lines stand for the ways about it."""
+DEEP = 0.5
+"""Part of a radius, or of a half edge, from which on something is inside."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Where everything is at one time."""
+
+    nodes: Array  # of rods [m], shape (n_node, 3)
+    points: Array  # what meets surfaces, in the order of `GapCheck` [m], shape (n_point, 3)
+    surface_position: Array  # [m], shape (n_surface, 3)
+    surface_rotation: Array  # columns are its axes, shape (n_surface, 3, 3)
+
+
+class GapCheck:
+    """Checks the gaps of a model in frames of its run.
+
+    Attributes
+    ----------
+    every : int
+        Number of steps from one look to the next: 1 but for scenes with very many pairs.
+    """
+
+    def __init__(self, model: Model):
+        self._model = model
+        self._edge = model.edge_node
+        self._first, self._second = pairs_of_edges(model)
+        self.every = max(1, math.ceil(len(self._first) / MOST_PAIRS))
+        self._points = MeetingPoints(model)
+        self._surfaces = surfaces_of(model, self._points)
+        radius = self._points.node_radius
+        self._edge_radius = np.maximum(radius[self._edge], radius[self._edge + 1])
+        self._smallest_radius = float(radius[model.node_length > 0.0].min())
+        self._leave_out_joined()
+        self._before: Moment | None = None
+
+    def _leave_out_joined(self) -> None:
+        """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
+        if not len(self._first):
+            return
+        rods = self._model.rod_surfaces
+        joined = rods.rod_joined[rods.edge_rod[self._first], rods.edge_rod[self._second]]
+        gap = self._rod_gaps(self._model.start_position)
+        keep = ~(joined & (gap < self._model.scene.contact.barrier_distance))
+        self._first, self._second = self._first[keep], self._second[keep]
+
+    @property
+    def checks_anything(self) -> bool:
+        """Whether the scene has anything that could meet."""
+        return bool(len(self._first) or self._surfaces)
+
+    def moment(self, frame: Frame) -> Moment:
+        """What there is to be looked at in a frame."""
+        poses = [
+            (position, Rotation.from_quat(quaternion).as_matrix())
+            for position, quaternion in zip(frame.body_positions, frame.body_quaternions, strict=True)
+        ]
+        poses.append((np.zeros(3), np.eye(3)))  # the world
+        return Moment(
+            frame.positions[: self._model.node_count],
+            self._points.places(frame),
+            np.array([poses[s.body][0] + poses[s.body][1] @ s.position for s in self._surfaces]).reshape(-1, 3),
+            np.array([poses[s.body][1] @ s.rotation for s in self._surfaces]).reshape(-1, 3, 3),
+        )
+
+    def smallest(self, at: Moment) -> float:
+        """The smallest gap [m], infinite without anything that could meet."""
+        gaps = [math.inf]
+        if len(self._first):
+            gaps.append(float(self._rod_gaps(at.nodes).min()))
+        gaps += [float(gap.min()) for gap in self._surface_gaps(at) if gap.size]
+        return min(gaps)
+
+    def crossed(self, at: Moment) -> str:
+        """What was deep inside something on the straight way from the last look; empty if nothing was."""
+        before, self._before = self._before, at
+        if before is None:
+            return ""
+        turns = zip(before.surface_rotation, at.surface_rotation, strict=True)
+        turned = max((_angle(one.T @ other) for one, other in turns), default=0.0)
+        moved = max(_largest(b - a) for a, b in zip(list(vars(before).values())[:3], vars(at).values(), strict=False))
+        smallest = min([self._smallest_radius, *(s.smallest for s in self._surfaces)])
+        parts = math.ceil(moved / (0.5 * smallest))
+        if parts < 2 or turned > LARGEST_TURN:
+            return ""
+        ends = list(zip(vars(before).values(), vars(at).values(), strict=True))
+        for part in np.linspace(0.0, 1.0, min(parts, MOST_PARTS) + 1)[1:-1]:
+            if found := self._deep(Moment(*(a + part * (b - a) for a, b in ends))):
+                return found
+        return ""
+
+    def _deep(self, at: Moment) -> str:
+        if len(self._first):
+            radii = self._edge_radius[self._first] + self._edge_radius[self._second]
+            if (self._rod_gaps(at.nodes) < -DEEP * radii).any():
+                return "a rod passed through a rod"
+        for surface, gap in zip(self._surfaces, self._surface_gaps(at), strict=True):
+            if gap.size and float(gap.min()) < -DEEP * surface.smallest:
+                return f"something passed through {surface.name}"
+        return ""
+
+    def _rod_gaps(self, nodes: Array) -> Array:
+        """Gap of each pair of edges [m], or a lower bound of it where that is above the barrier distance."""
+        edge, first, second = self._edge, self._first, self._second
+        begin, end = nodes[edge], nodes[edge + 1]
+        middle, half = 0.5 * (begin + end), 0.5 * np.linalg.norm(end - begin, axis=1)
+        radii = self._edge_radius[first] + self._edge_radius[second]
+        bound = np.linalg.norm(middle[first] - middle[second], axis=1) - half[first] - half[second] - radii
+        near = np.flatnonzero(bound < self._model.scene.contact.barrier_distance)
+        if near.size:
+            a, b = first[near], second[near]
+            bound[near] = segment_distance(begin[a], end[a], begin[b], end[b]) - radii[near]
+        return bound
+
+    def _surface_gaps(self, at: Moment) -> list[Array]:
+        """Gaps of all that can meet each surface [m]."""
+        return [
+            surface.distance((at.points[surface.points] - position) @ rotation) - surface.radii
+            for surface, position, rotation in zip(
+                self._surfaces, at.surface_position, at.surface_rotation, strict=True
+            )
+        ]
+
+
+def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
+    """Smallest distance of segments ab and cd [m], each of shape (n, 3), to (n,).
+
+    The least of four distances of an end from the other segment, and that of the lines where both nearest points lie
+    inside.
+    """
+    found = np.minimum(_from_segment(a, c, d), _from_segment(b, c, d))
+    found = np.minimum(found, np.minimum(_from_segment(c, a, b), _from_segment(d, a, b)))
+    u, v, w = b - a, d - c, a - c
+    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
+    uw, vw = (u * w).sum(1), (v * w).sum(1)
+    determinant = uu * vv - uv * uv
+    skew = determinant > 1e-12 * uu * vv
+    safe = np.where(skew, determinant, 1.0)
+    s, t = (uv * vw - vv * uw) / safe, (uu * vw - uv * uw) / safe
+    inside = skew & (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
+    lines = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
+    return np.where(inside, np.minimum(found, lines), found)
+
+
+def _from_segment(p: Array, a: Array, b: Array) -> Array:
+    along = b - a
+    t = np.clip(((p - a) * along).sum(1) / np.maximum((along * along).sum(1), 1e-300), 0.0, 1.0)
+    return np.linalg.norm(p - a - t[:, None] * along, axis=1)
+
+
+def _largest(way: Array) -> float:
+    return float(np.linalg.norm(way, axis=1).max()) if len(way) else 0.0
+
+
+def _angle(rotation: Array) -> float:
+    return math.acos(min(max(0.5 * (float(np.trace(rotation)) - 1.0), -1.0), 1.0))
+
+
+def pairs_of_edges(model: Model) -> tuple[Array, Array]:
+    """All pairs of edges that may not come together, as two arrays of edges."""
+    surfaces = model.rod_surfaces
+    if surfaces is None:
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    first, second = np.triu_indices(len(surfaces.edge_rod), 1)
+    rod_a, rod_b = surfaces.edge_rod[first], surfaces.edge_rod[second]
+    arc, length = surfaces.edge_arc.mean(axis=1), surfaces.rod_length[rod_a]
+    apart = np.abs(arc[first] - arc[second])
+    around = np.where(np.isfinite(length), np.minimum(apart, length - apart), apart)
+    edge = surfaces.edge_arc[:, 1] - surfaces.edge_arc[:, 0]
+    same = rod_a == rod_b
+    far = around - 0.5 * (edge[first] + edge[second]) >= surfaces.rod_exclusion[rod_a]
+    keep = surfaces.rod_can_collide[rod_a, rod_b] & (~same | far)
+    return first[keep], second[keep]

@@ -1,0 +1,179 @@
+"""What is asked of every accepted step of every case, and of a run as a whole.
+
+========================= =====================================================================================
+finite                    positions and velocities are numbers
+gap                       the smallest gap is above zero, and nothing passed through anything (`stress.gaps`)
+energy without driving    T + V less supplied work rises by no more than `MOST_GAIN` of the largest energy
+numerical energy          what steps make beyond all forces stays below `MOST_MADE` of the largest energy
+momentum                  where nothing but gravity acts, the mass centre flies as it must
+budget                    the engine's energy budget closes to `LARGEST_RESIDUAL` of its largest row
+effort                    no more than `MOST_ITERATIONS` Newton iterations and `MOST_REJECTED` attempts a step
+========================= =====================================================================================
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..engine.energy_account import FREE, LARGEST, LOWEST, NUMERICAL
+from ..errors import BilayerError
+from ..scene.body import Guided
+from ..simulation.frame import Frame
+from ..simulation.simulator import Simulator
+from .gaps import GapCheck
+
+MOST_GAIN = 2e-3
+"""The engine stops at 1e-3; rounding and Newton's tolerance are beside it."""
+MOST_MADE = 0.1
+"""From which on a run warns (`simulation.summary`)."""
+LARGEST_RESIDUAL = 0.02
+MOST_ITERATIONS = 200
+MOST_REJECTED = 30
+"""An accepted step, on average over a run."""
+BALLISTIC = 10.0
+"""Times what Newton's tolerance lets the mass centre be off by."""
+
+
+class Verdict(BilayerError):
+    """A case failed: what was wrong, and when."""
+
+    def __init__(self, reason: str, time: float):
+        super().__init__(f"{reason} at t = {time:.6g} s")
+        self.reason, self.time = reason, time
+
+    def __reduce__(self) -> tuple:
+        """For its way between processes."""
+        return type(self), (self.reason, self.time)
+
+
+class Judge:
+    """Looks at a simulator after every accepted step, or after every so many.
+
+    Parameters
+    ----------
+    simulator : Simulator
+    every : int
+        From look to look, for very long runs; scenes with very many pairs of edges are looked at less often as well.
+
+    Attributes
+    ----------
+    steps : int
+        Accepted, as far as it was told.
+    min_gap : float
+        The smallest seen [m].
+    energy_gain, numerical : float
+        Over the largest energy: the most that T + V rose without driving, and what steps made (or lost, below zero).
+    momentum : float
+        The most that the mass centre was off its way, over what Newton's tolerance allows.
+    """
+
+    def __init__(self, simulator: Simulator, every: int = 1):
+        self._simulator, self._gaps = simulator, GapCheck(simulator.model)
+        self._every = max(every, self._gaps.every)
+        self.steps, self.min_gap = 0, math.inf
+        self.energy_gain = self.numerical = self.momentum = 0.0
+        self._numerical_before = float(simulator.energy_account[NUMERICAL])
+        self._ballistic = _Ballistic(simulator) if _flies(simulator) else None
+
+    def look(self, time: float) -> None:
+        """Look at what a step ended with.
+
+        Raises
+        ------
+        Verdict
+            If it is not as it must be.
+        """
+        self.steps += 1
+        if self.steps % self._every:
+            return
+        frame = self._simulator.frame()
+        if not (np.isfinite(frame.positions).all() and np.isfinite(frame.velocities).all()):
+            raise Verdict("a position or a velocity is not finite", time)
+        self._look_at_gaps(frame)
+        self._look_at_energy(time)
+        if self._ballistic is not None:
+            self.momentum = max(self.momentum, self._ballistic.off(frame))
+            if self.momentum > 1.0:
+                raise Verdict(f"the mass centre is off its way by {self.momentum:.3g} of what is allowed", time)
+
+    def _look_at_gaps(self, frame: Frame) -> None:
+        if not self._gaps.checks_anything:
+            return
+        moment = self._gaps.moment(frame)
+        self.min_gap = min(self.min_gap, self._gaps.smallest(moment))
+        if not self.min_gap > 0.0:
+            raise Verdict(f"the smallest gap is {self.min_gap:.3g} m, the engine's own {frame.min_gap:.3g} m", frame.time)
+        if found := self._gaps.crossed(moment):
+            raise Verdict(found, frame.time)
+
+    def _look_at_energy(self, time: float) -> None:
+        account = self._simulator.energy_account
+        largest = float(account[LARGEST])
+        if largest <= 0.0:
+            return
+        self.energy_gain = max(self.energy_gain, float(account[FREE] - account[LOWEST]) / largest)
+        self.numerical = (float(account[NUMERICAL]) - self._numerical_before) / largest
+        if self.energy_gain > MOST_GAIN:
+            raise Verdict(f"energy rose by {self.energy_gain:.3g} of the largest without driving", time)
+        if self.numerical > MOST_MADE:
+            raise Verdict(f"steps made {self.numerical:.3g} of the largest energy", time)
+
+    def end(self) -> dict[str, float]:
+        """Look at the run as a whole; the figures of it.
+
+        Raises
+        ------
+        Verdict
+            If the effort was not bounded.
+        """
+        statistics, time = self._simulator.statistics, self._simulator.time
+        parts = max(statistics.substeps, 1)
+        if statistics.iterations > MOST_ITERATIONS * parts:
+            raise Verdict(f"{statistics.iterations / parts:.0f} Newton iterations a step", time)
+        if statistics.rejected > MOST_REJECTED * parts:
+            raise Verdict(f"{statistics.rejected / parts:.0f} rejected attempts a step", time)
+        residual = self._simulator.budget()["relative_residual"] if self._simulator.keeps_budget else math.nan
+        return {"budget_residual": residual}
+
+
+class _Ballistic:
+    """The way of a mass centre on which nothing but gravity acts."""
+
+    def __init__(self, simulator: Simulator):
+        self._simulator, model = simulator, simulator.model
+        scene = model.scene
+        self._gravity = np.array(scene.gravity)
+        self._length = max(rod.path.length for rod in scene.rods)
+        frame = simulator.frame()
+        self._start, self._time = self._center(frame), frame.time
+        free = model.bodies.body_of_free
+        moved = model.node_mass @ frame.velocities[: model.node_count]
+        moved = moved + model.bodies.mass @ frame.body_velocities[free]
+        self._velocity = moved / (model.node_mass.sum() + model.bodies.mass.sum())
+
+    def _center(self, frame: Frame) -> np.ndarray:
+        model = self._simulator.model
+        of_rods, own = model.node_mass.sum(), model.bodies.mass
+        together = of_rods * self._simulator.com + own @ frame.body_positions[model.bodies.body_of_free]
+        return together / (of_rods + own.sum())
+
+    def off(self, frame: Frame) -> float:
+        """By how much it is off its way, over what is allowed."""
+        elapsed, simulator = frame.time - self._time, self._simulator
+        way = self._velocity * elapsed + 0.5 * self._gravity * elapsed**2
+        off = float(np.linalg.norm(self._center(frame) - self._start - way))
+        allowed = BALLISTIC * simulator.steps.newton_tolerance * elapsed + 1e-9 * self._length
+        allowed += 1e-12 * float(np.abs(frame.positions).max())
+        if simulator.plan.integrator == "implicit_euler":  # falls by ½ g t h too far
+            allowed += float(np.linalg.norm(self._gravity)) * elapsed * simulator.statistics.longest
+        return off / allowed
+
+
+def _flies(simulator: Simulator) -> bool:
+    """Whether nothing but gravity acts from outside on the robot."""
+    scene, model = simulator.scene, simulator.model
+    alone = scene.contact is None and scene.fluid is None and not scene.loads and scene.damping.mass == 0.0
+    guided = any(isinstance(body.motion, Guided) for body in scene.bodies)
+    return bool(alone and not guided and (model.attached_free >= 0).all())

@@ -1,0 +1,76 @@
+"""Worker processes that run cases: they stay, so that kernels are loaded once, and are killed at a case's limits."""
+
+from __future__ import annotations
+
+import os
+import resource
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, wait
+from multiprocessing import get_context
+
+from ..errors import InputError
+from .case import Outcome, Record, StressCase
+from .cases import all_cases
+
+MEMORY = 3 * 2**30
+"""Address space that a worker may take beyond what it has when it begins [bytes]."""
+GRACE = 12.0
+"""Wall time after which a worker is killed, over the case's limit of CPU time: a run, a finer one, and a remedy."""
+
+
+def run_cases(names: Iterable[str], workers: int, done: Callable[[Record], None]) -> None:
+    """Run cases, and hand on what comes of each as soon as it has.
+
+    Parameters
+    ----------
+    names : iterable of str
+    workers : int
+        Processes.
+    done : callable
+        Called with each record.
+
+    Raises
+    ------
+    InputError
+        If the library for it is not installed.
+    """
+    try:
+        from pebble import ProcessExpired, ProcessPool
+    except ImportError:
+        raise InputError("`bilayer stress` needs pebble: pip install 'bilayer_sim_ros[stress]'") from None
+    cases, left = all_cases(), list(reversed(list(names)))
+    with ProcessPool(workers, context=get_context("spawn"), initializer=_begin) as pool:
+        waiting = {}
+        while left or waiting:
+            while left and len(waiting) < 2 * workers:
+                name = left.pop()
+                waiting[pool.schedule(_run, (name,), timeout=GRACE * cases[name].cpu_limit)] = name
+            finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for job in finished:
+                case = cases[waiting.pop(job)]
+                try:
+                    record = Record.from_line(job.result())
+                except TimeoutError:
+                    record = _lost(case, f"took longer than {GRACE * case.cpu_limit:g} s, and was killed")
+                except ProcessExpired as death:
+                    record = _lost(case, f"its process died with exit code {death.exitcode}")
+                done(record)
+
+
+def _lost(case: StressCase, why: str) -> Record:
+    return Record(case.name, case.axis, not case.outside, list(case.outside), Outcome.FAILED, why)
+
+
+def _begin() -> None:
+    """What each worker does first: numpy and scipy are loaded, and then its address space is limited."""
+    from . import execute  # noqa: F401 (loads all that cases need)
+
+    with open("/proc/self/statm", encoding="ascii") as file:
+        present = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    resource.setrlimit(resource.RLIMIT_AS, (present + MEMORY, present + MEMORY))
+
+
+def _run(name: str) -> str:
+    from .execute import execute
+
+    return execute(all_cases()[name]).line()
