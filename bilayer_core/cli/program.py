@@ -19,6 +19,7 @@ from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
 from bilayer_core.cli.render import render
 from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import scenes, schema
+from bilayer_core.cli.stress import stress
 from bilayer_core.cli.validate import validate
 from bilayer_core.errors import BilayerError
 
@@ -48,7 +49,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, new, schema, check, run, converge, validate, bench, info, view, render):
+for verb in (scenes, new, schema, check, run, converge, validate, bench, stress, info, view, render):
     program.add_command(verb)
 
 

@@ -5,60 +5,100 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import click
 
 from bilayer_core.cli.options import Verb
-from bilayer_core.cli.watch import compile_kernels
+from bilayer_core.cli.watch import compile_kernels, count_bar
 from bilayer_core.errors import InputError
 
 FAILED = 1
+DEFAULT_DIRECTORY = "runs/stress"
 
 
 @click.command(cls=Verb)
-@click.option("--quick", is_flag=True, help="A seeded choice of 100 short cases, in about three minutes.")
-@click.option("--only", multiple=True, metavar="PATTERN", help="Cases of this name, such as 'torture/*' or 'dt/*/drop/*'.")
-@click.option("--list", "listed", is_flag=True, help="Name the cases, and why those outside the region of validity are.")
-@click.option("--resume", is_flag=True, help="Go on with the results in --out.")
-@click.option("--out", metavar="DIR", default="runs/stress", show_default=True, help="Results, report and figures.")
-@click.option("--json", "json_file", metavar="FILE.json", help="Write all results.")
-@click.option("--workers", type=click.IntRange(1), help="Processes; default: one a core.")
-@click.option("--no-shrink", is_flag=True, help="Do not make failures smaller.")
+@click.option("--quick", is_flag=True, help="A seeded choice of 100 short cases: about three minutes.")
+@click.option("--only", multiple=True, metavar="PATTERN", help="Cases of this name: 'torture/*', 'dt/*/drop/*'.")
+@click.option("--scene", "scenes", multiple=True, metavar="FILE.yaml", help="Judge a scene of your own instead.")
+@click.option("--list", "listed", is_flag=True, help="Name the cases and why they are outside the region of validity.")
+@click.option("--resume", is_flag=True, help="Go on with the results in DIR.")
+@click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
+@click.option("--json", "json_file", metavar="FILE.json", help="Write all results to one file.")
+@click.option("--workers", type=click.IntRange(1), help="Cases side by side; default: one a core.")
+@click.option("--shrink/--no-shrink", default=True, show_default=True, help="Make the scenes of failures smaller.")
 @click.option("--quiet", is_flag=True, help="No progress.")
 def stress(
     quick: bool,
     only: tuple[str, ...],
+    scenes: tuple[str, ...],
     listed: bool,
     resume: bool,
     out: str,
     json_file: str | None,
     workers: int | None,
-    no_shrink: bool,
+    shrink: bool,
     quiet: bool,
-) -> None:
-    """Run hard cases and judge every step of them; exit code 1 if one fails."""
+) -> int:
+    """Run hard cases, and judge every step of them.
+
+    Each case ends accurate, stable, refused with a reason, or FAILED. Writes DIR/results.jsonl as results come, then
+    a report (stability.md), figures, and the scenes of failures and of the worst cases. Exit code 1 if one fails.
+    """
     from bilayer_core.record.paths import check_output_path
     from bilayer_core.stress import report
-    from bilayer_core.stress.cases import all_cases, quick_names
     from bilayer_core.stress.journal import Journal, head_of
-    from bilayer_core.stress.pool import run_cases
+    from bilayer_core.stress.run import chosen_cases, measure, write
+    from bilayer_core.validate.figures import check_matplotlib
 
-    cases = all_cases()
-    names = _chosen(only, quick_names() if quick else cases.keys(), list(cases))
+    cases = chosen_cases(only, quick, scenes)
     if listed:
-        for name in names:
-            click.echo(f"{name}  {'; '.join(cases[name].outside)}".rstrip())
+        _list(cases)
         return 0
+    check_matplotlib()
     if json_file:
         check_output_path(json_file, force=True)
-    journal = Journal(Path(out), head_of({name: cases[name] for name in names}), resume)
-    left = [name for name in names if name not in journal.records]
+    directory = _directory(out)
+    journal = Journal(directory, head_of(cases), resume)
+    workers = workers or len(os.sched_getaffinity(0))
     compile_kernels(quiet)
-    with _Progress(len(left), quiet) as progress:
+    with count_bar(len(cases) - len(journal.records), quiet) as show:
+        measure(cases, journal, workers, lambda record: _tell(record, show))
+    for path in write(cases, journal, directory, shrink, workers):
+        click.echo(f"wrote {path}")
+    records = list(journal.records.values())
+    if json_file:
+        _write_json(Path(json_file), journal)
+    for line in report.summary_lines(records):
+        click.echo(line)
+    for line in report.shortfalls(records):
+        click.echo(line)
+    return FAILED if any(record.outcome == "FAILED" for record in records) else 0
 
-        def done(record) -> None:
-            journal.add(record)
-            progress.tell(record)
 
-        run_cases(left, workers or len(os.sched_getaffinity(0)), done)
-    return _finish(journal, Path(out), json_file, shrink=not no_shrink)
+def _tell(record: Any, show: Any) -> None:
+    show(record.name)
+    if record.outcome == "FAILED":
+        click.echo(f"FAILED  {record.name}: {record.reason.splitlines()[0]}")
+
+
+def _list(cases: dict) -> None:
+    for name, case in cases.items():
+        click.echo(f"{name}  [outside: {'; '.join(case.outside)}]" if case.outside else name)
+
+
+def _write_json(path: Path, journal: Any) -> None:
+    content = journal.head | {"results": [json.loads(record.line()) for record in journal.records.values()]}
+    try:
+        path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _directory(out: str) -> Path:
+    directory = Path(out)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out: {out}: cannot be made a directory: {error.strerror or error}") from error
+    return directory

@@ -14,8 +14,8 @@ from ..model.records.outcome import (
     ITERATIONS,
     LIGHT_ERROR,
     PAIR,
-    RESIDUAL,
     REGULARISED,
+    RESIDUAL,
     SETTLINGS,
     SWAPPED,
 )

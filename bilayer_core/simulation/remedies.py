@@ -55,7 +55,8 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
     if found.status == GAINS_ENERGY and solver.newton_tolerance is not None:
         return _without("solver.newton_tolerance", ": what it leaves undone is energy")
     if found.status == BEYOND:
-        return Remedy("set `solver.integrator` to sdirk2, which ends where it has looked", {"solver.integrator": "sdirk2"})
+        text = "set `solver.integrator` to sdirk2, which ends where it has looked"
+        return Remedy(text, {"solver.integrator": "sdirk2"})
     if not steps.adaptive:
         return _without("solver.dt", f" for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s")
     if scene.contact is not None and gap < SPENT * scene.contact.barrier_distance:
@@ -67,7 +68,8 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
         return Remedy("let what acts on the robot grow over a time instead of at once")
     friction = scene.contact.friction if scene.contact is not None else None
     if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
-        return _set("contact.friction.speed_threshold", f"{_rounded_up(MUCH_FASTER * steps.newton_tolerance):.1g}", "m/s")
+        needed = _rounded_up(MUCH_FASTER * steps.newton_tolerance)
+        return _set("contact.friction.speed_threshold", f"{needed:.1g}", "m/s")
     stuck = found.status in (MAX_ITERATIONS, LINE_SEARCH)
     if stuck and solver.newton_tolerance is not None:
         return _without("solver.newton_tolerance")

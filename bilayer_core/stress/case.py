@@ -66,8 +66,8 @@ class StressCase:
     ----------
     name : str
         Groups and case with slashes between.
-    content : callable
-        Returns the content of its scene file.
+    content : callable or str
+        Returns the content of its scene file; or the path of one.
     outside : tuple of str
         Why it is outside the region of validity; empty inside.
     most_steps : int
@@ -85,7 +85,7 @@ class StressCase:
     """
 
     name: str
-    content: Callable[[], dict]
+    content: Callable[[], dict] | str
     outside: tuple[str, ...] = ()
     most_steps: int = 2000
     look_every: int = 1
@@ -93,6 +93,10 @@ class StressCase:
     decide: Callable[[Trial], Decision] | None = None
     compared: bool = False
     axis: str = ""
+
+    def scene(self) -> dict | str:
+        """What `load_scene` takes."""
+        return self.content if isinstance(self.content, str) else self.content()
 
     @property
     def group(self) -> str:

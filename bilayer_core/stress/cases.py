@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def _of_matrix(case: MatrixCase, compared: bool) -> StressCase:
     is_long = case.most_steps > MOST_STEPS
     return StressCase(
         name=case.name,
-        content=lambda: scene_of(case.parameters),
+        content=partial(scene_of, case.parameters),
         outside=why,
         most_steps=case.most_steps,
         look_every=max(1, case.most_steps // LONG_LOOKS) if is_long else 1,

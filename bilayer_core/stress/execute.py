@@ -62,7 +62,7 @@ def _run(case: StressCase, record: Record, overrides: Sequence[str] = ()) -> tup
 
 def _trial_of(case: StressCase, overrides: Sequence[str] = (), effort: float = 1.0, judged: bool = True) -> Trial:
     return Trial(
-        case.content(),
+        case.scene(),
         most_steps=round(effort * case.most_steps),
         cpu_limit=effort * case.cpu_limit,
         overrides=overrides,

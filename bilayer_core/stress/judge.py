@@ -104,7 +104,8 @@ class Judge:
         moment = self._gaps.moment(frame)
         self.min_gap = min(self.min_gap, self._gaps.smallest(moment))
         if not self.min_gap > 0.0:
-            raise Verdict(f"the smallest gap is {self.min_gap:.3g} m, the engine's own {frame.min_gap:.3g} m", frame.time)
+            own = f"the engine's own {frame.min_gap:.3g} m"
+            raise Verdict(f"the smallest gap is {self.min_gap:.3g} m, {own}", frame.time)
         if found := self._gaps.crossed(moment):
             raise Verdict(found, frame.time)
 

@@ -10,7 +10,6 @@ from multiprocessing import get_context
 
 from ..errors import InputError
 from .case import Outcome, Record, StressCase
-from .cases import all_cases
 
 MEMORY = 3 * 2**30
 """Address space that a worker may take beyond what it has when it begins [bytes]."""
@@ -18,12 +17,12 @@ GRACE = 12.0
 """Wall time after which a worker is killed, over the case's limit of CPU time: a run, a finer one, and a remedy."""
 
 
-def run_cases(names: Iterable[str], workers: int, done: Callable[[Record], None]) -> None:
+def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record], None]) -> None:
     """Run cases, and hand on what comes of each as soon as it has.
 
     Parameters
     ----------
-    names : iterable of str
+    cases : iterable of StressCase
     workers : int
         Processes.
     done : callable
@@ -38,16 +37,16 @@ def run_cases(names: Iterable[str], workers: int, done: Callable[[Record], None]
         from pebble import ProcessExpired, ProcessPool
     except ImportError:
         raise InputError("`bilayer stress` needs pebble: pip install 'bilayer_sim_ros[stress]'") from None
-    cases, left = all_cases(), list(reversed(list(names)))
+    left = list(reversed(list(cases)))
     with ProcessPool(workers, context=get_context("spawn"), initializer=_begin) as pool:
         waiting = {}
         while left or waiting:
             while left and len(waiting) < 2 * workers:
-                name = left.pop()
-                waiting[pool.schedule(_run, (name,), timeout=GRACE * cases[name].cpu_limit)] = name
+                case = left.pop()
+                waiting[pool.schedule(_run, (case,), timeout=GRACE * case.cpu_limit)] = case
             finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
             for job in finished:
-                case = cases[waiting.pop(job)]
+                case = waiting.pop(job)
                 try:
                     record = Record.from_line(job.result())
                 except TimeoutError:
@@ -70,7 +69,7 @@ def _begin() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (present + MEMORY, present + MEMORY))
 
 
-def _run(name: str) -> str:
+def _run(case: StressCase) -> str:
     from .execute import execute
 
-    return execute(all_cases()[name]).line()
+    return execute(case).line()

@@ -21,8 +21,8 @@ class Trial:
 
     Parameters
     ----------
-    content : mapping
-        Of a scene file.
+    content : mapping or str
+        Of a scene file, or its path.
     most_steps : int
         Accepted steps after which runs end.
     cpu_limit : float
@@ -46,7 +46,7 @@ class Trial:
 
     def __init__(
         self,
-        content: Mapping,
+        content: Mapping | str,
         most_steps: int,
         cpu_limit: float,
         overrides: Sequence[str] = (),

@@ -1,7 +1,6 @@
 """Adaptive steps: their error, what refused ones leave, how they go on, and how long they are."""
 
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
