@@ -80,6 +80,8 @@ class StressCase:
         Runs the trial as it needs to, and returns the decision; without one the trial runs to the end of the scene.
     compared : bool
         Whether its error is found from a finer run.
+    budget : bool
+        Whether its energy budget is kept and judged, beside the account that every run keeps.
     axis : str
         The axis that it belongs to alone.
     """
@@ -92,6 +94,7 @@ class StressCase:
     cpu_limit: float = 20.0
     decide: Callable[[Trial], Decision] | None = None
     compared: bool = False
+    budget: bool = False
     axis: str = ""
 
     def scene(self) -> dict | str:

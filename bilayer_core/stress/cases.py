@@ -15,8 +15,9 @@ from .torture import torture_cases
 QUICK = 100
 """Cases of a quick run."""
 QUICK_STEPS = 400
-COMPARED = 0.2
-"""Part of the cases outside the region that are compared with a finer run; inside all are."""
+CHOSEN = 0.2
+"""Part of the cases, by the seed, whose energy budget is kept, and that are compared with a finer run also outside the
+region; inside all are."""
 LONG_LOOKS = 500
 """Looks of the judge at a long case."""
 LONG_LIMIT = 240.0
@@ -27,11 +28,11 @@ LONG_LIMIT = 240.0
 def all_cases() -> dict[str, StressCase]:
     """Every case by its name, in a fixed order."""
     chosen = np.random.default_rng(SEED)
-    cases = [*torture_cases(), *(_of_matrix(case, chosen.random() < COMPARED) for case in matrix())]
+    cases = [*torture_cases(), *(_of_matrix(case, chosen.random() < CHOSEN) for case in matrix())]
     return {case.name: case for case in cases}
 
 
-def _of_matrix(case: MatrixCase, compared: bool) -> StressCase:
+def _of_matrix(case: MatrixCase, is_chosen: bool) -> StressCase:
     why = tuple(outside(case.parameters))
     is_long = case.most_steps > MOST_STEPS
     return StressCase(
@@ -40,7 +41,8 @@ def _of_matrix(case: MatrixCase, compared: bool) -> StressCase:
         outside=why,
         most_steps=case.most_steps,
         look_every=max(1, case.most_steps // LONG_LOOKS) if is_long else 1,
-        compared=(compared or not why) and not is_long,
+        compared=(is_chosen or not why) and not is_long,
+        budget=is_chosen and not is_long,
         axis=case.axis,
         **({"cpu_limit": LONG_LIMIT} if is_long else {}),
     )

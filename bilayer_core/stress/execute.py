@@ -53,7 +53,7 @@ def _run(case: StressCase, record: Record, overrides: Sequence[str] = ()) -> tup
             decision = case.decide(trial)
         else:
             trial.frames = trial.looks(trial.ends(LOOKS))
-        record.figures |= trial.judge.end()
+        record.figures |= trial.judge.end(record.inside)
         return trial, decision
     finally:
         record.figures |= _figures(trial)
@@ -68,6 +68,7 @@ def _trial_of(case: StressCase, overrides: Sequence[str] = (), effort: float = 1
         overrides=overrides,
         look_every=case.look_every,
         judged=judged,
+        budget=judged and case.budget,
     )
 
 

@@ -6,7 +6,7 @@ gap                       the smallest gap is above zero, and nothing passed thr
 energy without driving    T + V less supplied work rises by no more than `MOST_GAIN` of the largest energy
 numerical energy          what steps make beyond all forces stays below `MOST_MADE` of the largest energy
 momentum                  where nothing but gravity acts, the mass centre flies as it must
-budget                    the engine's energy budget closes to `LARGEST_RESIDUAL` of its largest row
+budget                    inside the region the budget closes to `LARGEST_RESIDUAL` of its largest row
 effort                    no more than `MOST_ITERATIONS` Newton iterations and `MOST_REJECTED` attempts a step
 ========================= =====================================================================================
 """
@@ -121,13 +121,18 @@ class Judge:
         if self.numerical > MOST_MADE:
             raise Verdict(f"steps made {self.numerical:.3g} of the largest energy", time)
 
-    def end(self) -> dict[str, float]:
+    def end(self, inside: bool) -> dict[str, float]:
         """Look at the run as a whole; the figures of it.
+
+        Parameters
+        ----------
+        inside : bool
+            Whether it is in the region of validity.
 
         Raises
         ------
         Verdict
-            If the effort was not bounded.
+            If the effort was not bounded, or the budget does not close.
         """
         statistics, time = self._simulator.statistics, self._simulator.time
         parts = max(statistics.substeps, 1)
@@ -135,7 +140,11 @@ class Judge:
             raise Verdict(f"{statistics.iterations / parts:.0f} Newton iterations a step", time)
         if statistics.rejected > MOST_REJECTED * parts:
             raise Verdict(f"{statistics.rejected / parts:.0f} rejected attempts a step", time)
-        residual = self._simulator.budget()["relative_residual"] if self._simulator.keeps_budget else math.nan
+        if not self._simulator.keeps_budget:
+            return {}
+        residual = float(self._simulator.budget()["relative_residual"])
+        if inside and abs(residual) > LARGEST_RESIDUAL:
+            raise Verdict(f"the energy budget has a residual of {residual:.3g} of its largest row", time)
         return {"budget_residual": residual}
 
 

@@ -92,8 +92,8 @@ def _page(journal: Journal) -> Iterator[str]:
     records, head = list(journal.records.values()), journal.head
     yield "# Numerical stability"
     yield ""
-    yield "Made by `bilayer stress --out DIR` (DIR/stability.md); do not edit it. In `bilayer_core/stress`, `judge.py` has the"
-    yield "judge and its limits, `region.py` the region of validity, `matrix.py` and `torture.py` the cases."
+    yield "Made by `bilayer stress --out DIR` (DIR/stability.md); do not edit it. In `bilayer_core/stress`, `judge.py` has"
+    yield "the judge and its limits, `region.py` the region of validity, `matrix.py` and `torture.py` the cases."
     yield ""
     machine = head["machine"]
     yield f"{len(records)} cases on {machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, "
@@ -109,7 +109,7 @@ def _page(journal: Journal) -> Iterator[str]:
     yield "Inside the region of validity answers are accurate (their error against a run with a tenth of the tolerance,"
     yield "or a quarter of the step, is below 1 % of a strip's length) or at least stable. The region is decided by"
     yield f"numbers of the scene alone: eigenstrain at most {100 * LARGEST_STRAIN:g} %, curvature × thickness at most"
-    yield f"{LARGEST_BEND:g}, impacts at most at {LARGEST_MACH:g} of the speed of sound, a barrier that holds the weight and"
+    yield f"{LARGEST_BEND:g}, impacts at {LARGEST_MACH:g} of the speed of sound, a barrier that holds the weight and"
     yield "the impact, a step or a tolerance that resolves the motion."
     yield ""
     yield from _outcomes(records)

@@ -31,8 +31,8 @@ class Trial:
         ``KEY=VALUE``, as for ``--set``.
     look_every : int
         The judge's looks, in steps.
-    judged : bool
-        Whether the judge looks at it, and its energy budget is kept.
+    judged, budget : bool
+        Whether the judge looks at it, and whether its energy budget is kept.
 
     Attributes
     ----------
@@ -52,9 +52,10 @@ class Trial:
         overrides: Sequence[str] = (),
         look_every: int = 1,
         judged: bool = True,
+        budget: bool = False,
     ):
         scene = load_scene(content, overrides)
-        self.simulator = Simulator(scene, budget=judged and look_every == 1)
+        self.simulator = Simulator(scene, budget=budget)
         self.simulator.compile()
         self.judge = Judge(self.simulator, look_every)
         self.cut = False
