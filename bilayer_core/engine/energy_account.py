@@ -7,13 +7,16 @@ Over an accepted step, with the kinetic energy T and the energy V of the conserv
 is what no force accounts for: negative where the integrator damps, positive where it makes energy. `lost` is the work
 of friction, drag, damping and viscosity, `supplied` that of loads, of a flow and of prescribed bodies: both are
 h Σ bᵢ Pᵢ with the powers Pᵢ at the ends of the stages, which the last evaluation of each has left, and the integrator's
-own weights b (`Method.works`). What a stimulus supplies is ∫ s·dη, s = −∂V/∂η, by the trapezoidal rule.
+own weights b (`Method.works`). What a stimulus supplies is ∫ s·dη, s = −∂V/∂η, by the trapezoidal rule; where it jumps
+at the start of a step, the jump by itself, at the shape there.
 
 A step is not accepted that makes energy: without driving, T + V less the work of constant loads can only fall. Where it
 has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
 again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
 much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops. Driving
-ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow.
+ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow. Then what is supplied has
+the error of its quadrature, and a step is made again, as long as it can be shorter, if it makes by itself more than
+`LARGEST_GAIN_DRIVEN` of the largest energy.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -55,6 +58,7 @@ ended; the largest energy of the run; what steps have made or, below zero, lost;
 NONE, SOME, MUCH = range(3)
 """What a step makes of energy: nothing that counts, too much with the steps before, or by itself."""
 LARGEST_GAIN = 9e-4
+LARGEST_GAIN_DRIVEN = 0.02
 SMALL = 1e-3
 ROUNDING = 1e-11
 """Part of the energies that may be rounding."""
@@ -162,8 +166,8 @@ def _write_forces_of_laws(p, at, stage, force_out):
     return READY
 
 
-@piece(int, Problem, StateArrays, Work, float)
-def begin_step_account(p, state, work, weight):
+@piece(int, Problem, StateArrays, StageInputs, Work, float)
+def begin_step_account(p, state, inputs, work, weight):
     """Begin with a step from a state; `weight` is that of the powers there [s]."""
     drives, work_done = p.drives, work.account
     work_done[SUPPLIED], work_done[LOST] = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
@@ -172,7 +176,46 @@ def begin_step_account(p, state, work, weight):
     for i in range(work.start_strain.shape[0]):
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
+    _supply_by_jumps(p, state, inputs, work)
     return READY
+
+
+@kernel
+def _supply_by_jumps(p, state, inputs, work):
+    """Supply what stimuli do that jump at the start of a step, in layers that follow at once: the shape stays as it is
+    while η does, so that ∫ s·dη is exactly the mean of s before and after times the jump. Go on from behind it.
+    """
+    drives, strands, stage, done = p.drives, p.strands, work.stage, work.account
+    copy(state.law_force, work.start_force)
+    jumps = False
+    for i in range(work.start_strain.shape[0]):
+        work.strain[i] = 0.0
+        stimulus = inputs.first[drives.law_channel[i]]
+        lag = drives.law_rising[i] if stimulus > state.transduction[i] else drives.law_falling[i]
+        if lag == 0.0 and stimulus != state.transduction[i]:
+            law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
+            work.strain[i] = eigenstrain_of(stimulus, law[0], law[1], law[2]) - work.start_strain[i]
+            jumps = True
+    if not jumps:
+        return
+    stage.rest_edge[:], stage.rest_joint[:, 0] = 0.0, 0.0  # scratch until a stage begins
+    for k in range(drives.driven_edge.shape[0]):
+        stage.rest_edge[drives.driven_edge[k]] += drives.driven_weight[k] * work.strain[drives.driven_law[k]]
+    for k in range(drives.driven_joint.shape[0]):
+        j, grown = drives.driven_joint[k], work.strain[drives.driven_joint_law[k]]
+        stage.rest_joint[j, 0] += drives.driven_joint_weight[k] * grown
+    for k in range(drives.driven_edge.shape[0]):
+        e = drives.driven_edge[k]
+        force = strands.axial_stiffness[e] * stage.rest_edge[e] * strands.rest_length[e]
+        work.start_force[drives.driven_law[k]] -= drives.driven_weight[k] * force
+    for k in range(drives.driven_joint.shape[0]):
+        j = drives.driven_joint[k]
+        moment = strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]
+        work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * moment
+    for i in range(work.start_strain.shape[0]):
+        done[SUPPLIED] -= 0.5 * (state.law_force[i] + work.start_force[i]) * work.strain[i]
+        work.start_strain[i] += work.strain[i]
+    done[DRIVEN] = 1.0
 
 
 @kernel
@@ -366,7 +409,7 @@ def close_step_account(p, state, work, h, beyond, end):
         return NONE
     _write_forces_of_laws(p, end, work.stage, work.end_force)
     for i in range(work.start_strain.shape[0]):
-        mean = 0.5 * (state.law_force[i] + work.end_force[i])
+        mean = 0.5 * (work.start_force[i] + work.end_force[i])
         done[SUPPLIED] -= mean * (work.strain[i] - work.start_strain[i])
     copy(work.end_force, state.law_force)
     energy, barriers, scale = _energies(p, state, end)
@@ -384,9 +427,12 @@ def close_step_account(p, state, work, h, beyond, end):
     missed += DAMPING_SHARE * h * abs(damping - account[POWER_DAMPING])
     account[POWER_DAMPING] = damping
     p.outcome.figures[CONTACT_ERROR] = missed
-    if changed or done[DRIVEN] != 0.0:
+    driven = changed or done[DRIVEN] != 0.0
+    if driven:
         account[LOWEST] = account[FREE]
     account[LOWEST] = min(account[LOWEST], account[FREE])
+    if driven:
+        return SOME if gain + done[LOST] > LARGEST_GAIN_DRIVEN * account[LARGEST] else NONE
     allowed = LARGEST_GAIN * account[LARGEST]
     if account[FREE] - account[LOWEST] <= allowed or gain <= SMALL * allowed:
         return NONE

@@ -142,7 +142,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     _clear(p.outcome)
     call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
     call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), work.first))
-    call(p.calls.begin_step_account, (p, state, work, method.works[0] * h))
+    call(p.calls.begin_step_account, (p, state, inputs, work, method.works[0] * h))
     if p.light.exists:
         call(p.calls.begin_light, (p, state))
     stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h

@@ -27,8 +27,8 @@ class RodSurfaces(ReadOnlyArrays):
     length between the middles to its neighbours, at the ends for half of it.
 
     A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of
-    `FEW_EDGES` edges and π/2 (H + d̂), with H the thickness of the rod. A rod that met itself nearer than that would be
-    bent more sharply than half its thickness.
+    `FEW_EDGES` edges and π/2 (H + d̂), with H the thickness of the rod, or twice the radius about its nodes where these
+    are nearer to one face. A rod that met itself nearer than that would be bent more sharply than half of it.
 
     Edges that are copies (`model.strand_arrays`) have no points, and belong to one rod more that meets nothing.
     """
@@ -67,15 +67,16 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     joined = np.array(
         [[_joined(a, b, itself=i == j) for j, b in enumerate(rods)] for i, a in enumerate(rods)], dtype=bool
     )
+    node_radius = found.column("node_radius")
+    thickest = [float(EdgeFigures(scene, rod).thickness.max()) for rod in rods]
+    for strand in found.strands:
+        number, own = names.index(strand.rod), slice(strand.first_node, strand.first_node + strand.node_count)
+        thickest[number] = max(thickest[number], 2.0 * float(node_radius[own].max()))
     exclusion = [
-        max(
-            FEW_EDGES * rod.edge_length,
-            0.5 * math.pi * (float(EdgeFigures(scene, rod).thickness.max()) + scene.contact.barrier_distance),
-        )
-        for rod in rods
+        max(FEW_EDGES * rod.edge_length, 0.5 * math.pi * (thick + scene.contact.barrier_distance))
+        for rod, thick in zip(rods, thickest, strict=True)
     ]
     parts: dict[str, list[Array]] = {}
-    node_radius = found.column("node_radius")
     for strand in found.strands:
         number = names.index(strand.rod)
         rod = rods[number]

@@ -123,7 +123,8 @@ class Record:
         What a refusal says to change; ``remedy_works`` whether that helped, None if nothing was tried.
     error : float or None
         Largest distance of a node or a body from where a finer run has it, at output times, over the length of the
-        longest strip; or the relative error of what decides a torture case.
+        longest strip, or over the longest way of anything if that is longer. Of a torture case the relative error of
+        what decides it.
     decision : str
         What decided a torture case.
     figures : dict

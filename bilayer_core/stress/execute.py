@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 from ..errors import BilayerError, Remedy, SimulationError
 from ..scene.config import DEFAULT_TOLERANCE
+from ..simulation.frame import Frame
 from ..simulation.simulator import Simulator
 from .case import Decision, Outcome, Record, StressCase
 from .judge import Verdict
@@ -142,8 +143,13 @@ def _error(case: StressCase, trial: Trial) -> tuple[float | None, str]:
         return None, f"the finer run {refusal}"
     if len(frames) < len(trial.frames):
         return None, "the finer run took too long"
-    length = max(rod.path.length for rod in trial.simulator.scene.rods)
-    return max(map(distance_of, trial.frames, frames)) / length, ""
+    return max(map(distance_of, trial.frames, frames)) / _size_of_motion(trial, frames), ""
+
+
+def _size_of_motion(trial: Trial, frames: Sequence[Frame]) -> float:
+    """What an error is measured by [m]: the longest strip, or the way of what moved farther."""
+    start = trial.start
+    return max([trial.length, *(distance_of(start, frame) for frame in frames)])
 
 
 def _try_remedy(case: StressCase, record: Record, remedy: Remedy | None) -> None:

@@ -4,8 +4,8 @@
 finite                    positions and velocities are numbers
 gap                       the smallest gap is above zero, and nothing passed through anything (`stress.gaps`)
 energy without driving    T + V less supplied work rises by no more than `MOST_GAIN` of the largest energy
-numerical energy          what steps make beyond all forces stays below `MOST_MADE` of the largest energy
-momentum                  where nothing but gravity acts, the mass centre flies as it must
+numerical energy          what steps make beyond all forces stays below `MOST_MADE` of the largest energy of the run
+momentum                  where nothing but gravity acts, it changes as gravity has it, to Newton's tolerance
 budget                    inside the region the budget closes to `LARGEST_RESIDUAL` of its largest row
 effort                    no more than `MOST_ITERATIONS` Newton iterations and `MOST_REJECTED` attempts a step
 ========================= =====================================================================================
@@ -32,8 +32,8 @@ LARGEST_RESIDUAL = 0.02
 MOST_ITERATIONS = 200
 MOST_REJECTED = 30
 """An accepted step, on average over a run."""
-BALLISTIC = 10.0
-"""Times what Newton's tolerance lets the mass centre be off by."""
+ROUNDING = 1e-9
+"""Of the fastest speed, in that of the mass centre."""
 
 
 class Verdict(BilayerError):
@@ -64,18 +64,18 @@ class Judge:
     min_gap : float
         The smallest seen [m].
     energy_gain, numerical : float
-        Over the largest energy: the most that T + V rose without driving, and what steps made (or lost, below zero).
+        Over the largest energy: the most that T + V rose without driving, and the most that steps had made.
     momentum : float
-        The most that the mass centre was off its way, over what Newton's tolerance allows.
+        The most that it was wrong by, over what Newton's tolerance allows.
     """
 
     def __init__(self, simulator: Simulator, every: int = 1):
         self._simulator, self._gaps = simulator, GapCheck(simulator.model)
         self._every = max(every, self._gaps.every)
         self.steps, self.min_gap = 0, math.inf
-        self.energy_gain = self.numerical = self.momentum = 0.0
+        self.energy_gain = self.numerical = self.momentum = self._made = 0.0
         self._numerical_before = float(simulator.energy_account[NUMERICAL])
-        self._ballistic = _Ballistic(simulator) if _flies(simulator) else None
+        self._momentum = _Momentum(simulator) if _flies(simulator) else None
 
     def look(self, time: float) -> None:
         """Look at what a step ended with.
@@ -93,10 +93,10 @@ class Judge:
             raise Verdict("a position or a velocity is not finite", time)
         self._look_at_gaps(frame)
         self._look_at_energy(time)
-        if self._ballistic is not None:
-            self.momentum = max(self.momentum, self._ballistic.off(frame))
+        if self._momentum is not None:
+            self.momentum = max(self.momentum, self._momentum.off(frame))
             if self.momentum > 1.0:
-                raise Verdict(f"the mass centre is off its way by {self.momentum:.3g} of what is allowed", time)
+                raise Verdict(f"momentum is wrong by {self.momentum:.3g} of what Newton's tolerance allows", time)
 
     def _look_at_gaps(self, frame: Frame) -> None:
         if not self._gaps.checks_anything:
@@ -115,11 +115,10 @@ class Judge:
         if largest <= 0.0:
             return
         self.energy_gain = max(self.energy_gain, float(account[FREE] - account[LOWEST]) / largest)
-        self.numerical = (float(account[NUMERICAL]) - self._numerical_before) / largest
+        self._made = max(self._made, float(account[NUMERICAL]) - self._numerical_before)
+        self.numerical = self._made / largest
         if self.energy_gain > MOST_GAIN:
             raise Verdict(f"energy rose by {self.energy_gain:.3g} of the largest without driving", time)
-        if self.numerical > MOST_MADE:
-            raise Verdict(f"steps made {self.numerical:.3g} of the largest energy", time)
 
     def end(self, inside: bool) -> dict[str, float]:
         """Look at the run as a whole; the figures of it.
@@ -135,6 +134,8 @@ class Judge:
             If the effort was not bounded, or the budget does not close.
         """
         statistics, time = self._simulator.statistics, self._simulator.time
+        if self.numerical > MOST_MADE:
+            raise Verdict(f"steps made {self.numerical:.3g} of the largest energy of the run", time)
         parts = max(statistics.substeps, 1)
         if statistics.iterations > MOST_ITERATIONS * parts:
             raise Verdict(f"{statistics.iterations / parts:.0f} Newton iterations a step", time)
@@ -148,37 +149,29 @@ class Judge:
         return {"budget_residual": residual}
 
 
-class _Ballistic:
-    """The way of a mass centre on which nothing but gravity acts."""
+class _Momentum:
+    """The momentum of a robot on which nothing but gravity acts: that of its nodes and bodies, where the model has all
+    mass.
+    """
 
     def __init__(self, simulator: Simulator):
-        self._simulator, model = simulator, simulator.model
-        scene = model.scene
-        self._gravity = np.array(scene.gravity)
-        self._length = max(rod.path.length for rod in scene.rods)
-        frame = simulator.frame()
-        self._start, self._time = self._center(frame), frame.time
-        free = model.bodies.body_of_free
-        moved = model.node_mass @ frame.velocities[: model.node_count]
-        moved = moved + model.bodies.mass @ frame.body_velocities[free]
-        self._velocity = moved / (model.node_mass.sum() + model.bodies.mass.sum())
+        self._simulator, frame = simulator, simulator.frame()
+        self._time, self._velocity = frame.time, self._mean(frame)
 
-    def _center(self, frame: Frame) -> np.ndarray:
+    def _mean(self, frame: Frame) -> np.ndarray:
+        """Velocity of the mass centre [m/s], shape (3,)."""
         model = self._simulator.model
-        of_rods, own = model.node_mass.sum(), model.bodies.mass
-        together = of_rods * self._simulator.com + own @ frame.body_positions[model.bodies.body_of_free]
-        return together / (of_rods + own.sum())
+        nodes, bodies = model.node_mass, model.bodies.mass
+        momentum = nodes @ frame.velocities[: model.node_count]
+        momentum = momentum + bodies @ frame.body_velocities[model.bodies.body_of_free]
+        return momentum / (nodes.sum() + bodies.sum())
 
     def off(self, frame: Frame) -> float:
-        """By how much it is off its way, over what is allowed."""
-        elapsed, simulator = frame.time - self._time, self._simulator
-        way = self._velocity * elapsed + 0.5 * self._gravity * elapsed**2
-        off = float(np.linalg.norm(self._center(frame) - self._start - way))
-        allowed = BALLISTIC * simulator.steps.newton_tolerance * elapsed + 1e-9 * self._length
-        allowed += 1e-12 * float(np.abs(frame.positions).max())
-        if simulator.plan.integrator == "implicit_euler":  # falls by ½ g t h too far
-            allowed += float(np.linalg.norm(self._gravity)) * elapsed * simulator.statistics.longest
-        return off / allowed
+        """By how much the velocity of the mass centre is not what it must be, over what is allowed."""
+        gained = np.array(self._simulator.scene.gravity) * (frame.time - self._time)
+        off = float(np.linalg.norm(self._mean(frame) - self._velocity - gained))
+        fastest = float(np.linalg.norm(frame.velocities, axis=1).max())
+        return off / (self._simulator.steps.newton_tolerance + ROUNDING * fastest)
 
 
 def _flies(simulator: Simulator) -> bool:

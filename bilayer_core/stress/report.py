@@ -21,7 +21,7 @@ PROMISES = (
     ("energy without driving", f"T + V rises by less than {MOST_GAIN:g} of the largest energy of the run"),
     ("energy with driving", f"steps make less than {MOST_MADE:g} of the largest energy"),
     ("energy budget", f"closes to {100 * LARGEST_RESIDUAL:g} % of its largest row inside the region"),
-    ("momentum", "the mass centre of what flies freely is where it must be, to Newton's tolerance"),
+    ("momentum", "of what flies freely changes as gravity has it, to Newton's tolerance"),
     ("effort", f"at most {MOST_ITERATIONS} Newton iterations and {MOST_REJECTED} attempts a step, on average"),
     ("refusals", "say what, when, how close and what to change"),
 )
@@ -92,7 +92,7 @@ def _page(journal: Journal) -> Iterator[str]:
     records, head = list(journal.records.values()), journal.head
     yield "# Numerical stability"
     yield ""
-    yield "Made by `bilayer stress --out DIR` (DIR/stability.md); do not edit it. In `bilayer_core/stress`, `judge.py` has"
+    yield "Made by `bilayer stress --out DIR` as DIR/stability.md; do not edit it. In `bilayer_core/stress`, `judge.py` has"
     yield "the judge and its limits, `region.py` the region of validity, `matrix.py` and `torture.py` the cases."
     yield ""
     machine = head["machine"]

@@ -217,9 +217,14 @@ def _ground() -> list[dict]:
     return [{"name": "ground", "type": "plane", "point": [0.0, 0.0, 0.0], "normal": [0.0, 0.0, 1.0]}]
 
 
+def _below(p: Parameters) -> float:
+    """From a strip's path, between its layers, to its lower face, or to the upper one if that is farther [m]."""
+    return max(layer_thicknesses(p))
+
+
 def _clear(p: Parameters) -> float:
     """Height of a strip whose face is three barrier distances over the ground [m]."""
-    return 0.5 * thickness(p) + 3.0 * barrier(p)
+    return _below(p) + 3.0 * barrier(p)
 
 
 def _ball_radius(p: Parameters) -> float:
@@ -243,7 +248,7 @@ def _drop(p: Parameters, content: dict) -> None:
 
 
 def _crawler(p: Parameters, content: dict) -> None:
-    content["rods"] = [_strip(p, start=(0.0, 0.0, 0.5 * thickness(p) + 0.5 * barrier(p)))]
+    content["rods"] = [_strip(p, start=(0.0, 0.0, layer_thicknesses(p)[0] + 0.5 * barrier(p)))]
     content["obstacles"] = _ground()
     content["contact"]["friction"] |= {"forward": 0.3 * p.friction, "backward": p.friction}
 
@@ -268,7 +273,7 @@ def _free_ball(p: Parameters, position, direction) -> dict:
 
 def _bat(p: Parameters, content: dict) -> None:
     radius, way = _ball_radius(p), 0.6 * p.length
-    gap = radius + 0.5 * thickness(p) + 3.0 * barrier(p)
+    gap = radius + _below(p) + 3.0 * barrier(p)
     time = 1.5 * way / speed(p)  # the cubic smoothstep is fastest half way, by 1.5
     there = (-gap - 0.2 * p.length, 0.0, -0.7 * p.length)
     bat = _held("bat", there, times=[0.0, time], displacements=[[0.0] * 3, [way, 0.0, 0.0]])
@@ -277,7 +282,7 @@ def _bat(p: Parameters, content: dict) -> None:
 
 
 def _pile(p: Parameters, content: dict) -> None:
-    rise = thickness(p) + 3.0 * barrier(p)
+    rise = 2.0 * thickness(p) + 3.0 * barrier(p)  # rods have round surfaces about their neutral axes
     lowest = _clear(p) + height(p)
     rods = []
     for index in range(3):

@@ -38,6 +38,9 @@ class Trial:
     ----------
     simulator : Simulator
     judge : Judge
+    length : float
+        Of the longest strip [m].
+    start : Frame
     cut : bool
         Whether a run ended before its time, by its steps or its CPU time.
     frames : list of Frame
@@ -58,6 +61,8 @@ class Trial:
         self.simulator = Simulator(scene, budget=budget)
         self.simulator.compile()
         self.judge = Judge(self.simulator, look_every)
+        self.length = max(rod.path.length for rod in scene.rods)
+        self.start = self.simulator.frame()
         self.cut = False
         self.frames: list[Frame] = []
         self._judged = judged

@@ -163,8 +163,9 @@ class Work:
     rotation: Stack = ("body", 3, 3)  # scratch
     transduction: Vector = ("law",)  # at a stage
     strain: Vector = ("law",)  # of laws at a stage
-    start_strain: Vector = ("law",)  # and at the start of the step
-    end_force: Vector = ("law",)  # −∂V/∂η of laws at its end [J]
+    start_strain: Vector = ("law",)  # and at the start of the step, after jumps of stimuli
+    start_force: Vector = ("law",)  # −∂V/∂η of laws there [J]
+    end_force: Vector = ("law",)  # and at its end
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
     account: Vector = (7,)  # of the energy of a step; see `engine.energy_account`
     touched: Flags = ("contact_point",)  # contact points that something pushed at the end of the last step

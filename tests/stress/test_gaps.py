@@ -1,0 +1,99 @@
+"""The judge's own check of gaps: it agrees with the engine, and it sees what an engine must never do."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.stress.gaps import GapCheck, from_segment
+from bilayer_core.stress.matrix import matrix
+from bilayer_core.stress.robots import scene_of
+
+
+def simulator_of(name):
+    case = next(case for case in matrix() if case.name == name)
+    simulator = Simulator(load_scene(scene_of(case.parameters)))
+    simulator.compile()
+    return simulator
+
+
+def test_distance_from_a_segment_is_that_of_a_dense_search():
+    p, a, b = np.random.default_rng(3).normal(size=(3, 50, 3))
+    part = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    dense = np.linalg.norm(a + part * (b - a) - p, axis=2).min(axis=0)
+    np.testing.assert_allclose(from_segment(p, a, b), dense, rtol=1e-5)
+
+
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+@pytest.mark.parametrize("robot", ["drop", "ball", "bat", "pile"])
+def test_the_engine_s_smallest_gap_is_found_again(robot, model):
+    simulator = simulator_of(f"integrator/sdirk2/{robot}/{model}/3")
+    check, smallest = GapCheck(simulator.model), []
+
+    def look(time):
+        frame = simulator.frame()
+        smallest.append((check.smallest(check.moment(frame)), frame.min_gap))
+
+    simulator.run(0.3 * simulator.scene.duration, each_step=look)
+    touching = [pair for pair in smallest if pair[1] < simulator.scene.contact.barrier_distance]
+    assert touching
+    np.testing.assert_allclose(*np.array(touching).T, rtol=2e-2)  # the engine's is from before the last correction
+
+
+def test_a_node_under_the_ground_is_seen():
+    simulator = simulator_of("integrator/sdirk2/drop/laminate/3")
+    check, frame = GapCheck(simulator.model), simulator.frame()
+    assert check.smallest(check.moment(frame)) > 0.0
+    down = replace(frame, positions=frame.positions - [0.0, 0.0, 1.0])
+    assert check.smallest(check.moment(down)) < 0.0
+
+
+def crossing(name, moved):
+    """What is seen when a part of what moves is somewhere else at the next look."""
+    simulator = simulator_of(name)
+    check, frame = GapCheck(simulator.model), simulator.frame()
+    assert check.crossed(check.moment(frame)) == ""
+    after = moved(simulator, frame)
+    moment = check.moment(after)
+    assert check.smallest(moment) > 0.0  # at its end nothing is wrong
+    return check.crossed(moment)
+
+
+def test_a_ball_that_leaves_its_box_through_the_wall_is_seen():
+    def moved(_, frame):
+        way = np.zeros_like(frame.body_positions)
+        way[1, 0] = 0.5
+        return replace(frame, body_positions=frame.body_positions + way)
+
+    assert crossing("integrator/sdirk2/box/laminate/3", moved) == "something passed through right"
+
+
+def test_a_strip_that_changes_places_with_the_one_below_is_seen():
+    def moved(simulator, frame):
+        top = simulator.model.strands[-1]
+        nodes, positions = slice(top.first_node, top.first_node + top.node_count), frame.positions.copy()
+        positions[nodes, 2] -= 3.4 * (positions[nodes, 2] - positions[0, 2])
+        return replace(frame, positions=positions + [0.0, 0.0, 1.0])
+
+    simulator = simulator_of("integrator/sdirk2/pile/laminate/3")
+    check, frame = GapCheck(simulator.model), simulator.frame()
+    lifted = replace(frame, positions=frame.positions + [0.0, 0.0, 1.0])
+    check.crossed(check.moment(lifted))
+    assert check.crossed(check.moment(moved(simulator, frame))) == "a rod passed through a rod"
+
+
+def test_what_moves_and_touches_nothing_has_crossed_nothing():
+    def moved(_, frame):
+        return replace(frame, positions=frame.positions + [0.02, 0.0, 0.1])
+
+    assert crossing("integrator/sdirk2/pile/laminate/3", moved) == ""
+
+
+def test_nothing_that_could_meet_has_no_gap():
+    simulator = simulator_of("integrator/sdirk2/beam/laminate/3")
+    check = GapCheck(simulator.model)
+    assert not check.checks_anything
+    assert check.smallest(check.moment(simulator.frame())) == math.inf
