@@ -432,7 +432,7 @@ def close_step_account(p, state, work, h, beyond, end):
         account[LOWEST] = account[FREE]
     account[LOWEST] = min(account[LOWEST], account[FREE])
     if driven:
-        return SOME if gain + done[LOST] > LARGEST_GAIN_DRIVEN * account[LARGEST] else NONE
+        return SOME if gain > LARGEST_GAIN_DRIVEN * account[LARGEST] else NONE
     allowed = LARGEST_GAIN * account[LARGEST]
     if account[FREE] - account[LOWEST] <= allowed or gain <= SMALL * allowed:
         return NONE

@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
+from ..contact.barrier import barrier
 from ..engine.newton import LAST_DIGITS
 from ..engine.report import IntegrationReport
 from ..errors import Remedy
-from ..model.impacts import heaviest, stiffness_that_holds
+from ..integrators.method import Method
+from ..model.impacts import HELD, heaviest, stiffness_that_holds
 from ..model.model import Model
 from ..model.records.status import BEYOND, BLOCKED, GAINS_ENERGY, LINE_SEARCH, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
 from ..scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
@@ -24,7 +26,9 @@ SPENT = 1e-3
 """Part of the barrier distance: what comes so near is more than the barrier holds, 1e5 times stiffer than half way."""
 
 
-def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, speed: float) -> Remedy:
+def remedy(
+    found: IntegrationReport, steps: Steps, method: Method, model: Model, gap: float, speed: float
+) -> Remedy:
     """The setting to change, and to what, for a run to get past the step that failed.
 
     Parameters
@@ -32,6 +36,7 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
     found : IntegrationReport
         Of which the last attempt failed.
     steps : Steps
+    method : Method
     model : Model
     gap : float
         The smallest in the last attempt [m].
@@ -41,6 +46,8 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
     scene = model.scene
     solver, usual = scene.solver, Solver.model_fields["max_newton_iterations"].default
     if found.status == BLOCKED:
+        if not _holds(model, speed):
+            return _set("contact.stiffness", f"{_stiffness_that_holds(model, speed):.0e}", "Pa")
         return Remedy("a prescribed body must stop before nothing can give way: change its `motion`")
     farthest, length = float(np.abs(model.start_position).max()), max(rod.path.length for rod in scene.rods)
     if LAST_DIGITS * farthest > (steps.tolerance or DEFAULT_TOLERANCE) * length:
@@ -57,8 +64,15 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
     if found.status == BEYOND:
         text = "set `solver.integrator` to sdirk2, which ends where it has looked"
         return Remedy(text, {"solver.integrator": "sdirk2"})
+    stuck = found.status in (MAX_ITERATIONS, LINE_SEARCH)
+    if stuck and solver.newton_tolerance is None and found.residual <= NEARLY * steps.newton_tolerance:
+        return _set("solver.newton_tolerance", f"{_rounded_up(MARGIN * found.residual):.1g}", "m/s")
     if not steps.adaptive:
-        return _without("solver.dt", f" for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s")
+        text = f"leave `solver.dt` out for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s"
+        if method.estimate is not None:
+            return Remedy(text, {"solver.dt": None})
+        text = f"{text}; {method.name} has none, set `solver.integrator` to sdirk2 for them"
+        return Remedy(text, {"solver.dt": None, "solver.integrator": "sdirk2"})
     if scene.contact is not None and gap < SPENT * scene.contact.barrier_distance:
         return _set("contact.stiffness", f"{_stiffness_that_holds(model, speed):.0e}", "Pa")
     if found.status == TOO_INACCURATE:
@@ -70,11 +84,8 @@ def remedy(found: IntegrationReport, steps: Steps, model: Model, gap: float, spe
     if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
         needed = _rounded_up(MUCH_FASTER * steps.newton_tolerance)
         return _set("contact.friction.speed_threshold", f"{needed:.1g}", "m/s")
-    stuck = found.status in (MAX_ITERATIONS, LINE_SEARCH)
     if stuck and solver.newton_tolerance is not None:
         return _without("solver.newton_tolerance")
-    if stuck and found.residual <= NEARLY * steps.newton_tolerance:
-        return _set("solver.newton_tolerance", f"{_rounded_up(MARGIN * found.residual):.1g}", "m/s")
     if found.status == UNSETTLED:
         return _set("contact.friction.speed_threshold", f"{MUCH_FASTER * friction.speed_threshold:.1g}", "m/s")
     return _set("solver.tolerance", f"{MUCH_SHORTER * steps.tolerance:.1g}")
@@ -86,6 +97,12 @@ def _set(key: str, value: str, unit: str = "") -> Remedy:
 
 def _without(key: str, more: str = "") -> Remedy:
     return Remedy(f"leave `{key}` out{more}", {key: None})
+
+
+def _holds(model: Model, speed: float) -> bool:
+    """Whether the barrier takes up the motion of what is heaviest at a speed [m/s]."""
+    distance = model.scene.contact.barrier_distance
+    return 0.5 * heaviest(model) * speed**2 <= model.contact_stiffness * barrier(HELD * distance, distance)
 
 
 def _stiffness_that_holds(model: Model, speed: float) -> float:

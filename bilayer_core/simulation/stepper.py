@@ -11,6 +11,7 @@ from ..engine.energy_account import LARGEST
 from ..engine.engine import Engine
 from ..engine.integrate import TIME_ROUNDING, StepControl
 from ..engine.modes import EVALUATE_STATE
+from ..engine.newton import LAST_DIGITS
 from ..engine.report import FAILURES, IntegrationReport
 from ..errors import InputError, Remedy, SimulationError
 from ..integrators.method import Method
@@ -93,9 +94,10 @@ class Stepper:
                 f"tolerance: {steps.tolerance:g} is not allowed with the integrator {method.name}, which has no "
                 "estimate of its error; leave it out, or take another integrator"
             )
-        self.model, self.steps = model, steps
+        self.model, self.steps, self._method = model, steps, method
         first = min(steps.dt, steps.longest) if steps.adaptive else steps.dt
         self._same = first * (TIME_ROUNDING if steps.adaptive else FIXED_ROUNDING)
+        self._same = max(self._same, LAST_DIGITS * model.scene.duration)
         control = StepControl(
             dt=0.0 if steps.adaptive else steps.dt,
             order=method.order,
@@ -207,4 +209,4 @@ class Stepper:
         mass = self.model.node_mass.sum() + self.model.bodies.mass.sum()
         of_energy = math.sqrt(2.0 * state.account[LARGEST] / mass)
         speed = max(float(np.linalg.norm(moving, axis=1).max()), of_energy)
-        return remedy(found, self.steps, self.model, gap, speed)
+        return remedy(found, self.steps, self._method, self.model, gap, speed)

@@ -20,6 +20,8 @@ ACCURATE = 0.01
 """Largest error of what is called accurate."""
 FINER_TOLERANCE, FINER_STEP = 0.1, 0.25
 """Of the finer run, over that of the case."""
+MOST_REMEDIES = 3
+"""That are followed one after the other, as a user would."""
 FINER_EFFORT = 6
 """Steps and CPU time that a finer run may take, over those of the case."""
 
@@ -153,16 +155,22 @@ def _size_of_motion(trial: Trial, frames: Sequence[Frame]) -> float:
 
 
 def _try_remedy(case: StressCase, record: Record, remedy: Remedy | None) -> None:
-    """Do what a refusal names, and see whether the case comes through."""
-    if remedy is None:
-        return
-    record.remedy = str(remedy)
-    if not remedy.changes:
-        return
-    again = Record(case.name, case.axis, record.inside, [], Outcome.STABLE)
-    try:
-        _run(case, again, remedy.overrides())
-        record.remedy_works = True
-    except BilayerError as failure:
+    """Do what a refusal names, and what the next one names, and see whether the case comes through."""
+    overrides: list[str] = []
+    for _ in range(MOST_REMEDIES):
+        if remedy is None:
+            return
+        record.remedy += f"{'; then ' if record.remedy else ''}{remedy}"
         record.remedy_works = False
-        record.remedy += f" [then: {failure}]"
+        if not remedy.changes:
+            return
+        overrides += remedy.overrides()
+        try:
+            _run(case, Record(case.name, case.axis, record.inside, [], Outcome.STABLE), overrides)
+            record.remedy_works = True
+            return
+        except SimulationError as refusal:
+            remedy = refusal.remedy
+        except BilayerError as failure:
+            record.remedy += f" [{failure}]"
+            return

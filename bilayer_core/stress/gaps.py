@@ -3,9 +3,9 @@
 Nothing here is shared with the solver but the geometry of the scene: what has which thickness, which radius, which
 half edges. All pairs are looked at, without lists of near ones; distances are computed by other formulas.
 
-- Rods are capsules about their edges, with the radius that the model gives them. They meet where the model has points on
-  them, no farther apart than that radius: where two cross between points, the capsules may overlap by a thirtieth of
-  the radius at most, √(4 + 1/4) − 2 = 0.06 for two together. On one rod, edges count that are at least as far apart
+- Rods are capsules about their edges, with the radius that the model gives them. They meet where the model has points
+  on them, no farther apart than that radius: where two cross between points, the capsules may overlap by a thirtieth
+  of the radius at most, √(4 + 1/4) − 2 = 0.06 for two together. On one rod, edges count that are at least as far apart
   along it as the model's own exclusion (`model.rod_surfaces`).
 - Surfaces are met by rods, by balls and by the corners and rims of bodies (`stress.surfaces`).
 

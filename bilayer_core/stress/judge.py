@@ -3,8 +3,9 @@
 ========================= =====================================================================================
 finite                    positions and velocities are numbers
 gap                       the smallest gap is above zero, and nothing passed through anything (`stress.gaps`)
-energy without driving    T + V less supplied work rises by no more than `MOST_GAIN` of the largest energy
-numerical energy          what steps make beyond all forces stays below `MOST_MADE` of the largest energy of the run
+energy without driving    T + V can only fall: it rises by no more than `MOST_GAIN` of the largest energy
+energy with driving       T + V less supplied work can only fall, but for the quadrature of that work: it rises by no
+                          more than `MOST_MADE` of the largest energy of the run
 momentum                  where nothing but gravity acts, it changes as gravity has it, to Newton's tolerance
 budget                    inside the region the budget closes to `LARGEST_RESIDUAL` of its largest row
 effort                    no more than `MOST_ITERATIONS` Newton iterations and `MOST_REJECTED` attempts a step
@@ -17,7 +18,7 @@ import math
 
 import numpy as np
 
-from ..engine.energy_account import FREE, LARGEST, LOWEST, NUMERICAL
+from ..engine.energy_account import FREE, LARGEST, LOWEST
 from ..errors import BilayerError
 from ..scene.body import Guided
 from ..simulation.frame import Frame
@@ -27,7 +28,7 @@ from .gaps import GapCheck
 MOST_GAIN = 2e-3
 """The engine stops at 1e-3; rounding and Newton's tolerance are beside it."""
 MOST_MADE = 0.1
-"""From which on a run warns (`simulation.summary`)."""
+"""What a summary calls large (`simulation.summary.LARGE_NUMERICAL`)."""
 LARGEST_RESIDUAL = 0.02
 MOST_ITERATIONS = 200
 MOST_REJECTED = 30
@@ -64,7 +65,7 @@ class Judge:
     min_gap : float
         The smallest seen [m].
     energy_gain, numerical : float
-        Over the largest energy: the most that T + V rose without driving, and the most that steps had made.
+        Over the largest energy: the most that T + V less supplied work rose, without driving and in all.
     momentum : float
         The most that it was wrong by, over what Newton's tolerance allows.
     """
@@ -74,7 +75,7 @@ class Judge:
         self._every = max(every, self._gaps.every)
         self.steps, self.min_gap = 0, math.inf
         self.energy_gain = self.numerical = self.momentum = self._made = 0.0
-        self._numerical_before = float(simulator.energy_account[NUMERICAL])
+        self._lowest = math.inf
         self._momentum = _Momentum(simulator) if _flies(simulator) else None
 
     def look(self, time: float) -> None:
@@ -115,7 +116,8 @@ class Judge:
         if largest <= 0.0:
             return
         self.energy_gain = max(self.energy_gain, float(account[FREE] - account[LOWEST]) / largest)
-        self._made = max(self._made, float(account[NUMERICAL]) - self._numerical_before)
+        self._lowest = min(self._lowest, float(account[FREE]))
+        self._made = max(self._made, float(account[FREE]) - self._lowest)
         self.numerical = self._made / largest
         if self.energy_gain > MOST_GAIN:
             raise Verdict(f"energy rose by {self.energy_gain:.3g} of the largest without driving", time)

@@ -19,7 +19,7 @@ PROMISES = (
     ("positions, velocities", "numbers, at every accepted step"),
     ("gaps", "above zero at every accepted step, and nothing passes through anything in one, by a check of its own"),
     ("energy without driving", f"T + V rises by less than {MOST_GAIN:g} of the largest energy of the run"),
-    ("energy with driving", f"steps make less than {MOST_MADE:g} of the largest energy"),
+    ("energy with driving", f"T + V less the work supplied rises by less than {MOST_MADE:g} of the largest energy"),
     ("energy budget", f"closes to {100 * LARGEST_RESIDUAL:g} % of its largest row inside the region"),
     ("momentum", "of what flies freely changes as gravity has it, to Newton's tolerance"),
     ("effort", f"at most {MOST_ITERATIONS} Newton iterations and {MOST_REJECTED} attempts a step, on average"),
@@ -92,8 +92,8 @@ def _page(journal: Journal) -> Iterator[str]:
     records, head = list(journal.records.values()), journal.head
     yield "# Numerical stability"
     yield ""
-    yield "Made by `bilayer stress --out DIR` as DIR/stability.md; do not edit it. In `bilayer_core/stress`, `judge.py` has"
-    yield "the judge and its limits, `region.py` the region of validity, `matrix.py` and `torture.py` the cases."
+    yield "Made by `bilayer stress --out DIR` as DIR/stability.md; do not edit it. In `bilayer_core/stress`, `judge.py`"
+    yield "has the judge and its limits, `region.py` the region of validity, `matrix.py` and `torture.py` the cases."
     yield ""
     machine = head["machine"]
     yield f"{len(records)} cases on {machine['cpu']}, {machine['cores']} cores, Python {machine['python']}, "

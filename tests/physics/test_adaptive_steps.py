@@ -235,10 +235,10 @@ def test_a_stop_names_a_remedy_that_works(name):
     assert simulator.time == pytest.approx(0.02)
 
 
-def on_ground(start=0.0, threshold=1e-4, **solver):
+def on_ground(start=0.0, threshold=1e-4, stiffness=1e7, **solver):
     """A strip at rest on the ground, with friction."""
     strip = rod([layer(thickness=2e-3)], length=0.05, start=(start, 0, 2e-3))
-    law = contact(barrier_distance=1e-4, coefficient=0.3, speed_threshold=threshold)
+    law = contact(barrier_distance=1e-4, coefficient=0.3, speed_threshold=threshold) | {"stiffness": stiffness}
     return {**scene([strip], obstacles=[GROUND], contact=law), "solver": solver}
 
 
@@ -253,7 +253,8 @@ FAILED = {
     "leave `solver.newton_tolerance` out": (on_ground(newton_tolerance=1e-12), {}, 1.0),
     "set `solver.tolerance` to 1e-05": (on_ground(), {"residual": 1.0}, 1.0),
     "set `solver.integrator` to sdirk2": (on_ground(), {"status": BEYOND}, 1.0),
-    "must stop before nothing can give way": (on_ground(), {"status": BLOCKED}, 1.0),
+    "must stop before nothing can give way": (on_ground(stiffness=1e12), {"status": BLOCKED}, 1.0),
+    "set `contact.stiffness` to 6e+11": (on_ground(), {"status": BLOCKED}, 1.0),  # as above
     "nearer to the origin: 1e+12 m from it positions are known to 0.0009 m": (on_ground(start=1e12), {}, 1.0),
 }
 """Remedies, each with the scene that stops, how its last attempt failed, and its smallest gap [m]."""
@@ -264,7 +265,8 @@ def test_every_failure_has_a_remedy(told):
     content, failure, gap = FAILED[told]
     simulator = Simulator(load_scene(content))
     found = IntegrationReport(0, MAX_ITERATIONS, -1, 50, 1, 0, 1e3)
-    named = remedy(replace(found, **failure), simulator.steps, simulator.model, gap, 1e3)
+    method = INTEGRATORS[simulator.plan.integrator]
+    named = remedy(replace(found, **failure), simulator.steps, method, simulator.model, gap, 1e3)
     assert told in str(named)
     load_scene(content, named.overrides())
     assert bool(named.changes) == str(named).startswith(("set ", "leave "))
