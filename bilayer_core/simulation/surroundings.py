@@ -84,15 +84,14 @@ class Surroundings:
         pose_goal : Array
             How controlled bodies go to where they are asked to be (`State.pose_goal`).
         """
-        if not np.array_equal(pose_goal, self._pose_goal):
+        moved = not np.array_equal(pose_goal, self._pose_goal)
+        if moved:
             self._pose_goal = pose_goal.copy()
             self._paths = paths_of(self.model, pose_goal)
-            self.actuation = self._pieces_about(time, afresh=True)
-            self._begin, self._override = time, override.copy()
         known = self._begin <= time and time + self._ahead < self.actuation.horizon[0]
-        if not (known and np.array_equal(override, self._override, equal_nan=True)):
+        if moved or not (known and np.array_equal(override, self._override, equal_nan=True)):
             self._begin, self._override = time, override.copy()
-            self.actuation = self._pieces_about(time)
+            self.actuation = self._pieces_about(time, afresh=moved)
 
     def _pieces_about(self, time: float, afresh: bool = False) -> Actuation:
         schedules = zip([*self._channels, *self._loads], self._override.tolist(), strict=True)

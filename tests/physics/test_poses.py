@@ -158,6 +158,21 @@ def test_a_saved_state_goes_on_to_its_goal_bit_for_bit():
     assert np.array_equal(sim.save_state(), other.save_state())
 
 
+@pytest.mark.parametrize("pose_first", [True, False])
+def test_a_load_that_is_set_together_with_a_pose_acts_from_the_next_step_on(pose_first):
+    content = scene()
+    content["loads"] = [{"name": "tug", "rod": "strip", "position": 0.1, "force": [0, 0, 0.1]}]
+    pushed, free = (Simulator(load_scene(content)) for _ in range(2))
+    for sim in (pushed, free):
+        if pose_first:
+            sim.set_pose("hub", [0.01, 0.0, 0.0])
+        sim.set_load("tug", 1.0 if sim is pushed else 0.0)
+        if not pose_first:
+            sim.set_pose("hub", [0.01, 0.0, 0.0])
+        sim.run(0.02)
+    assert pushed.positions[-1, 2] - free.positions[-1, 2] > 1e-4
+
+
 def test_reset_forgets_goals_and_brings_the_body_back():
     sim, fresh = simulator(), simulator()
     sim.set_pose("hub", [0.02, 0.03, 0.01])
