@@ -55,8 +55,8 @@ def gap_normal(surfaces, at, i, s, x0, x1, x2):
 def list_near(surfaces, at, margin):
     """List pairs whose gap is at most max(d̂ + m, smallest gap + 2 m), by surfaces and then by contact points.
 
-    The list, the extents of surfaces and where everything is are written to `surfaces`; pairs beyond the capacity of
-    the list are counted but not written.
+    The list with its gaps, the extents of surfaces and where everything is are written to `surfaces`; pairs beyond the
+    capacity of the list are counted but not written.
 
     Parameters
     ----------
@@ -91,6 +91,7 @@ def list_near(surfaces, at, margin):
                 if count < surfaces.near_contact_point.shape[0]:
                     surfaces.near_contact_point[count] = i
                     surfaces.near_surface[count] = s
+                    surfaces.near_gap[count] = gap
                 count += 1
     for i in range(point.shape[0]):
         for c in range(3):

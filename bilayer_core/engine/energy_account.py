@@ -55,6 +55,9 @@ barriers take up and contact damping takes [W]; T + V less all that was supplied
 ended; the largest energy of the run; what steps have made or, below zero, lost; the potential of gravity at the start
 [J]; 1 if all these are of the state.
 """
+QUESTIONED = 2.0
+"""In `OPEN`: of a state that someone has changed, or that is of other conditions. Its account is kept if it may be its
+own."""
 NONE, SOME, MUCH = range(3)
 """What a step makes of energy: nothing that counts, too much with the steps before, or by itself."""
 LARGEST_GAIN = 9e-4
@@ -132,8 +135,11 @@ def _energies(p, state, at):
 def open_account(p, state, stage, at):
     """Begin with a state whose potential has been evaluated at `at` in a stage, unless the account is its own."""
     account = state.account
+    if account[OPEN] == 1.0:
+        return READY
     energy, _, scale = _energies(p, state, at)
-    if account[OPEN] == 1.0 and abs(account[ENERGY] - energy) <= SAME * scale:
+    if account[OPEN] == QUESTIONED and abs(account[ENERGY] - energy) <= SAME * scale:
+        account[OPEN] = 1.0
         return READY
     account[:] = 0.0
     account[GRAVITY_AT_START] = p.sums.energy[GRAVITY]

@@ -57,8 +57,6 @@ class Engine:
         barrier distance count.
     stimulus : Array
         Value of each channel at the end of the last step, shape (n_channel,).
-    touched : Array
-        ContactPoints that something pushed at the end of the last step, bool, shape (n_contact_point,).
     extrema : RunExtrema
         Of the run.
     """
@@ -74,7 +72,6 @@ class Engine:
         self._configurations = [new_configuration(model) for _ in range(3)]
         self.end = self._configurations[1]
         self._work = new_work(model, self._configurations, max(len(used.nodes) for used in methods))
-        self.touched = self._work.touched
         self._inputs = new_inputs(model, max(len(used.points) for used in methods))
         self.stimulus = self._inputs.applied
         self.actuation: Actuation | None = None
@@ -154,7 +151,6 @@ class Engine:
                 error_norm=self._error_norm,
                 work=self._work,
                 start_state=start_arrays,
-                start_touched=self.touched.copy(),
                 extrema=self.extrema,
                 counts=self._counts,
             )

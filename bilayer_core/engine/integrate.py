@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from ..jit import call, kernel, piece, record_at
-from ..jit.record import Flags, Indices, Vector, record
+from ..jit.record import Indices, Vector, record
 from ..kinematics.copying import copy
 from ..model.records.outcome import (
     CONFIGURATION,
@@ -99,7 +99,6 @@ class Integration:
     error_norm: ErrorNorm
     work: Work
     start_state: StateArrays  # at the start of the step
-    start_touched: Flags
     extrema: RunExtrema
     counts: Counts
 
@@ -228,7 +227,6 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         if starts:
             method = run.starter
         copy(state.values, start_state.values)
-        copy(work.touched, run.start_touched)
         h, time, error, shortest = planned, begin, math.inf, control.shortest
         rejected = iterations = 0
         residual = 0.0
@@ -280,7 +278,6 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                 shortest = _shortest(run, begin)
             if status >= TOO_INACCURATE:
                 copy(start_state.values, state.values)
-                copy(run.start_touched, work.touched)
             if h <= GROWTH_LIMIT * shortest:
                 counts.failure[0], counts.failure[1], counts.failure[2] = h, residual, error
                 counts.failure[3] = iterations

@@ -47,7 +47,9 @@ def _compare_touched(sums, touched):
     """Note which contact points something pushes; whether they are those of before."""
     same = True
     for i in range(touched.shape[0]):
-        pushed = sums.contact_point[i, 0] != 0.0 or sums.contact_point[i, 1] != 0.0 or sums.contact_point[i, 2] != 0.0
+        pushed = 0.0
+        if sums.contact_point[i, 0] != 0.0 or sums.contact_point[i, 1] != 0.0 or sums.contact_point[i, 2] != 0.0:
+            pushed = 1.0
         same &= pushed == touched[i]
         touched[i] = pushed
     return same
@@ -186,7 +188,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
             call(p.calls.keep_stage_derivatives, (state, work.origin, work.end, stage.lengths[1], method.carry))
             if not method.history:  # a first step may begin with velocities, but with no rates of strains
                 state.strain_acceleration[:] = 0.0
-            state.has_history[0] = _compare_touched(p.sums, work.touched)
+            state.has_history[0] = _compare_touched(p.sums, state.touched)
     copy(work.transduction, state.transduction)
     status = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
     copy(p.memory, state.memory)

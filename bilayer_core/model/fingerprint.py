@@ -65,6 +65,12 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
     return np.array([_number(content[part]) for part in FIXED], dtype=float)
 
 
+def conditions_of(scene: SceneConfig) -> int:
+    """A number of all that forces depend on and that may differ: it is another where a state's energy may be."""
+    texts_and_steps = {"name", "title", "description", "duration", "solver", "output"}
+    return _number(scene.model_dump(mode="json", exclude=texts_and_steps))
+
+
 def _number(content: Any) -> int:
     text = json.dumps(content, sort_keys=True, ensure_ascii=False)
     return int(hashlib.sha256(text.encode("utf-8")).hexdigest()[:DIGITS], 16)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -11,10 +12,13 @@ from .fingerprint import FREE, difference
 from .lit import light_of, part_seen
 from .mechanisms import start_rates
 from .model import Model
+from .sizes import sizes_of
 
 Array = np.ndarray
 POSE_GOAL = 26
 """Values that say how a body goes to a pose."""
+NOT_KNOWN = -1.0
+"""Of a contact point, whether it is touched."""
 LAST_STEP = 1e-3
 """Length of a step that ends at time 0, for the value of a schedule before a jump there [s]."""
 
@@ -51,6 +55,7 @@ class State:
     has_history: (
         Array  # 1 if the accelerations and forces below are those of the last step, shape (1,), or (0,) without a use
     )
+    touched: Array  # 1 for nodes and points of bodies that something pushed at the end of the last step, or `NOT_KNOWN`
     acceleration: Array  # of nodes [m/s²], shape (n_node, 3); like the others empty if the integrator has no history
     spin_acceleration: Array  # of edges [rad/s²], shape (n_edge,)
     body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
@@ -62,6 +67,8 @@ class State:
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
     light_rate: Array  # of m1·l and V of each lit element over the last step [1/s], shape (n_lit, 2)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
+    conditions: Array  # number of all that a state may be taken into another scene for, shape (1,)
+    seal: Array  # checksum of a flat state, 0 before it is one, shape (1,)
     override: Array  # value of each channel, then factor of each load, set from outside; NaN where schedules act
     pose_goal: Array  # of controlled bodies; see `simulation.poses`, shape (n_controlled, 26), zeros where none acts
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
@@ -74,6 +81,8 @@ class State:
         for name, part in zip(PARTS, parts, strict=True):
             setattr(self, name, self.values[start : start + part.size].reshape(part.shape))
             start += part.size
+            if name == "seal":
+                self._place_of_seal = start - 1
 
     def copy(self) -> State:
         """A state of its own with the same values."""
@@ -84,22 +93,24 @@ class State:
         self.values[:] = other.values
 
     def flat(self) -> Array:
-        """All parts in order, as one array of float64."""
-        return self.values.copy()
+        """All parts in order, as one array of float64, with a seal: what has one is as a run left it."""
+        flat = self.values.copy()
+        flat[self._place_of_seal] = zlib.crc32(flat)
+        return flat
 
     def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
         """Name and shape of each part of `flat`."""
         return tuple((name, getattr(self, name).shape) for name in PARTS)
 
-    def set_flat(self, flat: Array) -> None:
-        """Take all parts from a flat array.
+    def set_flat(self, flat: Array) -> bool:
+        """Take all parts from a flat array; whether it is as `flat` made it, under the same conditions.
 
         Raises
         ------
         InputError
             If it belongs to another scene, or its length or a value does not fit this model; nothing is changed then.
         """
-        flat = np.asarray(flat, dtype=float)
+        flat = np.array(flat, dtype=float)
         size, marks = self.values.size, self.fingerprint.size
         differs = ""
         if marks and flat.ndim == 1 and flat.size >= marks:
@@ -115,7 +126,12 @@ class State:
         bad = np.flatnonzero(~finite)
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
+        seal, conditions = flat[self._place_of_seal], self.conditions.copy()
+        flat[self._place_of_seal] = 0.0
         self.values[:] = flat
+        untouched = seal == zlib.crc32(flat) and np.array_equal(self.conditions, conditions)
+        self.conditions[:] = conditions
+        return untouched
 
 
 PARTS = tuple(part.name for part in fields(State))
@@ -158,14 +174,20 @@ def _settled(model: Model, stimulus: Array) -> Array:
     return settled * part_seen(light, model.start_position, frames, bodies.start_position, bodies.start_rotation)
 
 
-def initial_state(model: Model, with_history: bool = False, fingerprint: Array | None = None, memory: int = 0) -> State:
+def initial_state(
+    model: Model,
+    with_history: bool = False,
+    fingerprint: Array | None = None,
+    memory: int = 0,
+    conditions: float = 0.0,
+) -> State:
     """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
 
     Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
     `with_history` makes arrays for what some integrators keep from step to step, `memory` for so many values of forces;
-    `fingerprint` says what the state belongs to (`model.fingerprint`).
+    `fingerprint` says what the state belongs to, `conditions` is a number of all else (`model.fingerprint`).
     """
-    bodies, in_fluid = model.bodies, model.node_count if len(model.fluid_mass) else 0
+    bodies, in_fluid, sizes = model.bodies, model.node_count if len(model.fluid_mass) else 0, sizes_of(model)
     rates = start_rates(model.scene, bodies.start_velocity, bodies.start_angular_velocity)
     strain_rate = np.concatenate([np.zeros(model.strain_count + len(model.impact_pairs)), rates])
     channels = list(model.scene.stimuli.values())
@@ -189,6 +211,7 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         body_angular_velocity=bodies.start_angular_velocity.copy(),
         memory=np.zeros(memory),
         has_history=np.zeros(int(with_history)),
+        touched=np.full(with_history * (sizes["node"] + sizes["point"]), NOT_KNOWN),
         acceleration=np.zeros((with_history * model.node_count, 3)),
         spin_acceleration=np.zeros(with_history * model.edge_count),
         body_acceleration=np.zeros((with_history * model.free_count, 3)),
@@ -200,6 +223,8 @@ def initial_state(model: Model, with_history: bool = False, fingerprint: Array |
         law_force=np.zeros(len(model.law_channel)),
         light_rate=np.zeros((len(model.lit_law), 2)),
         transduction=_settled(model, before) if len(channels) else np.zeros(0),
+        conditions=np.array([conditions]),
+        seal=np.zeros(1),
         override=np.full(len(channels) + len(model.scene.loads), np.nan),
         pose_goal=np.zeros((len(bodies.controlled), POSE_GOAL)),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),

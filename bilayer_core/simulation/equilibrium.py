@@ -22,7 +22,7 @@ from ..engine.report import FAILURES
 from ..errors import InputError, SimulationError
 from ..model.lit import light_of, part_seen
 from ..model.records.status import MAX_ITERATIONS
-from ..model.state import State
+from ..model.state import NOT_KNOWN, State
 from .stepper import Stepper
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
@@ -118,6 +118,7 @@ class _Search:
             state.light_rate,
         ):
             still.fill(0.0)
+        state.touched.fill(NOT_KNOWN)
         self.light = light_of(model)
         self._drive(stepper)
         self.rounds = self.iterations = self.factorisations = 0

@@ -8,13 +8,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ..engine.energy_account import OPEN, QUESTIONED
 from ..engine.report import IntegrationReport
 from ..errors import InputError, SimulationError
 from ..forces.register import memory_size
 from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
 from ..model.build import build_model
-from ..model.fingerprint import fingerprint_of
+from ..model.fingerprint import conditions_of, fingerprint_of
 from ..model.impacts import reason_of_stiffness
 from ..model.model import Model
 from ..model.plan import make_plan
@@ -84,6 +85,7 @@ class Simulator:
         self.model = build_model(scene, self.plan.model, self.plan.dimension)
         self._keeps_history = method.history is not None
         self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
+        self._conditions = float(conditions_of(scene))
         self._method = method
         self._stepper = self._stepper_of(self.model)
         self.keeps_budget = budget
@@ -102,7 +104,8 @@ class Simulator:
         return self._stepper_of(self.model if same else build_model(self.scene, self.plan.model, dimension))
 
     def _initial_state(self) -> State:
-        return initial_state(self.model, self._keeps_history, self._fingerprint, memory_size(self.model))
+        marks = self._fingerprint, memory_size(self.model), self._conditions
+        return initial_state(self.model, self._keeps_history, *marks)
 
     def _start_over(self) -> None:
         self.statistics = RunStatistics(com_max_height=float(self.com[2]))
@@ -402,9 +405,10 @@ class Simulator:
     ) -> RunResult:
         """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
 
-        Fixed steps end within half a step of it. Adaptive ones end exactly there, and at the scene's output times
-        (`output.rate`, counted from time 0), whether or not anybody observes: the run is the same bit for bit whatever
-        watches it. So is a run in parts that meet at output times; at another time the end of a part is one more end
+        Fixed steps end within half a step of it. Adaptive ones end exactly there, or at the output time that differs
+        from it by rounding alone, and at all of the scene's output times (`output.rate`, counted from time 0), whether
+        or not anybody observes: the run is the same bit for bit whatever watches it. So is a run in parts that meet at
+        output times; at another time the end of a part is one more end
         of a step.
 
         Parameters
@@ -433,7 +437,7 @@ class Simulator:
             raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
         self.compile()
         begin, cpu, wall, before = self.time, self.cpu_time, clock.perf_counter(), self._state.step[0]
-        end = begin + (steps * self.dt if fixed else left)
+        end = begin + steps * self.dt if fixed else self._stepper.end_near(begin + left)
         last = end - 0.5 * self.dt if fixed else end
         termination = Termination.INTERRUPTED
         most = STEPS_AT_ONCE if each_step is None else 1
@@ -513,7 +517,8 @@ class Simulator:
         loaded = self._initial_state()
         loaded.set_flat(snapshot)
         refuse_out_of_plane(self.model, loaded)
-        self._state.set_flat(snapshot)
+        if not self._state.set_flat(snapshot) and self._state.account[OPEN] == 1.0:
+            self._state.account[OPEN] = QUESTIONED
         self.compile()
         self._stepper.evaluate(self._state)
         self._start_over()

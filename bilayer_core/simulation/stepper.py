@@ -18,7 +18,7 @@ from ..integrators.method import Method
 from ..model.model import Model
 from ..model.records.status import INPUTS_END, TOO_INACCURATE
 from ..model.records.step import Configuration
-from ..model.state import State
+from ..model.state import NOT_KNOWN, State
 from .energy_budget import EnergyLedger
 from .remedies import remedy
 from .step_choice import Steps
@@ -126,12 +126,15 @@ class Stepper:
         return self.engine.stimulus
 
     def evaluate(self, state: State) -> None:
-        """Evaluate the potential at a state as it stands, for energies and contact forces before the next step."""
+        """Evaluate the potential at a state as it stands, for energies and contact forces before the next step; where
+        it does not know what touches, it takes that from there.
+        """
         time = float(state.time[0])
         rest = self.surroundings.rest_strains_of(state.transduction)
         self.engine.set_drive(rest, self.surroundings.load_factor(state))
         self.engine.do_once(state, EVALUATE_STATE)
-        self.engine.touched[:] = self.engine.touching
+        unknown = state.touched == NOT_KNOWN
+        state.touched[unknown] = self.engine.touching[: len(unknown)][unknown]
         self.engine.stimulus[:] = self.surroundings.stimulus_at(state, time)
 
     def compile(self, state: State) -> None:
@@ -142,6 +145,12 @@ class Stepper:
         """Begin again with the first step's length: something has jumped."""
         state.next_step[0] = min(float(state.next_step[0]), self._first)
         state.last_error[0] = 0.0
+
+    def end_near(self, time: float) -> float:
+        """The output time that a time [s] is but for rounding, else the time itself: so a sum of periods is one."""
+        rate = self.model.scene.output.rate
+        output = round(time * rate) / rate if math.isfinite(time) else time
+        return output if abs(output - time) <= TIME_ROUNDING / rate else time
 
     def integrate(self, state: State, most: int, until: float, due: float = math.inf) -> IntegrationReport:
         """Make at most so many steps, of which parts of a fixed one count, in place.

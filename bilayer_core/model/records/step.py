@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...jit.record import Flags, Indices, Matrix, Stack, Tensor, Vector, record
+from ...jit.record import Indices, Matrix, Stack, Tensor, Vector, record
 
 
 @record
@@ -168,7 +168,6 @@ class Work:
     end_force: Vector = ("law",)  # and at its end
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
     account: Vector = (7,)  # of the energy of a step; see `engine.energy_account`
-    touched: Flags = ("contact_point",)  # contact points that something pushed at the end of the last step
 
 
 @record
@@ -190,6 +189,7 @@ class StateArrays:
     body_angular_velocity: Matrix
     memory: Vector
     has_history: Vector
+    touched: Vector
     acceleration: Matrix
     spin_acceleration: Vector
     body_acceleration: Matrix
