@@ -207,13 +207,13 @@ def _add_eigenstrain(
         else:
             groups = [(found.law(scene, law), with_copies(rod, edges))]
         for number, driven in groups:
-            of_edges, of_nodes = whole.driven(half, driven)
-            bent = np.flatnonzero((of_nodes != 0.0) & (joints >= 0))
+            of_edges, nodes, of_nodes = whole.driven(half, driven)
+            bent = (of_nodes != 0.0) & (joints[nodes] >= 0)
             found.add(
                 driven_edge=first_edge + driven,
                 driven_law=np.full(len(driven), number),
-                driven_weight=of_edges[driven],
-                driven_joint=joints[bent],
-                driven_joint_law=np.full(len(bent), number),
+                driven_weight=of_edges,
+                driven_joint=joints[nodes[bent]],
+                driven_joint_law=np.full(np.count_nonzero(bent), number),
                 driven_joint_weight=of_nodes[bent],
             )

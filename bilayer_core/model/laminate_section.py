@@ -161,12 +161,12 @@ class WholeSection:
         pairs[1:, 0], pairs[:-1, 1] = slope[:, 1], slope[:, 0]
         return pairs
 
-    def driven(self, half: LayerHalves, edges: Array) -> tuple[Array, Array]:
-        """Rest strains of edges, shape (n_edge,), and κ̄₁ of nodes [rad], shape (n_node,), per eigenstrain of a layer on
-        some edges: N*/A* and −Σ ℓ M/D.
+    def driven(self, half: LayerHalves, edges: Array) -> tuple[Array, Array, Array]:
+        """Per eigenstrain of a layer on some edges: their rest strains, N*/A*, shape (n_driven,), the nodes at their
+        ends, shape (n_end,), and κ̄₁ of these nodes, −Σ ℓ M/D [rad].
         """
-        here = np.zeros((len(half.axial), 1))
-        here[edges] = 1.0
-        axial = here * half.axial
-        part = np.mean(axial * (1.0 - self.coupling * half.height / self.bending), axis=1) / self.axial_stiffness
-        return part, -self.to_nodes(axial * half.height / self.bending)
+        axial, height, bending = half.axial[edges], half.height[edges], self.bending[edges]
+        part = np.mean(axial * (1.0 - self.coupling[edges] * height / bending), axis=1) / self.axial_stiffness[edges]
+        nodes, slot = np.unique(np.stack([edges, edges + 1], axis=1), return_inverse=True)
+        of_halves = -self._half_length[edges] * (axial * height / bending)
+        return part, nodes, np.bincount(slot.ravel(), weights=of_halves.ravel(), minlength=len(nodes))

@@ -17,8 +17,10 @@ from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 ROUNDING = 1e-9
 """Relative difference of typed numbers that is not taken for a fault."""
 
-LONGEST_VALUE = 60
-"""Characters of a found value that are shown."""
+LONGEST_VALUE, LONGEST_LIST, LONGEST_TEXT = 60, 600, 120
+"""Characters of a found value, of a list of names and of anything else that somebody wrote, that are shown."""
+MOST_FAULTS = 100
+"""That are told; one mistake may be in every item of a long list."""
 
 Location = tuple[str | int, ...]
 Fault = tuple[Location, Any, str]
@@ -55,8 +57,17 @@ def refuse_all(title: str, faults: Sequence[Fault]) -> None:
 def one_of(what: str, found: object, allowed: Iterable[str]) -> str:
     """The demand that a name be one of those allowed, with the nearest one suggested."""
     names = [str(name) for name in allowed]
-    listed = ", ".join(names) if names else "there are none"
-    return f"must be one of the {what} ({listed}){suggestion(found, names)}"
+    return f"must be one of the {what} ({listed(names) or 'there are none'}){suggestion(found, names)}"
+
+
+def shortened(text: str, most: int = LONGEST_TEXT) -> str:
+    """Text, cut off where it gets long."""
+    return text if len(text) <= most else f"{text[:most]}..."
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names in a row, cut off where they get long."""
+    return shortened(", ".join(names), LONGEST_LIST)
 
 
 def suggestion(found: object, allowed: Iterable[str]) -> str:
@@ -77,7 +88,11 @@ def tell(error: ValidationError, schema: type[BaseModel], data: Any, source: str
     source : str
         File, or another origin, to begin each line with.
     """
-    return "\n".join(f"{source}: {_line(fault, schema, data)}" for fault in error.errors(include_url=False))
+    faults = error.errors(include_url=False)
+    lines = [f"{source}: {_line(fault, schema, data)}" for fault in faults[:MOST_FAULTS]]
+    if len(faults) > MOST_FAULTS:
+        lines.append(f"{source}: and {len(faults) - MOST_FAULTS} more faults")
+    return "\n".join(lines)
 
 
 def _line(fault: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
@@ -125,7 +140,7 @@ def key_path(location: Location, data: Any) -> str:
                 continue
             item = here[part] if isinstance(here, list | tuple) and part < len(here) else None
             name = item.get("name") if isinstance(item, dict) else None
-            path += f".{name}" if isinstance(name, str) else f"[{part}]"
+            path += f".{shortened(name)}" if isinstance(name, str) else f"[{part}]"
             here = item
         elif (
             isinstance(here, dict)
@@ -135,14 +150,14 @@ def key_path(location: Location, data: Any) -> str:
         ):
             continue
         else:
-            path += f".{part}"
+            path += f".{shortened(part)}"
             here = here.get(part) if isinstance(here, dict) else None
     return path.removeprefix(".") or "scene"
 
 
 def _shown(value: Any) -> str:
     text = json.dumps(value, default=str, ensure_ascii=False) if not isinstance(value, BaseModel) else str(value)
-    return text if len(text) <= LONGEST_VALUE else f"{text[:LONGEST_VALUE]}..."
+    return shortened(text, LONGEST_VALUE)
 
 
 # What the schema expects at a place, from the annotations of its classes

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bilayer_core.errors import SceneError
-from bilayer_core.scene.faults import Fault
+from bilayer_core.scene.faults import Fault, shortened
 
 LARGEST_FILE = 2_000_000
 """Of a scene [bytes]. Long lists of points or values belong into csv files."""
@@ -28,6 +28,8 @@ MOST_NODES = 200_000
 """Of all layers of all rods."""
 MOST_POINTS = 10_000
 """Contact points of a surface."""
+MOST_SIGHTS = 1e8
+"""Pairs of an element that follows a light and an edge that may stand before it: all are looked at in every step."""
 MEMORY_PER_NODE = 5e3
 """Of a built simulation, two rods in space with contact, as measured [bytes]."""
 LOG_MAGIC = b"\x89MCAP"
@@ -37,6 +39,7 @@ class Rods(Protocol):
     """A scene, as far as its size goes: see `bilayer_core.scene.config.SceneConfig`."""
 
     rods: list
+    stimuli: dict
 
 
 def read_text(path: Path, largest: int) -> str:
@@ -100,7 +103,7 @@ def faults_of_size(scene: Rods) -> list[Fault]:
         return [(("rods",), f"{copies} rods", f"must be at most {MOST_COPIES}, copies of patterns included")]
     nodes = sum(copies * own for copies, own in sizes)
     if nodes <= MOST_NODES:
-        return []
+        return _faults_of_light(scene, sizes, nodes)
     largest = max(range(len(sizes)), key=lambda index: sizes[index][0] * sizes[index][1])
     memory = 1e-9 * MEMORY_PER_NODE * nodes
     return [
@@ -111,6 +114,23 @@ def faults_of_size(scene: Rods) -> list[Fault]:
             "are simulated",
         )
     ]
+
+
+def _faults_of_light(scene: Rods, sizes: list[tuple[int, int]], nodes: int) -> list[Fault]:
+    """Whether so many elements of layers follow lights that a look at all of them would take seconds."""
+    lights = {name for name, channel in scene.stimuli.items() if channel.light is not None}
+    lit = [
+        copies * rod.stations * sum(law.stimulus in lights for layer in rod.layers for law in layer.eigenstrain)
+        for rod, (copies, _) in zip(scene.rods, sizes, strict=True)
+    ]
+    if sum(lit) * nodes <= MOST_SIGHTS:
+        return []
+    largest = lit.index(max(lit))
+    demand = (
+        f"must be fewer: {sum(lit)} elements follow lights, and each has {nodes} nodes to look at; the product may be "
+        f"{MOST_SIGHTS:g}"
+    )
+    return [(("rods", largest, "stations"), scene.rods[largest].stations, demand)]
 
 
 def refused_file_name(name: str) -> str:
@@ -125,5 +145,4 @@ def refused_file_name(name: str) -> str:
 
 def longest(items: Iterable[str], most: int = 60) -> str:
     """Items in a row, cut off where they get long."""
-    text = ", ".join(items)
-    return text if len(text) <= most else f"{text[:most]}..."
+    return shortened(", ".join(items), most)

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from bilayer_core.errors import SceneError
 from bilayer_core.scene.bundled import bundled_scene
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.faults import tell
+from bilayer_core.scene.faults import shortened, tell
 from bilayer_core.scene.limits import LARGEST_FILE, check_content, read_text
 from bilayer_core.scene.overrides import apply_override
 from bilayer_core.scene.text import read_yaml, write_yaml
@@ -96,7 +96,7 @@ def _validated(data: Any, source: str, overrides: Sequence[str], directory: Path
     for override in overrides:
         apply_override(data, override)
     check_content(data, source)
-    return _validate(data, f"{source} with {' '.join(overrides)}", directory)
+    return _validate(data, f"{source} with {shortened(' '.join(overrides))}", directory)
 
 
 def _validate(data: dict[str, Any], source: str, directory: Path) -> SceneConfig:

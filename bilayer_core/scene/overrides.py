@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from bilayer_core.errors import SceneError
-from bilayer_core.scene.faults import suggestion
+from bilayer_core.scene.faults import listed, shortened, suggestion
 from bilayer_core.scene.text import read_yaml
 
 
@@ -26,16 +26,16 @@ def apply_override(data: dict, text: str) -> None:
         If the path does not exist; says what there is instead.
     """
     path, equals, value = text.partition("=")
-    keys = path.strip().split(".")
+    keys, origin = path.strip().split("."), f"override {shortened(text)}"
     if not equals or not all(keys):
-        raise SceneError(f"override {text}: must be PATH=VALUE, such as rods.arm.stations=100")
+        raise SceneError(f"{origin}: must be PATH=VALUE, such as rods.arm.stations=100")
     here: Any = data
     for depth, key in enumerate(keys):
         place = _place(here, key)
         if place is None:
-            raise SceneError(f"override {text}: {_absent(here, key, '.'.join(keys[:depth]))}")
+            raise SceneError(f"{origin}: {_absent(here, key, '.'.join(keys[:depth]))}")
         if depth == len(keys) - 1:
-            here[place] = read_yaml(value, f"override {text}")
+            here[place] = read_yaml(value, origin)
         else:
             here = here[place]
 
@@ -49,7 +49,7 @@ def _place(here: Any, key: str) -> str | int | None:
     for index, item in enumerate(here):
         if isinstance(item, dict) and item.get("name") == key:
             return index
-    return int(key) if key.isdecimal() and int(key) < len(here) else None
+    return next((index for index in range(len(here)) if str(index) == key), None)
 
 
 def _absent(here: Any, key: str, parent: str) -> str:
@@ -57,10 +57,9 @@ def _absent(here: Any, key: str, parent: str) -> str:
     if isinstance(here, dict):
         names = list(here)
     elif isinstance(here, list):
-        names = [item["name"] if isinstance(item, dict) and "name" in item else str(i) for i, item in enumerate(here)]
+        names = [str(item["name"] if isinstance(item, dict) and "name" in item else i) for i, item in enumerate(here)]
     elif here is None:
-        return f"{parent} is not given in this scene; set it as a whole, {parent}={{{key}: ...}}"
+        return f"{parent} is not given in this scene; set it as a whole, {parent}={{{shortened(key)}: ...}}"
     else:
-        return f"{parent} is a single value and has no {key}"
-    listed = ", ".join(map(str, names)) if names else "none"
-    return f"there is no {key}{of_parent}{suggestion(key, names)}; there are {listed}"
+        return f"{parent} is a single value and has no {shortened(key)}"
+    return f"there is no {shortened(key)}{of_parent}{suggestion(key, names)}; there are {listed(names) or 'none'}"

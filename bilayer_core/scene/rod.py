@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, field_serializer, model_validator
 
+from bilayer_core.scene.crossings import crossings
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, refuse_all, repeated
 from bilayer_core.scene.imperfection import Imperfection
@@ -209,10 +210,11 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         return interval[0] < interval[1] <= rod.path.length * (1.0 + ROUNDING)
 
     faults += _profiles(rod, (), ("width",), rod.path.length)
+    faults += _far_away(rod)
     sharp_bends = list(_sharp_bends(rod))
     faults += sharp_bends
     if not (demand or sharp_bends):
-        faults += _crossings(rod)
+        faults += crossings(rod)
     if rod.imperfection is not None:
         curvature = np.hypot(*rod.curvatures_at(rod.path.sharpest)[:, :2].T).max(initial=0.0)
         largest = min(LARGEST_IMPERFECTION * rod.path.length, 0.5 / curvature if curvature else math.inf)
@@ -277,6 +279,25 @@ def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
             yield ("layers", index, "interval"), layer.interval, demand
 
 
+FARTHEST = 1e9
+"""Coordinates of a rod in edges: theirs are then known to 2e-7 of their length, and farther away soon not at all."""
+
+
+def _far_away(rod: Rod) -> Iterator[Fault]:
+    """Whether the differences of its nodes' coordinates are lost in their rounding."""
+    points = rod.frames_at(np.array([0.0, rod.path.length]))[0]
+    farthest = FARTHEST * rod.edge_length
+    if np.abs(points).max() > farthest:
+        where: Location = ("path", "start" if "start" in type(rod.path).model_fields else "points")
+        found: Any = rod.path.start
+    elif rod.pattern and any(np.abs(place.points(points)).max() > farthest for place in rod.pattern.places()):
+        where, found = ("pattern",), rod.pattern.type
+    else:
+        return
+    demand = f"must leave all coordinates of the rod below {farthest:g} m: beyond, its edges are lost in rounding"
+    yield where, found, demand
+
+
 POINTS_COMPARED = 9
 """Along two copies of a rod that may lie on each other, in either direction."""
 
@@ -294,10 +315,10 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
         if getattr(rod, end) is not None and getattr(rod.pattern, end) is not None:
             yield (end,), getattr(rod, end), f"must be left out where `pattern.{end}` has the body of each copy"
     points = rod.frames_at(np.linspace(0.0, rod.path.length, POINTS_COMPARED))[0]
-    copies = [place.points(points) for place in rod.pattern.places()]
+    copies = np.array([place.points(points) for place in rod.pattern.places()])
     for second in range(1, len(copies)):
         ways = copies[second], copies[second][::-1]
-        apart = np.min([np.abs(np.array(copies[:second]) - way).max(axis=(1, 2)) for way in ways], axis=0)
+        apart = np.min([np.abs(copies[:second] - way).max(axis=(1, 2)) for way in ways], axis=0)
         if apart.min() <= ROUNDING * rod.path.length:
             first = rod.copy_names[int(apart.argmin())]
             demand = f"must leave no copy where another is: {rod.copy_names[second]} lies on {first}"
@@ -332,40 +353,6 @@ def _sharp_bends(rod: Rod) -> Iterator[Fault]:
         if isinstance(rod.path, PolylinePath):
             demand += "; longer edges, points on a round bend or `shape: spline` bend less sharply"
         yield ("path", key), radius if key == "points" else getattr(rod.path, key), demand
-
-
-SAMPLES_PER_THICKNESS = 3
-"""Of a path that may cross itself: two of them are nearer than the thickness wherever it does."""
-
-
-def _crossings(rod: Rod) -> Iterator[Fault]:
-    """Whether a path comes nearer to itself than the thickness of its rod, but for the two sides of a bend no sharper
-    than half the thickness.
-
-    One that turns by less than half a turn cannot.
-    """
-    if rod.path.turn < math.pi:
-        return
-    from scipy.spatial import cKDTree
-
-    thickness = sum(extremes(layer.thickness)[1] for layer in rod.layers)
-    samples = math.ceil(SAMPLES_PER_THICKNESS * rod.path.length / thickness)
-    arc = np.linspace(0.0, rod.path.length, samples + 1)[: samples if rod.closed else None]
-    points = rod.frames_at(arc)[0]
-    near = cKDTree(points).query_pairs(thickness * (1.0 - ROUNDING), output_type="ndarray")
-    along = np.abs(np.subtract(*arc[near].T))
-    if rod.closed:
-        along = np.minimum(along, rod.path.length - along)
-    near = near[along > 0.5 * math.pi * thickness]
-    if not len(near):
-        return
-    apart = np.linalg.norm(points[near[:, 0]] - points[near[:, 1]], axis=1)
-    first, second = np.sort(arc[near[apart.argmin()]])
-    demand = f"must not come nearer to itself than the thickness of the rod, {thickness:g} m"
-    ends_meet = not rod.closed and first <= thickness and rod.path.length - second <= thickness
-    if ends_meet and hasattr(rod.path, "closed"):
-        demand += "; a ring without ends is `closed: true`"
-    yield ("path",), f"{apart.min():.3g} m between {first:.4g} m and {second:.4g} m along it", demand
 
 
 def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:

@@ -28,7 +28,7 @@ def _checked(construct: Callable, what: str) -> Callable:
     def number(reader: _Reader, node: yaml.Node) -> Any:
         try:
             return construct(reader, node)
-        except (ValueError, OverflowError, KeyError):
+        except (ValueError, OverflowError, KeyError, IndexError):
             shown = str(node.value)[:20]
             problem = f"{shown!r}{'...' if len(node.value) > len(shown) else ''} is not {what}"
             raise yaml.constructor.ConstructorError(None, None, problem, node.start_mark) from None

@@ -22,7 +22,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _UNIT = r"(?:1?\s*/\s*)?[A-Za-zµμ°%][\w°%*/^ ().-]*?"
 _TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>{_UNIT})?\s*")
 
-SMALLEST, LARGEST = 1e-100, 1e100
+SMALLEST, LARGEST = 1e-30, 1e30
 """Of what must be above 0, and of all numbers: products of several are numbers yet."""
 LARGEST_COUNT = 2**53
 """Of all whole numbers: larger ones are no floating-point numbers."""
@@ -87,9 +87,11 @@ def parse_quantity(text: str, unit: str) -> float:
 
 @cache
 def _unit(text: str) -> Any:
-    """The unit that a text such as ``m/s^2`` or ``/s`` names."""
+    """The unit that a text such as ``m/s^2`` or ``/s`` names; those with another zero or a logarithm are none."""
     try:
-        return _registry().Unit(f"1{text}" if text.startswith("/") else text)
+        unit = _registry().Unit(f"1{text}" if text.startswith("/") else text)
+        _registry().Quantity(Decimal(1), unit).to_root_units()
+        return unit
     except Exception:  # what the library raises on text that is no unit has no base in common
         raise ValueError(f"whose unit {text!r} is not known") from None
 

@@ -12,8 +12,9 @@ import time
 import numpy as np
 import pytest
 
-from bilayer_core import load_scene
+from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
+from bilayer_core.scene.faults import MOST_FAULTS
 from bilayer_core.scene.limits import DEEPEST, LARGEST_FILE, MOST_COPIES, MOST_NODES, MOST_VALUES
 from bilayer_core.scene.text import read_yaml
 from bilayer_core.validate.parts import layer, rod, scene
@@ -23,6 +24,8 @@ BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
 )
 LONGEST = 10.0
 """Time until an answer [s]."""
+LONGEST_LINE = 1000
+"""Of a message [characters]."""
 
 
 def refusal(data, overrides=()):
@@ -84,7 +87,7 @@ def test_text_that_is_no_scene_is_refused_with_the_reason(name, tmp_path):
     [
         ("title=" + "[" * 100_000, "deep"),
         ("rods=&a [*a]", "deep inside each other"),
-        ("duration=1e-300", "below 1e-100, as good as 0"),
+        ("duration=1e-60", "below 1e-30, as good as 0"),
         ("duration=" + "9" * 5000, "is not a whole number that can be read"),
         ("rods.strip.stations=100000000", f"at most {MOST_NODES}"),
         ("rods.strip.stations=1" + "0" * 400, f"at most {MOST_NODES}"),
@@ -92,10 +95,20 @@ def test_text_that_is_no_scene_is_refused_with_the_reason(name, tmp_path):
         ("rods.strip.path.length=1e200", "must be a length [m]"),
         ("materials={on: 1}", "materials.on"),
         ("rods.strip.name=" + "x" * 1000, "at most 100 characters"),
+        ("rods.strip.path.length=3 dB", "whose unit 'dB' is not known"),
+        ("rods.strip.width=1e40", "must be a length [m]"),
+        ("rods.strip.path.start=[0, 1e20, 0]", "rods.strip.path.start: found"),
+        ("rods.strip.pattern={type: translation, step: [0, 1e20, 0], count: 2}", "must leave all coordinates"),
+        ("duration=!!int ", "'' is not a whole number that can be read"),
+        ("rods." + "9" * 5000 + ".width=1", "there is no 999"),
+        ("duration={" + "x" * 900 + ": 1}", "must be a time"),
+        ("x" * 5000 + "=1", "there is no xxx"),
+        ("y" * 5000, "must be PATH=VALUE"),
     ],
 )
 def test_an_override_that_cannot_be_is_refused(override, reason):
-    assert reason in refusal("cantilever", [override])
+    text = refusal("cantilever", [override])
+    assert reason in text and max(map(len, text.splitlines())) < LONGEST_LINE
 
 
 @pytest.mark.parametrize("given", [None, 7, 1.5, ["cantilever"], b"cantilever", np.zeros(3)])
@@ -139,6 +152,42 @@ def test_dates_and_words_for_true_are_text_where_text_is_meant(tmp_path):
 )
 def test_too_many_copies_are_refused(pattern, reason):
     assert reason in refusal(scene([rod([layer()]) | {"pattern": pattern}]))
+
+
+def test_names_that_became_numbers_are_listed_as_they_are():
+    text = refusal(scene([rod([layer()])]), ["rods.rod.name=3", "rods.arm.width=1"])
+    assert text.endswith("there is no arm of rods; there are 3")
+
+
+def test_as_many_copies_as_there_may_be_are_compared_in_time():
+    placements = [{"position": [0, 1.0 * k, 0]} for k in range(MOST_COPIES - 1)]
+    pattern = {"type": "list", "placements": [*placements, placements[0]]}
+    assert f"rod_{MOST_COPIES - 1} lies on rod_0" in refusal(scene([rod([layer()]) | {"pattern": pattern}]))
+
+
+@pytest.mark.parametrize(
+    ("turns", "reason"),
+    [(100, "found \"0 m between"), (1e6, "must be at most 200000 times the thickness of the rod, 0.001 m")],
+)
+def test_a_path_of_many_turns_on_each_other_is_refused_in_time_and_memory(turns, reason):
+    arc = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.05, "angle": f"{turns} turns"}
+    assert reason in refusal(scene([rod([layer()]) | {"path": arc}]))
+
+
+@pytest.mark.slow
+def test_as_many_elements_as_a_light_may_have_are_built_in_time():
+    light = {"sun": {"light": {"from": [0, 0, 1], "shadow": True}, "schedule": {"type": "hold", "value": 1.0}}}
+    sheet = layer(eigenstrain={"stimulus": "sun", "gain": 0.01, "time_constant": 1.0})
+    few, many = (scene([rod([sheet], stations=n)], stimuli=light, solver={"model": "auto"}) for n in (7_000, 20_000))
+    assert "20000 elements follow lights, and each has 20000 nodes to look at" in refusal(many)
+    begin = time.process_time()
+    Simulator(load_scene(few))
+    assert time.process_time() - begin < LONGEST
+
+
+def test_of_very_many_faults_the_first_are_told():
+    lines = refusal(scene([rod([layer()])], masses=[{}] * 5000)).splitlines()
+    assert len(lines) == MOST_FAULTS + 1 and lines[-1] == f"scene: and {4 * 5000 - MOST_FAULTS} more faults"
 
 
 def test_too_many_nodes_are_refused_with_the_memory_that_they_would_take():

@@ -68,7 +68,11 @@ def test_a_length_that_is_not_a_finite_number_of_its_range_is_refused_with_its_u
 
 @pytest.mark.parametrize(
     ("annotation", "limit", "beside"),
-    [(units.PositiveLength, 0.0, 1e-100), (units.NonNegativeLength, -1e-100, 0.0), (units.whole(3), 2, 3)],
+    [
+        (units.PositiveLength, 0.0, units.SMALLEST),
+        (units.NonNegativeLength, -units.SMALLEST, 0.0),
+        (units.whole(3), 2, 3),
+    ],
 )
 def test_the_ends_of_a_range_belong_to_it_as_its_words_say(annotation, limit, beside):
     adapter = TypeAdapter(annotation)
