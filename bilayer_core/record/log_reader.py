@@ -28,6 +28,8 @@ from bilayer_core.simulation.frame import Description
 CUT_OFF = "cut off"
 _RECORD_HEAD = 9  # opcode and length of a record [bytes]
 _MAGIC_SIZE = 8
+_HEAD = ("description", "versions", "settings")
+"""Metadata that every log has before its first chunk."""
 
 
 @dataclass(frozen=True)
@@ -244,7 +246,9 @@ def _open(path: Path) -> Iterator[BinaryIO]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     except (McapError, struct.error, ValueError, RuntimeError) as error:  # RuntimeError: lz4's
-        raise InputError(f"{path}: is not an MCAP log, or is damaged: {error}") from error
+        # mcap says nothing of a record whose parts are longer than itself.
+        reason = str(error) or "a record in it ends too early"
+        raise InputError(f"{path}: is not an MCAP log, or is damaged: {reason}") from error
 
 
 class _WholeRecords:
@@ -302,6 +306,8 @@ def _messages(path: Path, topics: set[str] | None = None) -> Iterator[tuple[str,
             elif isinstance(record, Channel) and record.id not in channels:
                 if topics is not None and record.topic not in topics:
                     continue
+                if record.schema_id not in schemas:
+                    raise InputError(f"{path}: is damaged: the type of {record.topic} is missing")
                 channels[record.id] = (record.topic, schemas[record.schema_id])
                 yield *channels[record.id], 0, None
 
@@ -320,8 +326,10 @@ def _read_head(path: Path) -> _Head:
                 metadata[record.name] = record.metadata
             if scene is not None and "description" in metadata:
                 break
-    if scene is None or "description" not in metadata:
-        raise InputError(f"{path}: is an MCAP file, but no log of bilayer_sim_ros: scene or description is missing")
+    missing = [name for name in _HEAD if name not in metadata] + ([] if scene is not None else ["scene"])
+    if missing:
+        what = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise InputError(f"{path}: is an MCAP file, but no log of bilayer_sim_ros, or is damaged: {what}")
     versions = metadata["versions"]
     try:
         description = from_text(metadata["description"], scene)

@@ -210,6 +210,26 @@ def test_a_damaged_chunk_is_noticed(log, tmp_path):
         read_log(damaged)
 
 
+@pytest.mark.parametrize("part", [b"versions", b"settings", b"description"])
+def test_a_log_whose_head_is_damaged_is_refused_with_what_is_missing(log, tmp_path, part):
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(log.read_bytes().replace(part, part[::-1], 1))
+    with pytest.raises(InputError, match=f"or is damaged: {part.decode()} is missing"):
+        read_log(damaged)
+
+
+def test_every_message_about_a_damaged_log_says_what_is_wrong(log, tmp_path):
+    data, random, told = log.read_bytes(), np.random.default_rng(1), set()
+    damaged = tmp_path / "damaged.mcap"
+    for place in random.integers(8, 400, 300):
+        damaged.write_bytes(data[:place] + b"\xff" + data[place + 1 :])
+        try:
+            read_info(damaged)
+        except InputError as error:
+            told.add(str(error).removeprefix(f"{damaged}: ").partition("damaged: ")[2] or str(error))
+    assert len(told) > 2 and all(len(message) > 10 for message in told)
+
+
 def test_bad_paths_are_refused_before_anything_is_computed(tmp_path):
     existing = tmp_path / "old.mcap"
     existing.write_bytes(b"precious")
