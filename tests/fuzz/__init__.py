@@ -1,0 +1,1 @@
+"""Scenes with random mutations, and what becomes of them."""
