@@ -9,6 +9,7 @@ import numpy as np
 
 from ..contact.broad_phase import RodSearch, near_pairs, scratch
 from ..scene.config import SceneConfig
+from ..scene.rod import Rod
 from .layout import ReadOnlyArrays
 from .rod_pairs import rod_pairs
 from .strands import Collected
@@ -56,21 +57,22 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     if not decisions:
         return None
     copies = [(index, copy) for index, rod in enumerate(scene.rods) for copy in rod.copies]
-    scene_index = [index for index, _ in copies]  # of each rod with copies
-    rods, names = [copy.rod for _, copy in copies], [copy.name for _, copy in copies]
+    scene_index = np.array([index for index, _ in copies])  # of each rod with copies
+    rods, numbers = [copy.rod for _, copy in copies], {copy.name: number for number, (_, copy) in enumerate(copies)}
     can_collide = np.zeros((len(rods), len(rods)), dtype=bool)
     for rod_pair in decisions:
-        for a in (i for i, p in enumerate(scene_index) if p == rod_pair.first):
-            for b in (i for i, p in enumerate(scene_index) if p == rod_pair.second):
-                if rod_pair.first != rod_pair.second or (a != b) == rod_pair.copies:
-                    can_collide[a, b] = can_collide[b, a] = True
-    joined = np.array(
-        [[_joined(a, b, itself=i == j) for j, b in enumerate(rods)] for i, a in enumerate(rods)], dtype=bool
-    )
-    node_radius = found.column("node_radius")
-    thickest = [float(EdgeFigures(scene, rod).thickness.max()) for rod in rods]
+        first, second = (np.flatnonzero(scene_index == index) for index in (rod_pair.first, rod_pair.second))
+        meet = np.ones((len(first), len(second)), dtype=bool)
+        if rod_pair.first == rod_pair.second:
+            meet = np.eye(len(first), dtype=bool) != rod_pair.copies
+        can_collide[np.ix_(first, second)] |= meet
+        can_collide[np.ix_(second, first)] |= meet.T
+    joined = _joined(scene, rods)
+    node_radius, rest_length = found.column("node_radius"), found.column("rest_length")
+    thickness = [float(EdgeFigures(scene, rod).thickness.max()) for rod in scene.rods]
+    thickest = [thickness[index] for index in scene_index]
     for strand in found.strands:
-        number, own = names.index(strand.rod), slice(strand.first_node, strand.first_node + strand.node_count)
+        number, own = numbers[strand.rod], slice(strand.first_node, strand.first_node + strand.node_count)
         thickest[number] = max(thickest[number], 2.0 * float(node_radius[own].max()))
     exclusion = [
         max(FEW_EDGES * rod.edge_length, 0.5 * math.pi * (thick + scene.contact.barrier_distance))
@@ -78,10 +80,10 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     ]
     parts: dict[str, list[Array]] = {}
     for strand in found.strands:
-        number = names.index(strand.rod)
+        number = numbers[strand.rod]
         rod = rods[number]
         edges = strand.shown - 1
-        length = found.column("rest_length")[strand.first_edge : strand.first_edge + edges]
+        length = rest_length[strand.first_edge : strand.first_edge + edges]
         radius = float(node_radius[strand.first_node : strand.first_node + strand.node_count].max())
         per_edge = max(1, math.ceil(float(length.max()) / radius * (1.0 - 1e-9)))
         if not can_collide[number].any():
@@ -125,12 +127,13 @@ def _with_copy(own: dict[str, Array], rod: int) -> dict[str, Array]:
     return found | {name: np.append(own[name], value) for name, value in of_copy.items()}
 
 
-def _joined(first, second, itself: bool) -> bool:
-    """Whether one body holds two rods; or both ends, of the same rod."""
-    ends = [{rod.clamp_start, rod.clamp_end} - {None} for rod in (first, second)]
-    if itself:
-        return first.clamp_start is not None and first.clamp_start == first.clamp_end
-    return bool(ends[0] & ends[1])
+def _joined(scene: SceneConfig, rods: list[Rod]) -> Array:
+    """Whether one body holds two rods; or both ends, of the same rod; shape (n_rod, n_rod)."""
+    ends = [(rod.clamp_start, rod.clamp_end) for rod in rods]
+    holds = np.array([[body.name in held for body in scene.bodies] for held in ends], dtype=np.float32)
+    joined = holds @ holds.T > 0.0
+    np.fill_diagonal(joined, [start is not None and start == end for start, end in ends])
+    return joined
 
 
 def _strand_points(spacing: float, start: int, length: Array, per_edge: int, closed: bool) -> dict[str, Array]:

@@ -281,7 +281,7 @@ def add_strand(
             continue
         body = body_index[clamp]
         own = rotation_matrix(np.array(scene.bodies[body].rotation))  # columns: axes of the body's frame
-        clamp_edge = -1 - sum(len(part) for part in found.columns.get("clamp_edge_tangent", []))
+        clamp_edge = -1 - len(found.columns.get("clamp_edge_tangent", []))
         node = end % nodes
         pair = (clamp_edge, first_edge) if end == 0 else (first_edge + edges - 1, clamp_edge)
         found.add(

@@ -61,8 +61,9 @@ def one_of(what: str, found: object, allowed: Iterable[str]) -> str:
 
 
 def shortened(text: str, most: int = LONGEST_TEXT) -> str:
-    """Text, cut off where it gets long."""
-    return text if len(text) <= most else f"{text[:most]}..."
+    """Text that can be printed, cut off where it gets long."""
+    printed = text[: most + 1].encode(errors="backslashreplace").decode()
+    return printed if len(text) <= most else f"{printed[:most]}..."
 
 
 def listed(names: Iterable[str]) -> str:

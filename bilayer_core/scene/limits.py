@@ -22,7 +22,7 @@ MOST_VALUES = 200_000
 DEEPEST = 50
 """Lists and mappings inside each other; scenes need nine."""
 TOO_DEEP = f"has lists and mappings more than {DEEPEST} deep inside each other; no scene needs that"
-MOST_COPIES = 2_000
+MOST_COPIES = 1_000
 """Rods of a pattern, and of a scene."""
 MOST_NODES = 200_000
 """Of all layers of all rods."""
@@ -70,7 +70,7 @@ def read_text(path: Path, largest: int) -> str:
 
 
 def check_content(data: Any, source: str) -> None:
-    """Raise SceneError if the content of a scene is too deep or too large, or contains itself."""
+    """Raise SceneError if the content of a scene is too deep or too large, contains itself, or has unwritable text."""
     count, level = 0, [data]
     for _ in range(DEEPEST + 1):
         inside: list[Any] = []
@@ -78,6 +78,7 @@ def check_content(data: Any, source: str) -> None:
             entries = _entries(item)
             count += len(entries)
             inside += [entry for entry in entries if isinstance(entry, Mapping | list | tuple)]
+            _refuse_unwritable([entry for entry in entries if isinstance(entry, str)], source)
             if count > MOST_VALUES:
                 raise SceneError(
                     f"{source}: has more than {MOST_VALUES} values, aliases written out, which is the most that is "
@@ -87,6 +88,15 @@ def check_content(data: Any, source: str) -> None:
             return
         level = inside
     raise SceneError(f"{source}: {TOO_DEEP}")
+
+
+def _refuse_unwritable(texts: list[str], source: str) -> None:
+    """Raise SceneError if a text cannot be written to any file: one half of a pair of surrogates."""
+    for text in texts:
+        try:
+            text.encode()
+        except UnicodeEncodeError as error:
+            raise SceneError(f"{source}: the text {shortened(text)!r} is not UTF-8: {error.reason}") from None
 
 
 def _entries(item: Any) -> list[Any]:

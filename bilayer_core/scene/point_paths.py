@@ -172,6 +172,7 @@ def faults_of_points(path: PointPath) -> list[Fault]:
         if _are_one(before, after)
     ]
     faults += _faults_of_gap(path) if path.closed and not faults else ()
+    faults += () if faults else _faults_of_spacing(path)
     if path.normals is not None and len(path.normals) != count:
         faults.append((("normals",), f"{len(path.normals)} entries", f"must be as many as points, {count}"))
     if faults:
@@ -215,6 +216,17 @@ def _faults_of_gap(path: PointPath) -> list[Fault]:
         return []
     demand = f"must be the first point or well apart from it: the path does not close by {gap:.3g} m"
     return [(("points", path.own_points - 1), own[-1], demand)]
+
+
+def _faults_of_spacing(path: PointPath) -> list[Fault]:
+    """Whether a point is so near to the one before it that no curve is smooth through all of them."""
+    spaces = [math.dist(before, after) for before, after in pairwise(path.points[: path.own_points])]
+    largest, least = max(spaces), min(spaces)
+    if least >= ROUNDING * largest:
+        return []
+    index = 1 + spaces.index(least)
+    demand = f"must be {ROUNDING * largest:g} m or more from the point before it: others are {largest:g} m apart"
+    return [(("points", index), path.points[index], demand)]
 
 
 def _rounded(vector: Array) -> str:

@@ -78,6 +78,10 @@ def read_yaml(text: str, source: str) -> Any:
         occurs twice.
     """
     try:
+        data = text.encode()
+    except UnicodeEncodeError as error:
+        raise SceneError(f"{source}: is not UTF-8 text: {error.reason} at character {error.start + 1}") from None
+    try:
         _refuse_deep(text, source)
         return yaml.load(text, _Reader)
     except yaml.MarkedYAMLError as error:
@@ -86,6 +90,13 @@ def read_yaml(text: str, source: str) -> Any:
         if "another document" in str(error.problem):
             raise SceneError(f"{source}{place}: begins another document; a scene is a single one") from None
         raise SceneError(f"{source}{place}: is not readable YAML: {_problem(error)}") from None
+    except yaml.reader.ReaderError as error:
+        before = text[: error.position] if _Base is yaml.SafeLoader else data[: error.position].decode(errors="ignore")
+        line, column = before.count("\n") + 1, len(before) - before.rfind("\n")
+        character = error.character if isinstance(error.character, int) else ord(error.character)
+        raise SceneError(
+            f"{source}:{line}:{column}: is not readable YAML: the character U+{character:04X} is not allowed"
+        ) from None
     except (yaml.YAMLError, RecursionError) as error:
         raise SceneError(f"{source}: is not readable YAML: {' '.join(str(error).split())}") from None
 

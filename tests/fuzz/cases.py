@@ -125,7 +125,7 @@ class Mutator(Drawer):
         if paths:
             path = self.one(paths)
             at(self.scene, path[:-1])[path[-1]] = self.one(
-                (0, 1, 2, 3, 4, 5, 50, 999, 2000, 2001, 20_000, 10**5, 10**6, 2**53)
+                (0, 1, 2, 3, 4, 5, 50, 999, 1000, 1001, 20_000, 10**5, 10**6, 2**53)
             )
 
     def deleted(self) -> None:
@@ -313,7 +313,8 @@ def overrides(draw) -> Case:
             value = mutator.one(ODD)
         text = value if isinstance(value, str) else written(value, in_line=True)
         if not valid:
-            text = mutator.one((text, text, text, "[" + text, "{a: " + text + "}", f"!!int {text}"))
+            odd = "[" + text, "{a: " + text + "}", f"!!int {text}", f"{text}\udcff"
+            text = mutator.one((text, text, text, *odd))
         dot, equals = mutator.one((".",) * 8 + ("..", "/")), mutator.one(("=",) * 9 + ("",))
         given.append(f"{dot.join(keys)}{equals}{text}")
     return Case(written(mutator.scene), tuple(given), draw(st.booleans()))

@@ -47,7 +47,8 @@ def keep(name: str, case: Case, outcome: Outcome) -> Path:
     path.write_bytes(case.text.encode("utf-8", "surrogatepass"))
     changes = " ".join(f"--set {shlex.quote(override)}" for override in case.overrides)
     json = " --json" if case.as_json else ""
-    path.with_suffix(".txt").write_text(f"bilayer check {path}{json} {changes}\n\n{outcome.message}")
+    told = f"bilayer check {path}{json} {changes}\n\n{outcome.message}"
+    path.with_suffix(".txt").write_text(told, errors="surrogateescape")
     return path
 
 
