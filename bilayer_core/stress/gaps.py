@@ -11,7 +11,8 @@ half edges. All pairs are looked at, without lists of near ones; distances are c
 
 A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
 look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
-than half way inside another in between has *crossed* it.
+than half way inside another in between has *crossed* it. What moves in one step by more than twelve times its size goes
+another way than the straight one: of that nothing is said.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ Array = np.ndarray
 MOST_PAIRS = 45_000
 """Pairs of edges that every step is checked for: those of 300 nodes."""
 MOST_PARTS = 24
-"""Into which the way of a step is cut."""
+"""Into which the way of a step is cut at most."""
 LARGEST_TURN = 0.3
 """Of a surface from look to look [rad], up to which straight lines stand for the ways about it."""
 DEEP = 0.5
@@ -113,25 +114,29 @@ class GapCheck:
         if before is None:
             return ""
         turns = zip(before.surface_rotation, at.surface_rotation, strict=True)
-        turned = max((_angle(one.T @ other) for one, other in turns), default=0.0)
-        moved = max(_largest(b - a) for a, b in zip(list(vars(before).values())[:3], vars(at).values(), strict=False))
-        smallest = min([self._smallest_radius, *(s.smallest for s in self._surfaces)])
-        parts = math.ceil(moved / (0.5 * smallest))
-        if parts < 2 or turned > LARGEST_TURN:
+        if max((_angle(one.T @ other) for one, other in turns), default=0.0) > LARGEST_TURN:
             return ""
+        rods = _parts(_largest(at.nodes - before.nodes), self._smallest_radius) if len(self._first) else 0
+        points, positions = at.points - before.points, at.surface_position - before.surface_position
+        surfaces = [
+            _parts(_largest(points[surface.points] - way), surface.smallest)
+            for surface, way in zip(self._surfaces, positions, strict=True)
+        ]
         ends = list(zip(vars(before).values(), vars(at).values(), strict=True))
-        for part in np.linspace(0.0, 1.0, min(parts, MOST_PARTS) + 1)[1:-1]:
-            if found := self._deep(Moment(*(a + part * (b - a) for a, b in ends))):
+        for part in np.linspace(0.0, 1.0, max([rods, *surfaces]) + 1)[1:-1]:
+            between = Moment(*(a + part * (b - a) for a, b in ends))
+            if found := self._deep(between, rods > 1, [parts > 1 for parts in surfaces]):
                 return found
         return ""
 
-    def _deep(self, at: Moment) -> str:
-        if len(self._first):
+    def _deep(self, at: Moment, with_rods: bool, with_surfaces: list[bool]) -> str:
+        if with_rods:
             radii = self._edge_radius[self._first] + self._edge_radius[self._second]
             if (self._rod_gaps(at.nodes) < -DEEP * radii).any():
                 return "a rod passed through a rod"
-        for surface, gap in zip(self._surfaces, self._surface_gaps(at), strict=True):
-            if gap.size and float(gap.min()) < -DEEP * surface.smallest:
+        gaps = self._surface_gaps(at)
+        for surface, gap, wanted in zip(self._surfaces, gaps, with_surfaces, strict=True):
+            if wanted and gap.size and float(gap.min()) < -DEEP * surface.smallest:
                 return f"something passed through {surface.name}"
         return ""
 
@@ -174,6 +179,12 @@ def from_segment(p: Array, a: Array, b: Array) -> Array:
     along = b - a
     t = np.clip(((p - a) * along).sum(1) / np.maximum((along * along).sum(1), 1e-300), 0.0, 1.0)
     return np.linalg.norm(p - a - t[:, None] * along, axis=1)
+
+
+def _parts(way: float, size: float) -> int:
+    """Into how many a way is cut that could pass through something of a size [m]; 0 if they would be too many."""
+    parts = math.ceil(way / (0.5 * size))
+    return parts if parts <= MOST_PARTS else 0
 
 
 def _largest(way: Array) -> float:
