@@ -22,6 +22,12 @@ class InputError(BilayerError):
     """Another input is not acceptable: a path, a command-line value, a stimulus, a saved state."""
 
 
+class OutputError(BilayerError):
+    """An output that could be begun could not be written: the disk is full, or fails."""
+
+    exit_code = 3
+
+
 class PenetrationError(SceneError):
     """A scene starts with a node behind a surface, or nearer to it than can be resolved."""
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..converge.order import LEAST_ORDER, SAFETY_WITH_ORDER, SAFETY_WITHOUT
 from ..errors import InputError, SimulationError
+from ..record.paths import write_text
 from ..scene.bundled import bundled_scene
 from ..scene.loader import read_scene_file
 from ..scene.text import read_yaml
@@ -178,7 +179,4 @@ def _write(content: dict) -> None:
             ]
             entries.append(f"  {json.dumps(model)}: {{\n" + ",\n".join(lines) + "\n  }")
         problems.append(f" {json.dumps(problem)}: {{\n" + ",\n".join(entries) + "\n }")
-    try:
-        FILE.write_text("{\n" + ",\n".join(problems) + "\n}\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{FILE}: cannot be written: {error.strerror or error}") from error
+    write_text(FILE, "{\n" + ",\n".join(problems) + "\n}\n", force=True)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 
 from ..errors import InputError
+from ..record.paths import write_text
 from . import machine
 
 SCHEMA = 1
@@ -79,9 +79,4 @@ class Results:
     def write(self) -> None:
         """Replace the file as a whole: an interruption leaves the old one or the new one."""
         self.content["ended"] = machine.now()
-        draft = self.path.with_suffix(".json.part")
-        try:
-            draft.write_text(json.dumps(self.content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-            os.replace(draft, self.path)
-        except OSError as error:
-            raise InputError(f"{self.path}: cannot be written: {error.strerror or error}") from error
+        write_text(self.path, json.dumps(self.content, indent=1, allow_nan=False) + "\n", force=True)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..errors import InputError
 from ..model.plan import RECOMMENDED, make_plan
+from ..record.paths import draft_of
 from . import cantilever, pareto, scaling, start, work_precision
 from .configurations import Family
 from .problems import PROBLEMS
@@ -226,11 +226,8 @@ def _rows(file, columns: list[str], records: list[dict]) -> None:
 
 
 def _write(path: Path, fill: Callable) -> None:
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            fill(file)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with draft_of(path, force=True) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        fill(file)
 
 
 def recommendation(content: dict) -> Family | None:

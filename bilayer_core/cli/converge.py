@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 from typing import Any
 
 import click
 
 from bilayer_core.cli.options import Duration, Verb, scene_argument, set_option
 from bilayer_core.cli.watch import compile_kernels
-from bilayer_core.errors import InputError
 
 
 @click.command(cls=Verb)
@@ -33,12 +31,12 @@ def converge(
 ) -> None:
     """Run SCENE at twice and half its time step, with half and twice its edges: observed orders and error bars."""
     from bilayer_core.converge import study
-    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.record.paths import check_output_path, write_text
     from bilayer_core.scene.loader import load_scene
 
     config = load_scene(scene, overrides)
     if json_file:
-        check_output_path(json_file, force=True)
+        check_output_path(json_file, force=True, suffix=".json")
     runs = len(study.planned_runs(config))
     done = 0
 
@@ -55,10 +53,7 @@ def converge(
     for name, reason in found.missing.items():
         click.echo(f"  {name}: {reason}")
     if json_file:
-        try:
-            Path(json_file).write_text(json.dumps(_content(config.name, found), indent=2) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"{json_file}: cannot be written: {error.strerror or error}") from error
+        write_text(json_file, json.dumps(_content(config.name, found), indent=2) + "\n", force=True)
 
 
 def _print_table(rows: list) -> None:

@@ -53,8 +53,9 @@ def view(file: str, web: bool, save: str | None, picture: str | None, moment: fl
         raise InputError("--time: is the time of a picture; give --screenshot FILE.png as well")
     if save and file.endswith(".rrd"):
         raise InputError(f"--save: {file} is a rerun recording already")
-    for path in filter(None, (save, picture)):
-        check_output_path(path, force)
+    for path, suffix in ((save, ".rrd"), (picture, ".png")):
+        if path:
+            check_output_path(path, force, suffix)
     if save:
         convert_log(file, save)
         click.echo(f"recording  {save}")

@@ -28,7 +28,7 @@ class NewVerb(Verb):
 def new(file: str, template: str | None, origin: str | None, force: bool) -> None:
     """Write a scene to start from: complete, with comments, ready to run."""
     from bilayer_core.errors import InputError
-    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.record.paths import check_output_path, write_text
     from bilayer_core.scene.new import DEFAULT_TEMPLATE, new_scene
 
     if template is not None and origin is not None:
@@ -36,9 +36,6 @@ def new(file: str, template: str | None, origin: str | None, force: bool) -> Non
     path = Path(file)
     text = new_scene(path, template or DEFAULT_TEMPLATE, origin)
     check_output_path(path, force)
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    write_text(path, text, force)
     click.echo(f"{path}: a scene to start from, like {origin or template or DEFAULT_TEMPLATE}")
     click.echo(f"next: bilayer check {path}")

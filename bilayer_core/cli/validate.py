@@ -42,7 +42,7 @@ def validate(out: str | None, json_file: str | None, only: str | None, quick: bo
     if json_file:
         from bilayer_core.record.paths import check_output_path
 
-        check_output_path(json_file, force=True)
+        check_output_path(json_file, force=True, suffix=".json")
     compile_kernels(quiet=False)
     _print_line(("case", "computed", "reference", "error", "limit", ""), "bold")
     results = register.run(cases, _print_result)

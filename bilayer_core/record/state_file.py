@@ -9,25 +9,20 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.record.paths import draft_of
 from bilayer_core.simulation.frame import Description
 
 LOG_SUFFIX = ".mcap"
 
 
-def write_state(path: str | Path, state: np.ndarray, description: Description) -> None:
+def write_state(path: str | Path, state: np.ndarray, description: Description, force: bool = True) -> None:
     """Write a flat state with the layout and the scene that it belongs to, as numpy's ``.npz``.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Parameters and errors are those of `draft_of`.
     """
-    try:
-        with open(path, "wb") as file:
-            layout = json.dumps(description.state_layout)
-            np.savez(file, state=state, layout=np.array(layout), scene=np.array(description.scene_text))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    layout = json.dumps(description.state_layout)
+    with draft_of(path, force) as draft, open(draft, "wb") as file:
+        np.savez(file, state=state, layout=np.array(layout), scene=np.array(description.scene_text))
 
 
 def read_saved_state(path: str | Path, description: Description) -> np.ndarray:
@@ -39,7 +34,7 @@ def read_saved_state(path: str | Path, description: Description) -> np.ndarray:
         If the file cannot be read, or its state has other parts than those of `description`.
     """
     path = Path(path)
-    if path.suffix == LOG_SUFFIX:
+    if path.suffix.lower() == LOG_SUFFIX:
         from bilayer_core.record.log_reader import read_description, read_state
 
         saved, state = read_description(path).state_layout, read_state(path)[0]

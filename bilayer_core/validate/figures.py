@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..record.paths import draft_of
 from ..scene.config import Coupling
 from . import bending, helix, laminate
 from .case import Case
@@ -161,10 +162,8 @@ def figure_of(rows: int, columns: int, size: tuple[float, float], **axes):
 
 
 def save(figure, path: Path) -> None:
-    try:
-        figure.savefig(path, dpi=DPI)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with draft_of(path, force=True) as draft:
+        figure.savefig(draft, dpi=DPI)
 
 
 FIGURES = (

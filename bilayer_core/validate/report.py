@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-from ..errors import InputError
+from ..record.paths import draft_of, write_text
 from .case import Result
 
 NOTHING = 1e-8
@@ -18,23 +18,20 @@ NOTHING = 1e-8
 def write_json(results: Sequence[Result], path: Path) -> None:
     """``{"cases": [{case, computed, reference, error, limit, pass, …}, …]}``."""
     text = json.dumps({"cases": [result.record() for result in results]}, indent=2, allow_nan=False)
-    _write(path, text + "\n")
+    write_text(path, text + "\n", force=True)
 
 
 def write_csv(results: Sequence[Result], path: Path) -> None:
     """The same, a line each."""
-    try:
-        with path.open("w", newline="", encoding="utf-8") as file:
-            table = csv.DictWriter(file, list(results[0].record()))
-            table.writeheader()
-            table.writerows(result.record() for result in results)
-    except OSError as error:
-        raise _unwritable(path, error) from error
+    with draft_of(path, force=True) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, list(results[0].record()))
+        table.writeheader()
+        table.writerows(result.record() for result in results)
 
 
 def write_page(results: Sequence[Result], path: Path) -> None:
     """Tables in Markdown, one a family."""
-    _write(path, page(results))
+    write_text(path, page(results), force=True)
 
 
 def page(results: Sequence[Result]) -> str:
@@ -78,14 +75,3 @@ def shown_error(error: float) -> str:
     if not math.isfinite(error):
         return "–"
     return f"1e{math.ceil(math.log10(max(error, NOTHING))):d}"
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise _unwritable(path, error) from error
-
-
-def _unwritable(path: Path, error: OSError) -> InputError:
-    return InputError(f"{path}: cannot be written: {error.strerror or error}")

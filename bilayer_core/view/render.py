@@ -15,6 +15,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
+from bilayer_core.record.paths import draft_of
 from bilayer_core.view.rerun_view import require_rerun
 from bilayer_core.view.scales import SHOWN_SLOPE, choose_scales, seen_from, visible_points
 
@@ -61,7 +62,8 @@ class Studio:
             directory = tempfile.mkdtemp(prefix="bilayer_render_")
             stack.callback(shutil.rmtree, directory, ignore_errors=True)
             recording = Path(directory) / "run.rrd"
-            write_recording(self._run, recording, partial(robot_alone, reactions=self._reactions))
+            with draft_of(recording, force=True) as draft:
+                write_recording(self._run, draft, partial(robot_alone, reactions=self._reactions))
             self._scales = choose_scales(self._run)
             self._viewer = stack.enter_context(HeadlessViewer(WINDOW_SIZE))
             self._viewer.open(recording)

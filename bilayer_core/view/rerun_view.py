@@ -11,16 +11,19 @@ from pathlib import Path
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.memory import MemoryRecorder
-from bilayer_core.record.paths import check_output_path
+from bilayer_core.record.paths import check_output_path, draft_of
 from bilayer_core.record.run_data import RunData
 
+RRD_SUFFIX = ".rrd"
 
-def write_rrd(run: RunData, rrd_path: str | Path) -> None:
-    """Write a run as a rerun recording with its layout inside. An existing file is replaced."""
+
+def write_rrd(run: RunData, rrd_path: str | Path, force: bool = True) -> None:
+    """Write a run as a rerun recording with its layout inside; with `force` an existing file is replaced."""
     require_rerun()
     from bilayer_core.view.rrd_writer import write_recording
 
-    write_recording(run, rrd_path)
+    with draft_of(rrd_path, force) as draft:
+        write_recording(run, draft)
 
 
 def convert_log(mcap_path: str | Path, rrd_path: str | Path) -> None:
@@ -51,13 +54,14 @@ class RrdRecorder(MemoryRecorder):
     def __init__(self, path: str | Path, rate: float = 50.0, force: bool = False):
         super().__init__(rate)
         require_rerun()
-        self.path = check_output_path(path, force)
+        self.path = check_output_path(path, force, RRD_SUFFIX)
+        self._force = force
 
     def close(self, complete: bool, termination: str = "") -> None:
         """Write the recording, also of a run that ended early."""
         super().close(complete, termination)
         if self.frames:
-            write_rrd(self.run_data(), self.path)
+            write_rrd(self.run_data(), self.path, self._force)
 
 
 def open_viewer(path: str | Path, web: bool = False) -> None:
@@ -77,20 +81,18 @@ def screenshot(path: str | Path, png_path: str | Path, time: float | None = None
     require_rerun()
     from bilayer_core.view.viewer_process import take_picture
 
-    check_output_path(png_path, force=True)
+    check_output_path(png_path, force=True, suffix=".png")
     with _as_recording(path) as recording:
         picture = take_picture(recording, time)
-    try:
-        Path(png_path).write_bytes(picture)
-    except OSError as error:
-        raise InputError(f"{png_path}: cannot be written: {error.strerror or error}") from error
+    with draft_of(png_path, force=True) as draft:
+        draft.write_bytes(picture)
 
 
 @contextmanager
 def _as_recording(path: str | Path) -> Iterator[Path]:
     """The file itself, or the recording that a log was converted to, deleted afterwards."""
     path = Path(path)
-    if path.suffix == ".rrd":
+    if path.suffix.lower() == RRD_SUFFIX:
         if not path.is_file():
             raise InputError(f"{path}: there is no such file")
         yield path.resolve()

@@ -33,15 +33,20 @@ Layout = Callable[[RunData, Scales], rrb.Blueprint]
 
 
 def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = blueprint) -> None:
-    """Write `run` to an ``.rrd`` file. InputError if the run holds no frame, or the file cannot be written."""
+    """Write `run` to an ``.rrd`` file; InputError if it holds no frame, OSError if the file cannot be written."""
     if not len(run.times) or not len(run.shape_times):
         raise InputError(f"{run.description.scene_name}: the run holds no frame, there is nothing to show")
     scales = choose_scales(run)
     recording = rr.RecordingStream("bilayer_sim")
-    try:
-        recording.save(str(rrd_path), default_blueprint=layout(run, scales))
-    except RuntimeError as error:
-        raise InputError(f"{rrd_path}: cannot be written: {error}") from error
+    memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
+    recording.send_blueprint(layout(run, scales), make_active=False, make_default=True)
+    _send(recording, run, scales)
+    Path(rrd_path).write_bytes(memory.drain_as_bytes())
+    recording.disconnect()
+
+
+def _send(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+    """All of a run."""
     recording.send_recording_name(f"{run.description.scene_name}: {run.description.title}")
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     recording.log("summary", rr.TextDocument(summary(run, scales), media_type="text/markdown"), static=True)
@@ -54,8 +59,6 @@ def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = bluepri
     for name, arrows in reaction_arrows(run, scales).items():
         _send_arrows(recording, f"world/{name}", REACTION_COLOURS[name], arrows, scales)
     _send_series(recording, run)
-    recording.flush()
-    recording.disconnect()
 
 
 def _chunks(count: int):

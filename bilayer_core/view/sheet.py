@@ -7,7 +7,7 @@ from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont
 
-from bilayer_core.errors import InputError
+from bilayer_core.record.paths import draft_of
 from bilayer_core.view.layout import BACKGROUND
 
 SHEET_WIDTH = 1120  # of a sheet, at most [pixels]
@@ -62,7 +62,7 @@ def put_together(pictures: list[Image.Image], times: list[float], footer: str) -
 
 
 def save_png(picture: Image.Image, path: str | Path) -> None:
-    """Write a picture. InputError if it cannot be written."""
+    """Write a picture; OutputError if it cannot be written."""
     _save(picture, path, optimize=True)
 
 
@@ -80,7 +80,5 @@ def save_gif(pictures: list[Image.Image], times: list[float], path: str | Path) 
 
 
 def _save(picture: Image.Image, path: str | Path, **options: object) -> None:
-    try:
-        picture.save(path, **options)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with draft_of(path, force=True) as draft:
+        picture.save(draft, **options)

@@ -30,8 +30,8 @@ ALLOWED = {
     "view": NUMERICS | {"record"},
     "converge": NUMERICS,
     "beam2d": {"errors", "scene", "model"},
-    "validate": NUMERICS | {"beam2d"},
-    "bench": NUMERICS | {"converge", "validate"},
+    "validate": NUMERICS | {"beam2d", "record"},
+    "bench": NUMERICS | {"converge", "record", "validate"},
     "stress": NUMERICS | {"converge", "validate", "bench"},
     "cli": NUMERICS | {"record", "view", "converge", "validate", "bench", "stress"},
 }
