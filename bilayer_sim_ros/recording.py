@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.simulation.frame import Description, Frame
+from bilayer_core.simulation.observers import first_failure
 
 RRD_ENDING = ".rrd"
 
@@ -78,6 +79,4 @@ class Recording:
 
     def close(self, complete: bool, termination: str) -> None:
         """Finish all files, each even if another cannot be."""
-        with ExitStack() as stack:
-            for recorder in self._recorders:
-                stack.callback(recorder.close, complete, termination)
+        first_failure(partial(recorder.close, complete, termination) for recorder in self._recorders)

@@ -18,7 +18,8 @@ from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64
-from bilayer_core.record.paths import check_output_path
+from bilayer_core.record.lock import open_alone, refuse_file_in_use
+from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
 from bilayer_core.record.topics import DisplayGate, Rate, stimulus_topics
 from bilayer_core.simulation.frame import Description, Frame
@@ -27,6 +28,7 @@ CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the 
 FLUSH_PERIOD = 0.5  # longest time a message waits for its chunk to be written [s of wall time]
 SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
+SUFFIX = ".mcap"
 SCENE_ATTACHMENT = "scene.yaml"
 
 
@@ -50,26 +52,37 @@ class McapRecorder:
     Raises
     ------
     InputError
-        At once, before any simulation: the directory is missing or not writable, or the file exists.
+        At once, before any simulation: the name does not end in ``.mcap``, the directory is missing or not writable,
+        the file exists, or with `force` another program is writing it.
     """
 
     def __init__(self, path: str | Path, rate: float = 50.0, marker_rate: float = 20.0, force: bool = False):
-        self.path = check_output_path(path, force)
+        self.path = check_output_path(path, force, SUFFIX)
+        refuse_file_in_use(self.path)
         self.rate = rate
         self._gate = DisplayGate(rate, marker_rate)
-        self._mode = "wb" if force else "xb"
+        self._force = force
         self._channels: tuple[str, ...] = ()
         self._last_time = 0.0
         self._queue: queue.Queue = queue.Queue(QUEUE_LENGTH)
         self._thread: threading.Thread | None = None
         self._failure: Exception | None = None
+        self._kept: float | None = None
 
     def start(self, description: Description) -> None:
-        """Open the file; write scene and settings, and flush them."""
+        """Open the file; write scene and settings, and flush them.
+
+        Raises
+        ------
+        InputError
+            If another program has begun to write the file.
+        OutputError
+            If it cannot be written; nothing is left then.
+        """
         try:
-            log = _LogFile(self.path, self._mode, description, self._gate)
+            log = _LogFile(self.path, self._force, description, self._gate)
         except OSError as error:
-            raise InputError(f"{self.path}: cannot be written: {error.strerror or error}") from error
+            raise unwritable(self.path, error) from error
         self._channels = description.channels
         # A daemon, so that a program that ends without `close` is not kept alive; its log is then cut off.
         self._thread = threading.Thread(target=self._write, args=(log,), name="mcap log", daemon=True)
@@ -77,8 +90,8 @@ class McapRecorder:
 
     def observe(self, frame: Frame) -> None:
         """Hand a frame to the writer; waits when the writer is behind. Raises SimulationError once writing failed."""
-        self._last_time = frame.time
         self._put(frame)
+        self._last_time = frame.time
 
     def log_stimulus(self, channel: str, value: float, time: float) -> None:
         """Log a stimulus set from outside at the time [s] from which it acts."""
@@ -124,36 +137,54 @@ class McapRecorder:
     def _raise_failure(self) -> None:
         if isinstance(self._failure, OSError):
             reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}"
-            raise SimulationError(reason, self._last_time) from self._failure
+            raise SimulationError(f"{reason}; {self._what_is_kept()}", self._last_time) from self._failure
         if self._failure is not None:
             raise self._failure
 
+    def _what_is_kept(self) -> str:
+        """After a failure."""
+        if not self.path.is_file():
+            return "nothing of it is kept"
+        if self._kept is None:
+            return "it holds no whole frame"
+        return f"it can be read up to t = {self._kept:.6g} s ({self.path.stat().st_size / 1e6:.3g} MB)"
+
     def _write(self, log: _LogFile) -> None:
         """The writer's thread: until the ending comes or something fails, which the other thread then raises."""
-        try:
+        failure = None
+        for work in (lambda: self._write_all(log), log.close):
             try:
-                while True:
-                    try:
-                        item = self._queue.get(timeout=log.time_to_flush())
-                    except queue.Empty:
-                        log.flush()
-                        continue
-                    if isinstance(item, dict):
-                        log.finish(item)
-                        return
-                    log.write(item)
-                    if log.time_to_flush() == 0.0:
-                        log.flush()
-            finally:
-                log.close()
-        except Exception as error:
-            self._failure = error
+                work()
+            except Exception as error:
+                failure = failure or error  # what fails after that, such as to close the file, follows from it
+        self._kept = log.kept
+        self._failure = failure
+
+    def _write_all(self, log: _LogFile) -> None:
+        while True:
+            try:
+                item = self._queue.get(timeout=log.time_to_flush())
+            except queue.Empty:
+                log.flush()
+                continue
+            if isinstance(item, dict):
+                log.finish(item)
+                return
+            log.write(item)
+            if log.time_to_flush() == 0.0:
+                log.flush()
 
 
 class _LogFile:
-    """The file itself, used by one thread at a time."""
+    """The file itself, used by one thread at a time.
 
-    def __init__(self, path: Path, mode: str, description: Description, gate: DisplayGate):
+    Attributes
+    ----------
+    kept : float or None
+        Time of the last frame that was handed to the system [s].
+    """
+
+    def __init__(self, path: Path, force: bool, description: Description, gate: DisplayGate):
         import mcap
         from mcap.writer import CompressionType, Writer
 
@@ -161,13 +192,15 @@ class _LogFile:
 
         self._gate = gate
         self._encoder = FrameEncoder(description)
-        self._file = open(path, mode)
+        self._file = open_alone(path, force)
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.LZ4)
         self._sequence = 0
         self._unflushed_since: float | None = None
         self._synced = clock.monotonic()
+        self.kept = self._last_written = None
         with ExitStack() as undo:
             undo.callback(self._file.close)
+            undo.callback(_delete, path)
             used = {**versions(), "mcap": mcap.__version__}
             self._writer.start(profile="ros2", library=f"bilayer_sim_ros {used['bilayer_sim_ros']}")
             scene = description.scene_text.encode()
@@ -199,6 +232,7 @@ class _LogFile:
                 if display or spec.rate is not Rate.DISPLAY:
                     self._add(spec.name, stamp, self._encoder.encode(spec.name, item))
             self._sequence += 1
+            self._last_written = item.time
         if self._unflushed_since is None:
             self._unflushed_since = clock.monotonic()
 
@@ -215,6 +249,7 @@ class _LogFile:
         """Write the chunk in hand; every second also to the disk."""
         self._writer.flush()
         self._unflushed_since = None
+        self.kept = self._last_written
         if clock.monotonic() - self._synced >= SYNC_PERIOD - FLUSH_PERIOD:
             self._sync()
 
@@ -227,6 +262,7 @@ class _LogFile:
     def finish(self, ending: dict[str, str]) -> None:
         """Write the metadata ``run`` and the file's index."""
         self._writer.flush()
+        self.kept = self._last_written
         self._writer.add_metadata("run", ending)
         self._writer.finish()
         self._file.flush()
@@ -235,3 +271,9 @@ class _LogFile:
     def close(self) -> None:
         """Close the file as it is."""
         self._file.close()
+
+
+def _delete(path: Path) -> None:
+    """Delete a file, but no device or pipe."""
+    if path.is_file():
+        path.unlink()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Protocol
 
 from ..engine import step_size
@@ -83,13 +83,42 @@ class Schedule:
             self._observers[i].observe(frame)
             self._last_seen[i] = frame.time
 
-    def finish(self, complete: bool, termination: str) -> None:
-        """Show the last frame to whom it is missing, and close all, whatever goes wrong with one of them."""
-        if not self._observers:
-            return
-        with ExitStack() as closing:
-            for observer in reversed(self._observers):
-                closing.callback(observer.close, complete, termination)
-            missing = [i for i, seen in enumerate(self._last_seen) if seen not in (None, self._simulator.time)]
-            if missing:
-                self._show(missing)
+    def finish(self, complete: bool, termination: str, failure: BaseException | None = None) -> None:
+        """Show the last frame to whom it is missing, and close all, whatever goes wrong with one of them.
+
+        Parameters
+        ----------
+        complete, termination
+            As in `Observer.close`.
+        failure : BaseException, optional
+            What ended the run; see `first_failure`.
+        """
+        work: list[Callable[[], None]] = [
+            partial(self._show, [i])
+            for i, seen in enumerate(self._last_seen)
+            if seen not in (None, self._simulator.time)
+        ]
+        work += [partial(observer.close, complete, termination) for observer in self._observers]
+        first_failure(work, failure)
+
+
+def first_failure(work: Iterable[Callable[[], None]], failure: BaseException | None = None) -> None:
+    """Do all, each whatever goes wrong with another; raise what went wrong first, with notes of what did after that.
+
+    Parameters
+    ----------
+    work : iterable of callable
+    failure : BaseException, optional
+        Went wrong before; it gets the notes, and is not raised.
+    """
+    before = failure
+    for do in work:
+        try:
+            do()
+        except Exception as error:
+            if failure is None:
+                failure = error
+            elif str(error) != str(failure):
+                failure.add_note(str(error))
+    if failure is not before:
+        raise failure

@@ -427,7 +427,8 @@ class Simulator:
         Raises
         ------
         SimulationError
-            If a step cannot be made. Observers have then seen the last accepted frame and are closed.
+            If a step cannot be made, or a log not written. Observers have then seen the last accepted frame and are
+            closed; what goes wrong with that is a note to the error.
         """
         left = self.scene.duration - self.time if duration is None else duration
         if not (math.isfinite(left) and left >= 0.0):
@@ -456,12 +457,14 @@ class Simulator:
             else:
                 termination = Termination.COMPLETED
                 self._look_out(0, last=True)
-        except SimulationError:
-            termination = Termination.FAILED
-            raise
-        finally:
+        except BaseException as failure:
+            if isinstance(failure, Exception):
+                termination = Termination.FAILED
             self.termination = termination.value
-            schedule.finish(termination is Termination.COMPLETED, termination.value)
+            schedule.finish(False, termination.value, failure)
+            raise
+        self.termination = termination.value
+        schedule.finish(termination is Termination.COMPLETED, termination.value)
         done = int(self._state.step[0] - before)
         return RunResult(
             termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall

@@ -1,12 +1,12 @@
 """Logs: written whole, cut off by a kill, refused, and on a disk that fails."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import fields
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError, OutputError, SimulationError
 from bilayer_core.record import mcap_log
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
@@ -237,8 +237,11 @@ def test_bad_paths_are_refused_before_anything_is_computed(tmp_path):
         McapRecorder(existing)
     with pytest.raises(InputError, match=r"there is no directory .*missing"):
         McapRecorder(tmp_path / "missing" / "run.mcap")
+    (tmp_path / "folder.mcap").mkdir()
     with pytest.raises(InputError, match="is a directory"):
-        McapRecorder(tmp_path, force=True)
+        McapRecorder(tmp_path / "folder.mcap", force=True)
+    with pytest.raises(InputError, match=r"run\.log: must end in \.mcap"):
+        McapRecorder(tmp_path / "run.log")
     assert existing.read_bytes() == b"precious"
 
 
@@ -251,9 +254,11 @@ def test_force_replaces_a_file_when_the_run_starts_and_not_before(tmp_path):
     assert read_info(path).complete
 
 
-def test_a_full_disk_surfaces_as_an_error_of_the_run():
-    recorder = McapRecorder(Path("/dev/full"), force=True)
-    with pytest.raises((InputError, SimulationError), match="/dev/full.*No space left on device"):
+def test_a_full_disk_surfaces_as_an_error_of_the_run(tmp_path):
+    path = tmp_path / "full.mcap"
+    path.symlink_to("/dev/full")
+    recorder = McapRecorder(path, force=True)
+    with pytest.raises((OutputError, SimulationError), match="full.mcap.*No space left on device"):
         recorder.start(synthetic_run.description())
         for moment in TIMES:
             recorder.observe(synthetic_run.frame(float(moment)))
@@ -277,7 +282,7 @@ class FullDisk:
 
 
 def test_a_disk_that_fills_up_stops_the_run_and_is_told_again_at_the_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(mcap_log, "open", lambda path, mode: FullDisk(path.open(mode), 300_000), raising=False)
+    monkeypatch.setattr(mcap_log, "open_alone", lambda path, force: FullDisk(path.open("xb"), 300_000))
     recorder = McapRecorder(tmp_path / "run.mcap")
     recorder.start(synthetic_run.description())
     with pytest.raises(SimulationError, match=r"run\.mcap could not be written: No space left") as raised:
@@ -286,7 +291,8 @@ def test_a_disk_that_fills_up_stops_the_run_and_is_told_again_at_the_end(tmp_pat
     assert raised.value.exit_code == 3
     with pytest.raises(SimulationError, match="No space left"):
         recorder.close(False)
-    assert len(read_log(tmp_path / "run.mcap").times) > 0
+    kept = float(re.search(r"it can be read up to t = (\S+) s", str(raised.value))[1])
+    assert 0.0 < kept <= read_log(tmp_path / "run.mcap").times[-1]
 
 
 def test_a_log_whose_directory_disappears_is_reported(tmp_path):
