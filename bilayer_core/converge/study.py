@@ -8,13 +8,13 @@ Adaptive steps are halved and doubled by their tolerance: their length goes as i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
 
 import numpy as np
 
 from bilayer_core.converge.order import Estimate, estimate
+from bilayer_core.converge.processes import side_by_side
 from bilayer_core.converge.quantities import check_names, headline, is_event, measure
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.register import INTEGRATORS
@@ -204,21 +204,18 @@ def _make(
 ) -> dict[str, str]:
     """Add what runs find to `found`, by their names; why one that is not needed is missing is returned."""
     text, missing = scene_text(scene), {}
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+    with side_by_side(workers) as pool:
         jobs = {pool.submit(_run, text, run.overrides, duration, start): run for run in runs}
-        try:
-            for job in as_completed(jobs):
-                name = jobs[job].name
-                try:
-                    found[name] = job.result()
-                except SimulationError as error:
-                    if name in NEEDED:
-                        raise SimulationError(f"{name}: {error.reason}", error.time, error.remedy) from error
-                    missing[name] = str(error)
-                if progress is not None:
-                    progress(name)
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)  # nothing is left unless one of them ended the study
+        for job in as_completed(jobs):
+            name = jobs[job].name
+            try:
+                found[name] = job.result()
+            except SimulationError as error:
+                if name in NEEDED:
+                    raise SimulationError(f"{name}: {error.reason}", error.time, error.remedy) from error
+                missing[name] = str(error)
+            if progress is not None:
+                progress(name)
     return missing
 
 

@@ -28,6 +28,8 @@ import numba
 import numpy as np
 from platformdirs import user_cache_path
 
+from ..errors import OutputError
+
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("jit", "kinematics", "contact", "scene", "model", "forces", "engine")
 """Of the package: all that hold kernels (a test looks for others)."""
@@ -87,7 +89,13 @@ def _delete_unused(root: Path) -> None:
 
 @contextmanager
 def cached() -> Iterator[None]:
-    """Let numba keep in the folder what is decorated meanwhile; its own setting is restored."""
+    """Let numba keep in the folder what is decorated meanwhile; its own setting is restored.
+
+    Raises
+    ------
+    OutputError
+        If what is compiled meanwhile cannot be kept.
+    """
     folder = cache_folder()
     if folder is None:
         yield
@@ -97,5 +105,10 @@ def cached() -> Iterator[None]:
         numba.config.CACHE_DIR = str(folder)
         try:
             yield
+        except OSError as error:
+            raise OutputError(
+                f"{folder}: compiled kernels cannot be kept: {error.strerror or error}; set {CACHE_DIR} to a directory "
+                "with room for them, or BILAYER_JIT_CACHE=0 to keep none"
+            ) from error
         finally:
             numba.config.CACHE_DIR = before

@@ -16,6 +16,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
+from ..errors import OutputError
 from .cache import cache_folder
 from .piece import PIECES
 
@@ -72,6 +73,8 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
 
     Raises
     ------
+    OutputError
+        If what is compiled cannot be kept.
     RuntimeError
         If one cannot be compiled; the message has what the process printed.
     """
@@ -84,51 +87,81 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     left: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in names:
         left.put(name)
-    done, printed = queue.SimpleQueue(), []
+    done: queue.SimpleQueue[str | Exception] = queue.SimpleQueue()
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    workers = [
-        threading.Thread(target=_feed, args=(left, done, printed), daemon=True)
-        for _ in range(min(MOST_PROCESSES, cores))
-    ]
-    for worker in workers:
-        worker.start()
-    for count in range(len(names)):
-        if report is not None:
-            report(count, len(names))
-        if done.get() is None:
-            raise RuntimeError("kernels cannot be compiled:\n" + "\n".join(printed))
-    for worker in workers:
-        worker.join()
+    workers = [_Worker(left, done) for _ in range(min(MOST_PROCESSES, cores))]
+    try:
+        for worker in workers:
+            worker.start()
+        for count in range(len(names)):
+            if report is not None:
+                report(count, len(names))
+            if isinstance(found := done.get(), Exception):
+                raise found
+        for worker in workers:
+            worker.join()
+    finally:
+        for worker in workers:
+            worker.end()
     if report is not None:
         report(len(names), len(names))
     (folder / COMPLETE).touch()
 
 
-def _feed(left: queue.SimpleQueue, done: queue.SimpleQueue, printed: list[str]) -> None:
-    """Have one process compile what is left, name by name."""
-    path = os.pathsep.join([str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])])
-    process = subprocess.Popen(
-        [sys.executable, "-P", "-m", WORKER],  # -P: not what has the package's name in the present folder
-        env=os.environ | {"PYTHONPATH": path},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    with process:
-        while True:
-            try:
-                name = left.get_nowait()
-            except queue.Empty:
-                process.stdin.close()
-                return
-            process.stdin.write(name + "\n")
-            process.stdin.flush()
-            if process.stdout.readline().strip() != name:
-                printed.append(process.stderr.read())
-                done.put(None)
-                return
-            done.put(name)
+class _Worker(threading.Thread):
+    """A process that compiles what is left, and the thread that hands it name by name."""
+
+    def __init__(self, left: queue.SimpleQueue[str], done: queue.SimpleQueue[str | Exception]):
+        super().__init__(daemon=True)
+        self._left, self._done = left, done
+        self._process: subprocess.Popen | None = None
+        self._ended = False
+
+    def run(self) -> None:
+        """Until nothing is left, or something fails, which `done` takes."""
+        path = os.pathsep.join([str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])])
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", WORKER],  # -P: not what has the package's name in the present folder
+            env=os.environ | {"PYTHONPATH": path},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,  # Ctrl-C is for the process that started it, and ends both
+        )
+        if self._ended:
+            self._process.terminate()
+        with self._process as process:
+            while (name := self._next()) is not None:
+                try:
+                    print(name, file=process.stdin, flush=True)
+                    answer = process.stdout.readline().strip()
+                except OSError:
+                    answer = ""
+                if answer != name:
+                    self._done.put(self._failure(process))
+                    return
+                self._done.put(name)
+            process.stdin.close()
+
+    def end(self) -> None:
+        """End the process, whatever it is at."""
+        self._ended = True
+        if self._process is not None:
+            self._process.terminate()
+
+    def _next(self) -> str | None:
+        try:
+            return self._left.get_nowait()
+        except queue.Empty:
+            return None
+
+    @staticmethod
+    def _failure(process: subprocess.Popen) -> Exception:
+        printed = process.stderr.read()
+        if process.wait() == OutputError.exit_code:
+            return OutputError(printed.strip())
+        return RuntimeError(f"kernels cannot be compiled:\n{printed}")
 
 
 def main() -> None:

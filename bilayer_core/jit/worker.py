@@ -1,21 +1,40 @@
-"""A process that compiles the pieces whose names it reads, one a line, and prints each when it is done."""
+"""A process that compiles the pieces whose names it reads, one a line, and prints each when it is done.
+
+It ends at once when its input does, whatever it is at: whoever started it has ended, or has no more work.
+"""
 
 from __future__ import annotations
 
+import os
+import queue
 import sys
+import threading
 from importlib import import_module
 
+from ..errors import OutputError
 from .compile_all import ENGINE
 from .piece import PIECES
 
 
 def main() -> None:
     """Compile what standard input names."""
+    names: queue.SimpleQueue[str] = queue.SimpleQueue()
+    threading.Thread(target=_read, args=(names,), daemon=True).start()
     import_module(ENGINE)
-    for line in sys.stdin:
-        name = line.strip()
-        _ = PIECES[name].address
+    while True:
+        name = names.get()
+        try:
+            _ = PIECES[name].address
+        except OutputError as error:
+            print(error, file=sys.stderr)
+            sys.exit(error.exit_code)
         print(name, flush=True)
+
+
+def _read(names: queue.SimpleQueue[str]) -> None:
+    for line in sys.stdin:
+        names.put(line.strip())
+    os._exit(0)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """`bilayer converge`: five runs, orders, error bars."""
 
 import json
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from bilayer_core import Simulator, estimate_error, load_scene
 from bilayer_core.cli import main
 from bilayer_core.cli.error_table import print_errors
+from bilayer_core.cli.signals import Interruption
 from bilayer_core.converge import study
 from bilayer_core.converge.order import estimate
 from bilayer_core.converge.quantities import measure
@@ -167,7 +169,7 @@ def test_the_time_of_a_contact_is_known_to_a_step():
 
 def test_an_estimate_that_is_interrupted_leaves_the_run_and_its_outputs(tmp_path, monkeypatch):
     def interrupt(*_, **__):
-        raise KeyboardInterrupt
+        raise Interruption(signal.SIGINT)
 
     monkeypatch.setattr(study, "estimate_error", interrupt)
     summary = tmp_path / "s.json"
