@@ -7,9 +7,9 @@ package costs nothing.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # what checkers of types take for true, without an import of milliseconds
     from bilayer_core.converge.study import estimate_error
     from bilayer_core.scene.loader import load_scene
     from bilayer_core.simulation.simulator import Simulator
@@ -26,7 +26,7 @@ _HOME = {
 __all__ = ["Simulator", "__version__", "estimate_error", "load_scene"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name == "__version__":
         return _installed_version()
     if name in _HOME:

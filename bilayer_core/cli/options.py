@@ -7,9 +7,6 @@ from typing import Any
 
 import click
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C."""
-
 
 @dataclass
 class Settings:

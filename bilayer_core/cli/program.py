@@ -15,10 +15,11 @@ from bilayer_core.cli.check import check
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.new import new
-from bilayer_core.cli.options import INTERRUPTED, Settings, VerbGroup
+from bilayer_core.cli.options import Settings, VerbGroup
 from bilayer_core.cli.render import render
 from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import scenes, schema
+from bilayer_core.cli.signals import interruption_behind
 from bilayer_core.cli.stress import stress
 from bilayer_core.cli.validate import validate
 from bilayer_core.errors import BilayerError
@@ -45,7 +46,8 @@ def program() -> None:
 
     SCENE is a scene file, or the name of a bundled scene (bilayer scenes lists them).
 
-    Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the simulation could not go on, 130 interrupted.
+    Exit codes: 0 done, 1 a check failed, 2 bad input, 3 the simulation could not go on or an output could not be
+    written, 130 interrupted (SIGINT), 143 ended (SIGTERM).
     """
 
 
@@ -68,23 +70,22 @@ def _seldom_collected() -> Iterator[None]:
 
 
 @_seldom_collected()
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return its exit code."""
+def run_program(arguments: Sequence[str] | None) -> int:
+    """Run the command line, by default that of the process; return its exit code."""
     settings = Settings()
     try:
         return program.main(arguments, prog_name="bilayer", standalone_mode=False, obj=settings) or 0
-    except click.Abort:
-        click.echo("bilayer: interrupted", err=True)
-        return INTERRUPTED
     except click.ClickException as error:
         error.show()
         return BilayerError.exit_code
     except SystemExit:
         return 0  # by which click tells that the reader of our output, such as `head`, has gone
     except BilayerError as error:
-        _explain(settings, str(error))
+        _explain(settings, "\n  then ".join([str(error), *getattr(error, "__notes__", [])]))
         return error.exit_code
     except Exception as error:
+        if interruption_behind(error) is not None:
+            raise
         text = " ".join(f"{type(error).__name__}: {error}".split())
         _explain(settings, f"internal error: {text}\nPlease report it, with what the same command prints with --debug.")
         return INTERNAL_ERROR

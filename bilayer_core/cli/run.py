@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from bilayer_core.cli.options import INTERRUPTED, Duration, Rate, Verb, scene_argument, set_option
+from bilayer_core.cli.options import Duration, Rate, Verb, scene_argument, set_option
 from bilayer_core.cli.report import summary_lines
+from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError
 
 if TYPE_CHECKING:
     from bilayer_core.converge.study import Study
@@ -25,7 +26,8 @@ TOLERANCE_HELP = (
     "`--error-estimate` tells it."
 )
 ERROR_HELP = "Show the global error of the headline numbers, from runs at twice and half the step."
-OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
+OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_state": ".npz"}
+"""How the names of outputs end, by their options."""
 
 
 @click.command(cls=Verb)
@@ -49,7 +51,7 @@ OUTPUT_OPTIONS = ("log", "rrd", "summary", "save_state")
 @click.option("--error-estimate", is_flag=True, help=ERROR_HELP)
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
-def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> int:
+def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> None:
     """Simulate SCENE as fast as this machine can."""
     from bilayer_core.scene.loader import load_scene
 
@@ -65,11 +67,19 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     failure = _simulate(simulator, duration, observers, interrupt, quiet, judge)
     if judge is not None and failure is None and not interrupt.granted:
         judge.estimate()
-    _finish(simulator, duration, failure, options, quiet, judge)
+    summary = _summary(simulator, duration, failure, judge)
     failure = failure or (judge and judge.failure)
-    if failure is not None:
-        raise failure
-    return INTERRUPTED if interrupt.granted or (judge and judge.interrupted) else 0
+    failure = _write_outputs(simulator, summary, options, failure)
+    try:
+        if not quiet:
+            _tell(simulator, summary, options, judge)
+    finally:  # that nobody reads what is told hides nothing
+        if failure is not None:
+            raise failure
+        if interrupt.granted:
+            raise Interruption(interrupt.wished)
+        if judge is not None and judge.interruption is not None:
+            raise judge.interruption
 
 
 class _Judge:
@@ -83,7 +93,7 @@ class _Judge:
         self.look = self._watch.look
         self.study: Study | None = None
         self.failure: SimulationError | None = None
-        self.interrupted = False
+        self.interruption: Interruption | None = None
 
     def estimate(self) -> None:
         """Make the runs. One that stops is this command's failure, and so is Ctrl-C, once the outputs are written."""
@@ -104,8 +114,9 @@ class _Judge:
             )
         except SimulationError as failure:
             self.failure = failure
-        except KeyboardInterrupt:
-            self.interrupted = True
+        except Interruption as interruption:
+            interruption.heeded = True
+            self.interruption = interruption
 
 
 def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
@@ -113,10 +124,10 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     from bilayer_core.record.paths import check_output_path
 
     force, output = options["force"], config.output
-    paths = [options[key] for key in OUTPUT_OPTIONS if options[key]]
-    for place, path in enumerate(paths):
-        check_output_path(path, force)
-        if Path(path).resolve() in {Path(other).resolve() for other in paths[:place]}:
+    paths = {key: options[key] for key in OUTPUT_SUFFIXES if options[key]}
+    for place, (key, path) in enumerate(paths.items()):
+        check_output_path(path, force, OUTPUT_SUFFIXES[key])
+        if Path(path).resolve() in {Path(other).resolve() for other in [*paths.values()][:place]}:
             raise InputError(f"{path}: is named for two outputs; give each a file of its own")
     observers, rate = [], options["log_rate"] or output.rate
     if options["log"]:
@@ -168,60 +179,82 @@ def _simulate(
     interrupt: Interrupt,
     quiet: bool,
     judge: _Judge | None,
-) -> SimulationError | None:
+) -> BilayerError | None:
     """Run; what stopped the simulation, if anything did, is returned, for the outputs to be completed first."""
     begin = simulator.time
     try:
         with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
             look = judge.look if judge is not None else None
             simulator.run(duration, observers=observers, stop=interrupt.grant, progress=show, each_step=look)
-    except SimulationError as failure:
+    except (SimulationError, OutputError) as failure:
         return failure
     return None
 
 
-def _finish(
-    simulator: Simulator,
-    duration: float,
-    failure: SimulationError | None,
-    options: dict[str, Any],
-    quiet: bool,
-    judge: _Judge | None,
-) -> None:
-    """Write the last state and the summary, and tell the user what happened."""
+def _summary(
+    simulator: Simulator, duration: float, failure: BilayerError | None, judge: _Judge | None
+) -> dict[str, Any]:
+    """All figures of the run."""
     from bilayer_core.simulation.result import Termination
 
     summary = {**simulator.summary(), "duration": duration}
-    if failure is not None:
+    if isinstance(failure, SimulationError):
         summary |= {"termination": Termination.FAILED.value, "reason": failure.reason}
         summary |= {"remedy": str(failure.remedy)} if failure.remedy else {}
-    study = judge.study if judge is not None else None
-    if study is not None:
+    elif simulator.termination == Termination.FAILED.value:
+        summary["reason"] = str(failure)
+    if judge is not None and judge.study is not None:
         from bilayer_core.cli.error_table import errors_of
 
-        summary["global_error"] = errors_of(study)
-    if options["save_state"]:
-        from bilayer_core.record.state_file import write_state
+        summary["global_error"] = errors_of(judge.study)
+    return summary
 
-        write_state(options["save_state"], simulator.save_state(), simulator.description)
-    if options["summary"]:
+
+def _write_outputs(
+    simulator: Simulator, summary: dict[str, Any], options: dict[str, Any], failure: BilayerError | None
+) -> BilayerError | None:
+    """Write the last state and the summary, each whatever happened before.
+
+    Returns
+    -------
+    BilayerError or None
+        The first failure, which `failure` is if there was one; later ones are notes to it.
+    """
+    from bilayer_core.record.paths import write_text
+    from bilayer_core.record.state_file import write_state
+
+    def state(path: str) -> None:
+        write_state(path, simulator.save_state(), simulator.description, options["force"])
+
+    def figures(path: str) -> None:
+        write_text(path, json.dumps(summary, indent=2, allow_nan=False) + "\n", options["force"])
+
+    for key, write in (("save_state", state), ("summary", figures)):
+        if not options[key]:
+            continue
         try:
-            Path(options["summary"]).write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"{options['summary']}: cannot be written: {error.strerror or error}") from error
-    if quiet:
-        return
+            write(options[key])
+        except OutputError as loss:
+            if failure is None:
+                failure = loss
+            else:
+                failure.add_note(str(loss))
+    return failure
+
+
+def _tell(simulator: Simulator, summary: dict[str, Any], options: dict[str, Any], judge: _Judge | None) -> None:
+    """Print what happened."""
     moved = {body.name for body in simulator.scene.bodies if body.motion.type != "prescribed"}
     for line in summary_lines(summary, moved):
         click.echo(line)
-    for key in OUTPUT_OPTIONS:
-        if options[key]:
+    for key in OUTPUT_SUFFIXES:
+        if options[key] and Path(options[key]).exists():
             click.echo(f"  {key.replace('_', ' '):22}{options[key]}")
     if options["budget"]:
         from bilayer_core.cli.budget_table import print_budget
 
         print_budget(summary["budget"])
-    if study is not None:
+    if judge is not None and judge.study is not None:
         from bilayer_core.cli.error_table import print_errors
 
-        print_errors(study)
+        print_errors(judge.study)

@@ -7,8 +7,11 @@ import sys
 import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from types import FrameType
 
 import click
+
+from bilayer_core.cli.signals import WORDS
 
 COMPILING_NOTICE = "compiling kernels, once for this version on this machine (about a minute) ..."
 REFRESH = 0.1
@@ -16,19 +19,23 @@ REFRESH = 0.1
 
 
 class Interrupt:
-    """Turns Ctrl-C, and the signal by which other programs end this one, into a wish that is granted after the step.
+    """Turns the first signal that asks the program to end into a wish that is granted after the step.
 
-    The second signal is not put off.
+    The next one is not put off: it goes to the handler that was there before.
+
+    Attributes
+    ----------
+    wished : int or None
+        The number of the signal.
+    granted : bool
     """
 
-    SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
     def __init__(self):
-        self.wished = False
+        self.wished: int | None = None
         self.granted = False
 
     def __enter__(self) -> Interrupt:
-        self._before = {number: signal.signal(number, self._note) for number in self.SIGNALS}
+        self._before = {number: signal.signal(number, self._note) for number in WORDS}
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -37,13 +44,14 @@ class Interrupt:
 
     def grant(self) -> bool:
         """Whether to end now; asked between steps."""
-        self.granted = self.wished
+        self.granted = self.wished is not None
         return self.granted
 
-    def _note(self, *_: object) -> None:
-        if self.wished:
-            raise KeyboardInterrupt
-        self.wished = True
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.wished is None:
+            self.wished = number
+            return
+        self._before[number](number, frame)
 
 
 def compile_kernels(quiet: bool) -> None:

@@ -39,16 +39,13 @@ Answer = TypeVar("Answer")
 
 
 def show(recording: Path, web: bool) -> None:
-    """Open a recording in a window or a browser; return when the viewer is closed or interrupted."""
+    """Open a recording in a window or a browser; return when the viewer is closed."""
     command = [str(viewer_executable()), str(recording)]
     if web:
         command += ["--web-viewer", "--bind", "127.0.0.1", "--port", "auto", "--web-viewer-port", "0"]
     else:
         command += ["--new"]
-    try:
-        code = subprocess.call(command, env=viewer_environment())
-    except KeyboardInterrupt:
-        return
+    code = subprocess.call(command, env=viewer_environment())
     if code:
         raise InputError(f"the viewer ended with exit code {code}; without a screen use a browser or a screenshot")
 

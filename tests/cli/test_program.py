@@ -57,7 +57,7 @@ def test_a_run_without_a_log_imports_neither_the_units_library_nor_that_of_logs(
 
 def test_the_garbage_collector_rests_while_a_command_runs_and_at_the_end_of_the_process():
     program = (
-        "import atexit, gc; from bilayer_core.cli.program import main, program\n"
+        "import atexit, gc; from bilayer_core.cli import main; from bilayer_core.cli.program import program\n"
         "atexit.register(lambda: print(gc.get_freeze_count() > 1000))\n"
         "before, during = gc.get_threshold(), []\n"
         "program.main = lambda *_, **__: during.append(gc.get_threshold())\n"
@@ -69,9 +69,10 @@ def test_the_garbage_collector_rests_while_a_command_runs_and_at_the_end_of_the_
 
 def test_help_names_every_verb_and_every_exit_code(capsys):
     assert main(["--help"]) == 0
-    text = capsys.readouterr().out
-    assert all(f"  {verb} " in text for verb in VERBS)
+    text = " ".join(capsys.readouterr().out.split())
+    assert all(f" {verb} " in text for verb in VERBS)
     assert "Exit codes: 0 done, 1 a check failed, 2 bad input, 3" in text
+    assert "130 interrupted (SIGINT), 143 ended (SIGTERM)." in text
 
 
 @pytest.mark.parametrize("verb", VERBS)

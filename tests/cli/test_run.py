@@ -193,35 +193,41 @@ def no_simulation(monkeypatch):
     monkeypatch.setattr("bilayer_core.simulation.simulator.Simulator", refuse)
 
 
-@pytest.mark.parametrize("option", ["--log", "--rrd", "--summary", "--save-state"])
+OUTPUTS = [("--log", ".mcap"), ("--rrd", ".rrd"), ("--summary", ".json"), ("--save-state", ".npz")]
+
+
+@pytest.mark.parametrize(("option", "suffix"), OUTPUTS)
 @pytest.mark.parametrize(
     ("path", "message"),
     [
-        ("there", "there: exists already; choose another name, or replace it with --force"),
-        ("absent/file", "absent/file: cannot be written: there is no directory absent"),
+        ("there{}", "there{}: exists already; choose another name, or replace it with --force"),
+        ("absent/file{}", "absent/file{}: cannot be written: there is no directory absent"),
         (".", "cannot be written: it is a directory"),
+        ("file", "file: must end in {}\n"),
+        ("file.txt", "file.txt: must end in {}\n"),
     ],
 )
 def test_an_output_that_cannot_be_written_is_refused_before_the_simulation(
-    here, capsys, no_simulation, option, path, message
+    here, capsys, no_simulation, option, suffix, path, message
 ):
-    (here / "there").write_text("precious")
-    assert main(["run", "cantilever", option, path]) == 2
-    assert message in capsys.readouterr().err
-    assert (here / "there").read_text() == "precious"
+    there = here / f"there{suffix}"
+    there.write_text("precious")
+    assert main(["run", "cantilever", option, path.format(suffix)]) == 2
+    assert message.format(suffix) in capsys.readouterr().err
+    assert there.read_text() == "precious" and list(here.iterdir()) == [there]
 
 
-@pytest.mark.parametrize("option", ["--log", "--summary"])
+@pytest.mark.parametrize(("option", "suffix"), OUTPUTS)
 def test_a_directory_without_permission_is_refused_before_the_simulation(
-    here, capsys, no_simulation, option, monkeypatch
+    here, capsys, no_simulation, option, suffix, monkeypatch
 ):
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root may write everywhere
-    assert main(["run", "cantilever", option, "file"]) == 2
-    assert "file: cannot be written: no permission to write in" in capsys.readouterr().err
+    assert main(["run", "cantilever", option, f"file{suffix}"]) == 2
+    assert f"file{suffix}: cannot be written: no permission to write in" in capsys.readouterr().err
 
 
 def test_one_file_for_two_outputs_is_refused(here, capsys, no_simulation):
-    assert main(["run", "cantilever", "--log", "a", "--summary", "./a"]) == 2
+    assert main(["run", "cantilever", "--log", "/dev/null", "--summary", "/dev/../dev/null", "--force"]) == 2
     assert "is named for two outputs" in capsys.readouterr().err
 
 
@@ -255,13 +261,16 @@ def start_long_run(here):
     return run
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_run_ends_with_130_and_whole_files(here, number):
+@pytest.mark.parametrize(
+    ("number", "line"), [(signal.SIGINT, "bilayer: interrupted\n"), (signal.SIGTERM, "bilayer: ended by SIGTERM\n")]
+)
+def test_an_interrupted_run_ends_with_a_line_and_whole_files(here, number, line):
     run = start_long_run(here)
     run.send_signal(number)
     out, err = run.communicate(timeout=60)
-    assert run.returncode == 130, err
-    assert out.startswith("cantilever: interrupted") and "Traceback" not in err
+    assert run.returncode == 128 + number, err
+    assert out.startswith("cantilever: interrupted") and err.endswith(line)
+    assert err.count("\n") == 1 or watch.COMPILING_NOTICE in err
     info = read_info("run.mcap")
     assert not info.complete and info.termination == "interrupted"
     summary = json.loads((here / "run.json").read_text())
@@ -282,7 +291,7 @@ def heeding():
 def test_a_second_signal_is_not_put_off():
     with watch.Interrupt() as interrupt:
         os.kill(os.getpid(), signal.SIGINT)
-        assert interrupt.wished and not interrupt.granted
+        assert interrupt.wished == signal.SIGINT and not interrupt.granted
         with pytest.raises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(1.0)
