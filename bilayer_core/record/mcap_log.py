@@ -67,7 +67,7 @@ class McapRecorder:
         self._queue: queue.Queue = queue.Queue(QUEUE_LENGTH)
         self._thread: threading.Thread | None = None
         self._failure: Exception | None = None
-        self._kept: float | None = None
+        self._kept = ""
 
     def start(self, description: Description) -> None:
         """Open the file; write scene and settings, and flush them.
@@ -137,17 +137,23 @@ class McapRecorder:
     def _raise_failure(self) -> None:
         if isinstance(self._failure, OSError):
             reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}"
-            raise SimulationError(f"{reason}; {self._what_is_kept()}", self._last_time) from self._failure
+            raise SimulationError(f"{reason}; {self._kept}", self._last_time) from self._failure
         if self._failure is not None:
             raise self._failure
 
     def _what_is_kept(self) -> str:
-        """After a failure."""
+        """After a failure, as who reads the file will find it."""
+        from bilayer_core.record.log_reader import read_info
+
         if not self.path.is_file():
             return "nothing of it is kept"
-        if self._kept is None:
-            return "it holds no whole frame"
-        return f"it can be read up to t = {self._kept:.6g} s ({self.path.stat().st_size / 1e6:.3g} MB)"
+        try:
+            info = read_info(self.path)
+        except InputError as error:
+            return f"what is kept cannot be read ({error})"
+        if not any(topic["count"] for topic in info.topics.values()):
+            return "it holds no frame"
+        return f"it can be read up to t = {info.last_time:.6g} s ({info.size / 1e6:.3g} MB)"
 
     def _write(self, log: _LogFile) -> None:
         """The writer's thread: until the ending comes or something fails, which the other thread then raises."""
@@ -157,7 +163,8 @@ class McapRecorder:
                 work()
             except Exception as error:
                 failure = failure or error  # what fails after that, such as to close the file, follows from it
-        self._kept = log.kept
+        if failure is not None:
+            self._kept = self._what_is_kept()
         self._failure = failure
 
     def _write_all(self, log: _LogFile) -> None:
@@ -176,13 +183,7 @@ class McapRecorder:
 
 
 class _LogFile:
-    """The file itself, used by one thread at a time.
-
-    Attributes
-    ----------
-    kept : float or None
-        Time of the last frame that was handed to the system [s].
-    """
+    """The file itself, used by one thread at a time."""
 
     def __init__(self, path: Path, force: bool, description: Description, gate: DisplayGate):
         import mcap
@@ -197,7 +198,6 @@ class _LogFile:
         self._sequence = 0
         self._unflushed_since: float | None = None
         self._synced = clock.monotonic()
-        self.kept = self._last_written = None
         with ExitStack() as undo:
             undo.callback(self._file.close)
             undo.callback(_delete, path)
@@ -232,7 +232,6 @@ class _LogFile:
                 if display or spec.rate is not Rate.DISPLAY:
                     self._add(spec.name, stamp, self._encoder.encode(spec.name, item))
             self._sequence += 1
-            self._last_written = item.time
         if self._unflushed_since is None:
             self._unflushed_since = clock.monotonic()
 
@@ -249,7 +248,6 @@ class _LogFile:
         """Write the chunk in hand; every second also to the disk."""
         self._writer.flush()
         self._unflushed_since = None
-        self.kept = self._last_written
         if clock.monotonic() - self._synced >= SYNC_PERIOD - FLUSH_PERIOD:
             self._sync()
 
@@ -262,7 +260,6 @@ class _LogFile:
     def finish(self, ending: dict[str, str]) -> None:
         """Write the metadata ``run`` and the file's index."""
         self._writer.flush()
-        self.kept = self._last_written
         self._writer.add_metadata("run", ending)
         self._writer.finish()
         self._file.flush()
