@@ -22,7 +22,7 @@ _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _UNIT = r"(?:1?\s*/\s*)?[A-Za-zµμ°%][\w°%*/^ ().-]*?"
 _TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>{_UNIT})?\s*")
 
-SMALLEST, LARGEST = 1e-30, 1e30
+SMALLEST, LARGEST = 1e-60, 1e30
 """Of what must be above 0, and of all numbers: products of several are numbers yet."""
 LARGEST_COUNT = 2**53
 """Of all whole numbers: larger ones are no floating-point numbers."""

@@ -73,10 +73,10 @@ def test_a_ball_that_leaves_its_box_through_the_wall_is_seen():
 
 def test_a_strip_that_changes_places_with_the_one_below_is_seen():
     def moved(simulator, frame):
-        top = simulator.model.strands[-1]
-        nodes, positions = slice(top.first_node, top.first_node + top.node_count), frame.positions.copy()
-        positions[nodes, 2] -= 3.4 * (positions[nodes, 2] - positions[0, 2])
-        return replace(frame, positions=positions + [0.0, 0.0, 1.0])
+        strand, positions = simulator.model.strands[1], frame.positions + [0.0, 0.0, 1.0]
+        nodes = slice(strand.first_node, strand.first_node + strand.node_count)
+        positions[nodes, 2] -= 2.0 * (positions[nodes, 2] - positions[0, 2])
+        return replace(frame, positions=positions)
 
     simulator = simulator_of("integrator/sdirk2/pile/laminate/3")
     check, frame = GapCheck(simulator.model), simulator.frame()
