@@ -45,6 +45,7 @@ data_files = [
     (f"share/{NAME}/config", glob("config/*.yaml")),
     (f"share/{NAME}/config/scenes", glob("config/scenes/*.yaml")),
     (f"share/{NAME}/config/templates", glob("config/templates/*.yaml")),
+    (f"share/{NAME}/config/torture", glob("config/torture/*.yaml")),
     (f"share/{NAME}/launch", glob("bilayer_sim_ros/launch/*.launch.py")),
 ]
 if {"bdist_wheel", "editable_wheel"} & set(sys.argv):
