@@ -1,4 +1,4 @@
-"""Torture cases of single beams: rolled up, bent in space, snapping, in free flight, and driven at twice a frequency."""
+"""Torture cases of single beams at rest: rolled up, and bent out of their plane."""
 
 from __future__ import annotations
 
