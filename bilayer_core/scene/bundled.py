@@ -1,4 +1,6 @@
-"""Where bundled scenes, templates and torture cases are: one lookup for a checkout, a wheel, an editable and both colcon installs."""
+"""Where bundled scenes, templates and torture cases are: one lookup for a checkout, a wheel, an editable and both
+colcon installs.
+"""
 
 from __future__ import annotations
 

@@ -34,9 +34,7 @@ def stiffness(scene: SceneConfig) -> Array:
     return np.array([torsion, moduli * width**2, moduli * layer.thickness**2])
 
 
-def loaded_tip(
-    force: Array, k: Array, free: Array, length: float, start: Array, place: float
-) -> tuple[Array, Array]:
+def loaded_tip(force: Array, k: Array, free: Array, length: float, start: Array, place: float) -> tuple[Array, Array]:
     """Where the tip goes [m], shape (3,), and the frame (t, m1, m2) at a place along the rod, as columns.
 
     Parameters
@@ -92,7 +90,9 @@ def cantilever(scene: SceneConfig) -> tuple[Array, Array]:
         curvature = (1.0 if path.toward == "normal" else -1.0) / path.radius
     start = np.stack([along, normal, np.cross(along, normal)], axis=1)
     free = np.array([0.0, 0.0, curvature])
-    return loaded_tip(np.array(load.force), stiffness(scene), free, path.length, start, path.length - 0.5 * rod.edge_length)
+    return loaded_tip(
+        np.array(load.force), stiffness(scene), free, path.length, start, path.length - 0.5 * rod.edge_length
+    )
 
 
 def angle_between(first: Array, last: Array) -> float:

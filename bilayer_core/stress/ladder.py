@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-from ..scene.bundled import bundled_torture
+from ..scene.bundled import bundled_scenes, bundled_torture
 from ..scene.loader import load_scene, scene_text
 from ..scene.text import read_yaml
 from .case import Decision, StressCase
@@ -49,7 +49,7 @@ class Torture:
         In the list of the docs.
     name : str
     scene : str
-        Name of its file, without the ending.
+        Name of its file, without the ending: of a torture case or of a bundled scene.
     source : str
         Where it comes from.
     expected : str
@@ -100,8 +100,9 @@ def balanced(trial: Trial, parts: int = 10) -> None:
 
 
 def content_of(scene: str, overrides: tuple[str, ...] = ()) -> dict:
-    """The content of a torture scene with changes."""
-    return read_yaml(scene_text(load_scene(bundled_torture()[scene], overrides)), scene)
+    """The content of a torture scene, or else of a bundled one, with changes."""
+    path = (bundled_scenes() | bundled_torture())[scene]
+    return read_yaml(scene_text(load_scene(path, overrides)), scene)
 
 
 def first_broken(*decisions: Decision) -> Decision:

@@ -17,8 +17,8 @@ Array = np.ndarray
 def closes(trial: Trial, statically: bool = False) -> Decision:
     """Distance of the tip from the clamp over the length.
 
-    The energy of a bend θ between two edges is EI/(2 l) (2 tan(θ/2))², so a moment M bends it by the part (M l/EI)²/3 less
-    than M l/EI.
+    The energy of a bend θ between two edges is EI/(2 l) (2 tan(θ/2))², so a moment M bends it by the part (M l/EI)²/3
+    less than M l/EI.
     """
     balanced(trial) if statically else trial.run()
     simulator = trial.simulator

@@ -116,7 +116,9 @@ FRICTION = (
             Rung("mu 0.1", (_friction(0.1),)),
             Rung("mu 0.2", (_friction(0.2),)),
             Rung("mu 0.4"),
-            Rung("mu 0.8", (_friction(0.8), "materials.film.youngs_modulus=1e9", "rods.strip.layers.film.thickness=1e-4")),
+            Rung(
+                "mu 0.8", (_friction(0.8), "materials.film.youngs_modulus=1e9", "rods.strip.layers.film.thickness=1e-4")
+            ),
             Rung("mu 0.4, dt 1 ms", ("solver.dt=0.001",)),
             Rung("mu 0.4, implicit Euler, dt 10 ms", (EULER, "solver.dt=0.01")),
             Rung("mu 0.4, 241 stations", ("rods.strip.stations=241",)),
@@ -149,11 +151,14 @@ FRICTION = (
         "boards",
         "IPC, whose arch has wedge-shaped blocks",
         "stands; falls at low μ",
-        "an arch of two boards stands from μ = 1/(2 tan β) on: it sinks by less than the creep of friction, or by 10 % of "
-        "a board",
+        "an arch of two boards stands from μ = 1/(2 tan β) on: it sinks by less than the creep of friction, else by 10 % "
+        "of a board",
         stands,
         (
-            *(Rung(f"{part:g} of mu needed", (_friction(part * BOARDS_NEED),)) for part in (0.3, 0.7, 0.9, 1.1, 1.5, 3.0)),
+            *(
+                Rung(f"{part:g} of mu needed", (_friction(part * BOARDS_NEED),))
+                for part in (0.3, 0.7, 0.9, 1.1, 1.5, 3.0)
+            ),
             Rung("1.5, dt 1 ms", (_friction(1.5 * BOARDS_NEED), "solver.dt=0.001")),
             Rung("0.7, implicit Euler, dt 5 ms", (_friction(0.7 * BOARDS_NEED), EULER, "solver.dt=0.005")),
         ),
@@ -168,7 +173,10 @@ FRICTION = (
         stays_on_table,
         (
             *(
-                Rung(f"{speed:g} m/s, dt 10 ms", (f"bodies.hand.motion.times=[0.1, {0.1 + 0.2 / speed}]", "solver.dt=0.01"))
+                Rung(
+                    f"{speed:g} m/s, dt 10 ms",
+                    (f"bodies.hand.motion.times=[0.1, {0.1 + 0.2 / speed}]", "solver.dt=0.01"),
+                )
                 for speed in (0.5, 2.0, 8.0)
             ),
             Rung("2 m/s, adaptive"),

@@ -72,7 +72,12 @@ def snaps_late(trial: Trial) -> Decision:
     passing = [lambda t, y: y[0]]
     passing[0].terminal = True
     way = solve_ivp(
-        lambda t, y: (y[1], (resists(y[0]) - rate * t) / line), (0.0, ramp), (a, 0.0), events=passing, rtol=1e-9, atol=1e-12
+        lambda t, y: (y[1], (resists(y[0]) - rate * t) / line),
+        (0.0, ramp),
+        (a, 0.0),
+        events=passing,
+        rtol=1e-9,
+        atol=1e-12,
     )
     trial.run(each_step=look)
     delay = crossed[0] - critical if crossed else math.nan
@@ -80,7 +85,11 @@ def snaps_late(trial: Trial) -> Decision:
 
 
 def _ramps(seconds: float) -> tuple[str, ...]:
-    return (f"duration={seconds}", "solver.tolerance=1e-6", *(f"loads.push{i}.schedule.end={seconds}" for i in range(1, 10)))
+    return (
+        f"duration={seconds}",
+        "solver.tolerance=1e-6",
+        *(f"loads.push{i}.schedule.end={seconds}" for i in range(1, 10)),
+    )
 
 
 def keeps_momenta(trial: Trial) -> Decision:
@@ -107,7 +116,13 @@ def keeps_momenta(trial: Trial) -> Decision:
     return first_broken(turning, kept, bounded)
 
 
-ANGULAR = {"implicit_midpoint": 1e-6, "sdirk2": 1e-2, "tr_bdf2": 1e-2, "generalised_alpha": 1e-2, "implicit_euler": 1e-2}
+ANGULAR = {
+    "implicit_midpoint": 1e-6,
+    "sdirk2": 1e-2,
+    "tr_bdf2": 1e-2,
+    "generalised_alpha": 1e-2,
+    "implicit_euler": 1e-2,
+}
 """Angular momentum that may change in all, over it: with the midpoint rule what Newton leaves."""
 
 
@@ -164,8 +179,8 @@ MOTION = (
         "arch_push",
         "arXiv 2312.13908",
         "slow: asymmetric; fast: symmetric",
-        "largest lop-sided part until it is through: above 20 % of the rise where the push takes 3 s, below 2 % where it "
-        "takes 20 ms",
+        "largest lop-sided part until it is through: above 20 % of the rise where the push takes 3 s, below 2 % where "
+        "it takes 20 ms",
         snaps,
         (
             Rung("slow"),
@@ -188,7 +203,10 @@ MOTION = (
         snaps_late,
         (
             *(Rung(f"ramp of {seconds:g} s", _ramps(seconds)) for seconds in (0.5, 1.0, 2.0, 4.0, 8.0)),
-            Rung("ramp of 2 s, implicit midpoint, dt 1 ms", (*_ramps(2.0), MIDPOINT, "solver.dt=0.001", "solver.tolerance=null")),
+            Rung(
+                "ramp of 2 s, implicit midpoint, dt 1 ms",
+                (*_ramps(2.0), MIDPOINT, "solver.dt=0.001", "solver.tolerance=null"),
+            ),
             Rung("ramp of 2 s, in space", (*_ramps(2.0), "solver.dimension=3")),
         ),
     ),

@@ -97,7 +97,9 @@ def leaves_line(trial: Trial) -> Decision:
 
 def turned(trial: Trial) -> float:
     """Turns that the ends have made against each other in all, right-handed."""
-    by = {body.name: body.motion.rotations for body in trial.simulator.scene.bodies if hasattr(body.motion, "rotations")}
+    by = {
+        body.name: body.motion.rotations for body in trial.simulator.scene.bodies if hasattr(body.motion, "rotations")
+    }
     last = {name: rotations[-1][0] if rotations else 0.0 for name, rotations in by.items()}
     return (last.get("right", 0.0) - last.get("left", 0.0)) / (2.0 * math.pi)
 
@@ -171,7 +173,8 @@ TWIST = (
                 )
             ),
             Rung(
-                "1.1, 121 stations", (f"rods.ring.layers.gel.natural_twist={1.1 * RING_TWIST}", "rods.ring.stations=121")
+                "1.1, 121 stations",
+                (f"rods.ring.layers.gel.natural_twist={1.1 * RING_TWIST}", "rods.ring.stations=121"),
             ),
             Rung(
                 "0.97, 121 stations",
