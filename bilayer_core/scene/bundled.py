@@ -1,6 +1,4 @@
-"""Where bundled scenes, templates and torture cases are: one lookup for a checkout, a wheel, an editable and both
-colcon installs.
-"""
+"""Where bundled scenes and templates are: one lookup for a checkout, a wheel, an editable and both colcon installs."""
 
 from __future__ import annotations
 
@@ -19,7 +17,7 @@ _SHARED = Path("share") / bilayer_core.DISTRIBUTION / "config"
 
 
 def _candidates() -> Iterator[Path]:
-    """Directories below which they may be, the likeliest first."""
+    """Directories below which scenes and templates may be, the likeliest first."""
     # A checkout, an editable install, a colcon symlink install: the package is a link into the checkout.
     beside = Path(bilayer_core.__file__).resolve().parents[1]
     yield beside / "config"
@@ -44,7 +42,7 @@ def _recorded() -> Iterator[Path]:
 
 
 def bundled_directory(kind: str) -> Path:
-    """The directory of the bundled ``scenes``, ``templates`` or ``torture`` cases.
+    """The directory of the bundled ``scenes`` or ``templates``.
 
     Raises
     ------
@@ -74,11 +72,6 @@ def bundled_scenes() -> dict[str, Path]:
 def bundled_templates() -> dict[str, Path]:
     """File of each template of a new scene by its name, in alphabetical order."""
     return _bundled("templates")
-
-
-def bundled_torture() -> dict[str, Path]:
-    """File of the scene of each torture case by its name, in alphabetical order."""
-    return _bundled("torture")
 
 
 def bundled_scene(name: str) -> Path:

@@ -6,8 +6,9 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
-from ..scene.bundled import bundled_scenes, bundled_torture
+from ..scene.bundled import bundled_directory, bundled_scenes
 from ..scene.loader import load_scene, scene_text
 from ..scene.text import read_yaml
 from .case import Decision, StressCase
@@ -99,9 +100,14 @@ def balanced(trial: Trial, parts: int = 10) -> None:
     trial.judge.look(simulator.time)
 
 
+def torture_scenes() -> dict[str, Path]:
+    """File of the scene of each torture case by its name, in alphabetical order."""
+    return {path.stem: path for path in sorted(bundled_directory("torture").glob("*.yaml"))}
+
+
 def content_of(scene: str, overrides: tuple[str, ...] = ()) -> dict:
     """The content of a torture scene, or else of a bundled one, with changes."""
-    path = (bundled_scenes() | bundled_torture())[scene]
+    path = (bundled_scenes() | torture_scenes())[scene]
     return read_yaml(scene_text(load_scene(path, overrides)), scene)
 
 

@@ -151,8 +151,8 @@ FRICTION = (
         "boards",
         "IPC, whose arch has wedge-shaped blocks",
         "stands; falls at low μ",
-        "an arch of two boards stands from μ = 1/(2 tan β) on: it sinks by less than the creep of friction, else by 10 % "
-        "of a board",
+        "an arch of two boards stands from μ = 1/(2 tan β) on: it sinks by less than friction creeps, else by 10 % of "
+        "a board",
         stands,
         (
             *(

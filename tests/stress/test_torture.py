@@ -10,11 +10,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.scene.bundled import bundled_scenes, bundled_torture
+from bilayer_core.scene.bundled import bundled_scenes
 from bilayer_core.stress.case import Outcome, StressCase
 from bilayer_core.stress.execute import execute
 from bilayer_core.stress.kirchhoff import cantilever, loaded_tip
-from bilayer_core.stress.ladder import content_of
+from bilayer_core.stress.ladder import content_of, torture_scenes
 from bilayer_core.stress.linking import gauss_integral, longer, twist
 from bilayer_core.stress.torture import NOT_EXPRESSIBLE, TORTURES, torture_cases
 from bilayer_core.stress.torture_twist import critical_torque, ply
@@ -39,9 +39,9 @@ def test_what_must_come_out_comes_out(case):
     assert record.outcome is Outcome.ACCURATE, record.reason
 
 
-@pytest.mark.parametrize("name", bundled_torture())
+@pytest.mark.parametrize("name", torture_scenes())
 def test_a_torture_scene_builds_and_has_the_name_of_its_file(name):
-    scene = load_scene(bundled_torture()[name])
+    scene = load_scene(torture_scenes()[name])
     assert scene.name == name
     assert Simulator(scene).model.node_count > 2
 
@@ -55,7 +55,7 @@ def test_every_rung_is_a_scene_that_differs_from_the_others_of_its_ladder():
 def test_every_number_of_the_list_is_a_case_or_says_why_it_is_none():
     numbers = {torture.number for torture in TORTURES} | {number for number, _, _ in NOT_EXPRESSIBLE}
     assert numbers == set(range(1, 26))
-    assert {torture.scene for torture in TORTURES} - set(bundled_scenes()) == set(bundled_torture())
+    assert {torture.scene for torture in TORTURES} - set(bundled_scenes()) == set(torture_scenes())
     names = [case.name for case in torture_cases()]
     assert len(set(names)) == len(names)
 
@@ -126,7 +126,7 @@ def test_the_kirchhoff_rod_is_an_elastica_in_the_plane():
 
 
 def test_the_kirchhoff_bend_is_near_the_published_one_that_is_flexible_in_shear():
-    scene = load_scene(bundled_torture()["bathe_bend"])
+    scene = load_scene(torture_scenes()["bathe_bend"])
     start = 100.0 * np.array([math.sqrt(0.5), math.sqrt(0.5) - 1.0, 0.0])
     published = np.array([-23.64597, 13.72080, 53.57765])
     off = np.linalg.norm(cantilever(scene)[0] - start - published)
