@@ -172,6 +172,7 @@ FRICTION = (
         "speed of the box below μ g t, its height above the table, and no gap below zero",
         stays_on_table,
         (
+            Rung("2 m/s, adaptive"),
             *(
                 Rung(
                     f"{speed:g} m/s, dt 10 ms",
@@ -179,7 +180,7 @@ FRICTION = (
                 )
                 for speed in (0.5, 2.0, 8.0)
             ),
-            Rung("2 m/s, adaptive"),
+            Rung("0.5 m/s, implicit Euler, dt 10 ms", ("bodies.hand.motion.times=[0.1, 0.5]", EULER, "solver.dt=0.01")),
             Rung("8 m/s, adaptive", ("bodies.hand.motion.times=[0.1, 0.125]",)),
             Rung("8 m/s, implicit Euler, dt 10 ms", ("bodies.hand.motion.times=[0.1, 0.125]", EULER, "solver.dt=0.01")),
             Rung("2 m/s, in space", ("solver.dimension=3",)),
