@@ -39,6 +39,15 @@ install: $(STAMP) kernels  ## Install into .venv, and compile the kernels.
 bounds: $(STAMP)  ## Run tests of all kernels with the bounds of arrays checked.
 	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest $(BOUNDS)
 
+stress: $(STAMP)  ## Run a hundred stress cases, about three minutes.
+	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
+
+# What is found is committed: docs/stability.md with its figures, and bilayer_core/stress/seeded_bugs.jsonl.
+verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scenes, seeded bugs.
+	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz
+	$(BIN)/bilayer stress --out runs/stress
+	$(BIN)/bilayer stress --mutations --out runs/mutations
+
 clean:  ## Remove .venv and what runs and tests left.
 	rm -rf $(VENV) build install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
 
@@ -76,4 +85,4 @@ system:
 	printf '\nSystem packages are missing. Install them with this line, then run make again:\n\n' >&2; \
 	printf '    sudo apt-get update && sudo apt-get install %s\n\n' "$$(echo $$missing)" >&2; exit 1
 
-.PHONY: help demo test bounds lint install kernels clean system
+.PHONY: help demo test bounds stress verify lint install kernels clean system

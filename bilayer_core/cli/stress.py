@@ -26,6 +26,7 @@ DEFAULT_DIRECTORY = "runs/stress"
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
 @click.option("--json", "json_file", metavar="FILE.json", help="Write all results to one file.")
 @click.option("--workers", type=click.IntRange(1), help="Cases side by side; default: one a core.")
+@click.option("--mutations", is_flag=True, help="Put bugs into copies of this checkout, and see what notices them.")
 @click.option("--shrink/--no-shrink", default=True, show_default=True, help="Make the scenes of failures smaller.")
 @click.option("--quiet", is_flag=True, help="No progress.")
 def stress(
@@ -37,6 +38,7 @@ def stress(
     out: str,
     json_file: str | None,
     workers: int | None,
+    mutations: bool,
     shrink: bool,
     quiet: bool,
 ) -> int:
@@ -45,6 +47,9 @@ def stress(
     Each case ends accurate, stable, refused with a reason, or FAILED. Writes DIR/results.jsonl as results come, then
     a report (stability.md), figures, and the scenes of failures and of the worst cases. Exit code 1 if one fails.
     """
+    workers = workers or len(os.sched_getaffinity(0))
+    if mutations:
+        return _judge_seeded_bugs(only, listed, resume, _directory(out), workers, quiet)
     from bilayer_core.record.paths import check_output_path
     from bilayer_core.stress import report
     from bilayer_core.stress.journal import Journal, head_of
@@ -60,7 +65,6 @@ def stress(
         check_output_path(json_file, force=True)
     directory = _directory(out)
     journal = Journal(directory, head_of(cases), resume)
-    workers = workers or len(os.sched_getaffinity(0))
     compile_kernels(quiet)
     with count_bar(len(cases) - len(journal.records), quiet) as show:
         measure(cases, journal, workers, lambda record: _tell(record, show))
@@ -74,6 +78,31 @@ def stress(
     for line in report.shortfalls(records):
         click.echo(line)
     return FAILED if any(record.outcome == "FAILED" for record in records) else 0
+
+
+def _judge_seeded_bugs(
+    only: tuple[str, ...], listed: bool, resume: bool, directory: Path, workers: int, quiet: bool
+) -> int:
+    """Run the seeded bugs; exit code 1 if one lives."""
+    from bilayer_core.stress.mutants import chosen_mutants
+    from bilayer_core.stress.mutations import run_mutations
+
+    chosen = chosen_mutants(only)
+    if listed:
+        for mutant in chosen.values():
+            click.echo(f"{mutant.name}  {mutant.file}: {mutant.bug}")
+        return 0
+
+    def tell(result: Any) -> None:
+        show(result.name)
+        if not result.caught:
+            click.echo(f"lives  {result.name}: {chosen[result.name].bug}")
+
+    with count_bar(len(chosen), quiet) as show:
+        results = run_mutations(only, directory, tell, resume=resume, workers=workers)
+    lives = [name for name in chosen if not results[name].caught]
+    click.echo(f"{len(chosen) - len(lives)} of {len(chosen)} seeded bugs were noticed")
+    return FAILED if lives else 0
 
 
 def _tell(record: Any, show: Any) -> None:
