@@ -14,7 +14,8 @@ from .torture import torture_cases
 
 QUICK = 100
 """Cases of a quick run."""
-QUICK_STEPS = 400
+QUICK_STEPS, QUICK_LIMIT = 300, 3.0
+"""Accepted steps and CPU time [s] of a case of a quick run."""
 CHOSEN = 0.2
 """Part of the cases, by the seed, whose energy budget is kept, and that are compared with a finer run also outside the
 region; inside all are."""

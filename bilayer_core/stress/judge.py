@@ -8,7 +8,7 @@ energy with driving       T + V less supplied work can only fall, but for the qu
                           more than `MOST_MADE` of the largest energy of the run
 momentum                  where nothing but gravity acts, it changes as gravity has it, to Newton's tolerance
 budget                    inside the region the budget closes to `LARGEST_RESIDUAL` of its largest row
-effort                    no more than `MOST_ITERATIONS` Newton iterations and `MOST_REJECTED` attempts a step
+effort                    no more than `MOST_ITERATIONS` Newton iterations an attempt, and `MOST_REJECTED` attempts a step
 ========================= =====================================================================================
 """
 
@@ -32,7 +32,7 @@ MOST_MADE = 0.1
 LARGEST_RESIDUAL = 0.02
 MOST_ITERATIONS = 200
 MOST_REJECTED = 30
-"""An accepted step, on average over a run."""
+"""On average over a run."""
 ROUNDING = 1e-9
 """Of the fastest speed, in that of the mass centre."""
 
@@ -139,8 +139,9 @@ class Judge:
         if self.numerical > MOST_MADE:
             raise Verdict(f"steps made {self.numerical:.3g} of the largest energy of the run", time)
         parts = max(statistics.substeps, 1)
-        if statistics.iterations > MOST_ITERATIONS * parts:
-            raise Verdict(f"{statistics.iterations / parts:.0f} Newton iterations a step", time)
+        attempts = parts + statistics.rejected
+        if statistics.iterations > MOST_ITERATIONS * attempts:
+            raise Verdict(f"{statistics.iterations / attempts:.0f} Newton iterations an attempt", time)
         if statistics.rejected > MOST_REJECTED * parts:
             raise Verdict(f"{statistics.rejected / parts:.0f} rejected attempts a step", time)
         if not self._simulator.keeps_budget:

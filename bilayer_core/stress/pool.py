@@ -13,8 +13,10 @@ from .case import Outcome, Record, StressCase
 
 MEMORY = 3 * 2**30
 """Address space that a worker may take beyond what it has when it begins [bytes]."""
-GRACE = 12.0
-"""Wall time after which a worker is killed, over the case's limit of CPU time: a run, a finer one, and a remedy."""
+GRACE, LEAST_TIME = 12.0, 120.0
+"""Wall time after which a worker is killed, over the case's limit of CPU time (a run, a finer one, and a remedy), and
+the least [s].
+"""
 
 
 def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record], None]) -> None:
@@ -43,17 +45,21 @@ def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record]
         while left or waiting:
             while left and len(waiting) < 2 * workers:
                 case = left.pop()
-                waiting[pool.schedule(_run, (case,), timeout=GRACE * case.cpu_limit)] = case
+                waiting[pool.schedule(_run, (case,), timeout=_time_of(case))] = case
             finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
             for job in finished:
                 case = waiting.pop(job)
                 try:
                     record = Record.from_line(job.result())
                 except TimeoutError:
-                    record = _lost(case, f"took longer than {GRACE * case.cpu_limit:g} s, and was killed")
+                    record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
                 except ProcessExpired as death:
                     record = _lost(case, f"its process died with exit code {death.exitcode}")
                 done(record)
+
+
+def _time_of(case: StressCase) -> float:
+    return max(LEAST_TIME, GRACE * case.cpu_limit)
 
 
 def _lost(case: StressCase, why: str) -> Record:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import fnmatch
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
 from . import figures, report
 from .case import Outcome, Record, StressCase
-from .cases import all_cases, quick_names
+from .cases import QUICK_LIMIT, QUICK_STEPS, all_cases, quick_names
 from .journal import Journal
 from .pool import run_cases
 from .shrink import is_shrinkable, shrink, write_scene
@@ -46,7 +47,11 @@ def chosen_cases(only: Sequence[str], quick: bool, scenes: Sequence[str] = ()) -
                 raise InputError(f"--only {pattern}: fits no case; there are groups {groups} (--list names all)")
         cases = {name: case for name, case in cases.items() if any(fnmatch.fnmatchcase(name, p) for p in only)}
     if quick:
-        cases = {name: case for name, case in cases.items() if name in quick_names()}
+        cases = {
+            name: replace(case, most_steps=min(case.most_steps, QUICK_STEPS), cpu_limit=QUICK_LIMIT)
+            for name, case in cases.items()
+            if name in quick_names()
+        }
     return cases
 
 

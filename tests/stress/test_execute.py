@@ -83,7 +83,7 @@ def test_an_error_that_no_user_may_see_fails_a_case():
     [
         ("MOST_GAIN", -1.0, "energy rose"),
         ("MOST_MADE", -1.0, "steps made"),
-        ("MOST_ITERATIONS", 0, "Newton iterations a step"),
+        ("MOST_ITERATIONS", 0, "Newton iterations an attempt"),
         ("LARGEST_RESIDUAL", 0.0, "residual"),
     ],
 )
