@@ -64,7 +64,7 @@ setup(
     maintainer_email="maintainers@bilayer-sim.example",
     python_requires=">=3.11",
     packages=find_packages(include=["bilayer_core*", "bilayer_sim_ros*"]),
-    package_data={"bilayer_core.bench": ["references.json"]},
+    package_data={"bilayer_core.bench": ["references.json"], "bilayer_core.stress": ["mutants.toml"]},
     data_files=data_files,
     zip_safe=False,
     install_requires=[
