@@ -20,21 +20,24 @@ from queue import SimpleQueue
 
 from ..bench import machine
 from ..errors import InputError
+from ..jit.cache import FOLDERS
 from .case import Outcome, Record
 from .cases import quick_names
 from .checkout_copy import CheckoutCopy
 from .journal import commit
+from .mutants import FILE as MUTANTS_FILE
 from .mutants import Mutant, mutants
 
 FILE, CASES = "mutations.jsonl", "cases.jsonl"
 TEST, CASE, HANG, LIVES, VOID = "test", "case", "hang", "lives", "fails without it"
 TEST_TIME = 240.0
-"""CPU time [s] for the quick tests of a module, several times what the slowest takes with a bug's kernels to compile."""
+"""CPU time [s] for the quick tests of a module: several times what the slowest take, with a bug's kernels to compile."""
 CASE_TIME = 120.0
 """CPU time [s] of the cases that judge a bug which the tests let live, without it."""
 SLOWER = 4.0
 """Times that, after which they are ended."""
-TESTS = ("-m", "pytest", "-x", "-q", "-n", "0", "-m", "not slow", "--tb=line", "-rfE", "-p", "no:cacheprovider")
+PYTEST = ("-m", "pytest", "-q", "-n", "0", "-m", "not slow", "--tb=line", "-rfE", "-p", "no:cacheprovider")
+"""Of the interpreter."""
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (\S+?(?:\[.*?\])?)(?: - (.*))?$", re.MULTILINE)
 
 
@@ -53,6 +56,8 @@ class Judged:
         What it said.
     cpu_time, wall_time : float
         Until then [s], with what had to be compiled.
+    checked : bool
+        Whether it was seen that all is well without the bug.
     """
 
     name: str
@@ -62,6 +67,7 @@ class Judged:
     message: str = ""
     cpu_time: float = 0.0
     wall_time: float = 0.0
+    checked: bool = False
 
     @property
     def caught(self) -> bool:
@@ -116,9 +122,12 @@ def run_mutations(
         found = journal.results.get(name)
         if found is None or found.verdict == VOID or with_cases and found.verdict == LIVES:
             left.put(known[name])
+    if left.empty() and all(result.checked for result in journal.results.values() if result.caught):
+        return journal.results
     copies = [CheckoutCopy(out / "copies" / str(number)) for number in range(max(1, min(workers, left.qsize())))]
-    for copy in copies:
-        copy.compile()
+    if with_cases or any(known[name].file.split("/")[0] in FOLDERS for name in chosen):
+        for copy in copies:
+            copy.compile()
     expected = _expected(copies[0], out / CASES) if with_cases and not left.empty() else []
 
     def work(copy: CheckoutCopy) -> None:
@@ -130,9 +139,10 @@ def run_mutations(
     with ThreadPoolExecutor(len(copies)) as pool:
         for future in [pool.submit(work, copy) for copy in copies]:
             future.result()
-    for result in _void(copies[0], journal.results.values()):
+    for result in _checked(copies[0], [result for result in journal.results.values() if not result.checked]):
         journal.add(result)
-        tell(result)
+        if not result.caught:
+            tell(result)
     return journal.results
 
 
@@ -171,7 +181,7 @@ def read_results(path: Path) -> tuple[dict, dict[str, Judged]]:
 def _judge(copy: CheckoutCopy, mutant: Mutant, expected: list[Record]) -> Judged:
     begin, result = clock.monotonic(), Judged(mutant.name, mutant.digest, LIVES)
     with copy.changed(mutant):
-        ended = copy.run([*TESTS, *mutant.tests], TEST_TIME)
+        ended = copy.run([*PYTEST, "-x", *mutant.tests], TEST_TIME)
         cpu_time = ended.cpu_time
         if ended.stopped:
             result = replace(result, verdict=HANG, by=", ".join(mutant.tests), message=f"over {TEST_TIME:g} s")
@@ -224,22 +234,63 @@ def _expected(copy: CheckoutCopy, path: Path) -> list[Record]:
     return chosen
 
 
-def _void(copy: CheckoutCopy, results: Iterable[Judged]) -> list[Judged]:
-    """Results of tests that fail, or files of tests that take too long, without any bug as well."""
-    results, found = list(results), []
-    tests = sorted({result.by for result in results if result.verdict == TEST})
-    failing: set[str] = set()
-    if tests:
-        ended = copy.run([*(word for word in TESTS if word != "-x"), *tests], SLOWER * TEST_TIME)
-        failing = {name for name, _ in _FAILED.findall(ended.text)} if ended.code else set()
-        if ended.code not in (0, 1):
-            failing = set(tests)
-    slow = {
-        result.by
-        for result in {result.by: result for result in results if result.verdict == HANG}.values()
-        if copy.run([*TESTS, *result.by.split(", ")], TEST_TIME / SLOWER).code != 0
-    }
-    for result in results:
-        if result.verdict == TEST and result.by in failing or result.verdict == HANG and result.by in slow:
-            found.append(replace(result, verdict=VOID))
-    return found
+def _checked(copy: CheckoutCopy, results: list[Judged]) -> list[Judged]:
+    """Results of what noticed something, `VOID` where the test fails, or the tests take long, without any bug as well.
+
+    Cases were compared with those of the same copy.
+    """
+    by = {verdict: sorted({result.by for result in results if result.verdict == verdict}) for verdict in (TEST, HANG)}
+    wrong = {files for files in by[HANG] if _takes_long(copy, files)}
+    if by[TEST]:
+        ended = copy.run([*PYTEST, *by[TEST]], SLOWER * TEST_TIME)
+        failed = {name for name, _ in _FAILED.findall(ended.text)}
+        wrong |= failed if ended.code in (0, 1) else set(by[TEST])
+    caught = [replace(result, checked=True) for result in results if result.caught]
+    return [replace(result, verdict=VOID) if result.by in wrong else result for result in caught]
+
+
+def _takes_long(copy: CheckoutCopy, files: str) -> bool:
+    """Whether tests take nearly as long without any bug as they may with one, or fail."""
+    return copy.run([*PYTEST, *files.split(", ")], TEST_TIME / SLOWER).code != 0
+
+
+def markdown(path: Path) -> list[str]:
+    """Results as lines of a page: how many bugs were noticed, which live, and what noticed each.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file of results.
+    """
+    head, results = read_results(path)
+    known = mutants()
+    judged = [results[name] for name in known if name in results]
+    alive = [result for result in judged if not result.caught]
+    counted = {verdict: sum(result.verdict == verdict for result in judged) for verdict in (TEST, CASE, HANG)}
+    cpu_time = sum(result.cpu_time for result in judged)
+    lines = [
+        f"{len(judged)} bugs were put into the sources, one at a time (`bilayer stress --mutations`; they are in",
+        f"`bilayer_core/stress/{MUTANTS_FILE.name}`). {len(judged) - len(alive)} were noticed:",
+        f"{counted[TEST]} by the quick tests of their module, {counted[CASE]} by a case of the quick matrix,",
+        f"{counted[HANG]} because something did not come to an end. Commit {head['commit'] or 'unknown'},",
+        f"{str(head['date'])[:10]}, {cpu_time / 60.0:.0f} minutes of CPU.",
+        "",
+    ]
+    if alive:
+        lines += ["These live:", "", *(f"- {result.name}: {known[result.name].bug}." for result in alive), ""]
+    lines += ["| bug | what is wrong | noticed by | after CPU time |", "| --- | --- | --- | --- |"]
+    for result in judged:
+        bug = known[result.name].bug
+        lines.append(f"| {result.name} | {bug} | {_noticed_by(result)} | {result.cpu_time:.0f} s |")
+    return [*lines, ""]
+
+
+def _noticed_by(result: Judged) -> str:
+    if not result.caught:
+        return "nothing"
+    if result.verdict == CASE:
+        return f"case `{result.by}`"
+    if result.verdict == HANG:
+        return f"no end of {result.by}"
+    file, _, name = result.by.partition("::")
+    return f"`{name.split('[')[0] or file}`"

@@ -65,7 +65,8 @@ def _definitions(tree: ast.Module) -> dict[str, list[ast.stmt]]:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             names = [node.name]
         else:
-            names = [part.id for part in ast.walk(node) if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store)]
+            parts = [part for part in ast.walk(node) if isinstance(part, ast.Name)]
+            names = [part.id for part in parts if isinstance(part.ctx, ast.Store)]
         for name in names:
             found.setdefault(name, []).append(node)
     return found

@@ -10,7 +10,7 @@ import synthetic_run
 from rclpy.serialization import deserialize_message
 from rosbags.typesys import Stores, get_typestore
 
-from bilayer_core.record.cdr import read_float64_multi_array
+from bilayer_core.record.cdr import nanoseconds, read_float64_multi_array
 from bilayer_core.record.encoders import FrameEncoder, encode_float64
 from bilayer_core.record.markers import ADD, ARROW_DECADE, ARROW_FORCE, DELETE, LINE_LIST, SPHERE
 from bilayer_core.record.schemas import schema_text
@@ -120,8 +120,15 @@ def test_messages_hold_the_values_of_the_frame(encoder, typestore):
     points = read("points")
     assert [field.name for field in points.fields] == "x y z strain curvature fx fy fz".split()
     cloud = points.data.view("<f4").reshape(-1, 8)
+    np.testing.assert_array_equal(cloud[:, :3], frame.positions.astype(np.float32))
     np.testing.assert_array_equal(cloud[:, 3], frame.strain.astype(np.float32))
+    np.testing.assert_array_equal(cloud[:, 4], frame.curvature.astype(np.float32))
     np.testing.assert_array_equal(cloud[:, 5:], frame.contact_forces.astype(np.float32))
+
+
+def test_stamps_are_the_nearest_nanosecond():
+    times = np.arange(1, 10_000)
+    assert [nanoseconds(time * 1e-3) for time in times.tolist()] == (1_000_000 * times).tolist()
 
 
 def test_the_axes_of_a_node_are_director_width_and_tangent(encoder, typestore):
