@@ -76,6 +76,7 @@ class CheckoutCopy:
         self._kernels, self._own = directory.absolute() / "kernels", directory.absolute() / "kernels-of-mutant"
         self._home = directory.absolute() / "home"
         shutil.rmtree(self.tree, ignore_errors=True)
+        shutil.rmtree(self._own, ignore_errors=True)  # of a run that was killed
         self._home.mkdir(parents=True, exist_ok=True)
         for name in COPIED:
             source = self._root / name

@@ -31,7 +31,7 @@ from .mutants import Mutant, mutants
 FILE, CASES = "mutations.jsonl", "cases.jsonl"
 TEST, CASE, HANG, LIVES, VOID = "test", "case", "hang", "lives", "fails without it"
 TEST_TIME = 240.0
-"""CPU time [s] for the quick tests of a module: several times what the slowest take, with a bug's kernels to compile."""
+"""CPU time [s] for the quick tests of a module, several times what the slowest take with kernels to compile."""
 CASE_TIME = 120.0
 """CPU time [s] of the cases that judge a bug which the tests let live, without it."""
 SLOWER = 4.0

@@ -170,6 +170,17 @@ def test_arms_that_a_hub_holds_side_by_side_do_not_feel_what_joins_them():
     assert np.abs(simulator.contact_forces).max() == 0.0
 
 
+def test_a_rod_that_bends_to_just_over_its_thickness_does_not_feel_itself():
+    apart = 1e-3 + D_HAT  # of curves that begin to touch
+    path = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.55 * apart, "angle": "190 deg"}
+    hairpin = rod([layer()], stations=46) | {"path": path}
+    simulator = Simulator(load_scene(scene([hairpin], contact={**contact(), "rods": True})))
+    assert simulator.plan.contact_pairs  # it may meet itself elsewhere
+    simulator.run(1e-3)
+    assert simulator.energy()["rod barrier"] == 0.0
+    assert np.abs(simulator.contact_forces).max() == 0.0
+
+
 def hugging(coefficient):
     """A leaf between two arms of a free body that curl up onto it: nodes that the body holds touch it."""
     active = layer("active", eigenstrain={"stimulus": "heat", "gain": 0.06})

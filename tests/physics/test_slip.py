@@ -11,10 +11,11 @@ THRESHOLD, STEP = 1e-4, 1e-3  # ε_v [m/s], h [s]
 ZONE = THRESHOLD * STEP  # slip within which a contact sticks [m]
 
 
-def way_of(slip, rate, load=1.0, coefficient=0.5):
-    """One contact with equal coefficients all round."""
+def way_of(slip, rate, load=1.0, coefficient=0.5, forward=None):
+    """One contact with equal coefficients all round, but for that forward if it is given, which is smaller."""
     square = coefficient**2
-    return np.array([[*(slip[0], rate[0], slip[1], rate[1]), square, square, square, load, coefficient * STEP]])
+    ahead = square if forward is None else forward**2
+    return np.array([[*(slip[0], rate[0], slip[1], rate[1]), ahead, square, square, load, coefficient * STEP]])
 
 
 def derivatives(function, at, h):
@@ -57,6 +58,13 @@ def test_a_step_is_not_held_up_by_contacts_that_slip_on_or_yield_to_it():
         assert friction_limit(1, way, THRESHOLD, -0.3 * rate, 1.0) == 1.0
         assert friction_limit(1, way, THRESHOLD, -0.3 * rate, 0.25) == 0.25
     assert friction_limit(0, np.empty((0, PATH_SIZE)), THRESHOLD, -1.0, 0.5) == 0.5
+
+
+@pytest.mark.parametrize("rate, is_held", [(400.0 * ZONE, False), (-400.0 * ZONE, True)])
+def test_a_contact_at_rest_holds_a_step_up_by_the_friction_of_the_way_it_goes(rate, is_held):
+    way = way_of((0.0, 0.0), (rate, 0.0), forward=0.2)  # 0.5 backward
+    fraction = friction_limit(1, way, THRESHOLD, -0.3 * abs(rate), 1.0)
+    assert (fraction * abs(rate) < ZONE) if is_held else fraction == 1.0
 
 
 def test_sticking_and_slipping_on_the_ground_takes_few_iterations():
