@@ -75,6 +75,8 @@ class CheckoutCopy:
         self._root, self.tree = checkout(), directory.absolute() / "tree"
         self._kernels, self._own = directory.absolute() / "kernels", directory.absolute() / "kernels-of-mutant"
         self._home = directory.absolute() / "home"
+        self._process: int | None = None
+        self._stopped = False
         shutil.rmtree(self.tree, ignore_errors=True)
         shutil.rmtree(self._own, ignore_errors=True)  # of a run that was killed
         self._home.mkdir(parents=True, exist_ok=True)
@@ -96,6 +98,16 @@ class CheckoutCopy:
         ended = self.run(["-m", "bilayer_core.jit.compile_all"], 3600.0)
         if ended.code != 0:
             raise InputError(f"mutations: the kernels of {self.tree} cannot be compiled:\n{ended.text}")
+
+    def stop(self) -> None:
+        """End what runs, and let nothing run any more."""
+        self._stopped = True
+        if self._process is not None:
+            _end(self._process)
+
+    def _go_on(self) -> None:
+        if self._stopped:
+            raise InputError("mutations: were stopped")
 
     @contextmanager
     def changed(self, mutant: Mutant) -> Iterator[None]:
@@ -156,7 +168,13 @@ class CheckoutCopy:
             Of the interpreter.
         cpu_limit : float
             CPU time [s] after which the process is ended.
+
+        Raises
+        ------
+        InputError
+            After `stop`.
         """
+        self._go_on()
         shutil.rmtree(self._home, ignore_errors=True)  # what hypothesis remembers of other mutants
         self._home.mkdir(parents=True)
         kernels = self._own if self._own.exists() else self._kernels
@@ -171,11 +189,14 @@ class CheckoutCopy:
                 start_new_session=True,
             )
             resource.prlimit(process.pid, resource.RLIMIT_CPU, (int(cpu_limit), int(cpu_limit) + 5))
+            self._process = process.pid
             late = threading.Timer(WALL_OVER_CPU * cpu_limit, _end, (process.pid,))
             late.start()
             _, status, usage = os.wait4(process.pid, 0)
             late.cancel()
+            self._process = None
             process.returncode = os.waitstatus_to_exitcode(status)
+        self._go_on()
         stopped = process.returncode in (-signal.SIGXCPU, -signal.SIGKILL)
         text = output.read_text(encoding="utf-8", errors="replace")
         return Ended(process.returncode, text, usage.ru_utime + usage.ru_stime, stopped)

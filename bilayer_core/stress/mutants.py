@@ -6,8 +6,10 @@ and asks which test or case notices.
 
 from __future__ import annotations
 
+import fnmatch
 import hashlib
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -87,3 +89,21 @@ def mutants() -> dict[str, Mutant]:
             raise InputError(f"{FILE.name}: two mutants are called {mutant.name!r}")
         found[mutant.name] = mutant
     return found
+
+
+def chosen_mutants(only: Sequence[str]) -> dict[str, Mutant]:
+    """Those whose names fit a pattern, such as ``newton*``, or all without one.
+
+    Raises
+    ------
+    InputError
+        If a pattern fits none, or a mutant does not fit the sources.
+    """
+    known = mutants()
+    for pattern in only:
+        if not fnmatch.filter(known, pattern):
+            groups = ", ".join(dict.fromkeys(name.split(":")[0] for name in known))
+            raise InputError(f"--only {pattern}: fits no mutant; there are mutants of {groups} (--list names all)")
+    if not only:
+        return known
+    return {name: mutant for name, mutant in known.items() if any(fnmatch.fnmatchcase(name, p) for p in only)}

@@ -12,21 +12,21 @@ import json
 import re
 import threading
 import time as clock
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 
 from ..bench import machine
 from ..errors import InputError
 from ..jit.cache import FOLDERS
 from .case import Outcome, Record
 from .cases import quick_names
-from .checkout_copy import CheckoutCopy
+from .checkout_copy import CheckoutCopy, checkout
 from .journal import commit
 from .mutants import FILE as MUTANTS_FILE
-from .mutants import Mutant, mutants
+from .mutants import Mutant, chosen_mutants, mutants
 
 FILE, CASES = "mutations.jsonl", "cases.jsonl"
 TEST, CASE, HANG, LIVES, VOID = "test", "case", "hang", "lives", "fails without it"
@@ -56,6 +56,8 @@ class Judged:
         What it said.
     cpu_time, wall_time : float
         Until then [s], with what had to be compiled.
+    cases : int
+        How many cases were to judge it, after the tests.
     checked : bool
         Whether it was seen that all is well without the bug.
     """
@@ -67,6 +69,7 @@ class Judged:
     message: str = ""
     cpu_time: float = 0.0
     wall_time: float = 0.0
+    cases: int = 0
     checked: bool = False
 
     @property
@@ -76,7 +79,7 @@ class Judged:
 
 
 def run_mutations(
-    only: Iterable[str],
+    only: Sequence[str],
     out: Path,
     tell: Callable[[Judged], None],
     *,
@@ -88,8 +91,8 @@ def run_mutations(
 
     Parameters
     ----------
-    only : iterable of str
-        Names, from `mutants`.
+    only : sequence of str
+        Patterns of names; none for all.
     out : Path
         Where the results go, and the copies with their kernels, which a later run uses again.
     tell : callable
@@ -109,36 +112,42 @@ def run_mutations(
     Raises
     ------
     InputError
-        If the package is not run from a checkout, a name is unknown, or a mutant does not fit the sources.
+        If the package is not run from a checkout, a pattern fits no mutant, or a mutant does not fit the sources.
     """
-    known = mutants()
-    chosen = list(only)
-    unknown = [name for name in chosen if name not in known]
-    if unknown:
-        raise InputError(f"mutations: no mutant is called {unknown[0]!r}; `--list` names all")
-    journal = _Journal(out / FILE, known, resume)
+    chosen = chosen_mutants(only)
+    checkout()  # a package without its tests is refused before anything is written
+    journal = _Journal(out / FILE, mutants(), resume)
     left: SimpleQueue[Mutant] = SimpleQueue()
-    for name in chosen:
+    for name, mutant in chosen.items():
         found = journal.results.get(name)
-        if found is None or found.verdict == VOID or with_cases and found.verdict == LIVES:
-            left.put(known[name])
+        if found is None or found.verdict == VOID or with_cases and found.verdict == LIVES and not found.cases:
+            left.put(mutant)
     if left.empty() and all(result.checked for result in journal.results.values() if result.caught):
         return journal.results
     copies = [CheckoutCopy(out / "copies" / str(number)) for number in range(max(1, min(workers, left.qsize())))]
-    if with_cases or any(known[name].file.split("/")[0] in FOLDERS for name in chosen):
+    if with_cases or any(mutant.file.split("/")[0] in FOLDERS for mutant in chosen.values()):
         for copy in copies:
             copy.compile()
     expected = _expected(copies[0], out / CASES) if with_cases and not left.empty() else []
 
     def work(copy: CheckoutCopy) -> None:
-        while not left.empty():
-            result = _judge(copy, left.get(), expected)
+        while True:
+            try:
+                mutant = left.get_nowait()
+            except Empty:
+                return
+            result = _judge(copy, mutant, expected)
             journal.add(result)
             tell(result)
 
     with ThreadPoolExecutor(len(copies)) as pool:
-        for future in [pool.submit(work, copy) for copy in copies]:
-            future.result()
+        try:
+            for future in [pool.submit(work, copy) for copy in copies]:
+                future.result()
+        except BaseException:  # such as that of Ctrl-C
+            for copy in copies:
+                copy.stop()
+            raise
     for result in _checked(copies[0], [result for result in journal.results.values() if not result.checked]):
         journal.add(result)
         if not result.caught:
@@ -191,7 +200,7 @@ def _judge(copy: CheckoutCopy, mutant: Mutant, expected: list[Record]) -> Judged
             result = replace(result, verdict=TEST, by=by, message=(message or "").strip()[:200])
         elif expected:
             by, message, more = _first_unlike(copy, expected)
-            result = replace(result, verdict=CASE if by else LIVES, by=by, message=message)
+            result = replace(result, verdict=CASE if by else LIVES, by=by, message=message, cases=len(expected))
             cpu_time += more
     return replace(result, cpu_time=round(cpu_time, 1), wall_time=round(clock.monotonic() - begin, 1))
 

@@ -67,7 +67,7 @@ def test_a_package_without_its_tests_is_refused(monkeypatch, tmp_path):
 
 
 def test_an_unknown_name_is_refused_before_anything_is_copied(tmp_path):
-    with pytest.raises(InputError, match="no mutant is called 'sine'"):
+    with pytest.raises(InputError, match="--only sine: fits no mutant; there are mutants of stretch"):
         run_mutations(["sine"], tmp_path / "out", print)
     assert not (tmp_path / "out").exists()
 
