@@ -311,7 +311,7 @@ def test_steps_settle_at_the_tolerance_where_the_error_goes_with_a_power_of_thei
             lengths.append(h)
             h, before = after_success(order, h, error, before, 3.0, False), error
         assert lengths[-1] == pytest.approx(lengths[-2], rel=1e-3)
-        assert 0.7e-2 < lengths[-1] < 1e-2
+        assert lengths[-1] == pytest.approx(0.9**2.5 * 1e-2, rel=1e-3)  # where 0.9 E^(−2/5k) is 1
 
 
 def test_steps_neither_grow_too_fast_nor_where_newton_works_hard():

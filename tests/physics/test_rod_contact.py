@@ -9,6 +9,8 @@ from sample_scenes import contact, layer, rod, scene
 from slips import dissipation
 
 from bilayer_core import load_scene
+from bilayer_core.contact.rod_bound import FAR
+from bilayer_core.contact.step_bound import KEPT_FRACTION
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build import build_model
 from bilayer_core.model.rod_surfaces import NearPairs
@@ -360,6 +362,39 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
                 until = pairs.search.until[: pairs.count]
                 np.testing.assert_allclose(until, gap[point, segment] - D_HAT, rtol=0, atol=1e-15)
     assert met > 1000
+
+
+def gaps_between(model, position):
+    """Of all points of the first of two rods from all segments of the second, and the other way round."""
+    surfaces, found = model.rod_surfaces, []
+    i, s = model.edge_node[surfaces.point_edge], surfaces.point_fraction[:, None]
+    points = (1.0 - s) * position[i] + s * position[i + 1]
+    for own in (0, 1):
+        mine = surfaces.edge_rod[surfaces.point_edge] == own
+        other = np.flatnonzero(surfaces.edge_rod != own)
+        j = model.edge_node[other]
+        along, between = position[j + 1] - position[j], points[mine][:, None] - position[j]
+        t = np.clip((between * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
+        distance = np.linalg.norm(between - t[..., None] * along, axis=2)
+        radii = surfaces.edge_radius[surfaces.point_edge[mine]][:, None] + surfaces.edge_radius[other]
+        found.append((distance - radii).ravel())
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize("case", ["parallel", "crossed"])
+def test_a_step_up_to_its_bound_keeps_a_part_of_every_gap_between_rods(case):
+    rng = np.random.default_rng(6)
+    model, position = CASES[case](rng)
+    rods = Rods(model)
+    kept = KEPT_FRACTION * np.minimum(gaps_between(model, position), FAR * D_HAT)
+    bounded = 0
+    for _ in range(40):
+        step = 3e-3 * rng.standard_normal(position.shape)
+        fraction = rods.bound(position, step).fraction
+        bounded += fraction < 1.0
+        for part in np.linspace(0.0, fraction, 31):
+            assert (gaps_between(model, position + part * step) >= kept - 1e-12).all()
+    assert bounded > 10
 
 
 @pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3])

@@ -2,17 +2,21 @@
 
 import numpy as np
 import pytest
-from sample_scenes import HALF_SIZES
+from evaluations import at_rest
+from sample_scenes import HALF_SIZES, contact, layer, rod, scene
 
+from bilayer_core import load_scene
 from bilayer_core.contact.near import gap_normal, list_near
 from bilayer_core.contact.step_bound import KEPT_FRACTION, motion_of_points, step_bound
 from bilayer_core.jit import kernel, record_at
 from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.build import build_model
 from bilayer_core.model.records.contacts import RodPoints, Surfaces
 from bilayer_core.model.records.parts import Bodies, Strands
 from bilayer_core.model.records.problem import System
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.shapes import NUMBER
+from bilayer_core.model.state import initial_state
 
 surfaces_at, strands_at, bodies_at = record_at(Surfaces), record_at(Strands), record_at(Bodies)
 configuration_at, system_at = record_at(Configuration), record_at(System)
@@ -289,3 +293,22 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
         assert np.array_equal(surfaces.listed_contact_point, contact_point) and np.array_equal(
             surfaces.listed_surface_rotation, turn
         )
+
+
+@pytest.mark.parametrize(("start", "turn"), [(-0.02, 0.0), (-4e-3, 0.04)], ids=["shifted", "turned"])
+def test_what_a_moving_surface_comes_near_to_is_seen_in_time(start, turn):
+    plate = {"name": "plate", "position": [0.05, 0, start], "motion": {"type": "prescribed"}}
+    plate["surface"] = {"shape": "box", "size": [0.3, 0.1, 2e-3]}  # touches the strip from 1.5 mm below its curve
+    model = build_model(load_scene(scene([rod([layer()])], bodies=[plate], contact=contact())))
+
+    def energy(evaluator, part):
+        state, at = initial_state(model), evaluator.new()
+        state.body_position[0, 2] += 0.0 if turn else part * (-1.8e-3 - start)
+        state.body_rotation[0] = rotation_matrix(np.array([0.0, part * turn, 0.0]))
+        evaluator.take_state(state, at)
+        return evaluator.forces(at, ("barrier",))["barrier"]
+
+    evaluator, _ = at_rest(model, 0.01)
+    found = [energy(evaluator, part) for part in np.linspace(0.0, 1.0, 41)]
+    assert found == [energy(at_rest(model, 0.01)[0], part) for part in np.linspace(0.0, 1.0, 41)]
+    assert found[0] == 0.0 < found[-1] < np.inf
