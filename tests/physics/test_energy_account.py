@@ -95,6 +95,19 @@ def test_what_a_stimulus_supplies_is_in_the_account():
     )
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_what_viscosity_takes_is_in_the_account(dimension):
+    arm = rod([layer("bottom"), layer("top")], length=0.06, stations=11, clamp_start="wall")
+    soft = {"gel": {**GEL, "youngs_modulus": 5e5, "retardation_time": 0.02}}
+    hanging = scene([arm], bodies=[fixed()], gravity=[0, 0, -9.81], materials=soft)
+    simulator = Simulator(load_scene(hanging), dimension=dimension, dt=2.5e-4, integrator="tr_bdf2", budget=True)
+    simulator.run(0.1)
+    budget, account = simulator.budget(), simulator.energy_account
+    taken = budget["lost"]["viscosity"]
+    assert taken > 0.05 * account[LARGEST]
+    assert -account[NUMERICAL] == pytest.approx(budget["lost"]["numerical"], abs=0.02 * taken)
+
+
 def test_a_run_that_is_continued_from_a_saved_state_has_the_same_account():
     content = thrown(1e9, 2)
     whole = Simulator(load_scene(content), tolerance=1e-4)
