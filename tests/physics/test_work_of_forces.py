@@ -244,3 +244,18 @@ def test_loads_give_their_force_times_the_way_of_what_they_push():
     simulator = run(pushed, 0.05, 1e-3)
     way = simulator.positions[2, 1]
     assert simulator.budget()["supplied"]["loads"] == pytest.approx(0.02 * way, rel=1e-9)
+
+
+def test_a_curved_strip_feels_the_same_drag_from_whichever_end_its_path_begins():
+    def momentum(start, direction, normal):
+        path = {"shape": "arc", "start": start, "direction": direction, "radius": 0.05, "angle": "90 deg"}
+        strip = rod([layer()], stations=7) | {"path": path, "normal": normal}
+        fluid = {"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05]}
+        simulator = Simulator(load_scene(scene([strip], fluid=fluid)), dt=1e-4)
+        simulator.run(1e-3)
+        return simulator.model.node_mass @ simulator.velocities
+
+    one = momentum([0, 0, 0], [1, 0, 0], [0, 0, 1])
+    other = momentum([0.05, 0, 0.05], [0, 0, -1], [-1, 0, 0])
+    assert np.abs(one).min() > 0.0
+    assert other == pytest.approx(one, rel=1e-6)
