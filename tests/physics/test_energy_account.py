@@ -108,6 +108,20 @@ def test_what_viscosity_takes_is_in_the_account(dimension):
     assert -account[NUMERICAL] == pytest.approx(budget["lost"]["numerical"], abs=0.02 * taken)
 
 
+@pytest.mark.parametrize("frame", ["world", "material"])
+def test_what_a_load_supplies_is_in_the_account(frame):
+    arm = rod([layer("bottom"), layer("top")], length=0.06, stations=11, name="arm", clamp_start="wall")
+    pull = {"name": "pull", "rod": "arm", "position": 0.06, "force": [0, 0, 5e-3], "frame": frame}
+    soft = {"gel": {**GEL, "youngs_modulus": 5e5}}
+    content = scene([arm], bodies=[fixed()], materials=soft, loads=[pull])
+    simulator = Simulator(load_scene(content), dt=2.5e-4, integrator="tr_bdf2", budget=True)
+    simulator.run(0.05)
+    budget, account = simulator.budget(), simulator.energy_account
+    supplied = sum(budget["supplied"].values())
+    assert supplied > 0.1 * account[LARGEST] > 0.0
+    assert -account[NUMERICAL] == pytest.approx(budget["lost"]["numerical"], abs=0.02 * supplied)
+
+
 def test_a_run_that_is_continued_from_a_saved_state_has_the_same_account():
     content = thrown(1e9, 2)
     whole = Simulator(load_scene(content), tolerance=1e-4)

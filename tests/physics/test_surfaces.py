@@ -295,20 +295,26 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
         )
 
 
-@pytest.mark.parametrize(("start", "turn"), [(-0.02, 0.0), (-4e-3, 0.04)], ids=["shifted", "turned"])
-def test_what_a_moving_surface_comes_near_to_is_seen_in_time(start, turn):
-    plate = {"name": "plate", "position": [0.05, 0, start], "motion": {"type": "prescribed"}}
-    plate["surface"] = {"shape": "box", "size": [0.3, 0.1, 2e-3]}  # touches the strip from 1.5 mm below its curve
+@pytest.mark.parametrize(
+    ("length", "height", "shift", "turn"),
+    [(0.02, -1.8e-3, 0.04, 0.0), (0.3, -4e-3, 0.0, 0.04)],
+    ids=["shifted", "turned"],
+)
+def test_what_a_moving_surface_comes_near_to_is_seen_in_time(length, height, shift, turn):
+    plate = {"name": "plate", "position": [0.05, 0, height], "motion": {"type": "prescribed"}}
+    plate["surface"] = {"shape": "box", "size": [length, 0.1, 2e-3]}  # touches the strip from 1.5 mm below its curve
     model = build_model(load_scene(scene([rod([layer()])], bodies=[plate], contact=contact())))
 
     def energy(evaluator, part):
+        """Along the strip, or from one of its ends to the other, −1 … 1."""
         state, at = initial_state(model), evaluator.new()
-        state.body_position[0, 2] += 0.0 if turn else part * (-1.8e-3 - start)
+        state.body_position[0, 0] += part * shift
         state.body_rotation[0] = rotation_matrix(np.array([0.0, part * turn, 0.0]))
         evaluator.take_state(state, at)
         return evaluator.forces(at, ("barrier",))["barrier"]
 
     evaluator, _ = at_rest(model, 0.01)
-    found = [energy(evaluator, part) for part in np.linspace(0.0, 1.0, 41)]
-    assert found == [energy(at_rest(model, 0.01)[0], part) for part in np.linspace(0.0, 1.0, 41)]
-    assert found[0] == 0.0 < found[-1] < np.inf
+    parts = np.linspace(-1.0, 1.0, 41)
+    found = [energy(evaluator, part) for part in parts]
+    assert found == [energy(at_rest(model, 0.01)[0], part) for part in parts]
+    assert found[0] > 0.0 and np.isfinite(found).all() and found[-1] > 0.0
