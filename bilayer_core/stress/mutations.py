@@ -29,7 +29,8 @@ from .mutants import FILE as MUTANTS_FILE
 from .mutants import Mutant, chosen_mutants, mutants
 
 FILE, CASES = "mutations.jsonl", "cases.jsonl"
-TEST, CASE, HANG, LIVES, VOID = "test", "case", "hang", "lives", "fails without it"
+TEST, CASE, HANG, CRASH = "test", "case", "hang", "crash"
+LIVES, VOID = "lives", "fails without it"
 TEST_TIME = 240.0
 """CPU time [s] for the quick tests of a module, several times what the slowest take with kernels to compile."""
 CASE_TIME = 120.0
@@ -49,9 +50,9 @@ class Judged:
     ----------
     name, digest : str
     verdict : str
-        What noticed it: `TEST`, `CASE` or `HANG`; `LIVES`; `VOID` if the test fails without the bug as well.
+        What noticed it: `TEST`, `CASE`, `HANG` or `CRASH`; `LIVES`; `VOID` if the test fails without the bug as well.
     by : str
-        Which test, or which case.
+        Which test, or which case; the test files of which the process did not end, or died.
     message : str
         What it said.
     cpu_time, wall_time : float
@@ -75,7 +76,7 @@ class Judged:
     @property
     def caught(self) -> bool:
         """Whether anything noticed it."""
-        return self.verdict in (TEST, CASE, HANG)
+        return self.verdict in (TEST, CASE, HANG, CRASH)
 
 
 def run_mutations(
@@ -194,10 +195,11 @@ def _judge(copy: CheckoutCopy, mutant: Mutant, expected: list[Record]) -> Judged
         cpu_time = ended.cpu_time
         if ended.stopped:
             result = replace(result, verdict=HANG, by=", ".join(mutant.tests), message=f"over {TEST_TIME:g} s")
-        elif ended.code != 0:
-            found = _FAILED.search(ended.text)
-            by, message = found.groups() if found else ("", ended.text[-300:])
+        elif ended.code != 0 and (found := _FAILED.search(ended.text)):
+            by, message = found.groups()
             result = replace(result, verdict=TEST, by=by, message=(message or "").strip()[:200])
+        elif ended.code != 0:
+            result = replace(result, verdict=CRASH, by=", ".join(mutant.tests), message=f"exit code {ended.code}")
         elif expected:
             by, message, more = _first_unlike(copy, expected)
             result = replace(result, verdict=CASE if by else LIVES, by=by, message=message, cases=len(expected))
@@ -248,8 +250,9 @@ def _checked(copy: CheckoutCopy, results: list[Judged]) -> list[Judged]:
 
     Cases were compared with those of the same copy.
     """
-    by = {verdict: sorted({result.by for result in results if result.verdict == verdict}) for verdict in (TEST, HANG)}
-    wrong = {files for files in by[HANG] if _takes_long(copy, files)}
+    by = {verdict: sorted({r.by for r in results if r.verdict == verdict}) for verdict in (TEST, HANG, CRASH)}
+    wrong = {files for files in by[HANG] if _fails(copy, files, TEST_TIME / SLOWER)}
+    wrong |= {files for files in by[CRASH] if _fails(copy, files, TEST_TIME)}
     if by[TEST]:
         ended = copy.run([*PYTEST, *by[TEST]], SLOWER * TEST_TIME)
         failed = {name for name, _ in _FAILED.findall(ended.text)}
@@ -258,9 +261,9 @@ def _checked(copy: CheckoutCopy, results: list[Judged]) -> list[Judged]:
     return [replace(result, verdict=VOID) if result.by in wrong else result for result in caught]
 
 
-def _takes_long(copy: CheckoutCopy, files: str) -> bool:
-    """Whether tests take nearly as long without any bug as they may with one, or fail."""
-    return copy.run([*PYTEST, *files.split(", ")], TEST_TIME / SLOWER).code != 0
+def _fails(copy: CheckoutCopy, files: str, cpu_limit: float) -> bool:
+    """Whether tests fail, or take longer than they may, without any bug."""
+    return copy.run([*PYTEST, *files.split(", ")], cpu_limit).code != 0
 
 
 def markdown(path: Path) -> list[str]:
@@ -275,13 +278,13 @@ def markdown(path: Path) -> list[str]:
     known = mutants()
     judged = [results[name] for name in known if name in results]
     alive = [result for result in judged if not result.caught]
-    counted = {verdict: sum(result.verdict == verdict for result in judged) for verdict in (TEST, CASE, HANG)}
+    counted = {verdict: sum(result.verdict == verdict for result in judged) for verdict in (TEST, CASE, HANG, CRASH)}
     cpu_time = sum(result.cpu_time for result in judged)
     lines = [
         f"{len(judged)} bugs were put into the sources, one at a time (`bilayer stress --mutations`; they are in",
         f"`bilayer_core/stress/{MUTANTS_FILE.name}`). {len(judged) - len(alive)} were noticed:",
         f"{counted[TEST]} by the quick tests of their module, {counted[CASE]} by a case of the quick matrix,",
-        f"{counted[HANG]} because something did not come to an end. Commit {head['commit'] or 'unknown'},",
+        f"{counted[HANG] + counted[CRASH]} because a process did not end, or died. Commit {head['commit'] or 'unknown'},",
         f"{str(head['date'])[:10]}, {cpu_time / 60.0:.0f} minutes of CPU.",
         "",
     ]
@@ -299,7 +302,7 @@ def _noticed_by(result: Judged) -> str:
         return "nothing"
     if result.verdict == CASE:
         return f"case `{result.by}`"
-    if result.verdict == HANG:
-        return f"no end of {result.by}"
+    if result.verdict in (HANG, CRASH):
+        return f"{'no end' if result.verdict == HANG else 'death'} of {result.by}"
     file, _, name = result.by.partition("::")
     return f"`{name.split('[')[0] or file}`"

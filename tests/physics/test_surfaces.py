@@ -273,6 +273,7 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
             group=group,
             can_collide=can_collide,
             extent=np.zeros(4),
+            near_gap=np.zeros(1200),
             **listed,
             **{name: np.zeros(shape) for name, shape in then.items()},
         )
