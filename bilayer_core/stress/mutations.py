@@ -123,7 +123,8 @@ def run_mutations(
         found = journal.results.get(name)
         if found is None or found.verdict == VOID or with_cases and found.verdict == LIVES and not found.cases:
             left.put(mutant)
-    if left.empty() and all(result.checked for result in journal.results.values() if result.caught):
+    own = (result for name, result in journal.results.items() if name in chosen)
+    if left.empty() and all(result.checked for result in own if result.caught):
         return journal.results
     copies = [CheckoutCopy(out / "copies" / str(number)) for number in range(max(1, min(workers, left.qsize())))]
     if with_cases or any(mutant.file.split("/")[0] in FOLDERS for mutant in chosen.values()):
@@ -149,7 +150,8 @@ def run_mutations(
             for copy in copies:
                 copy.stop()
             raise
-    for result in _checked(copies[0], [result for result in journal.results.values() if not result.checked]):
+    unchecked = [result for name, result in journal.results.items() if name in chosen and not result.checked]
+    for result in _checked(copies[0], unchecked):
         journal.add(result)
         if not result.caught:
             tell(result)
@@ -284,8 +286,8 @@ def markdown(path: Path) -> list[str]:
         f"{len(judged)} bugs were put into the sources, one at a time (`bilayer stress --mutations`; they are in",
         f"`bilayer_core/stress/{MUTANTS_FILE.name}`). {len(judged) - len(alive)} were noticed:",
         f"{counted[TEST]} by the quick tests of their module, {counted[CASE]} by a case of the quick matrix,",
-        f"{counted[HANG] + counted[CRASH]} because a process did not end, or died. Commit {head['commit'] or 'unknown'},",
-        f"{str(head['date'])[:10]}, {cpu_time / 60.0:.0f} minutes of CPU.",
+        f"{counted[HANG] + counted[CRASH]} because a process did not end, or died.",
+        f"Commit {head['commit'] or 'unknown'}, {str(head['date'])[:10]}, {cpu_time / 60.0:.0f} minutes of CPU.",
         "",
     ]
     if alive:
