@@ -8,7 +8,7 @@ energy with driving       T + V less supplied work can only fall, but for the qu
                           more than `MOST_MADE` of the largest energy of the run
 momentum                  where nothing but gravity acts, it changes as gravity has it, to Newton's tolerance
 budget                    inside the region the budget closes to `LARGEST_RESIDUAL` of its largest row
-effort                    no more than `MOST_ITERATIONS` Newton iterations an attempt, and `MOST_REJECTED` attempts a step
+effort                    no more than `MOST_ITERATIONS` Newton iterations an attempt, `MOST_REJECTED` attempts a step
 ========================= =====================================================================================
 """
 

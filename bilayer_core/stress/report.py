@@ -22,7 +22,7 @@ PROMISES = (
     ("energy with driving", f"T + V less the work supplied rises by less than {MOST_MADE:g} of the largest energy"),
     ("energy budget", f"closes to {100 * LARGEST_RESIDUAL:g} % of its largest row inside the region"),
     ("momentum", "of what flies freely changes as gravity has it, to Newton's tolerance"),
-    ("effort", f"at most {MOST_ITERATIONS} Newton iterations an attempt and {MOST_REJECTED} attempts a step, on average"),
+    ("effort", f"at most {MOST_ITERATIONS} Newton iterations an attempt, {MOST_REJECTED} attempts a step, on average"),
     ("refusals", "say what, when, how close and what to change"),
 )
 
