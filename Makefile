@@ -42,7 +42,7 @@ bounds: $(STAMP)  ## Run tests of all kernels with the bounds of arrays checked.
 stress: $(STAMP)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
-# What is found is committed: docs/stability.md with its figures, and bilayer_core/stress/seeded_bugs.jsonl.
+# What is found is committed: docs/stability.md with its figures, and docs/data/mutations.jsonl.
 verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scenes, seeded bugs.
 	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz
 	$(BIN)/bilayer stress --out runs/stress

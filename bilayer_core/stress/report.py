@@ -9,9 +9,12 @@ from pathlib import Path
 from .case import Outcome, Record
 from .journal import Journal
 from .judge import LARGEST_RESIDUAL, MOST_GAIN, MOST_ITERATIONS, MOST_MADE, MOST_REJECTED
+from .mutations import markdown
 from .region import LARGEST_BEND, LARGEST_MACH, LARGEST_STRAIN
+from .torture import NOT_EXPRESSIBLE, TORTURES
 
 PAGE = "stability.md"
+SEEDED_BUGS = Path(__file__).resolve().parents[2] / "docs" / "data" / "mutations.jsonl"
 LEAST_ACCURATE, MOST_REFUSED, LEAST_REMEDIES = 0.70, 0.05, 0.90
 """Parts of the cases inside the region, and of the remedies tried."""
 
@@ -115,6 +118,8 @@ def _page(journal: Journal) -> Iterator[str]:
     yield from _outcomes(records)
     yield from _extremes(records)
     yield from _worst_cases(records)
+    yield from _torture_cases(records)
+    yield from _seeded_bugs()
 
 
 def _outcomes(records: Sequence[Record]) -> Iterator[str]:
@@ -174,3 +179,34 @@ def _worst_cases(records: Sequence[Record]) -> Iterator[str]:
         why = (record.reason or record.decision or "; ".join(record.warnings[:1])).splitlines()
         yield f"| `{record.name}` | {record.outcome} | {error} | {why[0].replace('|', '/') if why else ''} |"
     yield ""
+
+
+def _torture_cases(records: Sequence[Record]) -> Iterator[str]:
+    yield "## Torture cases"
+    yield ""
+    yield "Scenes in `config/torture`, each on a ladder of steps, stations, stiffness, friction or integrators:"
+    yield "`bilayer stress --only 'torture/*'`."
+    yield ""
+    yield "| | case | source | what must come out | what decides | rungs that hold |"
+    yield "| --- | --- | --- | --- | --- | --- |"
+    for torture in TORTURES:
+        own = [r for r in records if r.name.startswith(f"torture/{torture.number:02d} ")]
+        held = f"{sum(r.outcome is Outcome.ACCURATE for r in own)} of {len(own)}" if own else "not run"
+        figures = (torture.number, torture.name, torture.source, torture.expected, torture.decided, held)
+        yield f"| {' | '.join(str(figure).replace('|', '/') for figure in figures)} |"
+    yield ""
+    yield "What scenes cannot express, or nothing sure decides:"
+    yield ""
+    yield from (f"- {number} {name}: {why}" for number, name, why in NOT_EXPRESSIBLE)
+    yield ""
+
+
+def _seeded_bugs() -> Iterator[str]:
+    """The results of seeded bugs that the checkout has, if it is one."""
+    yield "## Seeded bugs"
+    yield ""
+    if SEEDED_BUGS.exists():
+        yield from markdown(SEEDED_BUGS)
+    else:
+        yield "`bilayer stress --mutations` has not been run."
+        yield ""
