@@ -62,7 +62,7 @@ def stress(
         return 0
     check_matplotlib()
     if json_file:
-        check_output_path(json_file, force=True)
+        check_output_path(json_file, force=True, suffix=".json")
     directory = _directory(out)
     journal = Journal(directory, head_of(cases), resume)
     compile_kernels(quiet)
@@ -72,7 +72,7 @@ def stress(
         click.echo(f"wrote {path}")
     records = list(journal.records.values())
     if json_file:
-        _write_json(Path(json_file), journal)
+        _write_json(json_file, journal)
     for line in report.summary_lines(records):
         click.echo(line)
     for line in report.shortfalls(records):
@@ -116,12 +116,11 @@ def _list(cases: dict) -> None:
         click.echo(f"{name}  [outside: {'; '.join(case.outside)}]" if case.outside else name)
 
 
-def _write_json(path: Path, journal: Any) -> None:
+def _write_json(path: str, journal: Any) -> None:
+    from bilayer_core.record.paths import write_text
+
     content = journal.head | {"results": [json.loads(record.line()) for record in journal.records.values()]}
-    try:
-        path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+    write_text(path, json.dumps(content, indent=1) + "\n", force=True)
 
 
 def _directory(out: str) -> Path:

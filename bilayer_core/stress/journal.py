@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ..bench import machine
 from ..errors import InputError
+from ..record.paths import unwritable
 from .case import Record, StressCase
 
 FILE = "results.jsonl"
@@ -38,6 +39,7 @@ class Journal:
     Parameters
     ----------
     directory : Path
+        That exists.
     head : dict
         From `head_of`.
     resume : bool
@@ -61,9 +63,8 @@ class Journal:
         self.records: dict[str, Record] = {}
         if resume:
             self._read()
-        directory.mkdir(parents=True, exist_ok=True)
         if not resume:
-            self.path.write_text(json.dumps(head) + "\n", encoding="utf-8")
+            self._write("w", json.dumps(head))
 
     def _read(self) -> None:
         if not self.path.exists():
@@ -86,5 +87,11 @@ class Journal:
     def add(self, record: Record) -> None:
         """Keep a result, on disk before this returns."""
         self.records[record.name] = record
-        with open(self.path, "a", encoding="utf-8") as file:
-            file.write(record.line() + "\n")
+        self._write("a", record.line())
+
+    def _write(self, mode: str, line: str) -> None:
+        try:
+            with open(self.path, mode, encoding="utf-8") as file:
+                file.write(line + "\n")
+        except OSError as error:
+            raise unwritable(self.path, error) from error

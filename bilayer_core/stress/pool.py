@@ -42,20 +42,24 @@ def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record]
     left = list(reversed(list(cases)))
     with ProcessPool(workers, context=get_context("spawn"), initializer=_begin) as pool:
         waiting = {}
-        while left or waiting:
-            while left and len(waiting) < 2 * workers:
-                case = left.pop()
-                waiting[pool.schedule(_run, (case,), timeout=_time_of(case))] = case
-            finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
-            for job in finished:
-                case = waiting.pop(job)
-                try:
-                    record = Record.from_line(job.result())
-                except TimeoutError:
-                    record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
-                except ProcessExpired as death:
-                    record = _lost(case, f"its process died with exit code {death.exitcode}")
-                done(record)
+        try:
+            while left or waiting:
+                while left and len(waiting) < 2 * workers:
+                    case = left.pop()
+                    waiting[pool.schedule(_run, (case,), timeout=_time_of(case))] = case
+                finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
+                for job in finished:
+                    case = waiting.pop(job)
+                    try:
+                        record = Record.from_line(job.result())
+                    except TimeoutError:
+                        record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
+                    except ProcessExpired as death:
+                        record = _lost(case, f"its process died with exit code {death.exitcode}")
+                    done(record)
+        except BaseException:  # such as that of Ctrl-C: cases that run are not waited for
+            pool.stop()
+            raise
 
 
 def _time_of(case: StressCase) -> float:

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from ..record.paths import write_text
 from .case import Outcome, Record
 from .journal import Journal
 from .judge import LARGEST_RESIDUAL, MOST_GAIN, MOST_ITERATIONS, MOST_MADE, MOST_REJECTED
@@ -87,7 +88,7 @@ def summary_lines(records: Sequence[Record]) -> Iterator[str]:
 def write_page(journal: Journal, directory: Path) -> Path:
     """Write `stability.md`."""
     path = directory / PAGE
-    path.write_text("\n".join(_page(journal)) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(_page(journal)) + "\n", force=True)
     return path
 
 

@@ -73,7 +73,8 @@ def write(cases: dict[str, StressCase], journal: Journal, directory: Path, shrin
     for record in failed[:MOST_SHRUNK] if shrinks else ():
         if is_shrinkable(cases[record.name]):
             written.append(shrink(cases[record.name], record, directory / "failures", workers))
-    for number, record in enumerate(report.worst(records, WORST), 1):
+    made_here = [record for record in records if not isinstance(cases[record.name].content, str)]
+    for number, record in enumerate(report.worst(made_here, WORST), 1):
         written.append(write_scene(cases[record.name], record, directory / "worst", f"{number:02d}_"))
     written += figures.draw(records, directory)
     written.append(report.write_page(journal, directory))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import yaml
 
+from ..record.paths import write_text
 from .case import Outcome, Record, StressCase
 from .parameters import Parameters
 from .pool import run_cases
@@ -73,7 +74,7 @@ def write_scene(case: StressCase, record: Record, directory: Path, before: str =
     notes += [f"remedy: {record.remedy}"] if record.remedy else []
     head = "".join(f"# {line}\n" for note in notes for line in note.splitlines())
     head += f"# bilayer stress --scene {path.name}\n"
-    path.write_text(head + yaml.safe_dump(case.content(), sort_keys=False), encoding="utf-8")
+    write_text(path, head + yaml.safe_dump(case.content(), sort_keys=False), force=True)
     return path
 
 

@@ -32,7 +32,7 @@ ALLOWED = {
     "beam2d": {"errors", "scene", "model"},
     "validate": NUMERICS | {"beam2d", "record"},
     "bench": NUMERICS | {"converge", "record", "validate"},
-    "stress": NUMERICS | {"converge", "validate", "bench"},
+    "stress": NUMERICS | {"record", "converge", "validate", "bench"},
     "cli": NUMERICS | {"record", "view", "converge", "validate", "bench", "stress"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
