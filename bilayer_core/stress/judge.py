@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from ..engine.energy_account import FREE, LARGEST, LOWEST
+from ..engine.energy_account import ENERGY, FREE, LARGEST, LOWEST, QUADRATURE_SHARE
 from ..errors import BilayerError
 from ..scene.body import Guided
 from ..simulation.frame import Frame
@@ -75,7 +75,8 @@ class Judge:
         self._every = max(every, self._gaps.every)
         self.steps, self.min_gap = 0, math.inf
         self.energy_gain = self.numerical = self.momentum = self._made = 0.0
-        self._lowest = math.inf
+        account = simulator.energy_account
+        self._account, self._risen = (float(account[FREE]), float(account[ENERGY])), 0.0
         self._momentum = _Momentum(simulator) if _flies(simulator) else None
 
     def look(self, time: float) -> None:
@@ -116,8 +117,11 @@ class Judge:
         if largest <= 0.0:
             return
         self.energy_gain = max(self.energy_gain, float(account[FREE] - account[LOWEST]) / largest)
-        self._lowest = min(self._lowest, float(account[FREE]))
-        self._made = max(self._made, float(account[FREE]) - self._lowest)
+        gain = float(account[FREE]) - self._account[0]
+        supplied = float(account[ENERGY]) - self._account[1] - gain
+        self._account = float(account[FREE]), float(account[ENERGY])
+        self._risen = max(self._risen + gain - (QUADRATURE_SHARE * abs(supplied) if gain > 0.0 else 0.0), 0.0)
+        self._made = max(self._made, self._risen)
         self.numerical = self._made / largest
         if self.energy_gain > MOST_GAIN:
             raise Verdict(f"energy rose by {self.energy_gain:.3g} of the largest without driving", time)
