@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bilayer_core.cli.program import main
+from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.stress import pool
 from bilayer_core.stress.case import Outcome, Record, StressCase
