@@ -14,9 +14,7 @@ A step is not accepted that makes energy: without driving, T + V less the work o
 has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
 again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
 much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops. Driving
-ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow. Then what is supplied has
-the error of its quadrature, and a step is made again, as long as it can be shorter, if it makes by itself more than
-`LARGEST_GAIN_DRIVEN` of the largest energy beyond that.
+ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -61,9 +59,6 @@ own."""
 NONE, SOME, MUCH = range(3)
 """What a step makes of energy: nothing that counts, too much with the steps before, or by itself."""
 LARGEST_GAIN = 9e-4
-LARGEST_GAIN_DRIVEN = 0.02
-QUADRATURE_SHARE = 0.5
-"""Of what a step is supplied with: what its quadrature may be wrong by where driving has just begun."""
 SMALL = 1e-3
 ROUNDING = 1e-11
 """Part of the energies that may be rounding."""
@@ -440,8 +435,7 @@ def close_step_account(p, state, work, h, beyond, end):
         account[LOWEST] = account[FREE]
     account[LOWEST] = min(account[LOWEST], account[FREE])
     if driven:
-        unexplained = gain - QUADRATURE_SHARE * abs(done[SUPPLIED])
-        return SOME if unexplained > LARGEST_GAIN_DRIVEN * account[LARGEST] else NONE
+        return NONE
     allowed = LARGEST_GAIN * account[LARGEST]
     if account[FREE] - account[LOWEST] <= allowed or gain <= SMALL * allowed:
         return NONE

@@ -23,7 +23,7 @@ PROMISES = (
     ("positions, velocities", "numbers, at every accepted step"),
     ("gaps", "above zero at every accepted step, and nothing passes through anything in one, by a check of its own"),
     ("energy without driving", f"T + V rises by less than {MOST_GAIN:g} of the largest energy of the run"),
-    ("energy with driving", f"T + V less the work supplied rises by less than {MOST_MADE:g} of the largest energy"),
+    ("energy with driving", f"inside the region T + V less supplied work rises by {MOST_MADE:g} of it at most"),
     ("energy budget", f"closes to {100 * LARGEST_RESIDUAL:g} % of its largest row inside the region"),
     ("momentum", "of what flies freely changes as gravity has it, to Newton's tolerance"),
     ("effort", f"at most {MOST_ITERATIONS} Newton iterations an attempt, {MOST_REJECTED} attempts a step, on average"),

@@ -14,7 +14,7 @@ from .parameters import Parameters
 from .pool import run_cases
 from .robots import scene_of
 
-FEWER_STATIONS = (5, 11)
+FEWER_STATIONS = (11, 5)
 ROUNDS = 2
 
 
@@ -53,7 +53,7 @@ def _taken_back(parameters: Parameters) -> list[dict[str, object]]:
     changes = [
         {setting.name: setting.default}
         for setting in dataclasses.fields(Parameters)
-        if setting.name != "robot" and getattr(parameters, setting.name) != setting.default
+        if setting.name not in ("robot", "stations") and getattr(parameters, setting.name) != setting.default
     ]
     changes += [{"stations": number} for number in FEWER_STATIONS if number < parameters.stations]
     return changes

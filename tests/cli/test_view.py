@@ -36,12 +36,12 @@ def test_the_viewer_is_asked_for_what_the_options_say(viewer, arguments, asked):
     assert viewer == asked
 
 
-@pytest.mark.parametrize("option", ["--save", "--screenshot"])
-def test_an_existing_file_is_replaced_with_force_only(viewer, tmp_path, option, capsys):
-    (tmp_path / "there").write_text("precious")
-    assert main(["view", "run.mcap", option, "there"]) == 2
-    assert "there: exists already" in capsys.readouterr().err and viewer == []
-    assert main(["view", "run.mcap", option, "there", "--force"]) == 0
+@pytest.mark.parametrize(("option", "name"), [("--save", "there.rrd"), ("--screenshot", "there.png")])
+def test_an_existing_file_is_replaced_with_force_only(viewer, tmp_path, option, name, capsys):
+    (tmp_path / name).write_text("precious")
+    assert main(["view", "run.mcap", option, name]) == 2
+    assert f"{name}: exists already" in capsys.readouterr().err and viewer == []
+    assert main(["view", "run.mcap", option, name, "--force"]) == 0
     assert len(viewer) == 1
 
 

@@ -181,6 +181,7 @@ def test_after_a_jump_of_a_load_a_method_that_starts_itself_makes_one_step():
     pulled = cantilever()
     pulled["loads"] = [{**pulled["loads"][0], "schedule": pulse}]
     simulator = Simulator(load_scene(pulled), tolerance=1e-3, dt=1e-3, integrator="generalised_alpha")
+    simulator.compile()
     used = []
     while simulator.time < 0.05:
         begin = simulator.time

@@ -112,7 +112,7 @@ def test_cases_that_hang_die_or_take_all_memory_fail_and_the_rest_goes_on(monkey
 def test_a_failure_is_made_smaller_and_runs_again(tmp_path):
     hard = Parameters(robot="drop", stations=15, friction=1.0, youngs_modulus=2e7)
     case = StressCase("hard", partial(scene_of, hard), decide=partial(is_stiff, 1.5e7))
-    path = shrink(case, Record("hard", "", True, [], Outcome.FAILED, "stiff: too much of it"), tmp_path, 1)
+    path = shrink(case, Record("hard", "", True, [], Outcome.FAILED, "stiff: too much: of it"), tmp_path, 1)
     text = path.read_text()
     assert "youngs_modulus: 20000000.0" in text  # without it nothing fails
     assert "stations: 5" in text and "coefficient: 0.4" in text  # all else is at its default, or less
