@@ -5,7 +5,7 @@ import pytest
 from sample_scenes import contact, fixed, layer, rod, scene
 
 from bilayer_core import load_scene
-from bilayer_core.cli.program import main
+from bilayer_core.cli import main
 from bilayer_core.errors import SceneError
 from bilayer_core.model.plan import best_dimension, make_plan
 from bilayer_core.model.validity import EdgeFigures

@@ -6,7 +6,7 @@ import pytest
 from sample_scenes import contact, fixed, layer, rod, scene
 
 from bilayer_core import load_scene
-from bilayer_core.cli.program import main
+from bilayer_core.cli import main
 from bilayer_core.model.findings import Finding, few, told
 from bilayer_core.model.plan import make_plan
 from bilayer_core.model.validity import validity_figures

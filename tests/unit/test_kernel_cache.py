@@ -105,7 +105,7 @@ def test_workers_compile_this_package_and_not_one_of_its_name_where_they_start(t
     decoy.parent.mkdir()
     decoy.write_text("raise ImportError('not this one')")
     monkeypatch.chdir(tmp_path)
-    left, done, printed = queue.SimpleQueue(), queue.SimpleQueue(), []
+    left, done = queue.SimpleQueue(), queue.SimpleQueue()
     left.put("update_attached")
-    compile_all._feed(left, done, printed)
-    assert not printed and done.get(timeout=1.0) is not None
+    compile_all._Worker(left, done).run()
+    assert done.get(timeout=1.0) == "update_attached"
