@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import click
 
-from bilayer_core.cli.options import Verb
+from bilayer_core.cli.options import Verb, output_directory
 from bilayer_core.cli.watch import count_bar
-from bilayer_core.errors import InputError
 
 DEFAULT_DIRECTORY = "runs/bench"
 
@@ -49,7 +46,7 @@ def bench(
         _make_references(run.chosen_problems(chosen))
         return
     check_matplotlib()
-    directory = _directory(out)
+    directory = output_directory(out)
     results = Results(directory, quick, resume, force)
     with count_bar(run.count(chosen, quick), quiet) as show:
         skipped = run.measure(chosen, results, quick, show)
@@ -90,12 +87,3 @@ def _conclude(content: dict) -> None:
         click.echo(f"recommended: {choice['model']} {choice['dimension']}-D, {choice['integrator']}")
     for name, slope in content["slopes"].items():
         click.echo(f"scaling of {name}: slope {slope:.2f}")
-
-
-def _directory(out: str) -> Path:
-    directory = Path(out)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out: {out}: cannot be made a directory: {error.strerror or error}") from error
-    return directory

@@ -1,11 +1,14 @@
-"""What the verbs share: the option --debug and the type of times."""
+"""What the verbs share: the option --debug, types of times, directories of results."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import click
+
+from bilayer_core.errors import InputError
 
 
 @dataclass
@@ -87,6 +90,22 @@ class Duration(click.ParamType):
             fault = error.errors()[0]
             note = f", {fault['ctx']['note']}" if fault["ctx"]["note"] else ""
             self.fail(f"found {value!r}{note}; {fault['msg']}", param, context)
+
+
+def output_directory(out: str) -> Path:
+    """The directory of ``--out``, made if it is not there.
+
+    Raises
+    ------
+    InputError
+        If it cannot be.
+    """
+    directory = Path(out)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"--out: {out}: cannot be made a directory: {error.strerror or error}") from error
+    return directory
 
 
 scene_argument = click.argument("scene", metavar="SCENE")

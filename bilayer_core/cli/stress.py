@@ -9,9 +9,8 @@ from typing import Any
 
 import click
 
-from bilayer_core.cli.options import Verb
+from bilayer_core.cli.options import Verb, output_directory
 from bilayer_core.cli.watch import compile_kernels, count_bar
-from bilayer_core.errors import InputError
 
 FAILED = 1
 DEFAULT_DIRECTORY = "runs/stress"
@@ -49,7 +48,7 @@ def stress(
     """
     workers = workers or len(os.sched_getaffinity(0))
     if mutations:
-        return _judge_seeded_bugs(only, listed, resume, _directory(out), workers, quiet)
+        return _judge_seeded_bugs(only, listed, resume, output_directory(out), workers, quiet)
     from bilayer_core.record.paths import check_output_path
     from bilayer_core.stress import report
     from bilayer_core.stress.journal import Journal, head_of
@@ -63,7 +62,7 @@ def stress(
     check_matplotlib()
     if json_file:
         check_output_path(json_file, force=True, suffix=".json")
-    directory = _directory(out)
+    directory = output_directory(out)
     journal = Journal(directory, head_of(cases), resume)
     compile_kernels(quiet)
     with count_bar(len(cases) - len(journal.records), quiet) as show:
@@ -121,12 +120,3 @@ def _write_json(path: str, journal: Any) -> None:
 
     content = journal.head | {"results": [json.loads(record.line()) for record in journal.records.values()]}
     write_text(path, json.dumps(content, indent=1) + "\n", force=True)
-
-
-def _directory(out: str) -> Path:
-    directory = Path(out)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out: {out}: cannot be made a directory: {error.strerror or error}") from error
-    return directory

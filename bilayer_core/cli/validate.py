@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from bilayer_core.cli.options import Verb
+from bilayer_core.cli.options import Verb, output_directory
 from bilayer_core.cli.watch import compile_kernels
-from bilayer_core.errors import InputError
 
 if TYPE_CHECKING:
     from bilayer_core.validate.case import Result
@@ -36,7 +35,7 @@ def validate(out: str | None, json_file: str | None, only: str | None, quick: bo
         for case in cases:
             click.echo(f"{case.name:{WIDTHS[0]}}  {case.against}")
         return 0
-    directory = _directory(out)
+    directory = None if out is None else output_directory(out)
     if directory is not None:
         figures.check_matplotlib()
     if json_file:
@@ -58,17 +57,6 @@ def validate(out: str | None, json_file: str | None, only: str | None, quick: bo
     cpu_time = sum(result.cpu_time for result in results)
     click.echo(f"{len(results)} cases, {failed} failed; {cpu_time:.1f} s of CPU, compilation included")
     return FAILED if failed else 0
-
-
-def _directory(out: str | None) -> Path | None:
-    if out is None:
-        return None
-    directory = Path(out)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out: {out}: cannot be made a directory: {error.strerror or error}") from error
-    return directory
 
 
 def _print_result(result: Result) -> None:

@@ -4,8 +4,8 @@
 finite                    positions and velocities are numbers
 gap                       the smallest gap is above zero, and nothing passed through anything (`stress.gaps`)
 energy without driving    T + V can only fall: it rises by no more than `MOST_GAIN` of the largest energy
-energy with driving       T + V less supplied work can only fall, but for the quadrature of that work: inside the region
-                          it rises by no more than `MOST_MADE` of the largest energy of the run
+energy with driving       T + V less supplied work can only fall, but for the quadrature of that work: it rises by no
+                          more than `MOST_MADE` of the largest energy of the run
 momentum                  where nothing but gravity acts, it changes as gravity has it, to Newton's tolerance
 budget                    inside the region the budget closes to `LARGEST_RESIDUAL` of its largest row
 effort                    no more than `MOST_ITERATIONS` Newton iterations an attempt, `MOST_REJECTED` attempts a step
@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from ..engine.energy_account import ENERGY, FREE, LARGEST, LOWEST
+from ..engine.energy_account import FREE, LARGEST, LOWEST
 from ..errors import BilayerError
 from ..scene.body import Guided
 from ..simulation.frame import Frame
@@ -29,8 +29,6 @@ MOST_GAIN = 2e-3
 """The engine stops at 1e-3; rounding and Newton's tolerance are beside it."""
 MOST_MADE = 0.1
 """What a summary calls large (`simulation.summary.LARGE_NUMERICAL`)."""
-QUADRATURE_SHARE = 0.5
-"""Of what a step is supplied with: what its quadrature may be wrong by."""
 LARGEST_RESIDUAL = 0.02
 MOST_ITERATIONS = 200
 MOST_REJECTED = 30
@@ -77,8 +75,7 @@ class Judge:
         self._every = max(every, self._gaps.every)
         self.steps, self.min_gap = 0, math.inf
         self.energy_gain = self.numerical = self.momentum = self._made = 0.0
-        account = simulator.energy_account
-        self._account, self._risen = (float(account[FREE]), float(account[ENERGY])), 0.0
+        self._lowest = float(simulator.energy_account[FREE])
         self._momentum = _Momentum(simulator) if _flies(simulator) else None
 
     def look(self, time: float) -> None:
@@ -119,11 +116,8 @@ class Judge:
         if largest <= 0.0:
             return
         self.energy_gain = max(self.energy_gain, float(account[FREE] - account[LOWEST]) / largest)
-        gain = float(account[FREE]) - self._account[0]
-        supplied = float(account[ENERGY]) - self._account[1] - gain
-        self._account = float(account[FREE]), float(account[ENERGY])
-        self._risen = max(self._risen + gain - (QUADRATURE_SHARE * abs(supplied) if gain > 0.0 else 0.0), 0.0)
-        self._made = max(self._made, self._risen)
+        self._lowest = min(self._lowest, float(account[FREE]))
+        self._made = max(self._made, float(account[FREE]) - self._lowest)
         self.numerical = self._made / largest
         if self.energy_gain > MOST_GAIN:
             raise Verdict(f"energy rose by {self.energy_gain:.3g} of the largest without driving", time)
@@ -142,7 +136,7 @@ class Judge:
             If the effort was not bounded, or the budget does not close.
         """
         statistics, time = self._simulator.statistics, self._simulator.time
-        if inside and self.numerical > MOST_MADE:
+        if self.numerical > MOST_MADE:
             raise Verdict(f"steps made {self.numerical:.3g} of the largest energy of the run", time)
         parts = max(statistics.substeps, 1)
         attempts = parts + statistics.rejected

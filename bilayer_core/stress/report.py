@@ -23,7 +23,7 @@ PROMISES = (
     ("positions, velocities", "numbers, at every accepted step"),
     ("gaps", "above zero at every accepted step, and nothing passes through anything in one, by a check of its own"),
     ("energy without driving", f"T + V rises by less than {MOST_GAIN:g} of the largest energy of the run"),
-    ("energy with driving", f"inside the region T + V less supplied work rises by {MOST_MADE:g} of it at most"),
+    ("energy with driving", f"T + V less the work supplied rises by at most {MOST_MADE:g} of the largest"),
     ("energy budget", f"closes to {100 * LARGEST_RESIDUAL:g} % of its largest row inside the region"),
     ("momentum", "of what flies freely changes as gravity has it, to Newton's tolerance"),
     ("effort", f"at most {MOST_ITERATIONS} Newton iterations an attempt, {MOST_REJECTED} attempts a step, on average"),
@@ -106,10 +106,7 @@ def _page(journal: Journal) -> Iterator[str]:
     yield ""
     yield "## What is promised"
     yield ""
-    yield "| quantity | promise |"
-    yield "| --- | --- |"
-    yield from (f"| {quantity} | {promise} |" for quantity, promise in PROMISES)
-    yield ""
+    yield from _table(("quantity", "promise"), PROMISES)
     yield "Inside the region of validity answers are accurate (their error against a run with a tenth of the tolerance,"
     yield "or a quarter of the step, is below 1 % of a strip's length) or at least stable. The region is decided by"
     yield f"numbers of the scene alone: eigenstrain at most {100 * LARGEST_STRAIN:g} %, curvature × thickness at most"
@@ -126,18 +123,14 @@ def _page(journal: Journal) -> Iterator[str]:
 def _outcomes(records: Sequence[Record]) -> Iterator[str]:
     yield "## Outcomes"
     yield ""
-    yield "| | cases | " + " | ".join(Outcome) + " |"
-    yield "| --- | --- | " + " | ".join("---" for _ in Outcome) + " |"
-    for where, outcomes in counts(records).items():
-        total = sum(outcomes.values())
-        yield f"| {where} | {total} | " + " | ".join(str(outcomes[outcome]) for outcome in Outcome) + " |"
-    groups = dict.fromkeys(record.name.split("/")[0] for record in records)
-    for group in groups:
-        own = [record for record in records if record.name.split("/")[0] == group]
-        outcomes = Counter(record.outcome for record in own)
-        yield f"| `{group}` | {len(own)} | " + " | ".join(str(outcomes[outcome]) for outcome in Outcome) + " |"
+    counted = counts(records)
+    for record in records:
+        counted.setdefault(f"`{record.name.split('/')[0]}`", Counter())[record.outcome] += 1
+    rows = [
+        (name, outcomes.total(), *(outcomes[outcome] for outcome in Outcome)) for name, outcomes in counted.items()
+    ]
+    yield from _table(("", "cases", *Outcome), rows)
     refused, worked = remedies(records)
-    yield ""
     yield f"{refused} cases were refused; what the message says to change was done, and works in {worked} of them."
     yield ""
     yield "![Outcomes by axis](images/stability_axes.png)"
@@ -149,8 +142,6 @@ def _outcomes(records: Sequence[Record]) -> Iterator[str]:
 def _extremes(records: Sequence[Record]) -> Iterator[str]:
     yield "## Extremes"
     yield ""
-    yield "| figure | value | case |"
-    yield "| --- | --- | --- |"
     figures = (
         ("smallest gap over the barrier distance", "gap_over_barrier", min),
         ("largest rise of energy without driving, over the largest energy", "energy_gain", max),
@@ -160,12 +151,13 @@ def _extremes(records: Sequence[Record]) -> Iterator[str]:
         ("most regularised matrices", "regularised", max),
         ("most steps that do not resolve their contact", "unresolved", max),
     )
+    rows = []
     for title, key, choose in figures:
         own = [r for r in records if r.figures.get(key) is not None and (r.inside or "inside" not in title)]
         if own:
             extreme = choose(own, key=lambda record: abs(record.figures[key]) if choose is max else record.figures[key])
-            yield f"| {title} | {extreme.figures[key]:.3g} | `{extreme.name}` |"
-    yield ""
+            rows.append((title, f"{extreme.figures[key]:.3g}", f"`{extreme.name}`"))
+    yield from _table(("figure", "value", "case"), rows)
 
 
 def _worst_cases(records: Sequence[Record]) -> Iterator[str]:
@@ -173,13 +165,12 @@ def _worst_cases(records: Sequence[Record]) -> Iterator[str]:
     yield ""
     yield "`bilayer stress` writes them to DIR/worst as scenes; `bilayer stress --scene FILE` runs one again."
     yield ""
-    yield "| case | outcome | error | why |"
-    yield "| --- | --- | --- | --- |"
+    rows = []
     for record in worst(records, 10):
         error = "" if record.error is None else f"{100 * record.error:.2g} %"
         why = (record.reason or record.decision or "; ".join(record.warnings[:1])).splitlines()
-        yield f"| `{record.name}` | {record.outcome} | {error} | {why[0].replace('|', '/') if why else ''} |"
-    yield ""
+        rows.append((f"`{record.name}`", record.outcome, error, why[0] if why else ""))
+    yield from _table(("case", "outcome", "error", "why"), rows)
 
 
 def _torture_cases(records: Sequence[Record]) -> Iterator[str]:
@@ -188,14 +179,12 @@ def _torture_cases(records: Sequence[Record]) -> Iterator[str]:
     yield "Scenes in `config/torture`, each on a ladder of steps, stations, stiffness, friction or integrators:"
     yield "`bilayer stress --only 'torture/*'`."
     yield ""
-    yield "| | case | source | what must come out | what decides | rungs that hold |"
-    yield "| --- | --- | --- | --- | --- | --- |"
+    rows = []
     for torture in TORTURES:
         own = [r for r in records if r.name.startswith(f"torture/{torture.number:02d} ")]
         held = f"{sum(r.outcome is Outcome.ACCURATE for r in own)} of {len(own)}" if own else "not run"
-        figures = (torture.number, torture.name, torture.source, torture.expected, torture.decided, held)
-        yield f"| {' | '.join(str(figure).replace('|', '/') for figure in figures)} |"
-    yield ""
+        rows.append((torture.number, torture.name, torture.source, torture.expected, torture.decided, held))
+    yield from _table(("", "case", "source", "what must come out", "what decides", "rungs that hold"), rows)
     yield "What scenes cannot express, or nothing sure decides:"
     yield ""
     yield from (f"- {number} {name}: {why}" for number, name, why in NOT_EXPRESSIBLE)
@@ -211,3 +200,10 @@ def _seeded_bugs() -> Iterator[str]:
     else:
         yield "`bilayer stress --mutations` has not been run."
         yield ""
+
+
+def _table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> Iterator[str]:
+    """A table and an empty line; what a cell has of bars is no border of one."""
+    for row in (titles, ["---"] * len(titles), *rows):
+        yield f"| {' | '.join(str(cell).replace('|', '/') for cell in row)} |"
+    yield ""

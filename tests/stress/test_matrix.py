@@ -65,7 +65,8 @@ def test_each_limit_of_the_region_is_named(changes, why):
 @pytest.mark.slow
 def test_every_case_is_a_scene_that_loads():
     for case in matrix():
-        load_scene(scene_of(case.parameters))
+        scene = load_scene(scene_of(case.parameters))
+        assert len(scene.rods[0].layers) == 2 and scene.rods[0].stations == case.parameters.stations
 
 
 def test_a_quick_run_has_some_cases_of_every_group():
