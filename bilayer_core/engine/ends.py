@@ -1,14 +1,15 @@
 """Where stages and steps end: positions, momenta and frames there, and what a state takes of them.
 
 The momentum of the fluid is no fixed multiple of a velocity. Where the end of a step lies beyond its last stage, both
-are extrapolated, and what they differ by at the end (second order in h) is kept in the state; the momentum counts.
+are extrapolated, and differ there (second order in h). The momentum counts, and velocities are those that it asks for;
+of nodes that a body holds, which move as it does, the difference is kept in the state.
 """
 
 from __future__ import annotations
 
 import math
 
-from ..forces.added_mass import momentum_at
+from ..forces.added_mass import momentum_at, write_inertia
 from ..forces.inertia import moment_of_rotation
 from ..forces.mechanisms import measure_mechanisms, remember_mechanisms
 from ..forces.restitution import measure_gaps
@@ -23,6 +24,9 @@ from ..kinematics.vector import row
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Point, StageInputs, StateArrays, Work
+
+HELD = 0.0
+"""In place of the inertia of a node that a body holds."""
 
 
 @piece(int, Problem, StateArrays, Work, StageInputs, int, Configuration)
@@ -74,10 +78,8 @@ def write_end(p, state, last, end, inputs, n):
     bodies, constrained, position, rates = p.bodies, p.constrained, inputs.position[n], inputs.rates[n]
     copy(last.velocity, state.velocity)
     _write_velocity_of_constrained(constrained, end, rates, state)
-    momentum_at(p.fluid, end, last.velocity, state.fluid_excess)
-    for i in range(state.fluid_excess.shape[0]):
-        for c in range(3):
-            state.fluid_excess[i, c] = last.fluid_momentum[i, c] - state.fluid_excess[i, c]
+    if p.fluid.exists:
+        _take_momentum(p, end, last, state)
     copy(last.spin, state.spin)
     copy(last.strain_rate, state.strain_rate)
     _move_positions(state.position, state.position_low, last.displacement)
@@ -134,6 +136,30 @@ def _write_frames(bodies, strands, at, state):
     for f in range(bodies.mass.shape[0]):
         b = bodies.body_of_free[f]
         _write_orthonormal(at.body_rotation, f, state.body_rotation, b)
+
+
+@kernel
+def _take_momentum(p, end, last, state):
+    """Change velocities v of nodes by w so that m (v + w) + P(v + w) is their momentum: (m + ∂P/∂v) w = P − P(v)."""
+    fluid, excess, velocity = p.fluid, state.fluid_excess, state.velocity
+    momentum_at(fluid, end, last.velocity, excess)
+    apart = False
+    for i in range(excess.shape[0]):
+        for c in range(3):
+            excess[i, c] = last.fluid_momentum[i, c] - excess[i, c]
+            apart |= excess[i, c] != 0.0
+    if not apart:
+        return
+    write_inertia(fluid, p.strands.node_mass, end)
+    for k in range(p.constrained.node.shape[0]):
+        fluid.inertia[p.constrained.node[k], 0, 0] = HELD
+    for i in range(excess.shape[0]):
+        if fluid.inertia[i, 0, 0] == HELD:
+            continue
+        gained = solve_three(fluid.inertia[i], excess[i, 0], excess[i, 1], excess[i, 2])
+        for c in range(3):
+            velocity[i, c] += gained[c]
+            excess[i, c] = 0.0
 
 
 @kernel

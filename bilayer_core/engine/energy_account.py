@@ -10,11 +10,15 @@ h Σ bᵢ Pᵢ with the powers Pᵢ at the ends of the stages, which the last ev
 own weights b (`Method.works`). What a stimulus supplies is ∫ s·dη, s = −∂V/∂η, by the trapezoidal rule; where it jumps
 at the start of a step, the jump by itself, at the shape there.
 
-A step is not accepted that makes energy: without driving, T + V less the work of constant loads can only fall. Where it
-has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
+A step is not accepted that makes energy: without driving, T + V less the work of constant loads can only fall. Where
+it has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
 again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
-much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops. Driving
-ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow.
+much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops.
+
+Driving ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow. What they supply
+has the error of its quadrature, at most ½|Δs·Δη| and ½h(max P − min P). What steps make beyond that is summed, and each
+step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike; limits are `LARGEST_DRIVEN_GAIN` and
+`SMALL_DRIVEN`.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -28,16 +32,13 @@ The account is part of the state, so that a run that is continued makes the same
 
 from __future__ import annotations
 
-from ..contact.barrier import barrier_gradient
-from ..contact.near import gap_normal
 from ..forces.bend_twist import bend_by_strains
 from ..forces.inertia import second_moment_beyond
-from ..forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
 from ..jit import call, kernel, piece
-from ..jit.stack import stack_matrix, stack_vector
+from ..jit.stack import stack_matrix
 from ..kinematics.copying import copy
-from ..kinematics.rotating import inertia_tensor, solve_three
-from ..kinematics.vector import cross, dot, row
+from ..kinematics.rotating import inertia_tensor
+from ..kinematics.vector import dot, row
 from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES, slot_of
 from ..model.records.outcome import CONTACT_ERROR, FRACTION
@@ -45,13 +46,25 @@ from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of
+from .powers import (
+    DRIVEN,
+    LEAST_SUPPLYING,
+    LOSING,
+    LOST,
+    MOST_SUPPLYING,
+    SUPPLIED,
+    SUPPLYING,
+    TAKEN_UP,
+    TAKING_UP,
+    in_barriers,
+)
 
 ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
-FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN = range(6, 12)
+FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN, MADE = range(6, 13)
 """Slots of `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
 barriers take up and contact damping takes [W]; T + V less all that was supplied, and the lowest that was since driving
 ended; the largest energy of the run; what steps have made or, below zero, lost; the potential of gravity at the start
-[J]; 1 if all these are of the state.
+[J]; 1 if all these are of the state; what steps have made lately, driven or not [J].
 """
 QUESTIONED = 2.0
 """In `OPEN`: of a state that someone has changed, or that is of other conditions. Its account is kept if it may be its
@@ -60,18 +73,15 @@ NONE, SOME, MUCH = range(3)
 """What a step makes of energy: nothing that counts, too much with the steps before, or by itself."""
 LARGEST_GAIN = 9e-4
 SMALL = 1e-3
+LARGEST_DRIVEN_GAIN = 0.05
+SMALL_DRIVEN = 0.02
+FORGOTTEN = 0.01
 ROUNDING = 1e-11
 """Part of the energies that may be rounding."""
 SAME = 1e-6
 """Part of the energies by which a state's may differ from those in its account."""
-SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN = range(7)
-"""Slots of `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
-[W], and whether anything drives it.
-"""
 CONSERVATIVE = tuple(NAMES.index(name) for name, kind in kinds().items() if kind is Kind.CONSERVATIVE)
-BARRIER, GRAVITY, INERTIA, RESTITUTION, ROD_BARRIER = map(
-    slot_of, ("barrier", "gravity", "inertia", "restitution", "rod barrier")
-)
+GRAVITY, INERTIA, RESTITUTION = map(slot_of, ("gravity", "inertia", "restitution"))
 DAMPING_SHARE = 0.01
 """Of the change of contact damping's power over a step, times its length: what its work may be wrong by."""
 
@@ -105,13 +115,6 @@ def _kinetic(p, state, at):
 
 
 @kernel
-def _in_barriers(p):
-    """Energy in what stops impacts: barriers, and limits of hinges and slides [J]."""
-    energy = p.sums.energy[BARRIER] + p.sums.energy[ROD_BARRIER]
-    return energy + p.mechanisms.in_limits[0] if p.mechanisms.exists else energy
-
-
-@kernel
 def _energies(p, state, at):
     """T + V, that in barriers, and what the largest energy of a run is measured by, with the potential of gravity from
     its value at the start [J].
@@ -123,7 +126,7 @@ def _energies(p, state, at):
         potential += energy
         rounding += abs(energy)
         size += abs(energy - state.account[GRAVITY_AT_START]) if k == GRAVITY else energy
-    barriers = _in_barriers(p)
+    barriers = in_barriers(p)
     measure = kinetic + size + ROUNDING / LARGEST_GAIN * rounding + p.least_energy
     return kinetic + potential, barriers, measure
 
@@ -176,6 +179,7 @@ def begin_step_account(p, state, inputs, work, weight):
     work_done[SUPPLIED], work_done[LOST] = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
     work_done[TAKEN_UP] = weight * state.account[POWER_BARRIER]
     work_done[DRIVEN] = 0.0
+    work_done[LEAST_SUPPLYING] = work_done[MOST_SUPPLYING] = state.account[POWER_SUPPLIED]
     for i in range(work.start_strain.shape[0]):
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
@@ -222,148 +226,6 @@ def _supply_by_jumps(p, state, inputs, work):
 
 
 @kernel
-def _turning_power(gradient, b, rates):
-    """∂Φ/∂(X, φ)·(V, ω)"""
-    power = 0.0
-    for c in range(6):
-        power += gradient[b, c] * rates[b, c]
-    return power
-
-
-@kernel
-def _power_of_prescribed(p, at, rates):
-    """What prescribed bodies supply [W]: forces and moments that they take, ∂Φ/∂(X, φ), times their velocities."""
-    sums, constrained, power = p.sums, p.constrained, 0.0
-    for i in range(p.bodies.prescribed.shape[0]):
-        b = p.bodies.prescribed[i]
-        power += _turning_power(sums.contact, b, rates)
-    for k in range(constrained.node.shape[0]):
-        if constrained.free[k] >= 0:
-            continue
-        b = constrained.body[k]
-        r, g = row(at.arm, k), row(sums.attached, k)
-        w = rates[b, 3], rates[b, 4], rates[b, 5]
-        power += dot(g, (rates[b, 0], rates[b, 1], rates[b, 2])) + dot(g, cross(w, r))
-    for k in range(constrained.clamp_edge_free.shape[0]):
-        if constrained.clamp_edge_free[k] >= 0:
-            continue
-        b, e = constrained.clamp_edge_body[k], p.strands.edge_count + k
-        t, w = row(at.tangent, e), (rates[b, 3], rates[b, 4], rates[b, 5])
-        power += dot(row(sums.edge, e), cross(w, t)) + sums.edge[e, 3] * dot(w, t)
-    return power
-
-
-@kernel
-def _write_rates(bodies, inputs, n, at, point, rates):
-    """Write (V, ω) of bodies at the end of stage n; the world, which is the last, rests."""
-    tensor = stack_matrix(3, 3)
-    for b in range(inputs.rates.shape[1]):
-        f = bodies.free_index[b]
-        if f < 0:
-            for c in range(6):
-                rates[b, c] = inputs.rates[n, b, c]
-            continue
-        inertia_tensor(bodies.second_moment, f, at.body_rotation, f, tensor)
-        momentum = point.angular_momentum
-        spin = solve_three(tensor, momentum[f, 0], momentum[f, 1], momentum[f, 2])
-        for c in range(3):
-            rates[b, c], rates[b, 3 + c] = point.body_velocity[f, c], spin[c]
-
-
-@kernel
-def _add_velocity(rates, b, x, at, sign, velocity_out):
-    """Add ± V + ω × (x − X) of a body."""
-    w = rates[b, 3], rates[b, 4], rates[b, 5]
-    turned = cross(w, (x[0] - at.pose_position[b, 0], x[1] - at.pose_position[b, 1], x[2] - at.pose_position[b, 2]))
-    for c in range(3):
-        velocity_out[c] += sign * (rates[b, c] + turned[c])
-
-
-@kernel
-def _power_of_barriers(p, at, point, rates):
-    """What barriers and limits take up at the velocities of a stage's end [W]: ∂V/∂d times the rates of gaps."""
-    surfaces, rods, sums, mechanisms, power = p.surfaces, p.rod_contact, p.sums, p.mechanisms, 0.0
-    for k in range(mechanisms.slides.shape[0]):
-        power += mechanisms.limit_slope[k] * point.strain_rate[mechanisms.first + k]
-    velocity = stack_vector(3)
-    if surfaces.exists:
-        scratch = sums.arm_rate.shape[0] - 1
-        for k in range(surfaces.near_count[0]):
-            if surfaces.near_gap[k] >= surfaces.d_hat:
-                continue
-            i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
-            x = row(at.contact_point, i)
-            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, x[0], x[1], x[2])
-            if not 0.0 < d < surfaces.d_hat:
-                continue
-            body, node = surfaces.contact_point_body[i], node_of(surfaces, i)
-            velocity[0] = velocity[1] = velocity[2] = 0.0
-            if body >= 0:
-                _add_velocity(rates, body, x, at, 1.0, velocity)
-            else:
-                for c in range(3):
-                    velocity[c] = point.velocity[node, c]
-                if has_arm(surfaces, i):
-                    write_material_rate(surfaces, p.strands, at, i, scratch, sums.arm_rate)
-                    add_step_of_arm(
-                        surfaces, p.strands, node, scratch, sums.arm_rate, point.velocity, point.spin, velocity
-                    )
-            _add_velocity(rates, surfaces.body[s], x, at, -1.0, velocity)
-            slope = surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
-            power += slope * (velocity[0] * n0 + velocity[1] * n1 + velocity[2] * n2)
-    if rods.exists:
-        contacts = rods.contacts
-        for c in range(contacts.count[0]):
-            i, j = contacts.node[c, 0], contacts.node[c, 1]
-            scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]
-            rate = 0.0
-            for m in range(3):
-                v = point.velocity
-                moved = contacts.weight[c, 0] * v[i, m] + contacts.weight[c, 1] * v[i + 1, m]
-                moved += contacts.weight[c, 2] * v[j, m] + contacts.weight[c, 3] * v[j + 1, m]
-                rate += contacts.normal[c, m] * moved
-            if contacts.gap[c] > 0.0:
-                power += scale * barrier_gradient(contacts.gap[c], rods.d_hat) * rate
-    return power
-
-
-@kernel
-def _moves(prescribed, rates):
-    for i in range(prescribed.shape[0]):
-        for c in range(6):
-            if rates[prescribed[i], c] != 0.0:
-                return True
-    return False
-
-
-@piece(int, Problem, Work, StageInputs, int, float, Configuration)
-def add_powers(p, work, inputs, n, weight, at):
-    """Add what is supplied and lost at the end of stage n, at `at` and in `Work.end`, times `weight` [s], to the
-    account of a step.
-    """
-    sums, flow, done = p.sums, p.flow, work.account
-    supplied = lost = 0.0
-    for k in range(sums.supplied.shape[0]):
-        supplied += sums.supplied[k]
-        lost += sums.lost[k]
-    _write_rates(p.bodies, inputs, n, at, work.end, work.rates)
-    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if _in_barriers(p) != 0.0 else 0.0
-    done[TAKEN_UP] += weight * done[TAKING_UP]
-    driven = p.followers.exists or p.moments.exists
-    if flow.exists:
-        driven |= flow.velocity[0] != 0.0 or flow.velocity[1] != 0.0 or flow.velocity[2] != 0.0
-    if _moves(p.bodies.prescribed, work.rates):
-        driven = True
-        supplied += _power_of_prescribed(p, at, work.rates)
-    done[SUPPLYING], done[LOSING] = supplied, lost
-    done[SUPPLIED] += weight * supplied
-    done[LOST] += weight * lost
-    if driven:
-        done[DRIVEN] = 1.0
-    return READY
-
-
-@kernel
 def _inertial(p, stage, at):
     """The potential of inertia at a configuration [J]; see `forces.inertia`."""
     strands, bodies, energy = p.strands, p.bodies, 0.0
@@ -403,17 +265,17 @@ def _after_last_correction(p, stage, at):
 def close_step_account(p, state, work, h, beyond, end):
     """Take the account of a step into that of a state, which is its end, at `end`; whether it makes too much energy."""
     account, done = state.account, work.account
-    changed = False
-    for i in range(work.start_strain.shape[0]):
-        changed |= work.strain[i] != work.start_strain[i]
     p.outcome.figures[CONTACT_ERROR] = 0.0
     if account[OPEN] == 0.0:
         call(p.calls.open_account, (p, state, work.stage, end))
         return NONE
     _write_forces_of_laws(p, end, work.stage, work.end_force)
+    driven, unsure = done[DRIVEN] != 0.0, 0.5 * h * (done[MOST_SUPPLYING] - done[LEAST_SUPPLYING])
     for i in range(work.start_strain.shape[0]):
-        mean = 0.5 * (work.start_force[i] + work.end_force[i])
-        done[SUPPLIED] -= mean * (work.strain[i] - work.start_strain[i])
+        grown, change = work.strain[i] - work.start_strain[i], work.end_force[i] - work.start_force[i]
+        driven |= grown != 0.0
+        done[SUPPLIED] -= (work.start_force[i] + 0.5 * change) * grown
+        unsure += 0.5 * abs(change * grown)
     copy(work.end_force, state.law_force)
     energy, barriers, scale = _energies(p, state, end)
     missed = abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP])
@@ -430,13 +292,19 @@ def close_step_account(p, state, work, h, beyond, end):
     missed += DAMPING_SHARE * h * abs(damping - account[POWER_DAMPING])
     account[POWER_DAMPING] = damping
     p.outcome.figures[CONTACT_ERROR] = missed
-    driven = changed or done[DRIVEN] != 0.0
+    if driven:
+        gain -= unsure
+    account[MADE] = max((1.0 - FORGOTTEN) * account[MADE] + gain, 0.0)
     if driven:
         account[LOWEST] = account[FREE]
+        return _too_much(account[MADE], gain, LARGEST_DRIVEN_GAIN * account[LARGEST], SMALL_DRIVEN)
     account[LOWEST] = min(account[LOWEST], account[FREE])
-    if driven:
-        return NONE
-    allowed = LARGEST_GAIN * account[LARGEST]
-    if account[FREE] - account[LOWEST] <= allowed or gain <= SMALL * allowed:
+    return _too_much(account[FREE] - account[LOWEST], gain, LARGEST_GAIN * account[LARGEST], SMALL)
+
+
+@kernel
+def _too_much(made, gain, allowed, small):
+    """What a step makes that gains so much, and with the steps before it so much [J]."""
+    if made <= allowed or gain <= small * allowed:
         return NONE
     return SOME if gain <= allowed else MUCH

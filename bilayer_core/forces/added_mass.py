@@ -96,6 +96,23 @@ def momentum_at(fluid, at, velocity, momentum_out):
     copy(fluid.momentum, momentum_out)
 
 
+@kernel
+def write_inertia(fluid, node_mass, at):
+    """Write m + ∂P/∂v of nodes [kg], with which nodes and the fluid about them move together."""
+    inertia = fluid.inertia
+    inertia[:] = 0.0
+    for i in range(node_mass.shape[0]):
+        for c in range(3):
+            inertia[i, c, c] = node_mass[i]
+    for k in range(fluid.mass.shape[0]):
+        mass1, mass2 = 0.5 * fluid.mass[k, 0], 0.5 * fluid.mass[k, 1]
+        for i in range(fluid.edge_node[k], fluid.edge_node[k] + 2):
+            for m in range(3):
+                for n in range(3):
+                    inertia[i, m, n] += mass1 * at.director1[k, m] * at.director1[k, n]
+                    inertia[i, m, n] += mass2 * at.director2[k, m] * at.director2[k, n]
+
+
 @piece(float, Fluid, Problem, Configuration, Stage, bool)
 def add_added_mass(fluid, p, at, stage, with_hessian):
     """Add the potential of the fluid's inertia and its derivatives by nodes and edges, z being where it was updated."""

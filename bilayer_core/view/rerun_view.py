@@ -22,7 +22,7 @@ def write_rrd(run: RunData, rrd_path: str | Path, force: bool = True) -> None:
     require_rerun()
     from bilayer_core.view.rrd_writer import write_recording
 
-    with draft_of(rrd_path, force) as draft:
+    with draft_of(check_output_path(rrd_path, force, RRD_SUFFIX), force) as draft:
         write_recording(run, draft)
 
 

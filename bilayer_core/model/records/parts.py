@@ -210,6 +210,7 @@ class Fluid:
     spin: Vector = ("edge",)  # likewise [rad/s]
     momentum: Matrix = ("node", 3)  # P of nodes [N s]
     shape_gradient: Matrix = ("edge", 4)  # ∂T/∂(ε, θ) of edges [N, N m]
+    inertia: Stack = ("node", 3, 3)  # m + ∂P/∂v of nodes [kg]
     fluid_momentum: Address
 
 

@@ -167,7 +167,7 @@ class Work:
     start_force: Vector = ("law",)  # −∂V/∂η of laws there [J]
     end_force: Vector = ("law",)  # and at its end
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
-    account: Vector = (7,)  # of the energy of a step; see `engine.energy_account`
+    account: Vector = (9,)  # of the energy of a step; see `engine.powers`
 
 
 @record

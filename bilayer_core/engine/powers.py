@@ -1,0 +1,172 @@
+"""Powers at the end of a stage: what is supplied, what is lost, and what barriers take up."""
+
+from __future__ import annotations
+
+from ..contact.barrier import barrier_gradient
+from ..contact.near import gap_normal
+from ..forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
+from ..jit import kernel, piece
+from ..jit.stack import stack_matrix, stack_vector
+from ..kinematics.rotating import inertia_tensor, solve_three
+from ..kinematics.vector import cross, dot, row
+from ..model.force_slots import slot_of
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Configuration, StageInputs, Work
+
+SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, LEAST_SUPPLYING, MOST_SUPPLYING = range(9)
+"""Slots of `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
+[W], whether anything drives it, and the least and the largest power supplied from its start on [W].
+"""
+BARRIER, ROD_BARRIER = map(slot_of, ("barrier", "rod barrier"))
+
+
+@kernel
+def in_barriers(p):
+    """Energy in what stops impacts: barriers, and limits of hinges and slides [J]."""
+    energy = p.sums.energy[BARRIER] + p.sums.energy[ROD_BARRIER]
+    return energy + p.mechanisms.in_limits[0] if p.mechanisms.exists else energy
+
+
+@kernel
+def _turning_power(gradient, b, rates):
+    """∂Φ/∂(X, φ)·(V, ω)"""
+    power = 0.0
+    for c in range(6):
+        power += gradient[b, c] * rates[b, c]
+    return power
+
+
+@kernel
+def _power_of_prescribed(p, at, rates):
+    """What prescribed bodies supply [W]: forces and moments that they take, ∂Φ/∂(X, φ), times their velocities."""
+    sums, constrained, power = p.sums, p.constrained, 0.0
+    for i in range(p.bodies.prescribed.shape[0]):
+        b = p.bodies.prescribed[i]
+        power += _turning_power(sums.contact, b, rates)
+    for k in range(constrained.node.shape[0]):
+        if constrained.free[k] >= 0:
+            continue
+        b = constrained.body[k]
+        r, g = row(at.arm, k), row(sums.attached, k)
+        w = rates[b, 3], rates[b, 4], rates[b, 5]
+        power += dot(g, (rates[b, 0], rates[b, 1], rates[b, 2])) + dot(g, cross(w, r))
+    for k in range(constrained.clamp_edge_free.shape[0]):
+        if constrained.clamp_edge_free[k] >= 0:
+            continue
+        b, e = constrained.clamp_edge_body[k], p.strands.edge_count + k
+        t, w = row(at.tangent, e), (rates[b, 3], rates[b, 4], rates[b, 5])
+        power += dot(row(sums.edge, e), cross(w, t)) + sums.edge[e, 3] * dot(w, t)
+    return power
+
+
+@kernel
+def _write_rates(bodies, inputs, n, at, point, rates):
+    """Write (V, ω) of bodies at the end of stage n; the world, which is the last, rests."""
+    tensor = stack_matrix(3, 3)
+    for b in range(inputs.rates.shape[1]):
+        f = bodies.free_index[b]
+        if f < 0:
+            for c in range(6):
+                rates[b, c] = inputs.rates[n, b, c]
+            continue
+        inertia_tensor(bodies.second_moment, f, at.body_rotation, f, tensor)
+        momentum = point.angular_momentum
+        spin = solve_three(tensor, momentum[f, 0], momentum[f, 1], momentum[f, 2])
+        for c in range(3):
+            rates[b, c], rates[b, 3 + c] = point.body_velocity[f, c], spin[c]
+
+
+@kernel
+def _add_velocity(rates, b, x, at, sign, velocity_out):
+    """Add ± V + ω × (x − X) of a body."""
+    w = rates[b, 3], rates[b, 4], rates[b, 5]
+    turned = cross(w, (x[0] - at.pose_position[b, 0], x[1] - at.pose_position[b, 1], x[2] - at.pose_position[b, 2]))
+    for c in range(3):
+        velocity_out[c] += sign * (rates[b, c] + turned[c])
+
+
+@kernel
+def _power_of_barriers(p, at, point, rates):
+    """What barriers and limits take up at the velocities of a stage's end [W]: ∂V/∂d times the rates of gaps."""
+    surfaces, rods, sums, mechanisms, power = p.surfaces, p.rod_contact, p.sums, p.mechanisms, 0.0
+    for k in range(mechanisms.slides.shape[0]):
+        power += mechanisms.limit_slope[k] * point.strain_rate[mechanisms.first + k]
+    velocity = stack_vector(3)
+    if surfaces.exists:
+        scratch = sums.arm_rate.shape[0] - 1
+        for k in range(surfaces.near_count[0]):
+            if surfaces.near_gap[k] >= surfaces.d_hat:
+                continue
+            i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
+            x = row(at.contact_point, i)
+            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, x[0], x[1], x[2])
+            if not 0.0 < d < surfaces.d_hat:
+                continue
+            body, node = surfaces.contact_point_body[i], node_of(surfaces, i)
+            velocity[0] = velocity[1] = velocity[2] = 0.0
+            if body >= 0:
+                _add_velocity(rates, body, x, at, 1.0, velocity)
+            else:
+                for c in range(3):
+                    velocity[c] = point.velocity[node, c]
+                if has_arm(surfaces, i):
+                    write_material_rate(surfaces, p.strands, at, i, scratch, sums.arm_rate)
+                    add_step_of_arm(
+                        surfaces, p.strands, node, scratch, sums.arm_rate, point.velocity, point.spin, velocity
+                    )
+            _add_velocity(rates, surfaces.body[s], x, at, -1.0, velocity)
+            slope = surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
+            power += slope * (velocity[0] * n0 + velocity[1] * n1 + velocity[2] * n2)
+    if rods.exists:
+        contacts = rods.contacts
+        for c in range(contacts.count[0]):
+            i, j = contacts.node[c, 0], contacts.node[c, 1]
+            scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]
+            rate = 0.0
+            for m in range(3):
+                v = point.velocity
+                moved = contacts.weight[c, 0] * v[i, m] + contacts.weight[c, 1] * v[i + 1, m]
+                moved += contacts.weight[c, 2] * v[j, m] + contacts.weight[c, 3] * v[j + 1, m]
+                rate += contacts.normal[c, m] * moved
+            if contacts.gap[c] > 0.0:
+                power += scale * barrier_gradient(contacts.gap[c], rods.d_hat) * rate
+    return power
+
+
+@kernel
+def _moves(prescribed, rates):
+    for i in range(prescribed.shape[0]):
+        for c in range(6):
+            if rates[prescribed[i], c] != 0.0:
+                return True
+    return False
+
+
+@piece(int, Problem, Work, StageInputs, int, float, Configuration)
+def add_powers(p, work, inputs, n, weight, at):
+    """Add what is supplied and lost at the end of stage n, at `at` and in `Work.end`, times `weight` [s], to the
+    account of a step.
+    """
+    sums, flow, done = p.sums, p.flow, work.account
+    supplied = lost = 0.0
+    for k in range(sums.supplied.shape[0]):
+        supplied += sums.supplied[k]
+        lost += sums.lost[k]
+    _write_rates(p.bodies, inputs, n, at, work.end, work.rates)
+    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if in_barriers(p) != 0.0 else 0.0
+    done[TAKEN_UP] += weight * done[TAKING_UP]
+    driven = p.followers.exists or p.moments.exists
+    if flow.exists:
+        driven |= flow.velocity[0] != 0.0 or flow.velocity[1] != 0.0 or flow.velocity[2] != 0.0
+    if _moves(p.bodies.prescribed, work.rates):
+        driven = True
+        supplied += _power_of_prescribed(p, at, work.rates)
+    done[SUPPLYING], done[LOSING] = supplied, lost
+    done[LEAST_SUPPLYING] = min(done[LEAST_SUPPLYING], supplied)
+    done[MOST_SUPPLYING] = max(done[MOST_SUPPLYING], supplied)
+    done[SUPPLIED] += weight * supplied
+    done[LOST] += weight * lost
+    if driven:
+        done[DRIVEN] = 1.0
+    return READY
