@@ -2,8 +2,8 @@
 
 An adaptive step is made again, shorter, where its error exceeds the tolerance or Newton's method fails. It ends exactly
 at corners and jumps of what acts from outside, and at output times; after a jump steps begin again with the first
-step's length. A fixed step is made in as few equal parts as Newton's method needs. All that this remembers is in the
-state.
+step's length. A fixed step is made in as few equal parts as Newton's method needs, and in two where something jumps
+within it. All that this remembers is in the state.
 """
 
 from __future__ import annotations
@@ -124,6 +124,21 @@ def _end_of_fixed(control, clock):
 
 
 @kernel
+def _jump_before(run, end):
+    """The next jump of what acts from outside, if it is before the end of a fixed step, else that end.
+
+    The work of a jump within a step would depend on where stages happen to lie (`engine.energy_account`).
+    """
+    calls, same, time = run.problem.calls, run.control.same, run.clock.time[0]
+    while True:
+        time = call(calls.corner_after, (run.actuation, time, same))
+        if time >= end - same:
+            return end
+        if call(calls.jumps_at, (run.actuation, time, same)):
+            return time
+
+
+@kernel
 def _end_of_adaptive(run, until):
     """The next time at which a step has to end: an output time, a corner, or `until`."""
     control, begin = run.control, run.clock.time[0]
@@ -216,7 +231,8 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
     status, pair, end, gap = READY, -1, 1, math.inf
     for k in range(most):
         begin = clock.time[0]
-        goal = _end_of_fixed(control, clock) if fixed else _end_of_adaptive(run, until)
+        grid = _end_of_fixed(control, clock) if fixed else math.inf
+        goal = _jump_before(run, grid) if fixed else _end_of_adaptive(run, until)
         if run.actuation.horizon[0] < goal - control.same or run.actuation.horizon[0] <= begin + control.same:
             return _leave(run, k, INPUTS_END, -1, end, gap)
         _begin_again_after_jump(run)
@@ -301,7 +317,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         for c in range(inputs.applied.shape[0]):
             inputs.applied[c] = inputs.stimulus[method.nodes.shape[0] - 1, c]
         clock.time[0] = time
-        whole = not fixed or time == goal
+        whole = not fixed or time == grid
         clock.step[0] += whole
         call(
             p.calls.count_end,
