@@ -325,6 +325,7 @@ def fluid_of(model: Model, sizes: dict[str, int]) -> Fluid:
         velocity=np.array(model.scene.fluid.velocity),
         edge_node=model.edge_node,
         mass=model.fluid_mass,
+        joined=model.joined_node,
         fluid_momentum=fluid_momentum.address,
     )
 

@@ -139,6 +139,17 @@ def _write_frames(bodies, strands, at, state):
 
 
 @kernel
+def _share(inertia, excess, first, copy):
+    """Give a node that is there twice, and its copy, what both have."""
+    for m in range(3):
+        excess[first, m] += excess[copy, m]
+        excess[copy, m] = excess[first, m]
+        for n in range(3):
+            inertia[first, m, n] += inertia[copy, m, n]
+            inertia[copy, m, n] = inertia[first, m, n]
+
+
+@kernel
 def _take_momentum(p, end, last, state):
     """Change velocities v of nodes by w so that m (v + w) + P(v + w) is their momentum: (m + ∂P/∂v) w = P − P(v)."""
     fluid, excess, velocity = p.fluid, state.fluid_excess, state.velocity
@@ -151,6 +162,8 @@ def _take_momentum(p, end, last, state):
     if not apart:
         return
     write_inertia(fluid, p.strands.node_mass, end)
+    for k in range(fluid.joined.shape[0]):
+        _share(fluid.inertia, excess, fluid.joined[k, 0], fluid.joined[k, 1])
     for k in range(p.constrained.node.shape[0]):
         fluid.inertia[p.constrained.node[k], 0, 0] = HELD
     for i in range(excess.shape[0]):

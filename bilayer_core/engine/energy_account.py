@@ -74,8 +74,8 @@ NONE, SOME, MUCH = range(3)
 LARGEST_GAIN = 9e-4
 SMALL = 1e-3
 LARGEST_DRIVEN_GAIN = 0.05
-SMALL_DRIVEN = 0.02
-FORGOTTEN = 0.01
+SMALL_DRIVEN = 5e-4
+FORGOTTEN = 5e-4
 ROUNDING = 1e-11
 """Part of the energies that may be rounding."""
 SAME = 1e-6

@@ -125,7 +125,8 @@ def _end_of_fixed(control, clock):
 
 @kernel
 def _jump_before(run, end):
-    """The next jump of what acts from outside, if it is before the end of a fixed step, else that end.
+    """The next jump of what acts from outside, if it is before the end of a fixed step, else that end; schedules are
+    known so far.
 
     The work of a jump within a step would depend on where stages happen to lie (`engine.energy_account`).
     """
@@ -232,9 +233,11 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
     for k in range(most):
         begin = clock.time[0]
         grid = _end_of_fixed(control, clock) if fixed else math.inf
-        goal = _jump_before(run, grid) if fixed else _end_of_adaptive(run, until)
+        goal = grid if fixed else _end_of_adaptive(run, until)
         if run.actuation.horizon[0] < goal - control.same or run.actuation.horizon[0] <= begin + control.same:
             return _leave(run, k, INPUTS_END, -1, end, gap)
+        if fixed:
+            goal = _jump_before(run, grid)
         _begin_again_after_jump(run)
         planned = min(clock.next_step[0], control.longest) if clock.next_step[0] > 0.0 else control.first
         take_first_stimuli(run.actuation, begin, control.same, inputs)

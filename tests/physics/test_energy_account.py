@@ -122,6 +122,43 @@ def test_what_a_load_supplies_is_in_the_account(frame):
     assert -account[NUMERICAL] == pytest.approx(budget["lost"]["numerical"], abs=0.02 * supplied)
 
 
+def rises(simulator, end):
+    """The most that T + V less supplied work rises over its lowest value, of the largest energy of the run."""
+    lowest, most = float(simulator.energy_account[FREE]), 0.0
+    while simulator.time < end:
+        simulator.step(until=end)
+        lowest = min(lowest, float(simulator.energy_account[FREE]))
+        most = max(most, float(simulator.energy_account[FREE]) - lowest)
+    return most / float(simulator.energy_account[LARGEST])
+
+
+@pytest.mark.parametrize("integrator", ["generalised_alpha", "implicit_midpoint"])
+def test_a_slow_stimulus_does_not_excuse_steps_that_make_energy(integrator):
+    """A slender strip that uncurls by three turns, much too fast for its steps, while a stimulus creeps."""
+    high = {"material": "stiff", "interval": [0, 0.011]}
+    layers = [layer("low", 5e-6, eigenstrain={"stimulus": "heat", "gain": -0.07}), layer("high", 7.5e-6, **high)]
+    for one in layers:
+        one["natural_curvature"] = -350.0
+    strip = rod(layers, length=0.05, stations=42, width=0.005, clamp_start="wall")
+    materials = {"gel": {**GEL, "youngs_modulus": 1e7}, "stiff": {**GEL, "youngs_modulus": 7e10}}
+    ramp = {"type": "ramp", "start": 0, "end": 0.7, "from": 0, "to": 1}
+    content = scene([strip], bodies=[fixed()], materials=materials, stimuli={"heat": {"schedule": ramp}})
+    simulator = Simulator(load_scene(content), dt=8.4e-4, integrator=integrator)
+    assert rises(simulator, 0.2) < 0.1
+    assert simulator.statistics.gaining > 0
+
+
+@pytest.mark.parametrize("start", [1.0e-2, 1.0001e-2, 1.02e-2, 1.05e-2, 1.0999e-2])
+def test_a_fixed_step_ends_where_a_stimulus_jumps(start):
+    """Work is that of the jump, wherever it lies between ends of steps, so that nothing is made of nothing."""
+    content = driven()
+    square = {"type": "square", "low": 0, "high": 1, "period": 1.37e-2, "start": start}
+    content["stimuli"]["heat"]["schedule"] = square
+    simulator = Simulator(load_scene(content), dt=1e-3, integrator="implicit_midpoint")
+    assert rises(simulator, 0.05) < 5e-3
+    assert simulator.statistics.steps == 50
+
+
 def test_a_run_that_is_continued_from_a_saved_state_has_the_same_account():
     content = thrown(1e9, 2)
     whole = Simulator(load_scene(content), tolerance=1e-4)

@@ -211,6 +211,7 @@ class Fluid:
     momentum: Matrix = ("node", 3)  # P of nodes [N s]
     shape_gradient: Matrix = ("edge", 4)  # ∂T/∂(ε, θ) of edges [N, N m]
     inertia: Stack = ("node", 3, 3)  # m + ∂P/∂v of nodes [kg]
+    joined: IndexTable  # nodes that closed rods have twice, each with its copy, shape (n_joined, 2)
     fluid_momentum: Address
 
 
