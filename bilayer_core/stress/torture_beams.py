@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -50,7 +51,7 @@ def as_kirchhoff(trial: Trial, statically: bool = False) -> Decision:
 
 
 def _bend(rung: str, *overrides: str, statically: bool = False) -> Rung:
-    return Rung(rung, overrides, (lambda trial: as_kirchhoff(trial, statically=True)) if statically else None)
+    return Rung(rung, overrides, partial(as_kirchhoff, statically=True) if statically else None)
 
 
 def _blade(degrees: float, newtons: float) -> tuple[str, ...]:
@@ -71,8 +72,8 @@ BEAMS = (
         "tip within 0.5 % of the length of the clamp, beside what so many bends leave open",
         closes,
         (
-            Rung("statics, 41 stations", (), lambda trial: closes(trial, statically=True)),
-            Rung("statics, 161 stations", ("rods.strip.stations=161",), lambda trial: closes(trial, statically=True)),
+            Rung("statics, 41 stations", (), partial(closes, statically=True)),
+            Rung("statics, 161 stations", ("rods.strip.stations=161",), partial(closes, statically=True)),
             Rung("in time, plane"),
             Rung("in time, space", ("solver.dimension=3",)),
             Rung("21 stations", ("rods.strip.stations=21",)),

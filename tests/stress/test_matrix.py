@@ -1,6 +1,7 @@
 """The matrix and its region of validity: fixed before anything was run, and readable by the simulator."""
 
 import hashlib
+import pickle
 
 import pytest
 
@@ -67,6 +68,11 @@ def test_every_case_is_a_scene_that_loads():
     for case in matrix():
         scene = load_scene(scene_of(case.parameters))
         assert len(scene.rods[0].layers) == 2 and scene.rods[0].stations == case.parameters.stations
+
+
+def test_every_case_finds_its_way_to_a_worker():
+    cases = all_cases()
+    assert pickle.loads(pickle.dumps(cases)).keys() == cases.keys()
 
 
 def test_a_quick_run_has_some_cases_of_every_group():
