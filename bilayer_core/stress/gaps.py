@@ -1,7 +1,8 @@
 """The smallest gap of a scene, and whether anything passed through anything: found anew from positions alone.
 
 Nothing here is shared with the solver but the geometry of the scene: what has which thickness, which radius, which
-half edges. All pairs are looked at, without lists of near ones; distances are computed by other formulas.
+half edges. All pairs are looked at, without lists of near ones, but for robots of thousands of edges, whose near pairs
+scipy's k-d tree finds anew at every look; distances are computed by other formulas.
 
 - Rods are capsules about their edges, with the radius that the model gives them. They meet where the model has points
   on them, no farther apart than that radius: where two cross between points, the capsules may overlap by a thirtieth
@@ -21,6 +22,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from ..model.model import Model
@@ -30,6 +32,8 @@ from .surfaces import MeetingPoints, surfaces_of
 Array = np.ndarray
 MOST_PAIRS = 45_000
 """Pairs of edges that every step is checked for: those of 300 nodes."""
+MOST_EDGES = 2000
+"""Of which all pairs are listed."""
 MOST_PARTS = 24
 """Into which the way of a step is cut at most."""
 LARGEST_TURN = 0.3
@@ -60,31 +64,30 @@ class GapCheck:
     def __init__(self, model: Model):
         self._model = model
         self._edge = model.edge_node
-        self._first, self._second = pairs_of_edges(model)
-        self.every = max(1, math.ceil(len(self._first) / MOST_PAIRS))
+        self._pairs = None if model.rod_surfaces is None else PairsOfEdges(model)
+        self.every = max(1, math.ceil(self._pairs.count / MOST_PAIRS)) if self._pairs else 1
         self._points = MeetingPoints(model)
         self._surfaces = surfaces_of(model, self._points)
         radius = self._points.node_radius
         self._edge_radius = np.zeros(0) if model.rod_surfaces is None else model.rod_surfaces.edge_radius
         self._fractions = fractions_of_points(model)
         self._smallest_radius = float(radius[model.node_length > 0.0].min())
-        self._leave_out_joined()
+        if self._pairs:
+            self._leave_out_joined()
         self._before: Moment | None = None
 
     def _leave_out_joined(self) -> None:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
-        if not len(self._first):
-            return
-        rods = self._model.rod_surfaces
-        joined = rods.rod_joined[rods.edge_rod[self._first], rods.edge_rod[self._second]]
-        gap = self._rod_gaps(self._model.start_position)
-        keep = ~(joined & (gap < self._model.scene.contact.barrier_distance))
-        self._first, self._second = self._first[keep], self._second[keep]
+        rods, start = self._model.rod_surfaces, self._model.start_position
+        first, second = self._pairs.at(start)
+        joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
+        gap, _ = self._rod_gaps(start)
+        self._pairs.leave_out(joined & (gap < self._model.scene.contact.barrier_distance))
 
     @property
     def checks_anything(self) -> bool:
         """Whether the scene has anything that could meet."""
-        return bool(len(self._first) or self._surfaces)
+        return bool((self._pairs and self._pairs.count) or self._surfaces)
 
     def moment(self, frame: Frame) -> Moment:
         """What there is to be looked at in a frame."""
@@ -103,8 +106,8 @@ class GapCheck:
     def smallest(self, at: Moment) -> float:
         """The smallest gap [m], infinite without anything that could meet."""
         gaps = [math.inf]
-        if len(self._first):
-            gaps.append(float(self._rod_gaps(at.nodes).min()))
+        if self._pairs:
+            gaps.append(float(self._rod_gaps(at.nodes)[0].min(initial=math.inf)))
         gaps += [float(gap.min()) for gap in self._surface_gaps(at) if gap.size]
         return min(gaps)
 
@@ -116,7 +119,7 @@ class GapCheck:
         turns = zip(before.surface_rotation, at.surface_rotation, strict=True)
         if max((_angle(one.T @ other) for one, other in turns), default=0.0) > LARGEST_TURN:
             return ""
-        rods = _parts(_largest(at.nodes - before.nodes), self._smallest_radius) if len(self._first) else 0
+        rods = _parts(_largest(at.nodes - before.nodes), self._smallest_radius) if self._pairs else 0
         points, positions = at.points - before.points, at.surface_position - before.surface_position
         surfaces = [
             _parts(_largest(points[surface.points] - way), surface.smallest)
@@ -131,8 +134,8 @@ class GapCheck:
 
     def _deep(self, at: Moment, with_rods: bool, with_surfaces: list[bool]) -> str:
         if with_rods:
-            radii = self._edge_radius[self._first] + self._edge_radius[self._second]
-            if (self._rod_gaps(at.nodes) < -DEEP * radii).any():
+            gap, radii = self._rod_gaps(at.nodes)
+            if (gap < -DEEP * radii).any():
                 return "a rod passed through a rod"
         gaps = self._surface_gaps(at)
         for surface, gap, wanted in zip(self._surfaces, gaps, with_surfaces, strict=True):
@@ -140,9 +143,9 @@ class GapCheck:
                 return f"something passed through {surface.name}"
         return ""
 
-    def _rod_gaps(self, nodes: Array) -> Array:
-        """Gap of each pair of edges [m], or a lower bound of it where that is above the barrier distance."""
-        edge, first, second = self._edge, self._first, self._second
+    def _rod_gaps(self, nodes: Array) -> tuple[Array, Array]:
+        """Gap of each pair of edges, or a lower bound where that is above the barrier distance, and their radii [m]."""
+        edge, (first, second) = self._edge, self._pairs.at(nodes)
         begin, end = nodes[edge], nodes[edge + 1]
         middle, half = 0.5 * (begin + end), 0.5 * np.linalg.norm(end - begin, axis=1)
         radii = self._edge_radius[first] + self._edge_radius[second]
@@ -153,7 +156,7 @@ class GapCheck:
             for a, b in ((one, other), (other, one)):
                 apart = self._from_points(begin, end, a, b) - radii[near]
                 bound[near] = apart if a is one else np.minimum(bound[near], apart)
-        return bound
+        return bound, radii
 
     def _from_points(self, begin: Array, end: Array, a: Array, b: Array) -> Array:
         """Smallest distance of the points on each edge of `a` from the edge of `b` beside it [m]."""
@@ -195,21 +198,67 @@ def _angle(rotation: Array) -> float:
     return math.acos(min(max(0.5 * (float(np.trace(rotation)) - 1.0), -1.0), 1.0))
 
 
-def pairs_of_edges(model: Model) -> tuple[Array, Array]:
-    """All pairs of edges that may not come together, as two arrays of edges."""
-    surfaces = model.rod_surfaces
-    if surfaces is None:
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
-    first, second = np.triu_indices(len(surfaces.edge_rod), 1)
-    rod_a, rod_b = surfaces.edge_rod[first], surfaces.edge_rod[second]
-    arc, length = surfaces.edge_arc.mean(axis=1), surfaces.rod_length[rod_a]
-    apart = np.abs(arc[first] - arc[second])
-    around = np.where(np.isfinite(length), np.minimum(apart, length - apart), apart)
-    edge = surfaces.edge_arc[:, 1] - surfaces.edge_arc[:, 0]
-    same = rod_a == rod_b
-    far = around - 0.5 * (edge[first] + edge[second]) >= surfaces.rod_exclusion[rod_a]
-    keep = surfaces.rod_can_collide[rod_a, rod_b] & (~same | far)
-    return first[keep], second[keep]
+class PairsOfEdges:
+    """The pairs of edges of a model that may not come together, all of them or, of very many, those that are near.
+
+    Parameters
+    ----------
+    model : Model
+        In which rods meet.
+    most : int
+        Number of edges up to which all pairs are listed.
+
+    Attributes
+    ----------
+    count : int
+        Of pairs; of very many edges, of all that there are.
+    """
+
+    def __init__(self, model: Model, most: int = MOST_EDGES):
+        self._model, self._edges = model, len(model.rod_surfaces.edge_rod)
+        self._all: tuple[Array, Array] | None = None
+        self._left_out = np.empty(0, dtype=np.int64)
+        self.count = self._edges * (self._edges - 1) // 2
+        if self._edges <= most:
+            self._all = self._allowed(*np.triu_indices(self._edges, 1))
+            self.count = len(self._all[0])
+
+    def at(self, nodes: Array) -> tuple[Array, Array]:
+        """Two arrays of edges, all pairs that may be nearer than the barrier distance among them; nodes [m]."""
+        if self._all is not None:
+            return self._all
+        edge = self._model.edge_node
+        middle, along = 0.5 * (nodes[edge] + nodes[edge + 1]), nodes[edge + 1] - nodes[edge]
+        reach = np.linalg.norm(along, axis=1).max() + 2.0 * self._model.rod_surfaces.edge_radius.max()
+        reach += self._model.scene.contact.barrier_distance
+        near = KDTree(middle).query_pairs(reach, output_type="ndarray")
+        first, second = self._allowed(near[:, 0], near[:, 1])
+        keep = ~np.isin(self._number(first, second), self._left_out)
+        return first[keep], second[keep]
+
+    def leave_out(self, out: Array) -> None:
+        """Leave out pairs, of those at the start, from now on."""
+        first, second = self.at(self._model.start_position)
+        if self._all is not None:
+            self._all = first[~out], second[~out]
+        else:
+            self._left_out = self._number(first[out], second[out])
+
+    def _number(self, first: Array, second: Array) -> Array:
+        return np.minimum(first, second) * self._edges + np.maximum(first, second)
+
+    def _allowed(self, first: Array, second: Array) -> tuple[Array, Array]:
+        """Those pairs that may not come together."""
+        surfaces = self._model.rod_surfaces
+        rod_a, rod_b = surfaces.edge_rod[first], surfaces.edge_rod[second]
+        arc, length = surfaces.edge_arc.mean(axis=1), surfaces.rod_length[rod_a]
+        apart = np.abs(arc[first] - arc[second])
+        around = np.where(np.isfinite(length), np.minimum(apart, length - apart), apart)
+        edge = surfaces.edge_arc[:, 1] - surfaces.edge_arc[:, 0]
+        same = rod_a == rod_b
+        far = around - 0.5 * (edge[first] + edge[second]) >= surfaces.rod_exclusion[rod_a]
+        keep = surfaces.rod_can_collide[rod_a, rod_b] & (~same | far)
+        return first[keep], second[keep]
 
 
 def fractions_of_points(model: Model) -> Array:

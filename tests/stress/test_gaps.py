@@ -8,7 +8,7 @@ import pytest
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.stress.gaps import GapCheck, from_segment
+from bilayer_core.stress.gaps import GapCheck, PairsOfEdges, from_segment
 from bilayer_core.stress.matrix import matrix
 from bilayer_core.stress.robots import scene_of
 
@@ -41,6 +41,27 @@ def test_the_engine_s_smallest_gap_is_found_again(robot, model):
     touching = [pair for pair in smallest if pair[1] < simulator.scene.contact.barrier_distance]
     assert touching
     np.testing.assert_allclose(*np.array(touching).T, rtol=2e-2)  # the engine's is from before the last correction
+
+
+@pytest.mark.parametrize("kind", ["laminate", "two_rod"])
+def test_near_pairs_of_very_many_edges_are_those_of_all(kind):
+    simulator = simulator_of(f"integrator/sdirk2/pile/{kind}/3")
+    model = simulator.model
+    few, many = PairsOfEdges(model), PairsOfEdges(model, most=0)
+    simulator.run()
+    nodes = simulator.frame().positions[: model.node_count]
+    middle = 0.5 * (nodes[model.edge_node] + nodes[model.edge_node + 1])
+    first, second = few.at(nodes)
+    longest = np.linalg.norm(nodes[model.edge_node + 1] - nodes[model.edge_node], axis=1).max()
+    reach = longest + 2.0 * model.rod_surfaces.edge_radius.max() + simulator.scene.contact.barrier_distance
+    near = np.linalg.norm(middle[first] - middle[second], axis=1) < reach
+    expected = set(zip(first[near].tolist(), second[near].tolist(), strict=True))
+    found = {(min(pair), max(pair)) for pair in zip(*(part.tolist() for part in many.at(nodes)), strict=True)}
+    assert expected and expected <= found
+    assert len(found) < few.count < many.count
+    start = model.start_position
+    many.leave_out(np.ones(len(many.at(start)[0]), dtype=bool))
+    assert len(many.at(start)[0]) == 0
 
 
 def test_a_node_under_the_ground_is_seen():
