@@ -209,8 +209,8 @@ def _supply_by_jumps(p, state, inputs, work):
     for k in range(drives.driven_edge.shape[0]):
         stage.rest_edge[drives.driven_edge[k]] += drives.driven_weight[k] * work.strain[drives.driven_law[k]]
     for k in range(drives.driven_joint.shape[0]):
-        j, grown = drives.driven_joint[k], work.strain[drives.driven_joint_law[k]]
-        stage.rest_joint[j, 0] += drives.driven_joint_weight[k] * grown
+        j, strained = drives.driven_joint[k], work.strain[drives.driven_joint_law[k]]
+        stage.rest_joint[j, 0] += drives.driven_joint_weight[k] * strained
     for k in range(drives.driven_edge.shape[0]):
         e = drives.driven_edge[k]
         force = strands.axial_stiffness[e] * stage.rest_edge[e] * strands.rest_length[e]
@@ -272,10 +272,10 @@ def close_step_account(p, state, work, h, beyond, end):
     _write_forces_of_laws(p, end, work.stage, work.end_force)
     driven, unsure = done[DRIVEN] != 0.0, 0.5 * h * (done[MOST_SUPPLYING] - done[LEAST_SUPPLYING])
     for i in range(work.start_strain.shape[0]):
-        grown, change = work.strain[i] - work.start_strain[i], work.end_force[i] - work.start_force[i]
-        driven |= grown != 0.0
-        done[SUPPLIED] -= (work.start_force[i] + 0.5 * change) * grown
-        unsure += 0.5 * abs(change * grown)
+        strained, forced = work.strain[i] - work.start_strain[i], work.end_force[i] - work.start_force[i]
+        driven |= strained != 0.0
+        done[SUPPLIED] -= (work.start_force[i] + 0.5 * forced) * strained
+        unsure += 0.5 * abs(forced * strained)
     copy(work.end_force, state.law_force)
     energy, barriers, scale = _energies(p, state, end)
     missed = abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP])

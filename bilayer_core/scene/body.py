@@ -23,6 +23,8 @@ from bilayer_core.scene.units import (
     Speed,
 )
 
+LEAST_INERTIA = 1e-10
+"""Of the largest principal moment: with less, rounding decides how a body rotates about that axis."""
 Inertia = tuple[PositiveInertia, PositiveInertia, PositiveInertia]
 
 
@@ -215,4 +217,7 @@ def faults_of_inertia(motion: Free | Guided) -> list[Fault]:
     small, middle, large = sorted(motion.inertia)
     if large > (1.0 + ROUNDING) * (small + middle):
         return [(("inertia",), motion.inertia, "must be such that none exceeds the sum of the other two")]
+    if small < LEAST_INERTIA * large:
+        why = f"must all be at least {LEAST_INERTIA:g} of the largest: with {small:g} nothing resists rotation"
+        return [(("inertia",), motion.inertia, why)]
     return []

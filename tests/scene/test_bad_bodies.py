@@ -16,6 +16,11 @@ def test_a_body_without_mass_distribution_is_refused():
     assert "none exceeds the sum of the other two" in faults_of({**everything(), "bodies": [fixed("hub"), body]})[0]
 
 
+def test_a_body_without_inertia_about_an_axis_is_refused():
+    body = ball((0, 0, 0.0209), inertia=[1e-7, 1e-7, 0.9e-17])
+    assert "at least 1e-10 of the largest" in faults_of({**everything(), "bodies": [fixed("hub"), body]})[0]
+
+
 @pytest.mark.parametrize("part", ["obstacle", "ball", "contact point"])
 def test_whatever_can_touch_needs_contact_settings(part):
     content = scene([rod([layer()])])
