@@ -7,8 +7,9 @@ Over an accepted step, with the kinetic energy T and the energy V of the conserv
 is what no force accounts for: negative where the integrator damps, positive where it makes energy. `lost` is the work
 of friction, drag, damping and viscosity, `supplied` that of loads, of a flow and of prescribed bodies: both are
 h Σ bᵢ Pᵢ with the powers Pᵢ at the ends of the stages, which the last evaluation of each has left, and the integrator's
-own weights b (`Method.works`). What a stimulus supplies is ∫ s·dη, s = −∂V/∂η, by the trapezoidal rule; where it jumps
-at the start of a step, the jump by itself, at the shape there.
+own weights b (`Method.works`). What a stimulus supplies is ∫ s·dη, s = −∂V/∂η, by the same weights: Σ bᵢ sᵢ·Δη. (So the
+implicit midpoint rule makes nothing where V is quadratic, however long its steps; with the trapezoidal rule for this
+work it would seem to.) Where it jumps at the start of a step, the jump counts by itself, at the shape there.
 
 A step is not accepted that makes energy: without driving, T + V less the work of constant loads can only fall. Where
 it has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
@@ -16,9 +17,9 @@ again, shorter, unless its own part is less than `SMALL` of that. The shortest s
 much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops.
 
 Driving ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow. What they supply
-has the error of its quadrature, at most ½|Δs·Δη| and ½h(max P − min P). What steps make beyond that is summed, and each
-step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike; limits are `LARGEST_DRIVEN_GAIN` and
-`SMALL_DRIVEN`.
+has the error of its quadrature: |(Σ bᵢ sᵢ − ½(s₀ + s₁))·Δη|, and ½h(max P − min P). What steps make beyond that is
+summed, and each step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike; limits are
+`LARGEST_DRIVEN_GAIN` and `SMALL_DRIVEN`.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -32,13 +33,12 @@ The account is part of the state, so that a run that is continued makes the same
 
 from __future__ import annotations
 
-from ..forces.bend_twist import bend_by_strains
 from ..forces.inertia import second_moment_beyond
 from ..jit import call, kernel, piece
 from ..jit.stack import stack_matrix
 from ..kinematics.copying import copy
 from ..kinematics.rotating import inertia_tensor
-from ..kinematics.vector import dot, row
+from ..kinematics.vector import row
 from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES, slot_of
 from ..model.records.outcome import CONTACT_ERROR, FRACTION
@@ -57,6 +57,7 @@ from .powers import (
     TAKEN_UP,
     TAKING_UP,
     in_barriers,
+    write_forces_of_laws,
 )
 
 ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
@@ -73,7 +74,7 @@ NONE, SOME, MUCH = range(3)
 """What a step makes of energy: nothing that counts, too much with the steps before, or by itself."""
 LARGEST_GAIN = 9e-4
 SMALL = 1e-3
-LARGEST_DRIVEN_GAIN = 0.05
+LARGEST_DRIVEN_GAIN = 0.02
 SMALL_DRIVEN = 5e-4
 FORGOTTEN = 5e-4
 ROUNDING = 1e-11
@@ -145,30 +146,7 @@ def open_account(p, state, stage, at):
     account[GRAVITY_AT_START] = p.sums.energy[GRAVITY]
     account[ENERGY], account[IN_BARRIERS], account[LARGEST] = _energies(p, state, at)
     account[OPEN] = 1.0
-    _write_forces_of_laws(p, at, stage, state.law_force)
-    return READY
-
-
-@kernel
-def _write_forces_of_laws(p, at, stage, force_out):
-    """Write −∂V/∂η of each law [J] at a configuration, with the rest strains of the stage."""
-    strands, drives, off_axis = p.strands, p.drives, p.off_axis
-    force_out[:] = 0.0
-    for k in range(drives.driven_edge.shape[0]):
-        e, weight = drives.driven_edge[k], drives.driven_weight[k]
-        strain = at.length[e] / strands.rest_length[e] - 1.0 - stage.rest_edge[e]
-        force_out[drives.driven_law[k]] += weight * strands.axial_stiffness[e] * strain * strands.rest_length[e]
-    bends = drives.driven_joint.shape[0] > 0 and off_axis.exists
-    if bends:
-        bend_by_strains(off_axis, strands, at, stage.rest_joint)
-    for k in range(drives.driven_joint.shape[0]):
-        j = drives.driven_joint[k]
-        a, b = strands.joint_a[j], strands.joint_b[j]
-        t, u = row(at.tangent, a), row(at.tangent, b)
-        bend = (dot(u, row(at.director1, a)) - dot(t, row(at.director1, b))) / (1.0 + dot(t, u))
-        bend -= off_axis.rest[j, 0] if bends else stage.rest_joint[j, 0]
-        moment = drives.driven_joint_weight[k] * strands.joint_stiffness[j, 0] * bend
-        force_out[drives.driven_joint_law[k]] += moment
+    write_forces_of_laws(p, at, stage, state.law_force)
     return READY
 
 
@@ -184,6 +162,8 @@ def begin_step_account(p, state, inputs, work, weight):
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
     _supply_by_jumps(p, state, inputs, work)
+    for i in range(work.mean_force.shape[0]):
+        work.mean_force[i] = weight * work.start_force[i]
     return READY
 
 
@@ -269,13 +249,13 @@ def close_step_account(p, state, work, h, beyond, end):
     if account[OPEN] == 0.0:
         call(p.calls.open_account, (p, state, work.stage, end))
         return NONE
-    _write_forces_of_laws(p, end, work.stage, work.end_force)
+    write_forces_of_laws(p, end, work.stage, work.end_force)
     driven, unsure = done[DRIVEN] != 0.0, 0.5 * h * (done[MOST_SUPPLYING] - done[LEAST_SUPPLYING])
     for i in range(work.start_strain.shape[0]):
-        strained, forced = work.strain[i] - work.start_strain[i], work.end_force[i] - work.start_force[i]
+        strained, mean = work.strain[i] - work.start_strain[i], work.mean_force[i] / h
         driven |= strained != 0.0
-        done[SUPPLIED] -= (work.start_force[i] + 0.5 * forced) * strained
-        unsure += 0.5 * abs(forced * strained)
+        done[SUPPLIED] -= mean * strained
+        unsure += abs((mean - 0.5 * (work.start_force[i] + work.end_force[i])) * strained)
     copy(work.end_force, state.law_force)
     energy, barriers, scale = _energies(p, state, end)
     missed = abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..contact.barrier import barrier_gradient
 from ..contact.near import gap_normal
+from ..forces.bend_twist import bend_by_strains
 from ..forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
 from ..jit import kernel, piece
 from ..jit.stack import stack_matrix, stack_vector
@@ -19,6 +20,29 @@ SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, LEAST_SUPPLYING,
 [W], whether anything drives it, and the least and the largest power supplied from its start on [W].
 """
 BARRIER, ROD_BARRIER = map(slot_of, ("barrier", "rod barrier"))
+
+
+@kernel
+def write_forces_of_laws(p, at, stage, force_out):
+    """Write −∂V/∂η of each law [J] at a configuration, with the rest strains of the stage."""
+    strands, drives, off_axis = p.strands, p.drives, p.off_axis
+    force_out[:] = 0.0
+    for k in range(drives.driven_edge.shape[0]):
+        e, weight = drives.driven_edge[k], drives.driven_weight[k]
+        strain = at.length[e] / strands.rest_length[e] - 1.0 - stage.rest_edge[e]
+        force_out[drives.driven_law[k]] += weight * strands.axial_stiffness[e] * strain * strands.rest_length[e]
+    bends = drives.driven_joint.shape[0] > 0 and off_axis.exists
+    if bends:
+        bend_by_strains(off_axis, strands, at, stage.rest_joint)
+    for k in range(drives.driven_joint.shape[0]):
+        j = drives.driven_joint[k]
+        a, b = strands.joint_a[j], strands.joint_b[j]
+        t, u = row(at.tangent, a), row(at.tangent, b)
+        bend = (dot(u, row(at.director1, a)) - dot(t, row(at.director1, b))) / (1.0 + dot(t, u))
+        bend -= off_axis.rest[j, 0] if bends else stage.rest_joint[j, 0]
+        moment = drives.driven_joint_weight[k] * strands.joint_stiffness[j, 0] * bend
+        force_out[drives.driven_joint_law[k]] += moment
+    return READY
 
 
 @kernel
@@ -169,4 +193,7 @@ def add_powers(p, work, inputs, n, weight, at):
     done[LOST] += weight * lost
     if driven:
         done[DRIVEN] = 1.0
+    write_forces_of_laws(p, at, work.stage, work.end_force)
+    for i in range(work.mean_force.shape[0]):
+        work.mean_force[i] += weight * work.end_force[i]
     return READY

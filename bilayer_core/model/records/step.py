@@ -165,6 +165,7 @@ class Work:
     strain: Vector = ("law",)  # of laws at a stage
     start_strain: Vector = ("law",)  # and at the start of the step, after jumps of stimuli
     start_force: Vector = ("law",)  # −∂V/∂η of laws there [J]
+    mean_force: Vector = ("law",)  # likewise at the start and at stages, by their weights [J s]
     end_force: Vector = ("law",)  # and at its end
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
     account: Vector = (9,)  # of the energy of a step; see `engine.powers`
