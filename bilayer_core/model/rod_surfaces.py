@@ -16,6 +16,8 @@ from .strands import Collected
 from .validity import EdgeFigures
 
 Array = np.ndarray
+WITHIN = 1.0 - 1e-9
+"""Of an arc distance: nodes that are exactly as far apart see each other, whatever rounding says."""
 FEW_EDGES = 2  # that a point is away from the nearest edge of its own rod that it sees, at least
 
 
@@ -75,7 +77,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         number, own = numbers[strand.rod], slice(strand.first_node, strand.first_node + strand.node_count)
         thickest[number] = max(thickest[number], 2.0 * float(node_radius[own].max()))
     exclusion = [
-        max(FEW_EDGES * rod.edge_length, 0.5 * math.pi * (thick + scene.contact.barrier_distance))
+        WITHIN * max(FEW_EDGES * rod.edge_length, 0.5 * math.pi * (thick + scene.contact.barrier_distance))
         for rod, thick in zip(rods, thickest, strict=True)
     ]
     parts: dict[str, list[Array]] = {}
