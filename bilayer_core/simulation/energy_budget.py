@@ -169,7 +169,7 @@ class EnergyLedger:
             "lost": lost,
             "work": {name: work[name] for name in self._watched},
             "residual": residual,
-            "relative_residual": residual / largest if largest > 0.0 else 0.0,
+            "relative_residual": float(residual) / float(largest) if largest > 0.0 else 0.0,
         }
 
     def _work_of_barrier(

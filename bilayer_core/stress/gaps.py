@@ -13,7 +13,8 @@ scipy's k-d tree finds anew at every look; distances are computed by other formu
 A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
 look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
 than half way inside another in between has *crossed* it. What moves in one step by more than twelve times its size goes
-another way than the straight one: of that nothing is said.
+another way than the straight one: of that nothing is said. Nor is it of two parts of one rod that move against each
+other by more than half of the length between them: where that straightens and bends the other way, they swing past.
 """
 
 from __future__ import annotations
@@ -128,15 +129,21 @@ class GapCheck:
         ends = list(zip(vars(before).values(), vars(at).values(), strict=True))
         for part in np.linspace(0.0, 1.0, max([rods, *surfaces]) + 1)[1:-1]:
             between = Moment(*(a + part * (b - a) for a, b in ends))
-            if found := self._deep(between, rods > 1, [parts > 1 for parts in surfaces]):
+            if found := self._deep(between, at.nodes - before.nodes, rods > 1, [parts > 1 for parts in surfaces]):
                 return found
         return ""
 
-    def _deep(self, at: Moment, with_rods: bool, with_surfaces: list[bool]) -> str:
+    def _deep(self, at: Moment, way: Array, with_rods: bool, with_surfaces: list[bool]) -> str:
+        """What is deep inside something, of nodes that move by `way` from look to look."""
         if with_rods:
             gap, radii = self._rod_gaps(at.nodes)
-            if (gap < -DEEP * radii).any():
-                return "a rod passed through a rod"
+            deep = np.flatnonzero(gap < -DEEP * radii)
+            if deep.size:
+                first, second = (edges[deep] for edges in self._pairs.at(at.nodes))
+                middle = 0.5 * (way[self._edge] + way[self._edge + 1])
+                against = np.linalg.norm(middle[first] - middle[second], axis=1)
+                if (2.0 * against <= self._pairs.length_between(first, second)).any():
+                    return "a rod passed through a rod"
         gaps = self._surface_gaps(at)
         for surface, gap, wanted in zip(self._surfaces, gaps, with_surfaces, strict=True):
             if wanted and gap.size and float(gap.min()) < -DEEP * surface.smallest:
@@ -243,6 +250,13 @@ class PairsOfEdges:
             self._all = first[~out], second[~out]
         else:
             self._left_out = self._number(first[out], second[out])
+
+    def length_between(self, first: Array, second: Array) -> Array:
+        """Length of rod between two edges [m], infinite between rods."""
+        surfaces = self._model.rod_surfaces
+        same = surfaces.edge_rod[first] == surfaces.edge_rod[second]
+        arc = surfaces.edge_arc.mean(axis=1)
+        return np.where(same, np.abs(arc[first] - arc[second]), math.inf)
 
     def _number(self, first: Array, second: Array) -> Array:
         return np.minimum(first, second) * self._edges + np.maximum(first, second)
