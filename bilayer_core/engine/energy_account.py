@@ -16,10 +16,10 @@ it has risen by more than `LARGEST_GAIN` of the largest energy of the run over i
 again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
 much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops.
 
-Driving ends this: a stimulus that changes, a prescribed body that moves, a flow, forces that follow. What they supply
-has the error of its quadrature: |(Σ bᵢ sᵢ − ½(s₀ + s₁))·Δη|, and ½h(max P − min P). What steps make beyond that is
-summed, and each step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike; limits are
-`LARGEST_DRIVEN_GAIN` and `SMALL_DRIVEN`.
+Driving ends this: a prescribed body that moves, a flow, forces that follow. A stimulus that changes does not. What it
+supplies has the error of its quadrature, |(Σ bᵢ sᵢ − ½(s₀ + s₁))·Δη|; what steps make beyond that is summed, and each
+step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike. Limits are then `LARGEST_DRIVEN_GAIN`
+and `SMALL_DRIVEN`.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -48,10 +48,9 @@ from ..model.records.step import Configuration, Stage, StageInputs, StateArrays,
 from ..scene.transduction import eigenstrain_of
 from .powers import (
     DRIVEN,
-    LEAST_SUPPLYING,
     LOSING,
     LOST,
-    MOST_SUPPLYING,
+    STRAINED,
     SUPPLIED,
     SUPPLYING,
     TAKEN_UP,
@@ -65,7 +64,7 @@ FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN, MADE = range(6, 13)
 """Slots of `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
 barriers take up and contact damping takes [W]; T + V less all that was supplied, and the lowest that was since driving
 ended; the largest energy of the run; what steps have made or, below zero, lost; the potential of gravity at the start
-[J]; 1 if all these are of the state; what steps have made lately, driven or not [J].
+[J]; 1 if all these are of the state; what steps have made lately [J].
 """
 QUESTIONED = 2.0
 """In `OPEN`: of a state that someone has changed, or that is of other conditions. Its account is kept if it may be its
@@ -156,8 +155,7 @@ def begin_step_account(p, state, inputs, work, weight):
     drives, work_done = p.drives, work.account
     work_done[SUPPLIED], work_done[LOST] = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
     work_done[TAKEN_UP] = weight * state.account[POWER_BARRIER]
-    work_done[DRIVEN] = 0.0
-    work_done[LEAST_SUPPLYING] = work_done[MOST_SUPPLYING] = state.account[POWER_SUPPLIED]
+    work_done[DRIVEN] = work_done[STRAINED] = 0.0
     for i in range(work.start_strain.shape[0]):
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
@@ -202,7 +200,7 @@ def _supply_by_jumps(p, state, inputs, work):
     for i in range(work.start_strain.shape[0]):
         done[SUPPLIED] -= 0.5 * (state.law_force[i] + work.start_force[i]) * work.strain[i]
         work.start_strain[i] += work.strain[i]
-    done[DRIVEN] = 1.0
+    done[STRAINED] = 1.0
 
 
 @kernel
@@ -250,10 +248,10 @@ def close_step_account(p, state, work, h, beyond, end):
         call(p.calls.open_account, (p, state, work.stage, end))
         return NONE
     write_forces_of_laws(p, end, work.stage, work.end_force)
-    driven, unsure = done[DRIVEN] != 0.0, 0.5 * h * (done[MOST_SUPPLYING] - done[LEAST_SUPPLYING])
+    grows, unsure = done[STRAINED] != 0.0, 0.0
     for i in range(work.start_strain.shape[0]):
         strained, mean = work.strain[i] - work.start_strain[i], work.mean_force[i] / h
-        driven |= strained != 0.0
+        grows |= strained != 0.0
         done[SUPPLIED] -= mean * strained
         unsure += abs((mean - 0.5 * (work.start_force[i] + work.end_force[i])) * strained)
     copy(work.end_force, state.law_force)
@@ -272,10 +270,12 @@ def close_step_account(p, state, work, h, beyond, end):
     missed += DAMPING_SHARE * h * abs(damping - account[POWER_DAMPING])
     account[POWER_DAMPING] = damping
     p.outcome.figures[CONTACT_ERROR] = missed
-    if driven:
-        gain -= unsure
+    if done[DRIVEN] != 0.0:
+        account[LOWEST], account[MADE] = account[FREE], 0.0
+        return NONE
+    gain -= unsure
     account[MADE] = max((1.0 - FORGOTTEN) * account[MADE] + gain, 0.0)
-    if driven:
+    if grows:
         account[LOWEST] = account[FREE]
         return _too_much(account[MADE], gain, LARGEST_DRIVEN_GAIN * account[LARGEST], SMALL_DRIVEN)
     account[LOWEST] = min(account[LOWEST], account[FREE])

@@ -15,9 +15,9 @@ from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, StageInputs, Work
 
-SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, LEAST_SUPPLYING, MOST_SUPPLYING = range(9)
+SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, STRAINED = range(8)
 """Slots of `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
-[W], whether anything drives it, and the least and the largest power supplied from its start on [W].
+[W], whether bodies, a flow or followers drive it, and whether a stimulus has jumped.
 """
 BARRIER, ROD_BARRIER = map(slot_of, ("barrier", "rod barrier"))
 
@@ -187,8 +187,6 @@ def add_powers(p, work, inputs, n, weight, at):
         driven = True
         supplied += _power_of_prescribed(p, at, work.rates)
     done[SUPPLYING], done[LOSING] = supplied, lost
-    done[LEAST_SUPPLYING] = min(done[LEAST_SUPPLYING], supplied)
-    done[MOST_SUPPLYING] = max(done[MOST_SUPPLYING], supplied)
     done[SUPPLIED] += weight * supplied
     done[LOST] += weight * lost
     if driven:

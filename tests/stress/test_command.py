@@ -49,7 +49,7 @@ def test_cases_are_listed_with_why_they_are_outside(capfd):
 
 def test_a_pattern_that_fits_no_case_is_told_with_the_groups(capfd):
     assert main(["stress", "--only", "restitutoin/*"]) == 2
-    assert "--only restitutoin/*: fits no case; there are groups torture, dt, tolerance" in capfd.readouterr().err
+    assert "--only restitutoin/*: fits no case; there are groups dt, tolerance, stations" in capfd.readouterr().err
 
 
 def test_results_of_other_cases_are_not_gone_on_with(tmp_path):

@@ -168,7 +168,7 @@ class Work:
     mean_force: Vector = ("law",)  # likewise at the start and at stages, by their weights [J s]
     end_force: Vector = ("law",)  # and at its end
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
-    account: Vector = (9,)  # of the energy of a step; see `engine.powers`
+    account: Vector = (8,)  # of the energy of a step; see `engine.powers`
 
 
 @record
