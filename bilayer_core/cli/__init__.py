@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bilayer_core.cli.signals import Signals, interruption_behind
+from bilayer_core.cli.signals import Signals
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -25,9 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         if arguments is None:
             guard_streams()
-        return signals.ended(run_program(arguments))
+        return signals.ended(run_program(arguments, signals))
     except BaseException as error:
-        if (interruption := interruption_behind(error)) is None:
+        if (interruption := signals.behind(error)) is None:
             raise
         return signals.interrupted(interruption)
     finally:

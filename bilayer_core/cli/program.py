@@ -19,7 +19,7 @@ from bilayer_core.cli.options import Settings, VerbGroup
 from bilayer_core.cli.render import render
 from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import scenes, schema
-from bilayer_core.cli.signals import interruption_behind
+from bilayer_core.cli.signals import Signals
 from bilayer_core.cli.stress import stress
 from bilayer_core.cli.validate import validate
 from bilayer_core.errors import BilayerError
@@ -70,7 +70,7 @@ def _seldom_collected() -> Iterator[None]:
 
 
 @_seldom_collected()
-def run_program(arguments: Sequence[str] | None) -> int:
+def run_program(arguments: Sequence[str] | None, signals: Signals) -> int:
     """Run the command line, by default that of the process; return its exit code."""
     settings = Settings()
     try:
@@ -84,7 +84,7 @@ def run_program(arguments: Sequence[str] | None) -> int:
         _explain(settings, "\n  then ".join([str(error), *getattr(error, "__notes__", [])]))
         return error.exit_code
     except Exception as error:
-        if interruption_behind(error) is not None:
+        if signals.behind(error) is not None:
             raise
         text = " ".join(f"{type(error).__name__}: {error}".split())
         _explain(settings, f"internal error: {text}\nPlease report it, with what the same command prints with --debug.")

@@ -110,6 +110,12 @@ class Signals:
             signal.signal(signal.SIGALRM, signal.SIG_IGN)
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
+    def behind(self, error: BaseException) -> Interruption | None:
+        """The interruption of which an exception was made, if need be the one that was raised before it: compiled
+        libraries make others of it that do not say so.
+        """
+        return interruption_behind(error) or self._interruption
+
     def interrupted(self, interruption: Interruption) -> int:
         """Print the line; return the exit code."""
         _handle_by(signal.SIG_IGN)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from processes import TIMEOUT, bilayer, command, environment
 
+from bilayer_core.cli import main, program
 from bilayer_core.cli.signals import Signals
 from bilayer_core.record.log_reader import read_info
 
@@ -173,7 +174,7 @@ def test_the_exception_of_a_signal_that_other_code_catches_is_raised_again(tmp_p
     program = (
         "import os, signal, sys, time\n"
         "import bilayer_core.cli.program as program\n"
-        "def busy(arguments):\n"
+        "def busy(*arguments):\n"
         "    try:\n"
         "        os.kill(os.getpid(), signal.SIGTERM)\n"
         "    except BaseException:\n"
@@ -207,3 +208,18 @@ def test_a_signal_at_the_end_of_the_process_changes_nothing():
     )
     run = subprocess.run([sys.executable, "-c", program], env=environment(), capture_output=True, text=True, timeout=50)
     assert (run.returncode, run.stderr) == (0, "") and run.stdout == bilayer("scenes").stdout
+
+
+def test_an_error_that_a_library_makes_of_an_interruption_is_taken_for_one(capfd, monkeypatch):
+    """Compiled ones do not say of what they made it, as pydantic's does while it builds the models of scenes."""
+
+    def catch(*arguments, **settings):
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        except BaseException as error:
+            text = str(error)
+        raise ValueError(text)
+
+    monkeypatch.setattr(program.program, "main", catch)
+    assert main(["scenes"]) == 128 + signal.SIGTERM
+    assert capfd.readouterr().err == LINES[signal.SIGTERM]
