@@ -78,10 +78,10 @@ class _Pulses(Pieces):
 
     def _faults(self, width: float, where: str) -> list[Fault]:
         """Whether both flanks fit into the period."""
-        room = min(width, self.period - width)
-        if self.rise_time <= room * (1.0 + ROUNDING):
+        shortest = min(width, self.period - width)
+        if self.rise_time <= shortest * (1.0 + ROUNDING):
             return []
-        demand = f"must be at most {room:g} s: both flanks have to fit with `period` and `{where}`"
+        demand = f"must be at most {shortest:g} s: both flanks have to fit with `period` and `{where}`"
         return [(("rise_time",), self.rise_time, demand)]
 
     def points(self) -> dict[tuple[str | int, ...], float]:
