@@ -40,9 +40,9 @@ from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, NUMBER_ROUNDING, after_reje
 configuration_at = record_at(Configuration)
 TIME_ROUNDING = 1e-9
 """Part of a step, or of an output period, by which two times are the same."""
-CONTACT_SHARE = 8.0
+CONTACT_SHARE = 2.0
 """Part of the energy of the run by which the energy of contacts may err in a step, over the tolerance: by default an
-impact of ten steps ends with its speed right to 1 or 2 %.
+impact ends with its speed right to 1 %.
 """
 
 

@@ -118,11 +118,15 @@ def test_a_plate_that_turns_takes_its_grain_along(turn, coefficient):
     assert after_a_turn(turn) == pytest.approx(0.5 * (0.7 - GRAIN[coefficient]) * GRAVITY, rel=0.01)
 
 
+ON_BARRIER = 1.1988475e-3
+"""Height at which the strip below rests [m]: half its thickness, and where the barrier carries its weight."""
+
+
 def dragged(dimension, model, direction, **more):
-    """Distance [m] that a strip slides from 0.1 s after the start, when it has landed, to 0.3 s."""
+    """Distance [m] that a strip slides from 0.1 s after the start, at which it lies on the barrier, to 0.3 s."""
     law = contact(barrier_distance=2e-4, coefficient=0.4, speed_threshold=1e-4)
     law["friction"] |= DIRECTED | more
-    strip = rod([layer("a"), layer("b")], length=0.02, stations=6, start=(0, 0, 1.195e-3), friction_axis="across")
+    strip = rod([layer("a"), layer("b")], length=0.02, stations=6, start=(0, 0, ON_BARRIER), friction_axis="across")
     ground = GROUND | {"grain": [1, 0, 0]}
     content = scene([strip], gravity=[direction * 4.0, 0, -10.0], obstacles=[ground], contact=law)
     content["solver"] = {"model": model, "dimension": dimension}

@@ -13,6 +13,10 @@ from bilayer_core.simulation.plane_watch import FIRST_LOOK, MOST_STEPS, turning_
 from bilayer_core.validate.plane import blade
 
 
+STIFF = contact(1e-4, 0.3) | {"stiffness": 1e8}
+"""Else the ends of what jumps come down faster than the barrier can hold."""
+
+
 def warnings_of(simulator):
     """Those that name the remedy."""
     return [warning for warning in simulator.summary()["warnings"] if "--dimension 3" in warning]
@@ -23,7 +27,7 @@ def released(strain, **solver):
     growing = layer("top", eigenstrain={"stimulus": "heat", "gain": strain})
     strip = rod([layer(), growing], length=0.05, start=(0, 0, 1.2e-3))
     held = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
-    content = scene([strip], gravity=[0, 0, -9.81], obstacles=[GROUND], stimuli=held, contact=contact(1e-4, 0.3))
+    content = scene([strip], gravity=[0, 0, -9.81], obstacles=[GROUND], stimuli=held, contact=STIFF)
     return load_scene({**content, "solver": solver, "duration": 0.02})
 
 

@@ -83,7 +83,7 @@ def test_it_takes_off_within_milliseconds_and_rises_by_more_than_its_length(jump
     simulator, flight = jump
     assert simulator.summary()["converged"] is True
     assert 0.01 < flight.take_off < 0.03
-    assert flight.rise == pytest.approx(0.347, rel=0.05)  # with shorter steps
+    assert flight.rise == pytest.approx(0.351, rel=0.05)  # with shorter steps
     assert 0.0 < simulator.statistics.min_gap < 1e-3
 
 
@@ -118,7 +118,7 @@ def test_a_slow_release_does_not_make_it_jump():
 )
 def test_the_rise_falls_into_place_with_shorter_steps_of_any_integrator_and_either_model(change):
     _, flight = watched(*change)
-    assert flight.rise == pytest.approx(0.347, rel=0.015)
+    assert flight.rise == pytest.approx(0.351, rel=0.015)  # 0.3508 of SDIRK2 at 0.06 ms, 0.3503 of TR-BDF2 at 0.03 ms
 
 
 @pytest.mark.parametrize(
