@@ -12,7 +12,6 @@ from bilayer_core.model.plan import MODELS
 from bilayer_core.simulation.plane_watch import FIRST_LOOK, MOST_STEPS, turning_rate
 from bilayer_core.validate.plane import blade
 
-
 STIFF = contact(1e-4, 0.3) | {"stiffness": 1e8}
 """Else the ends of what jumps come down faster than the barrier can hold."""
 
