@@ -15,6 +15,7 @@ from ..model.impacts import HELD, heaviest, stiffness_that_holds
 from ..model.model import Model
 from ..model.records.status import BEYOND, BLOCKED, GAINS_ENERGY, LINE_SEARCH, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
 from ..scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
+from .collapse import damp_materials
 from .step_choice import Steps
 
 NEARLY = 1e3
@@ -27,7 +28,7 @@ SPENT = 1e-3
 
 
 def remedy(
-    found: IntegrationReport, steps: Steps, method: Method, model: Model, gap: float, speed: float
+    found: IntegrationReport, steps: Steps, method: Method, model: Model, gap: float, speed: float, folded: bool = False
 ) -> Remedy:
     """The setting to change, and to what, for a run to get past the step that failed.
 
@@ -42,12 +43,14 @@ def remedy(
         The smallest in the last attempt [m].
     speed : float
         Of the fastest node or body before it, or by the largest energy of the run [m/s].
+    folded : bool
+        Whether a rod has collapsed (`simulation.collapse`).
     """
     scene = model.scene
     solver, usual = scene.solver, Solver.model_fields["max_newton_iterations"].default
     if found.status == BLOCKED:
         if not _holds(model, speed):
-            return _set("contact.stiffness", f"{_stiffness_that_holds(model, speed):.0e}", "Pa")
+            return _stiffer(model, speed)
         return Remedy("a prescribed body must stop before nothing can give way: change its `motion`")
     farthest, length = float(np.abs(model.start_position).max()), max(rod.path.length for rod in scene.rods)
     if LAST_DIGITS * farthest > (steps.tolerance or DEFAULT_TOLERANCE) * length:
@@ -61,20 +64,21 @@ def remedy(
         return _without("solver.max_halvings", f", or set it above {solver.max_halvings}")
     if found.status == GAINS_ENERGY and solver.newton_tolerance is not None:
         return _without("solver.newton_tolerance", ": what it leaves undone is energy")
+    if folded:
+        return _with_adaptive_steps(damp_materials(model), steps, method)
     if found.status == BEYOND:
         text = "set `solver.integrator` to sdirk2, which ends where it has looked"
         return Remedy(text, {"solver.integrator": "sdirk2"})
+    touches = scene.contact is not None and gap < SPENT * scene.contact.barrier_distance
+    if touches and not _holds(model, speed):
+        return _with_adaptive_steps(_stiffer(model, speed), steps, method)
     stuck = found.status in (MAX_ITERATIONS, LINE_SEARCH)
     if stuck and solver.newton_tolerance is None and found.residual <= NEARLY * steps.newton_tolerance:
         return _set("solver.newton_tolerance", f"{_rounded_up(MARGIN * found.residual):.1g}", "m/s")
     if not steps.adaptive:
-        text = f"leave `solver.dt` out for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s"
-        if method.estimate is not None:
-            return Remedy(text, {"solver.dt": None})
-        text = f"{text}; {method.name} has none, set `solver.integrator` to sdirk2 for them"
-        return Remedy(text, {"solver.dt": None, "solver.integrator": "sdirk2"})
-    if scene.contact is not None and gap < SPENT * scene.contact.barrier_distance:
-        return _set("contact.stiffness", f"{_stiffness_that_holds(model, speed):.0e}", "Pa")
+        return _adaptive(steps, method)
+    if touches:
+        return _stiffer(model, speed)
     if found.status == TOO_INACCURATE:
         needed = _rounded_up(MARGIN * found.error * steps.tolerance)
         if needed <= LARGEST_TOLERANCE:
@@ -97,6 +101,26 @@ def _set(key: str, value: str, unit: str = "") -> Remedy:
 
 def _without(key: str, more: str = "") -> Remedy:
     return Remedy(f"leave `{key}` out{more}", {key: None})
+
+
+def _adaptive(steps: Steps, method: Method) -> Remedy:
+    text = f"leave `solver.dt` out for adaptive steps, or set it to {MUCH_SHORTER * steps.dt:.1g} s"
+    if method.estimate is not None:
+        return Remedy(text, {"solver.dt": None})
+    text = f"{text}; {method.name} has none, set `solver.integrator` to sdirk2 for them"
+    return Remedy(text, {"solver.dt": None, "solver.integrator": "sdirk2"})
+
+
+def _with_adaptive_steps(first: Remedy, steps: Steps, method: Method) -> Remedy:
+    """A change, and adaptive steps unless there are."""
+    if steps.adaptive:
+        return first
+    second = _adaptive(steps, method)
+    return Remedy(f"{first}, and {second}", first.changes | second.changes)
+
+
+def _stiffer(model: Model, speed: float) -> Remedy:
+    return _set("contact.stiffness", f"{_stiffness_that_holds(model, speed):.0e}", "Pa")
 
 
 def _holds(model: Model, speed: float) -> bool:

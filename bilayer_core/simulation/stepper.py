@@ -13,12 +13,13 @@ from ..engine.integrate import TIME_ROUNDING, StepControl
 from ..engine.modes import EVALUATE_STATE
 from ..engine.newton import LAST_DIGITS
 from ..engine.report import FAILURES, IntegrationReport
-from ..errors import InputError, Remedy, SimulationError
+from ..errors import InputError, SimulationError
 from ..integrators.method import Method
 from ..model.model import Model
 from ..model.records.status import INPUTS_END, TOO_INACCURATE
 from ..model.records.step import Configuration
 from ..model.state import NOT_KNOWN, State
+from .collapse import collapsed
 from .energy_budget import EnergyLedger
 from .remedies import remedy
 from .step_choice import Steps
@@ -182,7 +183,7 @@ class Stepper:
             gap = self.engine.gap
             self.evaluate(state)  # what the last attempt left is not what the state is
             if not found.done:
-                raise SimulationError(self._why(found, begin), begin, self._remedy(found, state, gap))
+                raise self._failure(found, begin, state, gap)
         if self.ledger is not None:
             rest = self.surroundings.rest_strains_of(state.transduction)
             load_factor = self.surroundings.load_factor(state, found.length)
@@ -213,9 +214,13 @@ class Stepper:
             text += f"{found.iterations} iterations)"
         return f"{text}: {self.engine.who_blocks(found.pair)}" if found.pair >= 0 else text
 
-    def _remedy(self, found: IntegrationReport, state: State, gap: float) -> Remedy:
+    def _failure(self, found: IntegrationReport, begin: float, state: State, gap: float) -> SimulationError:
+        """What is told of steps that cannot go on from a state."""
+        why, part = self._why(found, begin), collapsed(self.model, state.position)
+        why = f"{why}: {part}, which a linear material cannot hold" if part else why
         moving = np.concatenate([state.velocity, state.body_velocity])
         mass = self.model.node_mass.sum() + self.model.bodies.mass.sum()
         of_energy = math.sqrt(2.0 * state.account[LARGEST] / mass)
         speed = max(float(np.linalg.norm(moving, axis=1).max()), of_energy)
-        return remedy(found, self.steps, self._method, self.model, gap, speed)
+        change = remedy(found, self.steps, self._method, self.model, gap, speed, bool(part))
+        return SimulationError(why, begin, change)

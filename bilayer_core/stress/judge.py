@@ -6,7 +6,8 @@ gap                       the smallest gap is above zero, and nothing passed thr
 energy without driving    T + V can only fall: it rises by no more than `MOST_GAIN` of the largest energy
 energy with driving       T + V less supplied work can only fall, but for the quadrature of that work: it rises by no
                           more than `MOST_MADE` of the largest energy of the run
-momentum                  where nothing but gravity acts, it changes as gravity has it, to Newton's tolerance
+momentum                  where nothing but gravity acts, it changes as gravity has it, to what Newton's method leaves:
+                          its tolerance in a step, √n of it in n steps
 budget                    inside the region the budget closes to `LARGEST_RESIDUAL` of its largest row
 effort                    no more than `MOST_ITERATIONS` Newton iterations an attempt, `MOST_REJECTED` attempts a step
 ========================= =====================================================================================
@@ -174,7 +175,8 @@ class _Momentum:
         gained = np.array(self._simulator.scene.gravity) * (frame.time - self._time)
         off = float(np.linalg.norm(self._mean(frame) - self._velocity - gained))
         fastest = float(np.linalg.norm(frame.velocities, axis=1).max())
-        return off / (self._simulator.steps.newton_tolerance + ROUNDING * fastest)
+        steps = max(self._simulator.statistics.substeps, 1)
+        return off / (math.sqrt(steps) * self._simulator.steps.newton_tolerance + ROUNDING * fastest)
 
 
 def _flies(simulator: Simulator) -> bool:

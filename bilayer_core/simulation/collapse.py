@@ -1,0 +1,73 @@
+"""Where a rod has collapsed: an edge that has no length left, or a joint that is folded flat.
+
+The axial law ½ EA ε² l̄ costs no more than ½ EA l̄ at ε = −1, where an edge has no direction any more. Bending by the
+mean of two frames costs nothing more at a fold by 180° if the frames have turned about the edges by as much. What is
+strained by more than a linear material can hold gets there, if nothing damps it, and no step gets it out again.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..errors import Remedy
+from ..model.model import Model
+
+Array = np.ndarray
+LEAST_LENGTH = 0.01
+"""Part of its natural length that an edge must have."""
+SHARPEST = math.radians(175.0)
+"""By which two edges may turn at a joint."""
+CANTILEVER = 3.516
+"""ω₁ L² √(ρA/B) of the first vibration of a cantilever; a retardation time 1/ω₁ leaves it half of critical damping, and
+higher ones more than that."""
+MORE = 100.0
+"""Times a retardation time that was not enough."""
+
+
+def collapsed(model: Model, position: Array) -> str:
+    """What has collapsed, in words; empty if nothing has.
+
+    Parameters
+    ----------
+    model : Model
+    position : ndarray, shape (n_node, 3)
+        [m].
+    """
+    edges = np.diff(position[np.stack([model.edge_node, model.edge_node + 1], axis=1)], axis=1)[:, 0]
+    length = np.linalg.norm(edges, axis=1)
+    part = length / model.rest_length
+    if part.size and part.min() < LEAST_LENGTH:
+        edge = int(part.argmin())
+        return f"edge {_of_strand(model, edge)} has {100 * part[edge]:.2g} % of its length left"
+    bends = np.arange(model.bend_count)
+    bends = bends[np.maximum(model.joint_a[bends], model.joint_b[bends]) < model.edge_count]
+    first, second = model.joint_a[bends], model.joint_b[bends]
+    cosine = np.einsum("ij,ij->i", edges[first], edges[second]) / (length[first] * length[second])
+    if cosine.size and cosine.min() < math.cos(SHARPEST):
+        bend, turn = int(cosine.argmin()), math.degrees(math.acos(max(cosine.min(), -1.0)))
+        return f"the joint behind edge {_of_strand(model, int(first[bend]))} is folded by {turn:.1f}°"
+    return ""
+
+
+def _of_strand(model: Model, edge: int) -> str:
+    """An edge's number within its strand, and the strand."""
+    strand = next(s for s in reversed(model.strands) if s.first_edge <= edge)
+    return f"{edge - strand.first_edge} of {strand.name}"
+
+
+def damp_materials(model: Model) -> Remedy:
+    """Let all materials of rods damp what bends, more than they do: a rod then goes where it rests with little
+    overshoot, and does not collapse unless its rest is beyond its material.
+    """
+    scene = model.scene
+    names = sorted({layer.material for rod in scene.rods for layer in rod.layers})
+    longest = max(rod.path.length for rod in scene.rods)
+    edges, bends = slice(0, model.edge_count), slice(0, model.bend_count)
+    density = model.node_mass.sum() / model.rest_length[edges].sum()
+    stiffness = float(np.median(model.joint_stiffness[bends, 0] * model.voronoi_length))
+    time = longest**2 / CANTILEVER * math.sqrt(density / stiffness)
+    time = max(time, *(MORE * scene.materials[name].retardation_time for name in names))
+    changes = {f"materials.{name}.retardation_time": f"{time:.1g}" for name in names}
+    return Remedy(f"set {' and '.join(f'`{key}`' for key in changes)} to {time:.1g} s", changes)
