@@ -8,6 +8,7 @@ from pathlib import Path
 from bilayer_core.errors import InputError
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.simulation.frame import Description, Frame
+from bilayer_core.simulation.inputs import Input
 from bilayer_core.simulation.observers import first_failure
 
 RRD_ENDING = ".rrd"
@@ -72,10 +73,10 @@ class Recording:
         for recorder in self._recorders:
             recorder.observe(frame)
 
-    def log_stimulus(self, channel: str, value: float, time: float) -> None:
-        """Log a stimulus at the time [s] from which it acts."""
+    def note(self, told: Input) -> None:
+        """Log something that acts from outside."""
         if self._log:
-            self._log.log_stimulus(channel, value, time)
+            self._log.note(told)
 
     def close(self, complete: bool, termination: str) -> None:
         """Finish all files, each even if another cannot be."""

@@ -25,8 +25,6 @@ from bilayer_sim_ros.status import Status, StatusReporter
 
 # Shorter waits cost more than they are worth: the simulation may be this far ahead of the clock [s].
 SHORTEST_WAIT = 0.01
-# In a log, this stimulus says that the scene's schedule acts again.
-SCHEDULE = math.nan
 # Real time between two showings of what stands still [s].
 SHOWING_PERIOD = 1.0
 
@@ -97,6 +95,7 @@ class SimulationWorker:
         self._frames = Periods(rate)
         self._pacer = pacer
         self._duration = duration
+        self._stop_listening: Callable[[], None] = lambda: None
         self._paused = paused
         self._reporter = StatusReporter(report)
         self._finished = finished
@@ -168,12 +167,14 @@ class SimulationWorker:
             self._requests.close()
             self._finished()
 
-    def _finish_recording(self, complete: bool, termination: str) -> None:
-        """Close the files with the last accepted step in them."""
+    def _finish_recording(self, complete: bool, termination: str, last: Callable[[], None] = lambda: None) -> None:
+        """Close the files with the last accepted step in them, and with what is done `last`."""
         try:
             if not self._frame_is_out:
                 self._hand_out()
+            last()
         finally:
+            self._stop_listening()
             self._recording.close(complete, termination)
 
     def _begin(self) -> None:
@@ -182,6 +183,7 @@ class SimulationWorker:
         self._pacer.restart(self._simulator.time)
         self._reporter.start(self._simulator.time)
         self._recording.start(self._simulator.description)
+        self._stop_listening = self._simulator.listen(self._recording.note)
         self._hand_out()
         self._control.start(self._simulator.time)
 
@@ -215,7 +217,6 @@ class SimulationWorker:
         start = self._simulator.time
         for channel, value in self._control.changes(start).items():
             self._simulator.set_stimulus(channel, value)
-            self._recording.log_stimulus(channel, SCHEDULE if value is None else value, start)
         self._commands.apply(self._simulator)
         self._reporter.add(self._simulator.step(until=self._next_stop()))
         self._frame_is_out = False
@@ -274,9 +275,8 @@ class SimulationWorker:
     def _do_reset(self, answer: Future) -> None:
         following = self._recording.of_next_run()
         self._drop_single_steps("the simulation was reset before the next frame")
-        self._finish_recording(False, "reset")
+        self._finish_recording(False, "reset", self._simulator.reset)
         self._recording = following
-        self._simulator.reset()
         self._control.reset()
         self._commands.reset()
         self._begin()

@@ -17,6 +17,7 @@ from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.new import new
 from bilayer_core.cli.options import Settings, VerbGroup
 from bilayer_core.cli.render import render
+from bilayer_core.cli.replay import replay
 from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import scenes, schema
 from bilayer_core.cli.signals import Signals
@@ -51,7 +52,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, new, schema, check, run, converge, validate, bench, stress, info, view, render):
+for verb in (scenes, new, schema, check, run, converge, validate, bench, stress, info, replay, view, render):
     program.add_command(verb)
 
 

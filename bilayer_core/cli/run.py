@@ -47,6 +47,7 @@ OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_stat
 @click.option("--summary", metavar="FILE.json", help="Write all figures of the run.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
 @click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
+@click.option("--at", type=Duration(from_zero=True), metavar="T", help="Of the log of --from-state, its state at T.")
 @click.option("--budget", is_flag=True, help="Show where the energy went (runs two to three times as long).")
 @click.option("--error-estimate", is_flag=True, help=ERROR_HELP)
 @click.option("--force", is_flag=True, help="Replace existing files.")
@@ -61,7 +62,7 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     config = load_scene(scene, changes)
     interrupt = Interrupt()
     observers = _open_outputs(config, options)
-    simulator = _make_simulator(config, options["from_state"], options["budget"], quiet)
+    simulator = _make_simulator(config, options["from_state"], options["at"], options["budget"], quiet)
     duration = _duration(simulator, duration)
     judge = _Judge(simulator, duration, quiet) if options["error_estimate"] else None
     failure = _simulate(simulator, duration, observers, interrupt, quiet, judge)
@@ -141,15 +142,19 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     return observers
 
 
-def _make_simulator(config: SceneConfig, from_state: str | None, budget: bool, quiet: bool) -> Simulator:
+def _make_simulator(
+    config: SceneConfig, from_state: str | None, at: float | None, budget: bool, quiet: bool
+) -> Simulator:
     """A simulator that is ready to step."""
     from bilayer_core.simulation.simulator import Simulator
 
+    if at is not None and from_state is None:
+        raise InputError("--at: is a time of the log of --from-state; give that too")
     simulator = Simulator(config, budget=budget)
     if from_state is not None:
         from bilayer_core.record.state_file import read_saved_state
 
-        state = read_saved_state(from_state, simulator.description)
+        state = read_saved_state(from_state, simulator.description, at)
         try:
             simulator.load_state(state)
         except InputError as error:

@@ -9,11 +9,12 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from bilayer_core.record.cdr import Template
+from bilayer_core.record.cdr import Template, read_float64_multi_array
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.topics import FRAME_ID, output_topics
 from bilayer_core.simulation.frame import Description, Frame
+from bilayer_core.simulation.inputs import Input
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
 SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")
@@ -93,6 +94,21 @@ def encode_float64(value: float) -> bytes:
     template = float64_template()
     template.views()["data"][0] = value
     return template.to_bytes()
+
+
+def encode_input(told: Input) -> bytes:
+    """An input, as a message of `topics.INPUTS`."""
+    labels = [("step", 1), ("time", 1), (f"{told.kind}:{told.name}", len(told.values))]
+    template = multi_array_template(labels)
+    template.views()["data"][:] = (told.step, told.time, *told.values)
+    return template.to_bytes()
+
+
+def decode_input(data: bytes) -> Input:
+    """The input of such a message."""
+    (_, _, (label, _)), values = read_float64_multi_array(data)
+    kind, _, name = label.partition(":")
+    return Input(int(values[0]), float(values[1]), kind, name, tuple(values[2:].tolist()))
 
 
 class FrameEncoder:

@@ -72,7 +72,7 @@ class LogInfo:
 def read_info(path: str | Path) -> LogInfo:
     """What a log holds, from its index or, when it was cut off, by reading it through. InputError if it is no log."""
     path = Path(path)
-    head = _read_head(path)
+    head = read_head(path)
     counts: dict[str, int]
     with _open(path) as file:
         summary = _read_summary(file)
@@ -86,7 +86,7 @@ def read_info(path: str | Path) -> LogInfo:
         ending = _read_ending(path, summary)
     else:
         counts, times, types, ending = defaultdict(int), [], {}, {}
-        for topic, ros_type, time, data in _messages(path):
+        for topic, ros_type, time, data in read_messages(path):
             types[topic] = ros_type
             if data is not None:
                 counts[topic] += 1
@@ -111,7 +111,7 @@ def read_info(path: str | Path) -> LogInfo:
 
 def read_description(path: str | Path) -> Description:
     """The description that the log was written with."""
-    return _read_head(Path(path)).description
+    return read_head(Path(path)).description
 
 
 def scene_from_log(path: str | Path) -> str:
@@ -124,7 +124,7 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
     path = Path(path)
     limit = None if time is None else nanoseconds(time)
     found = None
-    for _, _, stamp, data in _messages(path, {f"{LOG_NAMESPACE}/state"}):
+    for _, _, stamp, data in read_messages(path, {f"{LOG_NAMESPACE}/state"}):
         if data is not None and (limit is None or stamp <= limit):
             found = (data, stamp)
     if found is None:
@@ -145,7 +145,7 @@ def read_log(path: str | Path) -> RunData:
     times: dict[str, list[int]] = defaultdict(list)
     labels: dict[str, list[str]] = {}
     fields = _fixed_fields(description)
-    for topic, ros_type, time, data in _messages(path, wanted):
+    for topic, ros_type, time, data in read_messages(path, wanted):
         if data is None:
             continue
         name = topic.removeprefix(prefix)
@@ -227,12 +227,13 @@ def _fixed_fields(description: Description) -> dict[str, tuple[int, tuple]]:
 
 
 @dataclass(frozen=True)
-class _Head:
+class Head:
     """What a log holds before its first message."""
 
     description: Description
     versions: dict[str, str]
     settings: dict[str, str]
+    machine: dict[str, str]  # empty in older logs
 
 
 @contextmanager
@@ -286,7 +287,7 @@ def _records(file: BinaryIO) -> Iterator:
         return
 
 
-def _messages(path: Path, topics: set[str] | None = None) -> Iterator[tuple[str, str, int, bytes | None]]:
+def read_messages(path: Path, topics: set[str] | None = None) -> Iterator[tuple[str, str, int, bytes | None]]:
     """Topic, ROS type, time [ns] and data of each message of `topics` (default all).
 
     Each topic is announced once with the data None, even if no message follows.
@@ -312,7 +313,7 @@ def _messages(path: Path, topics: set[str] | None = None) -> Iterator[tuple[str,
                 yield *channels[record.id], 0, None
 
 
-def _read_head(path: Path) -> _Head:
+def read_head(path: Path) -> Head:
     """Scene, description, versions and settings: all that comes before the first chunk."""
     from mcap.records import Attachment, Metadata
 
@@ -339,7 +340,7 @@ def _read_head(path: Path) -> _Head:
             f"{path}: describes its run in another way than this version reads (it was written by {DISTRIBUTION} "
             f"{writer}); run its scene again"
         ) from None
-    return _Head(description, versions, metadata["settings"])
+    return Head(description, versions, metadata["settings"], metadata.get("machine", {}))
 
 
 def _read_summary(file: BinaryIO):

@@ -17,12 +17,13 @@ from pathlib import Path
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
-from bilayer_core.record.encoders import FrameEncoder, encode_float64
+from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_input
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import DisplayGate, Rate, stimulus_topics
+from bilayer_core.record.topics import INPUTS, DisplayGate, Rate, TopicSpec, input_topics
 from bilayer_core.simulation.frame import Description, Frame
+from bilayer_core.simulation.inputs import STIMULUS, Input
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
 FLUSH_PERIOD = 0.5  # longest time a message waits for its chunk to be written [s of wall time]
@@ -30,6 +31,9 @@ SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 SUFFIX = ".mcap"
 SCENE_ATTACHMENT = "scene.yaml"
+QOS = "offered_qos_profiles"
+"""Metadata of a channel: the quality of service that its topic is offered with, in the form of rosbag2."""
+_INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 
 class McapRecorder:
@@ -62,7 +66,6 @@ class McapRecorder:
         self.rate = rate
         self._gate = DisplayGate(rate, marker_rate)
         self._force = force
-        self._channels: tuple[str, ...] = ()
         self._last_time = 0.0
         self._queue: queue.Queue = queue.Queue(QUEUE_LENGTH)
         self._thread: threading.Thread | None = None
@@ -83,7 +86,6 @@ class McapRecorder:
             log = _LogFile(self.path, self._force, description, self._gate)
         except OSError as error:
             raise unwritable(self.path, error) from error
-        self._channels = description.channels
         # A daemon, so that a program that ends without `close` is not kept alive; its log is then cut off.
         self._thread = threading.Thread(target=self._write, args=(log,), name="mcap log", daemon=True)
         self._thread.start()
@@ -93,11 +95,9 @@ class McapRecorder:
         self._put(frame)
         self._last_time = frame.time
 
-    def log_stimulus(self, channel: str, value: float, time: float) -> None:
-        """Log a stimulus set from outside at the time [s] from which it acts."""
-        if channel not in self._channels:
-            raise InputError(f"stimulus {channel!r}: no such channel; the log has: {', '.join(self._channels)}")
-        self._put((channel, value, time))
+    def note(self, told: Input) -> None:
+        """Log something that acts from outside; waits as `observe` does."""
+        self._put(told)
 
     def close(self, complete: bool, termination: str = "") -> None:
         """Write what is left and finish the file. Raises SimulationError if anything could not be written.
@@ -124,7 +124,7 @@ class McapRecorder:
             self._thread = None
         self._raise_failure()
 
-    def _put(self, item: Frame | tuple[str, float, float] | dict[str, str]) -> None:
+    def _put(self, item: Frame | Input | dict[str, str]) -> None:
         if self._thread is None and self._failure is None:
             raise RuntimeError("the recorder has not been started, or is closed")
         while True:
@@ -189,7 +189,7 @@ class _LogFile:
         import mcap
         from mcap.writer import CompressionType, Writer
 
-        from bilayer_core.simulation.observation import versions
+        from bilayer_core.simulation.observation import machine, versions
 
         self._gate = gate
         self._encoder = FrameEncoder(description)
@@ -206,25 +206,29 @@ class _LogFile:
             scene = description.scene_text.encode()
             self._writer.add_attachment(0, 0, SCENE_ATTACHMENT, "application/yaml", scene)
             self._writer.add_metadata("versions", used)
+            self._writer.add_metadata("machine", machine())
             settings = {key: text for key, text in description.settings.items() if key not in used}
             self._writer.add_metadata("settings", settings)
             self._writer.add_metadata("description", to_text(description))
             schemas: dict[str, int] = {}
             self._topics: dict[str, int] = {}
-            for spec in (*self._encoder.topics, *stimulus_topics(description)):
+            for spec in (*self._encoder.topics, *input_topics(description)):
                 if spec.type not in schemas:
                     text = schema_text(spec.type).encode()
                     schemas[spec.type] = self._writer.register_schema(spec.type, "ros2msg", text)
-                self._topics[spec.name] = self._writer.register_channel(spec.full_name(), "cdr", schemas[spec.type], {})
+                self._topics[spec.name] = self._writer.register_channel(
+                    spec.full_name(), "cdr", schemas[spec.type], {QOS: _profile(spec)}
+                )
             self._writer.flush()
             self._sync()
             undo.pop_all()
 
-    def write(self, item: Frame | tuple[str, float, float]) -> None:
-        """Write the messages of a frame, or a stimulus."""
-        if isinstance(item, tuple):
-            channel, value, time = item
-            self._add(f"stimulus/{channel}", nanoseconds(time), encode_float64(value))
+    def write(self, item: Frame | Input) -> None:
+        """Write the messages of a frame, or of what acts from outside."""
+        if isinstance(item, Input):
+            self._add(INPUTS.name, nanoseconds(item.time), encode_input(item))
+            if item.kind == STIMULUS:
+                self._add(f"stimulus/{item.name}", nanoseconds(item.time), encode_float64(item.values[0]))
         else:
             stamp = nanoseconds(item.time)
             display = self._gate.is_due(item.time)
@@ -268,6 +272,23 @@ class _LogFile:
     def close(self) -> None:
         """Close the file as it is."""
         self._file.close()
+
+
+def _profile(spec: TopicSpec) -> str:
+    """What rosbag2 is told of a topic, in the numbers of `rmw`: the last messages kept, reliable, volatile."""
+    policies = {
+        "history": 1,
+        "depth": spec.depth,
+        "reliability": 1,
+        "durability": 2,
+        "deadline": _INFINITE,
+        "lifespan": _INFINITE,
+        "liveliness": 1,
+        "liveliness_lease_duration": _INFINITE,
+        "avoid_ros_namespace_conventions": "false",
+    }
+    lines = [f"{key}: {value}" for key, value in policies.items()]
+    return "- " + "\n  ".join(lines) + "\n"
 
 
 def _delete(path: Path) -> None:

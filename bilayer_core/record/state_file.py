@@ -25,19 +25,21 @@ def write_state(path: str | Path, state: np.ndarray, description: Description, f
         np.savez(file, state=state, layout=np.array(layout), scene=np.array(description.scene_text))
 
 
-def read_saved_state(path: str | Path, description: Description) -> np.ndarray:
-    """Flat state from a file of `write_state`, or the last one of an MCAP log.
+def read_saved_state(path: str | Path, description: Description, time: float | None = None) -> np.ndarray:
+    """Flat state from a file of `write_state`, or from an MCAP log the last one, or the last at or before a time [s].
 
     Raises
     ------
     InputError
-        If the file cannot be read, or its state has other parts than those of `description`.
+        If the file cannot be read, its state has other parts than those of `description`, or it has none at that time.
     """
     path = Path(path)
     if path.suffix.lower() == LOG_SUFFIX:
         from bilayer_core.record.log_reader import read_description, read_state
 
-        saved, state = read_description(path).state_layout, read_state(path)[0]
+        saved, state = read_description(path).state_layout, read_state(path, time)[0]
+    elif time is not None:
+        raise InputError(f"{path}: holds one state; a time picks one of an MCAP log ({LOG_SUFFIX})")
     else:
         saved, state = _read(path)
     if saved != description.state_layout:

@@ -99,9 +99,21 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
     )
 
 
+INPUTS = TopicSpec("inputs", MULTI_ARRAY, Rate.EVENT)
+"""What acted from outside, exactly: a message for each `simulation.inputs.Input`, at the time from which on it acted.
+
+Labels are ``step``, ``time`` [s] and ``kind:name``, whose size is the number of its values.
+"""
+
+
 def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
     """The topics on which single channels are set; a log holds each value at the time from which it acted."""
     return tuple(TopicSpec(f"stimulus/{name}", "std_msgs/msg/Float64", Rate.EVENT) for name in description.channels)
+
+
+def input_topics(description: Description) -> tuple[TopicSpec, ...]:
+    """What a log holds beside `output_topics`."""
+    return (INPUTS, *stimulus_topics(description))
 
 
 class DisplayGate:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 
 import numpy as np
 
@@ -35,6 +36,19 @@ def versions() -> dict[str, str]:
         "scipy": scipy.__version__,
         "numba": numba.__version__,
     }
+
+
+def machine() -> dict[str, str]:
+    """What results depend on to the last bit, beside versions."""
+    return {"system": platform.system(), "machine": platform.machine(), "processor": _processor()}
+
+
+@cache
+def _processor() -> str:
+    """Name of the processor's model, as far as the system tells it."""
+    from llvmlite import binding
+
+    return str(binding.get_host_cpu_name())
 
 
 def describe(model: Model, state: State, settings: dict[str, str], scene_text: str) -> Description:

@@ -35,6 +35,8 @@ class Observed(Protocol):
 class Observer(Protocol):
     """Something that looks at a run `rate` times in each simulated second: when the first step ends after each multiple
     of its period, or exactly there. No step is another for it.
+
+    One that has a method ``note(input)`` is also told what acts from outside (`simulation.inputs.Input`).
     """
 
     rate: float

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clock
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -26,6 +27,7 @@ from . import observation as observe
 from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
 from .frame import Description, Frame
+from .inputs import LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_of_pose
 from .observers import Observer, Schedule
 from .plane_watch import PlaneWatch
 from .poses import LEAST_TIME, new_goal
@@ -90,6 +92,8 @@ class Simulator:
         self._stepper = self._stepper_of(self.model)
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
+        self._listeners: list[Callable[[Input], None]] = []
+        self._until = math.nan
         self._state = self._initial_state()
         self._compile_time: float | None = None
         self.plane_watch = PlaneWatch(self._in_dimension, scene.duration) if self.plan.dimension == 2 else None
@@ -250,17 +254,15 @@ class Simulator:
         if channel not in self.scene.stimuli:
             known = ", ".join(self.scene.stimuli) or "none"
             raise InputError(f"stimulus {channel!r}: no such channel; the scene {self.scene.name!r} has: {known}")
-        index = list(self.scene.stimuli).index(channel)
-        if value is None:
-            self._override(index, math.nan)
-            return
         allowed = self.scene.stimuli[channel]
-        if not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
+        if value is not None and not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
             raise InputError(
                 f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
                 f"to {allowed.maximum:g} (unit {allowed.unit})"
             )
-        self._override(index, float(value))
+        value = math.nan if value is None else float(value)
+        self._override(list(self.scene.stimuli).index(channel), value)
+        self._note(STIMULUS, channel, value)
 
     def set_load(self, name: str, factor: float | None) -> None:
         """Multiply force and moment of a load by a factor from the next step on; None gives it back to its schedule.
@@ -276,8 +278,10 @@ class Simulator:
             raise InputError(f"load {name!r}: no such load; the scene {self.scene.name!r} has: {known}")
         if factor is not None and not math.isfinite(factor):
             raise InputError(f"load {name!r}: a factor of {factor} is not allowed; it must be finite")
-        if self._override(len(self.scene.stimuli) + names.index(name), math.nan if factor is None else float(factor)):
+        value = math.nan if factor is None else float(factor)
+        if self._override(len(self.scene.stimuli) + names.index(name), value):
             self._state.has_history.fill(0.0)  # accelerations jump with a load
+        self._note(LOAD, name, value)
 
     def set_pose(
         self,
@@ -313,6 +317,7 @@ class Simulator:
         if goal is not None:
             self._state.pose_goal[goal[0]] = goal[1]
             self._state.has_history.fill(0.0)  # accelerations jump
+        self._note(POSE, name, *values_of_pose(position, quaternion, over))
 
     def _override(self, index: int, value: float) -> bool:
         """Set a value of `State.override`; whether it was another."""
@@ -322,6 +327,24 @@ class Simulator:
             self._stepper.restart(self._state)
         override[index] = value
         return changes
+
+    def listen(self, note: Callable[[Input], None]) -> Callable[[], None]:
+        """Have all that acts from outside told from now on; returns what ends that.
+
+        Parameters
+        ----------
+        note : callable
+            Called with each `simulation.inputs.Input`, before the step from which on it acts.
+        """
+        self._listeners.append(note)
+        self._until = math.nan  # who begins to listen hears where steps end
+        return lambda: self._listeners.remove(note)
+
+    def _note(self, kind: str, name: str, *values: float) -> None:
+        if self._listeners:
+            told = Input(int(self._state.step[0]), self.time, kind, name, values)
+            for listener in self._listeners:
+                listener(told)
 
     def compile(self) -> float:
         """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took.
@@ -357,15 +380,27 @@ class Simulator:
         self.compile()
         begin, before, found = self.time, self._state.step[0], None
         while self._state.step[0] == before:
-            more = self._integrate(1, until if self.steps.adaptive else math.inf, math.inf)
+            more = self._integrate_once(until)
             found = more if found is None else found.followed_by(more)
         return StepReport.of(found, self.time, self.time - begin)
+
+    def advance(self, until: float = math.inf) -> StepReport:
+        """Advance by one step, or by one part of a fixed one; otherwise like `step`."""
+        self.compile()
+        begin = self.time
+        return StepReport.of(self._integrate_once(until), self.time, self.time - begin)
+
+    def _integrate_once(self, until: float) -> IntegrationReport:
+        return self._integrate(1, until if self.steps.adaptive else math.inf, math.inf)
 
     def _integrate(self, most: int, until: float, due: float) -> IntegrationReport:
         """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that
         has reached `due` [s].
         """
         state, before = self._state, float(self._state.step[0])
+        if self._listeners and self.steps.adaptive and until != self._until:
+            self._until = until
+            self._note(UNTIL, "", until)
         if self.plane_watch is not None:
             most = min(most, self.plane_watch.steps_left)
         begin, wall = clock.thread_time(), clock.perf_counter()
@@ -402,6 +437,7 @@ class Simulator:
         stop: Callable[[], bool] | None = None,
         progress: Callable[[float], None] | None = None,
         each_step: Callable[[float], None] | None = None,
+        inputs: Sequence[Input] = (),
     ) -> RunResult:
         """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
 
@@ -423,6 +459,9 @@ class Simulator:
             Called every few steps with the simulated time [s].
         each_step : callable, optional
             Called with the simulated time [s] after each step, which is then made alone: that takes a little longer.
+        inputs : sequence of Input
+            What acts from outside (`simulation.inputs`), each from its time on: adaptive steps end there, of fixed ones
+            it acts from the first that begins then or later.
 
         Raises
         ------
@@ -442,11 +481,15 @@ class Simulator:
         last = end - 0.5 * self.dt if fixed else end
         termination = Termination.INTERRUPTED
         most = STEPS_AT_ONCE if each_step is None else 1
-        schedule = Schedule(observers, self)
+        schedule, waiting = Schedule(observers, self), deque(sorted(inputs, key=lambda of: of.time))
+        deaf = [self.listen(of.note) for of in observers if hasattr(of, "note")]
         try:
             schedule.start()
             while self.time < last:
-                self._integrate(most, end, schedule.next_due())
+                while waiting and waiting[0].time <= self.time:
+                    waiting.popleft().apply(self)
+                stop_at = min(end, waiting[0].time) if waiting else end
+                self._integrate(most, stop_at, schedule.next_due())
                 schedule.observe_due()
                 if each_step is not None:
                     each_step(self.time)
@@ -463,6 +506,9 @@ class Simulator:
             self.termination = termination.value
             schedule.finish(False, termination.value, failure)
             raise
+        finally:
+            for stop_listening in deaf:
+                stop_listening()
         self.termination = termination.value
         schedule.finish(termination is Termination.COMPLETED, termination.value)
         done = int(self._state.step[0] - before)
@@ -530,6 +576,7 @@ class Simulator:
 
     def reset(self) -> None:
         """Go back to the start of the scene; stimuli, loads and poses set from outside are forgotten."""
+        self._note(RESET, "")
         self.load_state(self._initial_state().flat())
 
     def summary(self) -> dict:

@@ -23,6 +23,7 @@ from bilayer_core.record.description_text import to_text
 from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.simulation.inputs import STIMULUS, Input
 
 TIMES = np.arange(0, 51) * 0.02
 
@@ -34,7 +35,7 @@ def log(tmp_path_factory):
     recorder.start(synthetic_run.description())
     for step, moment in enumerate(TIMES):
         if step == 25:
-            recorder.log_stimulus("humidity", 0.25, moment)
+            recorder.note(Input(step, moment, STIMULUS, "humidity", (0.25,)))
         recorder.observe(synthetic_run.frame(float(moment), TIMES[-1]))
     recorder.close(True)
     return path
@@ -118,7 +119,13 @@ def test_rosbags_reads_every_message(log):
     with AnyReader([log]) as reader:
         counts = {connection.topic: connection.msgcount for connection in reader.connections}
         decoded = [reader.deserialize(raw, connection.msgtype) for connection, _, raw in reader.messages()]
-    assert len(decoded) == sum(counts.values()) == 14 * 51 + 1
+        offered = {connection.topic: connection.ext.offered_qos_profiles for connection in reader.connections}
+    assert len(decoded) == sum(counts.values()) == 14 * 51 + 2
+    assert {len(profiles) for profiles in offered.values()} == {1}
+    profile = offered["/bilayer_sim/state"][0]
+    assert (profile.history.name, profile.depth) == ("KEEP_LAST", 10)
+    assert (profile.reliability.name, profile.durability.name) == ("RELIABLE", "VOLATILE")
+    assert offered["/clock"][0].depth == 1
 
 
 def test_mcap_ros2_reads_every_message_in_order_of_time(log):
@@ -129,12 +136,16 @@ def test_mcap_ros2_reads_every_message_in_order_of_time(log):
         last = {}
         for _, channel, message, decoded in reader.iter_decoded_messages():
             last[channel.topic] = (message.log_time, decoded)
-    assert len(last) == 15
+    assert len(last) == 16
     stamp, pose = last["/bilayer_sim/body_pose/ball"]
     assert stamp == 10**9
     assert (pose.header.stamp.sec, pose.header.frame_id) == (1, "world")
     assert pose.pose.position.z == pytest.approx(synthetic_run.RADIUS + 1e-3 + synthetic_run.LIFT)
     assert last["/bilayer_sim/stimulus/humidity"][0] == 500_000_000
+    stamp, told = last["/bilayer_sim/inputs"]
+    assert stamp == 500_000_000
+    assert [(part.label, part.size) for part in told.layout.dim] == [("step", 1), ("time", 1), ("stimulus:humidity", 1)]
+    assert list(told.data) == [25.0, 0.5, 0.25]
 
 
 def test_an_interrupted_run_is_not_complete(tmp_path):
@@ -322,11 +333,3 @@ def test_a_slow_disk_holds_the_run_back_and_loses_nothing(tmp_path, monkeypatch)
     synthetic_run.run(recorder, np.arange(60) * 0.02)
     assert time.monotonic() - start > 0.3
     assert read_info(tmp_path / "run.mcap").topics["/clock"]["count"] == 60
-
-
-def test_an_unknown_channel_is_not_logged(tmp_path):
-    recorder = McapRecorder(tmp_path / "run.mcap")
-    recorder.start(synthetic_run.description())
-    with pytest.raises(InputError, match="'light': no such channel; the log has: humidity"):
-        recorder.log_stimulus("light", 0.1, 0.0)
-    recorder.close(False)

@@ -1,0 +1,170 @@
+"""The verb ``replay``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from bilayer_core.cli.options import Duration, Verb, set_option
+from bilayer_core.cli.signals import Interruption
+from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
+from bilayer_core.errors import InputError
+
+if TYPE_CHECKING:
+    from bilayer_core.record.replay import Verification
+
+DIFFERS = 1
+"""Exit code if a run does not come out as it is in the log."""
+
+
+THENCE = "From there on; null: its schedule."
+
+
+@click.command(cls=Verb)
+@click.argument("log", metavar="LOG.mcap")
+@click.option("--verify", "verifies", is_flag=True, help="Simulate the run again, and compare every state in the log.")
+@click.option("--tolerance", type=float, metavar="X", help="Part of the longest rod by which positions may differ.")
+@click.option("--json", "json_file", metavar="FILE.json", help="Write what came of it; - is standard output.")
+@click.option("--from", "moment", type=Duration(from_zero=True), metavar="T", help="Go on from this time of the log.")
+@set_option
+@click.option("--stimulus", "stimuli", multiple=True, metavar="CHANNEL=VALUE", help=THENCE)
+@click.option("--load", "loads", multiple=True, metavar="NAME=FACTOR", help=THENCE)
+@click.option("--duration", type=Duration(), help="How long to go on; default: to the end of the log's run.")
+@click.option("--log", "new", metavar="NEW.mcap", help="Write a log of what comes then.")
+@click.option("--force", is_flag=True, help="Replace existing files.")
+@click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
+def replay(
+    log: str,
+    verifies: bool,
+    tolerance: float | None,
+    json_file: str | None,
+    moment: float | None,
+    overrides: tuple[str, ...],
+    stimuli: tuple[str, ...],
+    loads: tuple[str, ...],
+    duration: float | None,
+    new: str | None,
+    force: bool,
+    quiet: bool,
+) -> int:
+    """Make the run of a log again: to verify it (--verify), or another one from an instant on (--from).
+
+    Exit code 1 if --verify finds a difference.
+    """
+    if verifies == (moment is not None):
+        raise InputError("replay: say either --verify, to compare the run with its log, or --from T, to go on from T")
+    changes = {"--set": overrides, "--stimulus": stimuli, "--load": loads, "--duration": duration, "--log": new}
+    if verifies:
+        given = [option for option, value in changes.items() if value]
+        if given:
+            raise InputError(f"{given[0]}: is for --from; --verify makes the run as it was")
+        return _verify(log, tolerance, json_file, force, quiet)
+    for option, value in (("--tolerance", tolerance), ("--json", json_file)):
+        if value is not None:
+            raise InputError(f"{option}: is for --verify")
+    changed = _values("--stimulus", stimuli), _values("--load", loads)
+    _go_on(log, moment, overrides, *changed, duration, new, force, quiet)
+    return 0
+
+
+def _verify(log: str, tolerance: float | None, json_file: str | None, force: bool, quiet: bool) -> int:
+    from bilayer_core.record.paths import check_output_path, write_text
+    from bilayer_core.record.replay import verify
+
+    if tolerance is not None and not tolerance > 0.0:
+        raise InputError(f"--tolerance: {tolerance} is not allowed; it must be a part of the longest rod above 0")
+    if json_file not in (None, "-"):
+        check_output_path(json_file, force, ".json")
+    compile_kernels(quiet)
+    found = verify(log, tolerance)
+    if json_file is not None:
+        text = json.dumps(_as_json(found), indent=2) + "\n"
+        if json_file == "-":
+            click.echo(text, nl=False)
+        else:
+            write_text(json_file, text, force)
+    if not quiet and json_file != "-":
+        _tell(found)
+    return 0 if found.passed else DIFFERS
+
+
+def _as_json(found: Verification) -> dict:
+    differences = {"first": found.first, "largest": found.largest}
+    return {
+        "pass": found.passed,
+        "states": found.states,
+        "inputs": found.inputs,
+        "tolerance": found.tolerance,
+        "stopped": found.stopped,
+        "changed": {name: list(pair) for name, pair in found.changed.items()},
+        **{name: None if of is None else vars(of) for name, of in differences.items()},
+    }
+
+
+def _tell(found: Verification) -> None:
+    how = "equal bit for bit" if found.tolerance is None else f"equal within {found.tolerance:g} of the longest rod"
+    if found.passed:
+        click.echo(f"{found.states} states, {found.inputs} inputs: all {how}")
+    if found.first is not None:
+        click.echo(f"not {how}; the first difference is at {found.first}")
+    if found.largest is not None and not (found.passed and found.tolerance is None):
+        click.echo(f"largest difference of a position: {found.largest}")
+    if found.stopped:
+        click.echo(f"the run {found.stopped}")
+    for name, (then, now) in found.changed.items():
+        click.echo(f"  {name:20}{then} in the log, {now} here")
+
+
+def _values(option: str, texts: tuple[str, ...]) -> dict[str, float | None]:
+    """Numbers by name, None where the schedule is to act."""
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        try:
+            found[name] = None if value == "null" else float(value)
+        except ValueError:
+            equals = ""
+        if not (equals and name):
+            raise InputError(f"{option}: {text!r} is not allowed; it must be NAME=NUMBER or NAME=null")
+    return found
+
+
+def _go_on(
+    log: str,
+    moment: float,
+    overrides: tuple[str, ...],
+    stimuli: dict[str, float | None],
+    loads: dict[str, float | None],
+    duration: float | None,
+    new: str | None,
+    force: bool,
+    quiet: bool,
+) -> None:
+    from bilayer_core.cli.report import summary_lines
+    from bilayer_core.record.log_reader import read_info
+    from bilayer_core.record.mcap_log import McapRecorder
+    from bilayer_core.record.replay import branch
+
+    interrupt, observers = Interrupt(), []
+    simulator, inputs = branch(log, moment, overrides, stimuli, loads)
+    if new is not None:
+        if Path(new).resolve() == Path(log).resolve():
+            raise InputError(f"--log: {new} is the log that is gone on from; choose another name")
+        output = simulator.scene.output
+        observers.append(McapRecorder(new, output.rate, output.marker_rate, force))
+    if duration is None:
+        duration = read_info(log).last_time - simulator.time
+        if duration <= 0.0:
+            raise InputError(f"--from: the log ends at t = {simulator.time:g} s; say with --duration how long to go on")
+    compile_kernels(quiet)
+    begin = simulator.time
+    with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
+        simulator.run(duration, observers=observers, stop=interrupt.grant, progress=show, inputs=inputs)
+    if not quiet:
+        for line in summary_lines({**simulator.summary(), "duration": duration}, set()):
+            click.echo(line)
+    if interrupt.granted:
+        raise Interruption(interrupt.wished)

@@ -1,0 +1,352 @@
+"""Runs made again from their logs: the same one, to compare it bit for bit, or another one from an instant on.
+
+A log holds the scene, what the steps were to be, the state at every frame, and all that acted from outside with the
+step from which on it acted (`simulation.inputs`). That is all that a run depends on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.record.cdr import read_float64_multi_array
+from bilayer_core.record.encoders import decode_input
+from bilayer_core.record.log_reader import read_head, read_messages
+from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.scene.text import read_yaml
+from bilayer_core.simulation.frame import Description
+from bilayer_core.simulation.inputs import LOAD, STIMULUS, UNTIL, Input
+from bilayer_core.simulation.observation import machine, versions
+from bilayer_core.simulation.simulator import Simulator
+
+Array = np.ndarray
+STATE = f"{LOG_NAMESPACE}/state"
+SEAL = "seal"
+"""Part of a state that sums up the others."""
+TIME_ROUNDING = 1e-9
+"""Part of a time that may be rounding."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A value that came out otherwise.
+
+    Attributes
+    ----------
+    time : float
+        [s].
+    step : int
+    quantity : str
+        Part of the state, such as ``position``.
+    where : str
+        Node and rod, edge and rod, or body.
+    logged, replayed : float
+    """
+
+    time: float
+    step: int
+    quantity: str
+    where: str
+    logged: float
+    replayed: float
+
+    @property
+    def size(self) -> float:
+        """How much it differs by."""
+        return abs(self.replayed - self.logged)
+
+    def __str__(self) -> str:
+        of = f" of {self.where}" if self.where else ""
+        return (
+            f"t = {self.time:.9g} s (step {self.step}): {self.quantity}{of} is {self.replayed!r}, "
+            f"logged is {self.logged!r} ({self.size:.3g} off)"
+        )
+
+
+@dataclass
+class Verification:
+    """What came of making a run again.
+
+    Attributes
+    ----------
+    states : int
+        That were compared.
+    inputs : int
+        That acted.
+    tolerance : float or None
+        Part of the longest rod by which positions may differ; None: every value is to be equal bit for bit.
+    first, largest : Difference or None
+        The first difference, and the largest of positions.
+    stopped : str
+        Why the run could not be made to the end of the log; empty if it could.
+    changed : dict
+        What differs between the machine and versions of the log and the present ones: name to (then, now).
+    """
+
+    tolerance: float | None
+    states: int = 0
+    inputs: int = 0
+    first: Difference | None = None
+    largest: Difference | None = None
+    stopped: str = ""
+    changed: dict[str, tuple[str, str]] = field(default_factory=dict)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the run came out as it is in the log."""
+        return self.first is None and not self.stopped
+
+
+def verify(path: str | Path, tolerance: float | None = None) -> Verification:
+    """Simulate a log's run again, and compare every state in it.
+
+    Parameters
+    ----------
+    path : str or Path
+    tolerance : float, optional
+        Part of the longest rod by which positions of nodes and bodies may differ, for logs of other machines; without
+        one all values are to be the same bit for bit.
+
+    Raises
+    ------
+    InputError
+        If the file is no log, or an old one that does not hold what acted.
+    """
+    path = Path(path)
+    refuse_without_inputs(path)
+    simulator = simulator_of(path)
+    description = simulator.description
+    compare = _Comparison(description, tolerance)
+    result, until, waiting = Verification(tolerance, changed=_changed(path)), math.inf, []
+    for event in _events(path):
+        if isinstance(event, Input):
+            waiting.append(event)
+            result.inputs += event.kind != UNTIL
+            continue
+        time, step = float(event[0]), int(event[1])
+        if result.states == 0:
+            if time > 0.0 or step > 0:
+                simulator.load_state(event)
+        else:
+            loose = tolerance is not None or result.first is not None
+            try:
+                until = _advance(simulator, time, until, waiting, loose)
+            except SimulationError as failure:
+                result.stopped = failure.reason
+                break
+        until = _apply(simulator, waiting, until)
+        result.states += 1
+        compare.look(event, simulator.save_state(), result)
+    if not result.states:
+        raise InputError(f"{path}: holds no state; nothing can be compared")
+    return result
+
+
+def simulator_of(path: str | Path, overrides: Sequence[str] = ()) -> Simulator:
+    """A simulator of the scene in a log, with the steps that its run made, at the scene's start.
+
+    Parameters
+    ----------
+    path : str or Path
+    overrides : sequence of str
+        Changes to the scene, ``KEY=VALUE``; those of ``solver`` come before what the run used.
+    """
+    head = read_head(Path(path))
+    settings, content = head.settings, read_yaml(head.description.scene_text, str(path))
+    scene = load_scene(content, overrides)
+    asked = {of.partition("=")[0] for of in overrides}
+    used = {
+        "model": settings["model"],
+        "dimension": int(settings["dimension"]),
+        "integrator": settings["integrator"],
+        "dt": float(settings["dt"]),
+        "tolerance": None if settings["tolerance"] == "none" else float(settings["tolerance"]),
+    }
+    if asked & {"solver.dt", "solver.tolerance"}:
+        del used["dt"], used["tolerance"]
+    return Simulator(scene, **{key: value for key, value in used.items() if f"solver.{key}" not in asked})
+
+
+def branch(
+    path: str | Path,
+    time: float,
+    overrides: Sequence[str] = (),
+    stimuli: Mapping[str, float | None] | None = None,
+    loads: Mapping[str, float | None] | None = None,
+) -> tuple[Simulator, list[Input]]:
+    """A run that goes on from an instant of a log, with changes.
+
+    Parameters
+    ----------
+    path : str or Path
+    time : float
+        The last state at or before it [s] is gone on from.
+    overrides : sequence of str
+        Changes to the scene, ``KEY=VALUE``: of schedules, loads, gravity, contact, friction, damping, drag, steps.
+    stimuli, loads : mapping, optional
+        Channel to value, and load to factor, from that instant on; None: its schedule.
+
+    Returns
+    -------
+    simulator : Simulator
+        At that instant.
+    inputs : list of Input
+        What acted later in the log's run, but for those channels and loads; for `Simulator.run`.
+    """
+    stimuli, loads = stimuli or {}, loads or {}
+    refuse_without_inputs(Path(path))
+    simulator, state = simulator_of(path, overrides), state_at(path, time)
+    simulator.load_state(state)
+    for channel, value in stimuli.items():
+        simulator.set_stimulus(channel, value)
+    for name, factor in loads.items():
+        simulator.set_load(name, factor)
+    changed = {(STIMULUS, channel) for channel in stimuli} | {(LOAD, name) for name in loads}
+    return simulator, [told for told in inputs_after(path, state) if (told.kind, told.name) not in changed]
+
+
+def state_at(path: str | Path, time: float) -> Array:
+    """The last state of a log at or before a time [s].
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    found = None
+    for event in _events(Path(path), inputs=False):
+        if event[0] > time * (1.0 + TIME_ROUNDING):
+            break
+        found = event
+    if found is None:
+        raise InputError(f"{path}: holds no state at or before t = {time:g} s")
+    return found
+
+
+def inputs_after(path: str | Path, state: Array) -> list[Input]:
+    """What acted in a log's run after one of its states, without ends of steps."""
+    found, passed = [], False
+    for event in _events(Path(path)):
+        if not isinstance(event, Input):
+            passed = passed or (event[0] == state[0] and event[1] == state[1])
+        elif passed and event.kind != UNTIL:
+            found.append(event)
+    return found
+
+
+def refuse_without_inputs(path: Path) -> None:
+    """Raise InputError if a log does not say what acted."""
+    topics = {topic for topic, _, _, data in read_messages(path, {INPUTS.full_name()}) if data is None}
+    if not topics:
+        writer = read_head(path).versions.get("bilayer_sim_ros", "unknown")
+        raise InputError(
+            f"{path}: does not hold what acted on the run ({INPUTS.full_name()}), as version {writer} wrote it; "
+            "its states can be gone on from (`bilayer run --from-state`), but it cannot be replayed"
+        )
+
+
+def _events(path: Path, inputs: bool = True) -> Iterator[Array | Input]:
+    """States, as flat arrays, and inputs in the order in which they came."""
+    wanted = {STATE, INPUTS.full_name()} if inputs else {STATE}
+    for topic, _, _, data in read_messages(path, wanted):
+        if data is not None:
+            yield read_float64_multi_array(data)[1].copy() if topic == STATE else decode_input(data)
+
+
+def _advance(simulator: Simulator, time: float, until: float, waiting: list[Input], loose: bool) -> float:
+    """Make steps up to a time, each with what acts from it on; returns until when adaptive steps may go."""
+    while simulator.time < time * (1.0 - TIME_ROUNDING if loose else 1.0):
+        until = _apply(simulator, waiting, until)
+        simulator.advance(min(until, time) if loose else until)
+    return until
+
+
+def _apply(simulator: Simulator, waiting: list[Input], until: float) -> float:
+    """Let act what is to act from here on."""
+    while waiting and waiting[0].time <= simulator.time:
+        told = waiting.pop(0)
+        if told.kind == UNTIL:
+            until = told.values[0]
+        told.apply(simulator)
+    return until
+
+
+def _changed(path: Path) -> dict[str, tuple[str, str]]:
+    """Versions and parts of the machine that are not those of the log."""
+    head = read_head(path)
+    then, now = head.versions | head.machine, versions() | machine()
+    return {key: (then[key], now[key]) for key in now if key in then and then[key] != now[key]}
+
+
+class _Comparison:
+    """Compares states with those of a log."""
+
+    def __init__(self, description: Description, tolerance: float | None):
+        self._description, self._tolerance = description, tolerance
+        self._parts: list[tuple[str, tuple[int, ...], int, int]] = []
+        begin = 0
+        for name, shape in description.state_layout:
+            size = math.prod(shape)
+            self._parts.append((name, shape, begin, begin + size))
+            begin += size
+
+    def look(self, logged: Array, replayed: Array, result: Verification) -> None:
+        """Note the first difference, and the largest of positions."""
+        for name, shape, begin, end in self._parts:
+            if name == SEAL:
+                continue
+            one, other = logged[begin:end], replayed[begin:end]
+            if name in ("position", "body_position"):
+                self._note_largest(name, shape, one, other, logged, result)
+            elif self._tolerance is not None:
+                continue
+            if result.first is None:
+                self._note_first(name, shape, one, other, logged, result)
+
+    def _note_first(self, name, shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
+        if self._tolerance is None:
+            differs = one.view(np.uint64) != other.view(np.uint64)
+        else:
+            differs = np.abs(one - other) > self._tolerance * self._length
+        if differs.any():
+            result.first = self._difference(name, shape, int(differs.argmax()), one, other, logged)
+
+    def _note_largest(self, name, shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
+        if not one.size:
+            return
+        index = int(np.abs(one - other).argmax())
+        found = self._difference(name, shape, index, one, other, logged)
+        if found.size > (result.largest.size if result.largest else 0.0):
+            result.largest = found
+
+    def _difference(self, name, shape, index: int, one: Array, other: Array, logged: Array) -> Difference:
+        row = int(np.unravel_index(index, shape)[0])
+        where = self._owner(name, shape, row)
+        return Difference(float(logged[0]), int(logged[1]), name, where, float(one[index]), float(other[index]))
+
+    def _owner(self, name: str, shape: tuple[int, ...], row: int) -> str:
+        """Which node, edge, body or channel a row of a part is of."""
+        description = self._description
+        nodes = max(s.nodes.stop for s in description.strands) if description.strands else 0
+        if name.startswith("body_") and shape[0] == len(description.bodies):
+            return f"body {description.bodies[row].name}"
+        if name == "override":
+            return description.channels[row] if row < len(description.channels) else f"load {row}"
+        for strand in description.strands:
+            for kind, of in (("node", strand.nodes), ("edge", strand.edges)):
+                count = nodes if kind == "node" else description.edge_count
+                if shape[0] == count and of.start <= row < of.stop:
+                    return f"{kind} {row - of.start} of {strand.name}"
+        return f"[{row}]" if shape[0] > 1 else ""
+
+    @property
+    def _length(self) -> float:
+        """That of the longest rod at the start [m]."""
+        scene = load_scene(read_yaml(self._description.scene_text, "scene"))
+        return max(rod.path.length for rod in scene.rods)

@@ -1,0 +1,88 @@
+"""What acts on a run from outside, each with the step from which on it acts: enough to make the same steps again.
+
+============ ========================================== ================================================================
+kind         values                                     from
+============ ========================================== ================================================================
+``stimulus`` value in the unit of the channel           `Simulator.set_stimulus`
+``load``     factor                                     `Simulator.set_load`
+``pose``     position [m], quaternion, least time [s]   `Simulator.set_pose`
+``until``    time [s]                                   whoever makes steps: where adaptive ones must end
+``reset``    none                                       `Simulator.reset`
+============ ========================================== ================================================================
+
+NaN stands for what is not given: of a stimulus or a load, its schedule acts again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+Values = Sequence[float]
+STIMULUS, LOAD, POSE, UNTIL, RESET = "stimulus", "load", "pose", "until", "reset"
+SIZES = {STIMULUS: 1, LOAD: 1, POSE: 8, UNTIL: 1, RESET: 0}
+"""Number of values of each kind."""
+POSITION, QUATERNION, OVER = slice(0, 3), slice(3, 7), 7
+"""Values of a pose."""
+
+
+class Acted(Protocol):
+    """What inputs act on: a `Simulator`."""
+
+    def set_stimulus(self, channel: str, value: float | None) -> None: ...
+
+    def set_load(self, name: str, factor: float | None) -> None: ...
+
+    def set_pose(self, name: str, position: Values | None, quaternion: Values | None, *, over: float) -> None: ...
+
+
+@dataclass(frozen=True)
+class Input:
+    """Something that acts from a step on.
+
+    Attributes
+    ----------
+    step : int
+        Number of steps done before.
+    time : float
+        At the end of the last of them [s].
+    kind : str
+    name : str
+        Of the channel, load or body; empty for others.
+    values : tuple of float
+    """
+
+    step: int
+    time: float
+    kind: str
+    name: str = ""
+    values: tuple[float, ...] = ()
+
+    def apply(self, simulator: Acted) -> None:
+        """Do to a simulator what was done to the one that this is from; ends of steps are for who makes steps."""
+        match self.kind:
+            case "stimulus":
+                simulator.set_stimulus(self.name, _given(self.values[0]))
+            case "load":
+                simulator.set_load(self.name, _given(self.values[0]))
+            case "pose":
+                position, quaternion = self.values[POSITION], self.values[QUATERNION]
+                simulator.set_pose(
+                    self.name,
+                    None if math.isnan(position[0]) else position,
+                    None if math.isnan(quaternion[0]) else quaternion,
+                    over=self.values[OVER],
+                )
+
+
+def values_of_pose(position: Values | None, quaternion: Values | None, over: float) -> tuple[float, ...]:
+    """The values of a pose as it was asked for."""
+    at = (math.nan,) * 3 if position is None else tuple(map(float, position))
+    turned = (math.nan,) * 4 if quaternion is None else tuple(map(float, quaternion))
+    return (*at, *turned, float(over))
+
+
+def _given(value: float) -> float | None:
+    return None if math.isnan(value) else value
