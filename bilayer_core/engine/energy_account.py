@@ -16,7 +16,9 @@ it has risen by more than `LARGEST_GAIN` of the largest energy of the run over i
 again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
 much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops.
 
-Driving ends this: a prescribed body that moves, a flow, forces that follow. A stimulus that changes does not. What it
+Driving ends this: a prescribed body that moves, a flow, forces that follow. All that is asked then is that no single
+step makes more than `LARGEST_STEP_GAIN` of the largest energy beyond the error of its quadrature, as far as shorter
+ones do not. A stimulus that changes does not end it. What it
 supplies has the error of its quadrature, |(Σ bᵢ sᵢ − ½(s₀ + s₁))·Δη|; what steps make beyond that is summed, and each
 step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike. Limits are then `LARGEST_DRIVEN_GAIN`
 and `SMALL_DRIVEN`.
@@ -75,6 +77,7 @@ LARGEST_GAIN = 9e-4
 SMALL = 1e-3
 LARGEST_DRIVEN_GAIN = 0.02
 SMALL_DRIVEN = 5e-4
+LARGEST_STEP_GAIN = 0.1
 FORGOTTEN = 5e-4
 ROUNDING = 1e-11
 """Part of the energies that may be rounding."""
@@ -249,6 +252,7 @@ def close_step_account(p, state, work, h, beyond, end):
         return NONE
     write_forces_of_laws(p, end, work.stage, work.end_force)
     grows, unsure = done[STRAINED] != 0.0, 0.0
+    by_powers, power = done[SUPPLIED], account[POWER_SUPPLIED]
     for i in range(work.start_strain.shape[0]):
         strained, mean = work.strain[i] - work.start_strain[i], work.mean_force[i] / h
         grows |= strained != 0.0
@@ -272,7 +276,8 @@ def close_step_account(p, state, work, h, beyond, end):
     p.outcome.figures[CONTACT_ERROR] = missed
     if done[DRIVEN] != 0.0:
         account[LOWEST], account[MADE] = account[FREE], 0.0
-        return NONE
+        gain -= unsure + abs(by_powers - 0.5 * h * (power + done[SUPPLYING]))
+        return SOME if gain > LARGEST_STEP_GAIN * account[LARGEST] else NONE
     gain -= unsure
     account[MADE] = max((1.0 - FORGOTTEN) * account[MADE] + gain, 0.0)
     if grows:
