@@ -92,6 +92,7 @@ setup(
             "jsonschema>=4.20",
             "matplotlib>=3.8",
             "mcap-ros2-support>=0.5",
+            "pandas>=2.2",
             "pebble>=5.0",
             "pillow>=10.1",
             "pytest>=8",
@@ -100,6 +101,7 @@ setup(
             "rosbags>=0.10",
             "ruff>=0.6",
             "sympy>=1.12",
+            "xarray>=2024.1",
         ],
     },
     entry_points={

@@ -57,6 +57,7 @@ def description() -> Description:
         obstacles=(ObstacleInfo("ground", shape("plane", 0.0)),),
         channels=("humidity",),
         channel_ranges=((0.0, 1.0),),
+        channel_units=("",),
         state_layout=(("positions", (node_count, 3)), ("velocities", (node_count, 3)), ("step", (1,))),
         settings={"model": "two_rod", "integrator": "implicit_euler", "dt": "0.001", "numpy": np.__version__},
     )

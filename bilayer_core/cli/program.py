@@ -12,6 +12,7 @@ import click
 
 from bilayer_core.cli.bench import bench
 from bilayer_core.cli.check import check
+from bilayer_core.cli.compare import compare
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.new import new
@@ -52,7 +53,7 @@ def program() -> None:
     """
 
 
-for verb in (scenes, new, schema, check, run, converge, validate, bench, stress, info, replay, view, render):
+for verb in (scenes, new, schema, check, run, converge, validate, bench, stress, info, replay, compare, view, render):
     program.add_command(verb)
 
 

@@ -9,6 +9,9 @@ import numpy as np
 
 from bilayer_core.simulation.frame import BodyInfo, Description, JointInfo, ObstacleInfo, ShapeInfo, Strand
 
+LATER = ("joints", "channel_units")
+"""What older logs do not have."""
+
 
 def _plain(value):
     """What JSON has no notation for, as lists."""
@@ -45,15 +48,16 @@ def to_text(description: Description) -> dict[str, str]:
 def from_text(attributes: dict[str, str], scene_text: str) -> Description:
     """The description of which `attributes` is `to_text`."""
     names = [item.name for item in fields(Description) if item.name != "scene_text"]
-    values = {name: json.loads(attributes[name]) for name in names if name in attributes or name != "joints"}
+    values = {name: json.loads(attributes[name]) for name in names if name in attributes or name not in LATER}
     values["strands"] = tuple(map(_strand, values["strands"]))
     values["bodies"] = tuple(
         BodyInfo(**body | {"shape": _shape(body["shape"]) if body["shape"] else None}) for body in values["bodies"]
     )
     values["obstacles"] = tuple(ObstacleInfo(part["name"], _shape(part["shape"])) for part in values["obstacles"])
-    joints = values.get("joints", ())  # older logs have none
+    joints = values.get("joints", ())
     values["joints"] = tuple(JointInfo(part["name"], part["body"], _shape(part["shape"])) for part in joints)
     values["channels"] = tuple(values["channels"])
     values["channel_ranges"] = tuple((lower, upper) for lower, upper in values["channel_ranges"])
+    values["channel_units"] = tuple(values.get("channel_units", [""] * len(values["channels"])))
     values["state_layout"] = tuple((name, tuple(shape)) for name, shape in values["state_layout"])
     return Description(scene_text=scene_text, **values)

@@ -145,6 +145,8 @@ class Description:
     settings : dict
         Solver settings and versions, as flat text values.
     joints : tuple of JointInfo
+    channel_units : tuple of str
+        Unit of each channel, empty for none.
     """
 
     scene_name: str
@@ -160,6 +162,7 @@ class Description:
     state_layout: tuple[tuple[str, tuple[int, ...]], ...]
     settings: dict[str, str] = field(default_factory=dict)
     joints: tuple[JointInfo, ...] = ()
+    channel_units: tuple[str, ...] = ()
 
     @property
     def layers(self) -> tuple[Strand, ...]:

@@ -73,6 +73,7 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         ),
         channels=tuple(scene.stimuli),
         channel_ranges=tuple((channel.minimum, channel.maximum) for channel in scene.stimuli.values()),
+        channel_units=tuple("" if channel.unit == "1" else channel.unit for channel in scene.stimuli.values()),
         state_layout=state.layout(),
         settings=settings,
         joints=joint_shapes(model),

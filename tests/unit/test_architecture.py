@@ -36,7 +36,7 @@ ALLOWED = {
     "cli": NUMERICS | {"record", "view", "converge", "validate", "bench", "stress"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
-FACES = {"__init__": NUMERICS | {"converge"}, "__main__": {"cli"}}
+FACES = {"__init__": NUMERICS | {"converge", "record"}, "__main__": {"cli"}}
 TOP = "bilayer_core"
 
 

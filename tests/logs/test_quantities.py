@@ -1,0 +1,148 @@
+"""Logs as named arrays with units, as tables of pandas and xarray, and compared with each other."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import synthetic_run
+
+import bilayer_core
+from bilayer_core import Simulator, compare, load_scene, read_log
+from bilayer_core.cli import main
+from bilayer_core.errors import InputError
+from bilayer_core.record.mcap_log import McapRecorder
+
+TIMES = np.arange(0, 26) * 0.02
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    synthetic_run.run(McapRecorder(path, rate=50.0, marker_rate=25.0), TIMES)
+    return read_log(path)
+
+
+@pytest.fixture(scope="module")
+def bent(tmp_path_factory):
+    """Logs of a strip that is bent to two ends, one of them recorded less often."""
+    directory = tmp_path_factory.mktemp("bent")
+    for name, value, rate in (("half", 0.5, 50.0), ("again", 0.5, 50.0), ("seldom", 0.5, 10.0), ("whole", 1.0, 50.0)):
+        simulator = Simulator(load_scene("bending"))
+        simulator.set_stimulus(next(iter(simulator.scene.stimuli)), value)
+        simulator.run(0.4, observers=[McapRecorder(directory / f"{name}.mcap", rate=rate)])
+    return directory
+
+
+def test_every_quantity_has_a_name_a_unit_and_times(run):
+    com = run["com"]
+    assert (com.unit, com.axes, com.labels) == ("m", ("axis",), ("x", "y", "z"))
+    np.testing.assert_array_equal(com.values, run.com)
+    np.testing.assert_allclose(com.times, TIMES)
+    assert run["energy/gravity"].unit == "J"
+    assert run["body/ball/position"].values.shape == (len(TIMES), 3)
+    for strand in run.description.strands:
+        position = run[f"rod/{strand.name}/position"]
+        np.testing.assert_array_equal(position.values, run.positions[:, strand.nodes])
+        assert position.times is run.shape_times and position.axes == ("node", "axis")
+        assert run[f"rod/{strand.name}/curvature"].unit == "1/m"
+        frames = run[f"rod/{strand.name}/frame"].values
+        np.testing.assert_allclose(np.linalg.norm(frames, axis=-1), 1.0, atol=1e-6)
+
+
+def test_the_unit_of_a_channel_is_that_of_its_scene(bent):
+    for name, channel in load_scene("bending").stimuli.items():
+        unit = read_log(bent / "half.mcap")[f"stimulus/{name}"].unit
+        assert unit == ("" if channel.unit == "1" else channel.unit)
+
+
+def test_arrays_cannot_be_changed(run):
+    with pytest.raises(ValueError, match="read-only"):
+        run["com"].values[0] = 1.0
+
+
+def test_a_name_that_is_none_is_told_with_those_near_it(run):
+    with pytest.raises(InputError, match=r"quantity 'body/ball/positions': there is none; near it: body/ball/position"):
+        run["body/ball/positions"]
+
+
+def test_a_run_is_told_within_a_screen(run):
+    assert len(repr(run)) < 400 and "26 frames" in repr(run)
+    assert repr(run["com"]) == "Quantity(com [m], shape (26, 3), t = 0 to 0.5 s)"
+
+
+def test_pandas_takes_all_but_shapes(run):
+    table = run.to_dataframe()
+    assert table.index.name == "time" and len(table) == len(TIMES)
+    np.testing.assert_array_equal(table["com.z"], run.com[:, 2])
+    np.testing.assert_array_equal(table["body/ball/contact_wrench.mz"], run.contact_wrenches[:, 0, 5])
+    assert not any(name.startswith("rod/") for name in table)
+
+
+def test_xarray_takes_all_with_units(run):
+    data = run.to_xarray()
+    assert set(data.data_vars) == set(run.quantities)
+    assert data["com"].attrs["units"] == "m" and data["com"].dims == ("time", "axis")
+    assert float(data["com"].sel(axis="z").isel(time=3)) == run.com[3, 2]
+    strand = run.description.strands[0].name
+    assert data[f"rod/{strand}/position"].dims == ("shape_time", f"node of rod/{strand}", "axis")
+
+
+def test_reading_is_one_line_of_the_package():
+    assert {"read_log", "compare"} <= set(bilayer_core.__all__)
+
+
+# two runs
+
+
+def test_a_run_is_equal_to_itself_made_again(bent):
+    found = compare(bent / "half.mcap", bent / "again.mcap")
+    assert found.equal and repr(found) == "Comparison(equal)"
+    assert found.span == (0.0, 0.4)
+
+
+def test_other_runs_differ_by_what_is_told_and_when(bent):
+    found = compare(bent / "half.mcap", bent / "whole.mcap")
+    one, other = read_log(bent / "half.mcap"), read_log(bent / "whole.mcap")
+    apart = np.abs(one.com - other.com).max(axis=1)
+    assert not found.equal
+    assert found["com"].largest == apart.max() and found["com"].time == one.times[apart.argmax()]
+    assert found["com"].part == pytest.approx(apart.max() / np.ptp(one.com))
+    assert not any(of.interpolated for of in found.differences)
+    assert "solver/cpu_time" not in {of.name for of in found.differences}
+
+
+def test_runs_with_other_times_are_interpolated(bent):
+    found = compare(bent / "half.mcap", bent / "seldom.mcap")
+    assert found["com"].interpolated and 0.0 < found["com"].part < 0.2
+
+
+def test_rotations_are_compared_and_not_signs_of_quaternions(run):
+    turned = replace(run, body_quaternions=-run.body_quaternions, material_frames=-run.material_frames)
+    assert compare(run, turned).equal
+
+
+def test_runs_of_other_robots_or_times_are_refused(bent, tmp_path):
+    later, finer = tmp_path / "later.mcap", tmp_path / "finer.mcap"
+    simulator = Simulator(load_scene("bending"))
+    simulator.run(0.5)
+    simulator.run(0.1, observers=[McapRecorder(later)])
+    with pytest.raises(InputError, match=r"no time in common: t = 0 to 0\.4 s, and 0\.5 to 0\.6 s"):
+        compare(bent / "half.mcap", later)
+    name = load_scene("bending").rods[0].name
+    Simulator(load_scene("bending", [f"rods.{name}.stations=11"])).run(0.1, observers=[McapRecorder(finer)])
+    with pytest.raises(InputError, match=r"compare: rod/.* has shape"):
+        compare(bent / "half.mcap", finer)
+
+
+def test_the_command_tells_the_largest_first(bent, capsys):
+    half, whole = str(bent / "half.mcap"), str(bent / "whole.mcap")
+    assert main(["compare", half, str(bent / "again.mcap")]) == 0
+    assert "equal to the last bit of the logs" in capsys.readouterr().out
+    assert main(["compare", half, whole]) == 0
+    first, _, *lines = capsys.readouterr().out.splitlines()
+    parts = [float(line.split(" s")[0].split()[-2]) for line in lines]
+    assert first.startswith("t = 0 to 0.4 s") and len(parts) > 5 and parts == sorted(parts, reverse=True)
+    assert main(["compare", half, whole, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["equal"] is False and {"name", "largest", "time", "part"} <= set(told["differences"][0])
