@@ -129,10 +129,9 @@ def verify(path: str | Path, tolerance: float | None = None) -> Verification:
             waiting.append(event)
             result.inputs += event.kind != UNTIL
             continue
-        time, step = float(event[0]), int(event[1])
+        time = float(event[0])
         if result.states == 0:
-            if time > 0.0 or step > 0:
-                simulator.load_state(event)
+            simulator.load_state(event)  # with all that was set before the log began
         else:
             loose = tolerance is not None or result.first is not None
             try:

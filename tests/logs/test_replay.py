@@ -89,6 +89,16 @@ def test_steps_that_someone_has_made_end_are_made_so_again(tmp_path):
     assert found.passed and found.states == 40
 
 
+def test_what_was_set_before_the_log_began_acts_again(tmp_path):
+    simulator = Simulator(load_scene(pushed()))
+    simulator.set_stimulus("heat", 0.6)
+    simulator.set_load("push", -1.0)
+    simulator.set_pose("hand", [0.04, 0.0, 4e-3])
+    simulator.run(0.1, observers=[McapRecorder(tmp_path / "run.mcap")])
+    found = verify(tmp_path / "run.mcap")
+    assert found.passed and found.inputs == 0
+
+
 def test_a_run_that_goes_on_from_a_state_does_too(tmp_path):
     recorded(tmp_path / "run.mcap", pushed(), seed=7)
     new, log = str(tmp_path / "next.mcap"), str(tmp_path / "run.mcap")
