@@ -16,9 +16,9 @@ it has risen by more than `LARGEST_GAIN` of the largest energy of the run over i
 again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
 much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops.
 
-Driving ends this: a prescribed body that moves, a flow, forces that follow. All that is asked then is that no single
-step makes more than `LARGEST_STEP_GAIN` of the largest energy beyond the error of its quadrature, as far as shorter
-ones do not. A stimulus that changes does not end it. What it
+Driving ends this: a prescribed body that moves, a flow, forces that follow. All that is asked where bodies alone drive
+is that no single step makes more than `LARGEST_STEP_GAIN` of the largest energy beyond the error of its quadrature, as
+far as shorter ones do not. A stimulus that changes does not end it. What it
 supplies has the error of its quadrature, |(Σ bᵢ sᵢ − ½(s₀ + s₁))·Δη|; what steps make beyond that is summed, and each
 step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike. Limits are then `LARGEST_DRIVEN_GAIN`
 and `SMALL_DRIVEN`.
@@ -49,6 +49,7 @@ from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of
 from .powers import (
+    BY_FLOW,
     DRIVEN,
     LOSING,
     LOST,
@@ -276,6 +277,8 @@ def close_step_account(p, state, work, h, beyond, end):
     p.outcome.figures[CONTACT_ERROR] = missed
     if done[DRIVEN] != 0.0:
         account[LOWEST], account[MADE] = account[FREE], 0.0
+        if done[DRIVEN] == BY_FLOW:
+            return NONE
         gain -= unsure + abs(by_powers - 0.5 * h * (power + done[SUPPLYING]))
         return SOME if gain > LARGEST_STEP_GAIN * account[LARGEST] else NONE
     gain -= unsure

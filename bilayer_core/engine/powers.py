@@ -19,6 +19,8 @@ SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, STRAINED = range
 """Slots of `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
 [W], whether bodies, a flow or followers drive it, and whether a stimulus has jumped.
 """
+BY_BODIES, BY_FLOW = 1.0, 2.0
+"""What drives a step: prescribed bodies alone, or a flow or followers too, of which T + V has no lowest value."""
 BARRIER, ROD_BARRIER = map(slot_of, ("barrier", "rod barrier"))
 
 
@@ -183,14 +185,14 @@ def add_powers(p, work, inputs, n, weight, at):
     driven = p.followers.exists or p.moments.exists
     if flow.exists:
         driven |= flow.velocity[0] != 0.0 or flow.velocity[1] != 0.0 or flow.velocity[2] != 0.0
+    if driven:
+        done[DRIVEN] = BY_FLOW
     if _moves(p.bodies.prescribed, work.rates):
-        driven = True
+        done[DRIVEN] = max(done[DRIVEN], BY_BODIES)
         supplied += _power_of_prescribed(p, at, work.rates)
     done[SUPPLYING], done[LOSING] = supplied, lost
     done[SUPPLIED] += weight * supplied
     done[LOST] += weight * lost
-    if driven:
-        done[DRIVEN] = 1.0
     write_forces_of_laws(p, at, work.stage, work.end_force)
     for i in range(work.mean_force.shape[0]):
         work.mean_force[i] += weight * work.end_force[i]
