@@ -14,7 +14,8 @@ work it would seem to.) Where it jumps at the start of a step, the jump counts b
 A step is not accepted that makes energy: without driving, T + V less the work of constant loads can only fall. Where
 it has risen by more than `LARGEST_GAIN` of the largest energy of the run over its lowest value so far, the step is made
 again, shorter, unless its own part is less than `SMALL` of that. The shortest step is taken if it makes less than that
-much by itself, which is what rounding and a loose tolerance of Newton's method leave; otherwise a run stops.
+much by itself, which is what rounding and a loose tolerance of Newton's method leave, and less than `MOST` times as
+much with those before it; otherwise a run stops.
 
 Driving ends this: a prescribed body that moves, a flow, forces that follow. All that is asked where bodies alone drive
 is that no single step makes more than `LARGEST_STEP_GAIN` of the largest energy beyond the error of its quadrature, as
@@ -79,6 +80,7 @@ SMALL = 1e-3
 LARGEST_DRIVEN_GAIN = 0.02
 SMALL_DRIVEN = 5e-4
 LARGEST_STEP_GAIN = 0.1
+MOST = 2.0
 FORGOTTEN = 5e-4
 ROUNDING = 1e-11
 """Part of the energies that may be rounding."""
@@ -295,4 +297,4 @@ def _too_much(made, gain, allowed, small):
     """What a step makes that gains so much, and with the steps before it so much [J]."""
     if made <= allowed or gain <= small * allowed:
         return NONE
-    return SOME if gain <= allowed else MUCH
+    return SOME if gain <= allowed and made <= MOST * allowed else MUCH

@@ -174,3 +174,6 @@ def _try_remedy(case: StressCase, record: Record, remedy: Remedy | None) -> None
         except BilayerError as failure:
             record.remedy += f" [{failure}]"
             return
+        except Exception as fault:  # no memory, or an error that no user may see: the remedy is none
+            record.remedy += f" [{type(fault).__name__}: {fault}]"
+            return

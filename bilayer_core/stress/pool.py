@@ -56,6 +56,8 @@ def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record]
                         record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
                     except ProcessExpired as death:
                         record = _lost(case, f"its process died with exit code {death.exitcode}")
+                    except Exception as fault:  # of the worker, such as no memory while it tells what came
+                        record = _lost(case, f"{type(fault).__name__}: {fault}")
                     done(record)
         except BaseException:  # such as that of Ctrl-C: cases that run are not waited for
             pool.stop()

@@ -13,6 +13,7 @@ MENDED = {
     "all/0213": "a jump within a fixed step supplied what depended on the step",
     "all/0222": "likewise",
     "all/0578": "a refusal's remedy passed through",
+    "all/0700": "many of the shortest steps, each of which was allowed some, made energy together",
 }
 
 
