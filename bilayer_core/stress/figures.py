@@ -39,7 +39,7 @@ def _outcomes_by_axis(records: Sequence[Record], axes: Sequence[str], path: Path
     from matplotlib.patches import Patch, Rectangle
 
     rows = -(-len(axes) // COLUMNS)
-    figure, grid = figure_of(rows, COLUMNS, (4.0 * COLUMNS, 2.3 * rows))
+    figure, grid = figure_of(rows, COLUMNS, (3.2 * COLUMNS, 2.1 * rows))
     panels = np.ravel(grid)
     colours = ListedColormap([EMPTY, *COLOURS.values()])
     for panel, axis in zip(panels, axes, strict=False):

@@ -25,7 +25,7 @@ PROMISES = (
     ("energy without driving", f"T + V rises by less than {MOST_GAIN:g} of the largest energy of the run"),
     ("energy with driving", f"T + V less the work supplied rises by at most {MOST_MADE:g} of the largest"),
     ("energy budget", f"closes to {100 * LARGEST_RESIDUAL:g} % of its largest row inside the region"),
-    ("momentum", "of what flies freely changes as gravity has it, to Newton's tolerance"),
+    ("momentum", "of what flies freely changes as gravity has it, to √n of Newton's tolerance in n steps"),
     ("effort", f"at most {MOST_ITERATIONS} Newton iterations an attempt, {MOST_REJECTED} attempts a step, on average"),
     ("refusals", "say what, when, how close and what to change"),
 )
