@@ -125,7 +125,9 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
     limit = None if time is None else nanoseconds(time)
     found = None
     for _, _, stamp, data in read_messages(path, {f"{LOG_NAMESPACE}/state"}):
-        if data is not None and (limit is None or stamp <= limit):
+        if data is not None and limit is not None and stamp > limit:
+            break
+        if data is not None:
             found = (data, stamp)
     if found is None:
         before = "" if time is None else f" at or before t = {time:g} s"

@@ -110,9 +110,9 @@ def quantities_of(run: Run) -> Iterator[Quantity]:
         yield scalar(f"{of}/contact_wrench", "N, N m", run.contact_wrenches[:, k], axes=("part",), labels=WRENCH)
         if body.holds_rods:
             yield scalar(f"{of}/clamp_wrench", "N, N m", run.clamp_wrenches[:, k], axes=("part",), labels=WRENCH)
-    place = {int(node): k for k, node in enumerate(node_order(run.description))}
+    row_of = {int(node): k for k, node in enumerate(node_order(run.description))}
     for strand in run.description.strands:
-        of, frames = f"rod/{strand.name}", [place[n] for n in range(strand.nodes.start, strand.nodes.stop)]
+        of, frames = f"rod/{strand.name}", [row_of[n] for n in range(strand.nodes.start, strand.nodes.stop)]
         shapes = (
             ("position", "m", run.positions[:, strand.nodes], ("node", "axis"), AXES),
             ("contact_force", "N", run.contact_forces[:, strand.nodes], ("node", "axis"), AXES),

@@ -16,7 +16,7 @@ import numpy as np
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.record.cdr import read_float64_multi_array
 from bilayer_core.record.encoders import decode_input
-from bilayer_core.record.log_reader import read_head, read_messages
+from bilayer_core.record.log_reader import read_head, read_messages, read_state
 from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.scene.text import read_yaml
@@ -121,8 +121,8 @@ def verify(path: str | Path, tolerance: float | None = None) -> Verification:
     path = Path(path)
     refuse_without_inputs(path)
     simulator = simulator_of(path)
-    description = simulator.description
-    compare = _Comparison(description, tolerance)
+    longest = max(rod.path.length for rod in simulator.scene.rods)
+    comparison = _Comparison(simulator.description, None if tolerance is None else tolerance * longest)
     result, until, waiting = Verification(tolerance, changed=_changed(path)), math.inf, []
     for event in _events(path):
         if isinstance(event, Input):
@@ -141,7 +141,7 @@ def verify(path: str | Path, tolerance: float | None = None) -> Verification:
                 break
         until = _apply(simulator, waiting, until)
         result.states += 1
-        compare.look(event, simulator.save_state(), result)
+        comparison.add(event, simulator.save_state(), result)
     if not result.states:
         raise InputError(f"{path}: holds no state; nothing can be compared")
     return result
@@ -200,7 +200,7 @@ def branch(
     """
     stimuli, loads = stimuli or {}, loads or {}
     refuse_without_inputs(Path(path))
-    simulator, state = simulator_of(path, overrides), state_at(path, time)
+    simulator, state = simulator_of(path, overrides), read_state(path, time)[0]
     simulator.load_state(state)
     for channel, value in stimuli.items():
         simulator.set_stimulus(channel, value)
@@ -208,24 +208,6 @@ def branch(
         simulator.set_load(name, factor)
     changed = {(STIMULUS, channel) for channel in stimuli} | {(LOAD, name) for name in loads}
     return simulator, [told for told in inputs_after(path, state) if (told.kind, told.name) not in changed]
-
-
-def state_at(path: str | Path, time: float) -> Array:
-    """The last state of a log at or before a time [s].
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
-    found = None
-    for event in _events(Path(path), inputs=False):
-        if event[0] > time * (1.0 + TIME_ROUNDING):
-            break
-        found = event
-    if found is None:
-        raise InputError(f"{path}: holds no state at or before t = {time:g} s")
-    return found
 
 
 def inputs_after(path: str | Path, state: Array) -> list[Input]:
@@ -250,10 +232,9 @@ def refuse_without_inputs(path: Path) -> None:
         )
 
 
-def _events(path: Path, inputs: bool = True) -> Iterator[Array | Input]:
+def _events(path: Path) -> Iterator[Array | Input]:
     """States, as flat arrays, and inputs in the order in which they came."""
-    wanted = {STATE, INPUTS.full_name()} if inputs else {STATE}
-    for topic, _, _, data in read_messages(path, wanted):
+    for topic, _, _, data in read_messages(path, {STATE, INPUTS.full_name()}):
         if data is not None:
             yield read_float64_multi_array(data)[1].copy() if topic == STATE else decode_input(data)
 
@@ -284,7 +265,7 @@ def _changed(path: Path) -> dict[str, tuple[str, str]]:
 
 
 class _Comparison:
-    """Compares states with those of a log."""
+    """Compares states with those of a log: bit for bit, or positions within a distance [m]."""
 
     def __init__(self, description: Description, tolerance: float | None):
         self._description, self._tolerance = description, tolerance
@@ -295,7 +276,7 @@ class _Comparison:
             self._parts.append((name, shape, begin, begin + size))
             begin += size
 
-    def look(self, logged: Array, replayed: Array, result: Verification) -> None:
+    def add(self, logged: Array, replayed: Array, result: Verification) -> None:
         """Note the first difference, and the largest of positions."""
         for name, shape, begin, end in self._parts:
             if name == SEAL:
@@ -312,7 +293,7 @@ class _Comparison:
         if self._tolerance is None:
             differs = one.view(np.uint64) != other.view(np.uint64)
         else:
-            differs = np.abs(one - other) > self._tolerance * self._length
+            differs = np.abs(one - other) > self._tolerance
         if differs.any():
             result.first = self._difference(name, shape, int(differs.argmax()), one, other, logged)
 
@@ -343,9 +324,3 @@ class _Comparison:
                 if shape[0] == count and of.start <= row < of.stop:
                     return f"{kind} {row - of.start} of {strand.name}"
         return f"[{row}]" if shape[0] > 1 else ""
-
-    @property
-    def _length(self) -> float:
-        """That of the longest rod at the start [m]."""
-        scene = load_scene(read_yaml(self._description.scene_text, "scene"))
-        return max(rod.path.length for rod in scene.rods)

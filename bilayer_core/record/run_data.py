@@ -112,8 +112,8 @@ class RunData:
             names = {"node": f"node of {strand}", "axis": "axis", "part": f"part of {len(quantity.labels)}"}
             axes = ("shape_time" if of_shape else "time", *(names[axis] for axis in quantity.axes))
             variables[quantity.name] = (axes, quantity.values, {"units": quantity.unit})
-        places = {"time": self.times, "shape_time": self.shape_times, "axis": list(AXES)}
-        return xarray.Dataset(variables, places, {"scene": self.description.scene_name})
+        coordinates = {"time": self.times, "shape_time": self.shape_times, "axis": list(AXES)}
+        return xarray.Dataset(variables, coordinates, {"scene": self.description.scene_name})
 
     def __repr__(self) -> str:
         span = f"t = {self.times[0]:g} to {self.times[-1]:g} s" if self.times.size else "empty"

@@ -482,7 +482,7 @@ class Simulator:
         termination = Termination.INTERRUPTED
         most = STEPS_AT_ONCE if each_step is None else 1
         schedule, waiting = Schedule(observers, self), deque(sorted(inputs, key=lambda of: of.time))
-        deaf = [self.listen(of.note) for of in observers if hasattr(of, "note")]
+        ends_of_listening = [self.listen(of.note) for of in observers if hasattr(of, "note")]
         try:
             schedule.start()
             while self.time < last:
@@ -507,7 +507,7 @@ class Simulator:
             schedule.finish(False, termination.value, failure)
             raise
         finally:
-            for stop_listening in deaf:
+            for stop_listening in ends_of_listening:
                 stop_listening()
         self.termination = termination.value
         schedule.finish(termination is Termination.COMPLETED, termination.value)

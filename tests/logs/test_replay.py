@@ -12,9 +12,9 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.record import mcap_log, replay
-from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_core.record.log_reader import read_info, read_log, read_state
 from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.replay import branch, inputs_after, state_at, verify
+from bilayer_core.record.replay import branch, inputs_after, verify
 from bilayer_core.scene.bundled import bundled_scenes
 from bilayer_core.simulation.inputs import LOAD, POSE, STIMULUS, UNTIL, Input
 
@@ -235,7 +235,7 @@ def test_a_run_goes_on_from_any_instant_of_a_log(tmp_path, capsys):
     assert read_info(tmp_path / "next.mcap").start_time == pytest.approx(0.1)
     assert main(["run", "bending", "--at", "0.1"]) == 2
     assert "--at: is a time of the log of --from-state" in capsys.readouterr().err
-    np.testing.assert_array_equal(state_at(tmp_path / "next.mcap", 0.16), state_at(log, 0.16))
+    np.testing.assert_array_equal(read_state(tmp_path / "next.mcap", 0.16)[0], read_state(log, 0.16)[0])
 
 
 # what is told
@@ -265,7 +265,7 @@ def test_inputs_of_a_run_act_at_their_times(tmp_path):
     inputs = [Input(0, t, STIMULUS, "heat", (v,)) for t, v in zip(times, (0.3, 0.9, math.nan), strict=True)]
     simulator = Simulator(load_scene(pushed()))
     simulator.run(0.1, observers=[McapRecorder(log)], inputs=inputs)
-    found = [told for told in inputs_after(log, state_at(log, 0.0)) if told.kind == STIMULUS]
+    found = [told for told in inputs_after(log, read_state(log, 0.0)[0]) if told.kind == STIMULUS]
     assert [told.time for told in found] == list(times)
     assert verify(log).passed
 
