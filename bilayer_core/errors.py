@@ -22,6 +22,12 @@ class InputError(BilayerError):
     """Another input is not acceptable: a path, a command-line value, a stimulus, a saved state."""
 
 
+class UnknownName(InputError, KeyError):
+    """There is nothing of this name; the message has the nearest names. As a KeyError it is what mappings raise."""
+
+    __str__ = Exception.__str__  # a KeyError shows its message as a literal
+
+
 class OutputError(BilayerError):
     """An output that could be begun could not be written: the disk is full, or fails."""
 

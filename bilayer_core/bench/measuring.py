@@ -74,7 +74,7 @@ def _run(problem: Problem, configuration: Configuration, longest: float, watched
     track, load = Track(simulator), os.getloadavg()[0]
     look, limit = (track.look, lambda: simulator.cpu_time > longest) if watched else (None, None)
     for end in sorted({*problem.measure.stops, problem.duration}):
-        result = simulator.run(end - simulator.time, stop=limit, each_step=look)
+        result = simulator.run(end - simulator.time, interrupted=limit, each_step=look)
         if result.termination is Termination.INTERRUPTED:
             return Run(f"ended after {longest:g} s of CPU at t = {simulator.time:.3g} s", None, {})
     statistics = simulator.statistics

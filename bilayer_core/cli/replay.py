@@ -162,7 +162,7 @@ def _go_on(
     compile_kernels(quiet)
     begin = simulator.time
     with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
-        simulator.run(duration, observers=observers, stop=interrupt.grant, progress=show, inputs=inputs)
+        simulator.run(duration, observers=observers, interrupted=interrupt.grant, progress=show, inputs=inputs)
     if not quiet:
         for line in summary_lines({**simulator.summary(), "duration": duration}, set()):
             click.echo(line)

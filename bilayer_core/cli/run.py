@@ -190,7 +190,7 @@ def _simulate(
     try:
         with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
             look = judge.look if judge is not None else None
-            simulator.run(duration, observers=observers, stop=interrupt.grant, progress=show, each_step=look)
+            simulator.run(duration, observers=observers, interrupted=interrupt.grant, progress=show, each_step=look)
     except (SimulationError, OutputError) as failure:
         return failure
     return None

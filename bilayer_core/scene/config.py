@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
-from bilayer_core.scene.faults import Fault, refuse, refuse_all
+from bilayer_core.scene.faults import Fault, refuse, refuse_all, shortened
 from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import Direction, Name, Part
@@ -280,6 +280,13 @@ class SceneConfig(Part):
     """Model, time step and accuracy."""
     output: Output = Output()
     """What logs and topics hold how often."""
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.rods)} rods, {len(self.bodies)} bodies, {len(self.obstacles)} obstacles"
+        channels = ", ".join(self.stimuli) or "none"
+        return f"SceneConfig({self.name}: {counts}, {self.duration:g} s; channels: {shortened(channels)})"
+
+    __str__ = __repr__
 
     @model_validator(mode="after")
     def _check(self) -> SceneConfig:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,13 @@ from bilayer_core.scene.bundled import bundled_scene
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.faults import shortened, tell
 from bilayer_core.scene.limits import LARGEST_FILE, check_content, read_text
-from bilayer_core.scene.overrides import apply_override
+from bilayer_core.scene.overrides import Overrides, read_overrides
 from bilayer_core.scene.text import read_yaml, write_yaml
 
 SUFFIXES = (".yaml", ".yml")
 
 
-def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] = ()) -> SceneConfig:
+def load_scene(scene: str | Path | Mapping[str, Any], overrides: Overrides = ()) -> SceneConfig:
     """Load and validate a scene.
 
     Parameters
@@ -27,8 +27,9 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Sequence[str] =
     scene : str, Path or mapping
         Path of a YAML file, name of a bundled scene, or the content of a scene. Files that a scene names are relative
         to its own file, for a mapping to the working directory.
-    overrides : sequence of str
-        Values to change, ``PATH=VALUE`` each, such as ``rods.arm.stations=100``.
+    overrides : sequence of str, or mapping
+        Values to change: ``["rods.arm.stations=100"]`` or ``{"rods.arm.stations": 100}``. A text may have a unit, a
+        number is in SI units.
 
     Returns
     -------
@@ -57,7 +58,7 @@ def read_scene_file(path: Path) -> str:
         raise SceneError(f"{str(path)!r}: {error}" if "\0" in str(path) else f"{path}: {error}") from None
 
 
-def parse_scene(text: str, source: str, overrides: Sequence[str] = (), directory: Path = Path()) -> SceneConfig:
+def parse_scene(text: str, source: str, overrides: Overrides = (), directory: Path = Path()) -> SceneConfig:
     """Validate the text of a scene; `source` begins each line of an error, and files that the scene names are
     relative to `directory`. Otherwise as `load_scene`.
     """
@@ -81,7 +82,7 @@ def find_scene(scene: str | Path) -> Path:
     return bundled_scene(scene)
 
 
-def _validated(data: Any, source: str, overrides: Sequence[str], directory: Path) -> SceneConfig:
+def _validated(data: Any, source: str, overrides: Overrides, directory: Path) -> SceneConfig:
     if data is None:
         raise SceneError(f"{source}: is empty; `bilayer new FILE` writes a scene to start from")
     if not isinstance(data, dict):
@@ -92,11 +93,12 @@ def _validated(data: Any, source: str, overrides: Sequence[str], directory: Path
     config = _validate(data, source, directory)
     if not overrides:
         return config
-    data = _content(config)
-    for override in overrides:
-        apply_override(data, override)
+    data, changes = _content(config), read_overrides(overrides)
+    for change in changes:
+        change.apply(data)
     check_content(data, source)
-    return _validate(data, f"{source} with {shortened(' '.join(overrides))}", directory)
+    changed = shortened(" ".join(change.text for change in changes))
+    return _validate(data, f"{source} with {changed}", directory)
 
 
 def _validate(data: dict[str, Any], source: str, directory: Path) -> SceneConfig:

@@ -1,43 +1,90 @@
-"""Changes to single values of a scene, as ``--set PATH=VALUE`` gives them."""
+"""Changes to single values of a scene, as ``--set PATH=VALUE`` and programs give them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from bilayer_core.errors import SceneError
 from bilayer_core.scene.faults import listed, shortened, suggestion
 from bilayer_core.scene.text import read_yaml
 
+Overrides = Sequence[str] | Mapping[str, Any]
+"""``PATH=VALUE`` texts, or values by their paths."""
 
-def apply_override(data: dict, text: str) -> None:
-    """Change one value of a complete scene, in place.
 
-    Parameters
+@dataclass(frozen=True)
+class Override:
+    """A change of one value of a scene.
+
+    Attributes
     ----------
-    data : dict
-        Content of the scene, values that the file leaves out included.
+    keys : tuple of str
+        To the value; items of a list are addressed by their name or their index.
+    value : object
+        As YAML has it.
     text : str
-        ``PATH=VALUE``, for example ``rods.arm.stations=100`` or ``gravity.2=-9.81``; items of a list are addressed by
-        their name or their index, and VALUE is YAML.
+        What the user gave, for messages.
+    """
+
+    keys: tuple[str, ...]
+    value: Any
+    text: str
+
+    @property
+    def origin(self) -> str:
+        """What begins a message about it."""
+        return f"override {shortened(self.text)}"
+
+    def apply(self, data: dict) -> None:
+        """Change the value in a complete scene, what its file leaves out included, in place.
+
+        Raises
+        ------
+        SceneError
+            If the path does not exist; says what there is instead.
+        """
+        here: Any = data
+        for depth, key in enumerate(self.keys):
+            place = _place(here, key)
+            if place is None:
+                raise SceneError(f"{self.origin}: {_absent(here, key, '.'.join(self.keys[:depth]))}")
+            if depth == len(self.keys) - 1:
+                here[place] = self.value
+            else:
+                here = here[place]
+
+
+def read_overrides(overrides: Overrides) -> list[Override]:
+    """Changes as users give them: ``PATH=VALUE`` texts, whose values are YAML, such as ``rods.arm.stations=100`` or
+    ``gravity.2=-9.81``, or a mapping of paths to values.
 
     Raises
     ------
     SceneError
-        If the path does not exist; says what there is instead.
+        If one is none.
     """
-    path, equals, value = text.partition("=")
-    keys, origin = path.strip().split("."), f"override {shortened(text)}"
-    if not equals or not all(keys):
-        raise SceneError(f"{origin}: must be PATH=VALUE, such as rods.arm.stations=100")
-    here: Any = data
-    for depth, key in enumerate(keys):
-        place = _place(here, key)
-        if place is None:
-            raise SceneError(f"{origin}: {_absent(here, key, '.'.join(keys[:depth]))}")
-        if depth == len(keys) - 1:
-            here[place] = read_yaml(value, origin)
-        else:
-            here = here[place]
+    if isinstance(overrides, Mapping):
+        return [_override(str(path), value, f"{path}={value}") for path, value in overrides.items()]
+    if isinstance(overrides, str) or not all(isinstance(text, str) for text in overrides):
+        raise SceneError('overrides: must be texts, ["PATH=VALUE", ...], or values by path, {"PATH": VALUE, ...}')
+    found = []
+    for text in overrides:
+        path, equals, value = text.partition("=")
+        if not equals:
+            raise SceneError(f"override {shortened(text)}: must be PATH=VALUE, such as rods.arm.stations=100")
+        found.append(_override(path, read_yaml(value, f"override {shortened(text)}"), text))
+    return found
+
+
+def _override(path: str, value: Any, text: str) -> Override:
+    keys = tuple(path.strip().split("."))
+    if not all(keys):
+        raise SceneError(f"override {shortened(text)}: must be PATH=VALUE, such as rods.arm.stations=100")
+    return Override(keys, value.tolist() if isinstance(value, np.generic | np.ndarray) else value, text)
 
 
 def _place(here: Any, key: str) -> str | int | None:

@@ -7,12 +7,14 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from bilayer_core.scene.faults import refuse
+from bilayer_core.scene.faults import refuse, shortened
 from bilayer_core.scene.units import (
     Length,
     Number,
 )
 
+LONGEST_REPR = 1500
+"""Characters: what a screen shows."""
 UNIT_LENGTH_TOLERANCE = 1e-14
 """A direction this near to length 1 is kept as it is, so that a dumped scene is read back bit for bit."""
 
@@ -38,3 +40,8 @@ class Part(BaseModel):
     """Unknown keys are faults, and nothing changes after validation."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __repr__(self) -> str:
+        return shortened(super().__repr__(), LONGEST_REPR)
+
+    __str__ = __repr__

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Strand:
     """One layer of one rod, or all of them: a chain of nodes joined by edges, in order of arc length.
 
@@ -43,6 +43,10 @@ class Strand:
     curvature: np.ndarray
     layers: tuple[Strand, ...] = ()
     closed: bool = False
+
+    def __repr__(self) -> str:
+        parts = f", layers {', '.join(part.layer for part in self.layers)}" if self.layers else ""
+        return f"Strand({self.name}: nodes {self.nodes.start} to {self.nodes.stop - 1}{parts})"
 
     def strain_of(self, strain: np.ndarray, curvature: np.ndarray) -> np.ndarray:
         """Axial strain in the middle of its section, which stays plane: (1 + ε − yχ)/(1 − yχ₀) − 1 at y = `offset`.
@@ -121,7 +125,7 @@ class JointInfo:
     shape: ShapeInfo
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Description:
     """What does not change during a run: names, shapes and settings.
 
@@ -164,13 +168,18 @@ class Description:
     joints: tuple[JointInfo, ...] = ()
     channel_units: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        counts = f"{len(self.strands)} strands, {self.node_count} nodes, {len(self.bodies)} bodies"
+        channels = ", ".join(self.channels) or "none"
+        return f"Description({self.scene_name}: {counts}, {len(self.obstacles)} obstacles; channels: {channels})"
+
     @property
     def layers(self) -> tuple[Strand, ...]:
         """Each layer of each rod, as it is to be drawn: strands of one layer, and the layers of the others."""
         return tuple(layer for strand in self.strands for layer in strand.layers or (strand,))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Frame:
     """One observation of a run. Arrays are copies that nobody writes to afterwards.
 
@@ -241,3 +250,7 @@ class Frame:
     substeps: int
     cpu_time: float
     state: np.ndarray
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.positions)} nodes, {len(self.body_positions)} bodies"
+        return f"Frame(t = {self.time:g} s, step {self.step}: {counts}, smallest gap {self.min_gap:.3g} m)"

@@ -61,7 +61,7 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         scene_text=scene_text,
         node_count=model.node_count + model.point_count,
         edge_count=model.edge_count,
-        strands=tuple(map(_strand, model.strands)),
+        strands=tuple(map(strand, model.strands)),
         bodies=tuple(
             BodyInfo(name, _shape_info(shape) if shape else None, bool(free < 0), index in model.attached_body)
             for index, (name, shape, free) in enumerate(
@@ -80,7 +80,8 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
     )
 
 
-def _strand(s: StrandArrays) -> Strand:
+def strand(s: StrandArrays) -> Strand:
+    """What is told of a strand."""
     return Strand(
         s.name,
         s.rod,
@@ -88,7 +89,7 @@ def _strand(s: StrandArrays) -> Strand:
         slice(s.first_node, s.first_node + s.shown),
         slice(s.first_edge, s.first_edge + s.shown - 1),
         *(part[: s.shown] for part in (s.width, s.thickness, s.offset, s.curvature)),
-        tuple(map(_strand, s.layers)),
+        tuple(map(strand, s.layers)),
         s.closed,
     )
 

@@ -67,6 +67,11 @@ class Schedule:
                 observer.start(description)
             self._show(range(len(self._observers)))
 
+    def start_over(self) -> None:
+        """Show what is now after a jump in time, and count from there."""
+        self._count = [completed(self._simulator.time, of.rate) for of in self._observers]
+        self._show(range(len(self._observers)))
+
     def next_due(self) -> float:
         """The earliest time of a step's end at which an observer is to look [s]; infinite without any."""
         due = zip(self._count, self._observers, strict=True)
@@ -79,7 +84,13 @@ class Schedule:
             self._count = done
             self._show(due)
 
-    def _show(self, which) -> None:
+    def observe_last(self) -> None:
+        """Show the present frame to those who have not seen it."""
+        missing = [i for i, seen in enumerate(self._last_seen) if seen not in (None, self._simulator.time)]
+        if missing:
+            self._show(missing)
+
+    def _show(self, which: Iterable[int]) -> None:
         frame = self._simulator.frame()
         for i in which:
             self._observers[i].observe(frame)
@@ -95,11 +106,7 @@ class Schedule:
         failure : BaseException, optional
             What ended the run; see `first_failure`.
         """
-        work: list[Callable[[], None]] = [
-            partial(self._show, [i])
-            for i, seen in enumerate(self._last_seen)
-            if seen not in (None, self._simulator.time)
-        ]
+        work: list[Callable[[], None]] = [self.observe_last]
         work += [partial(observer.close, complete, termination) for observer in self._observers]
         first_failure(work, failure)
 

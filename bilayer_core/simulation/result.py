@@ -10,6 +10,7 @@ class Termination(Enum):
     """Why a run ended; the value is the message."""
 
     COMPLETED = "completed"
+    STOPPED = "stopped"
     INTERRUPTED = "interrupted"
     FAILED = "failed"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections import deque
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -28,19 +27,22 @@ from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
 from .frame import Description, Frame
 from .inputs import LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_of_pose
-from .observers import Observer, Schedule
+from .observers import Observer, Schedule, first_failure
 from .plane_watch import PlaneWatch
 from .poses import LEAST_TIME, new_goal
 from .result import RunResult, Termination
+from .run_loop import Callbacks, advance_to
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
 from .stepper import Stepper, StepReport
 from .summary import summarise
-from .views import BodyView, ClampView, JointView, Present, body_views, clamp_views, joint_views
+from .views.body import BodyView, body_views
+from .views.clamp import ClampView, clamp_views
+from .views.joint import JointView, joint_views
+from .views.present import ByName, Present
+from .views.rod import RodView, rod_views
 
 Array = np.ndarray
-STEPS_AT_ONCE = 64
-"""That the engine makes before anyone is asked whether to go on."""
 
 
 class Simulator:
@@ -93,11 +95,19 @@ class Simulator:
         self.keeps_budget = budget
         self._ledger = EnergyLedger(self.model) if budget else None
         self._listeners: list[Callable[[Input], None]] = []
+        self._attached: list[Schedule] = []
         self._until = math.nan
         self._state = self._initial_state()
         self._compile_time: float | None = None
         self.plane_watch = PlaneWatch(self._in_dimension, scene.duration) if self.plan.dimension == 2 else None
         self._start_over()
+
+    def __repr__(self) -> str:
+        dof = self.model.node_count
+        return (
+            f"Simulator({self.scene.name} at t = {self.time:g} s: {self.plan.model} in {self.plan.dimension}-D, "
+            f"{self.plan.integrator}, {len(self.model.strands)} strands, {dof} nodes, {len(self.bodies)} bodies)"
+        )
 
     def _stepper_of(self, model: Model) -> Stepper:
         return Stepper(model, self._method, self.steps, self.scene.solver.max_newton_iterations)
@@ -168,17 +178,25 @@ class Simulator:
         return dict(zip(self.scene.stimuli, self._stepper.stimulus.tolist(), strict=True))
 
     @property
-    def bodies(self) -> dict[str, BodyView]:
+    def rods(self) -> ByName[RodView]:
+        """Every rod by name: positions, strain, curvature, directors and contact forces of its nodes, and its layers.
+
+        Copies of a pattern have names of their own, such as ``arm_0``.
+        """
+        return rod_views(self._present)
+
+    @property
+    def bodies(self) -> ByName[BodyView]:
         """Every body by name: its pose, and the force and moment of contact and of the rods that it holds."""
         return body_views(self._present)
 
     @property
-    def clamps(self) -> dict[str, ClampView]:
+    def clamps(self) -> ByName[ClampView]:
         """Every end of a rod that a body holds, by ``ROD.start`` or ``ROD.end``: the force and moment that it bears."""
         return clamp_views(self._present)
 
     @property
-    def joints(self) -> dict[str, JointView]:
+    def joints(self) -> ByName[JointView]:
         """Every joint between bodies by name: the force and moment that it bears, and how far it gives way."""
         return joint_views(self._present)
 
@@ -403,6 +421,7 @@ class Simulator:
             self._note(UNTIL, "", until)
         if self.plane_watch is not None:
             most = min(most, self.plane_watch.steps_left)
+        due = min([due, *(attached.next_due() for attached in self._attached)])
         begin, wall = clock.thread_time(), clock.perf_counter()
         try:
             found = self._stepper.integrate(state, most, until, due)
@@ -413,6 +432,8 @@ class Simulator:
         self.cpu_time += clock.thread_time() - begin
         self.wall_time += clock.perf_counter() - wall
         self._look_out(found.done)
+        for attached in self._attached:
+            attached.observe_due()
         return found
 
     def _look_out(self, steps: int, last: bool = False) -> None:
@@ -433,88 +454,124 @@ class Simulator:
         self,
         duration: float | None = None,
         *,
-        observers: Sequence[Observer] = (),
+        until: float | None = None,
         stop: Callable[[], bool] | None = None,
+        observers: Sequence[Observer] = (),
+        inputs: Sequence[Input] = (),
         progress: Callable[[float], None] | None = None,
         each_step: Callable[[float], None] | None = None,
-        inputs: Sequence[Input] = (),
+        interrupted: Callable[[], bool] | None = None,
     ) -> RunResult:
-        """Advance by `duration` [s] (default: to the end of the scene), showing frames to observers.
+        """Advance by a duration or to a time (default: to the end of the scene), showing frames to observers.
 
         Fixed steps end within half a step of it. Adaptive ones end exactly there, or at the output time that differs
         from it by rounding alone, and at all of the scene's output times (`output.rate`, counted from time 0), whether
         or not anybody observes: the run is the same bit for bit whatever watches it. So is a run in parts that meet at
-        output times; at another time the end of a part is one more end
-        of a step.
+        output times; at another time the end of a part is one more end of a step.
 
         Parameters
         ----------
         duration : float, optional
+            Simulated time to advance by [s].
+        until : float, optional
+            Simulated time to advance to [s], instead.
+        stop : callable, optional
+            Asked after each step; true ends the run, as ``stopped``. Steps are then made one by one, which takes a
+            little longer and changes none.
         observers : sequence of Observer
             Each sees the first frame, the last, and at its rate between that of the first step which ends at or after
-            each due time; all are closed whatever happens.
-        stop : callable, optional
-            Asked every few steps; true ends the run as interrupted.
-        progress : callable, optional
-            Called every few steps with the simulated time [s].
-        each_step : callable, optional
-            Called with the simulated time [s] after each step, which is then made alone: that takes a little longer.
+            each due time; all are closed whatever happens. For those that look at more than one run see `attach`.
         inputs : sequence of Input
             What acts from outside (`simulation.inputs`), each from its time on: adaptive steps end there, of fixed ones
             it acts from the first that begins then or later.
+        progress : callable, optional
+            Called every few steps with the simulated time [s].
+        each_step : callable, optional
+            Called with the simulated time [s] after each step, made one by one.
+        interrupted : callable, optional
+            Asked every few steps; true ends the run, as ``interrupted``.
+
+        Returns
+        -------
+        RunResult
 
         Raises
         ------
+        InputError
+            If the duration or the time is none to which the run can advance.
         SimulationError
-            If a step cannot be made, or a log not written. Observers have then seen the last accepted frame and are
-            closed; what goes wrong with that is a note to the error.
+            If a step cannot be made.
+        OutputError
+            If a log cannot be written. Observers have then seen the last accepted frame and are closed; what goes wrong
+            with that is a note to the error.
         """
-        left = self.scene.duration - self.time if duration is None else duration
-        if not (math.isfinite(left) and left >= 0.0):
-            raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
+        left = self._time_left(duration, until)
         steps, fixed = int(round(left / self.dt)), not self.steps.adaptive
         if fixed and left > 0.0 and steps == 0:
             raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
         self.compile()
         begin, cpu, wall, before = self.time, self.cpu_time, clock.perf_counter(), self._state.step[0]
-        end = begin + steps * self.dt if fixed else self._stepper.end_near(begin + left)
+        end = begin + steps * self.dt if fixed else self._stepper.end_near(begin + left if until is None else until)
         last = end - 0.5 * self.dt if fixed else end
-        termination = Termination.INTERRUPTED
-        most = STEPS_AT_ONCE if each_step is None else 1
-        schedule, waiting = Schedule(observers, self), deque(sorted(inputs, key=lambda of: of.time))
+        callbacks = Callbacks(stop, interrupted, progress, each_step)
+        schedule = Schedule(observers, self)
         ends_of_listening = [self.listen(of.note) for of in observers if hasattr(of, "note")]
         try:
             schedule.start()
-            while self.time < last:
-                while waiting and waiting[0].time <= self.time:
-                    waiting.popleft().apply(self)
-                stop_at = min(end, waiting[0].time) if waiting else end
-                self._integrate(most, stop_at, schedule.next_due())
-                schedule.observe_due()
-                if each_step is not None:
-                    each_step(self.time)
-                if progress is not None:
-                    progress(self.time)
-                if stop is not None and self.time < last and stop():
-                    break
-            else:
-                termination = Termination.COMPLETED
+            termination = advance_to(self, end, last, self._integrate, schedule, inputs, callbacks)
+            if termination is Termination.COMPLETED:
                 self._look_out(0, last=True)
+            for attached in self._attached:
+                attached.observe_last()
         except BaseException as failure:
-            if isinstance(failure, Exception):
-                termination = Termination.FAILED
-            self.termination = termination.value
-            schedule.finish(False, termination.value, failure)
+            of_program = isinstance(failure, Exception)
+            self.termination = (Termination.FAILED if of_program else Termination.INTERRUPTED).value
+            first_failure([attached.observe_last for attached in self._attached], failure)
+            schedule.finish(False, self.termination, failure)
             raise
         finally:
             for stop_listening in ends_of_listening:
                 stop_listening()
         self.termination = termination.value
-        schedule.finish(termination is Termination.COMPLETED, termination.value)
+        schedule.finish(termination is not Termination.INTERRUPTED, termination.value)
         done = int(self._state.step[0] - before)
         return RunResult(
             termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
         )
+
+    def _time_left(self, duration: float | None, until: float | None) -> float:
+        """Simulated time of a run [s]."""
+        if duration is not None and until is not None:
+            raise InputError("run: give a duration or a time `until`, not both")
+        if until is not None:
+            if not (math.isfinite(until) and until >= self.time):
+                allowed = f"it must be a number of seconds from the present time, {self.time:g}, up"
+                raise InputError(f"until: {until} is not allowed; {allowed}")
+            return until - self.time
+        left = self.scene.duration - self.time if duration is None else duration
+        if duration is None and left < 0.0:
+            at = f"the scene ends at {self.scene.duration:g} s, the present time is {self.time:g} s"
+            raise InputError(f"duration: is missing; {at}; say how long to go on")
+        if not (math.isfinite(left) and left >= 0.0):
+            raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
+        return left
+
+    def attach(self, observer: Observer) -> Callable[[], None]:
+        """Show frames to an observer from now on, at its rate, whoever makes steps; returns what ends that.
+
+        It also sees the last frame of each `run`, and the first after `load_state` and `reset`. It is closed when it is
+        detached.
+        """
+        schedule = Schedule([observer], self)
+        schedule.start()
+        self._attached.append(schedule)
+
+        def detach() -> None:
+            if schedule in self._attached:
+                self._attached.remove(schedule)
+                schedule.finish(True, self.termination)
+
+        return detach
 
     def solve_static(self, tolerance: float | None = None) -> StaticReport:
         """Go to an equilibrium under the present stimuli and loads, not in time; see `simulation.equilibrium`.
@@ -573,6 +630,8 @@ class Simulator:
         self._start_over()
         self.statistics.take_shape(self._stepper, self._state)
         self._begin_budget()
+        for attached in self._attached:
+            attached.start_over()
 
     def reset(self) -> None:
         """Go back to the start of the scene; stimuli, loads and poses set from outside are forgotten."""

@@ -14,7 +14,8 @@ from ..model.validity import LARGE_STRAIN
 from . import observation as observe
 from .plane_watch import PlaneWatch
 from .result import Termination
-from .views import BodyView, JointView
+from .views.body import BodyView
+from .views.joint import JointView
 
 LARGE_NUMERICAL = 0.1
 """Part of the largest energy of a run that its steps may make or lose without a warning."""

@@ -83,7 +83,7 @@ class Trial:
             if each_step is not None:
                 each_step(time)
 
-        self.simulator.run(duration, each_step=look if self._judged else None, stop=self._is_over)
+        self.simulator.run(duration, each_step=look if self._judged else None, interrupted=self._is_over)
         self.cut = self.simulator.termination == Termination.INTERRUPTED.value
 
     def _is_over(self) -> bool:

@@ -112,7 +112,8 @@ def test_a_run_that_goes_on_from_a_state_does_too(tmp_path):
 
 def test_a_run_that_was_interrupted_is_made_again_as_far_as_it_went(tmp_path):
     simulator, asked = Simulator(load_scene(pushed())), []
-    simulator.run(0.2, observers=[McapRecorder(tmp_path / "run.mcap")], stop=lambda: asked.append(0) or len(asked) > 3)
+    recorder = McapRecorder(tmp_path / "run.mcap")
+    simulator.run(0.2, observers=[recorder], interrupted=lambda: asked.append(0) or len(asked) > 3)
     assert simulator.time < 0.2
     assert verify(tmp_path / "run.mcap").passed
 

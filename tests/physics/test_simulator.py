@@ -133,7 +133,7 @@ def test_whoever_asks_for_each_step_sees_every_one_and_changes_none(simulator):
 
 def test_an_interrupted_run_tells_its_observers(simulator):
     recorder = Recorder(100.0)
-    result = simulator.run(0.05, observers=[recorder], stop=lambda: simulator.time > 0.0225)
+    result = simulator.run(0.05, observers=[recorder], interrupted=lambda: simulator.time > 0.0225)
     assert result.termination is Termination.INTERRUPTED
     assert (recorder.closed, recorder.termination) == (False, "interrupted")
     assert recorder.frames[-1].time == pytest.approx(0.03)  # asked whenever someone has looked

@@ -1,0 +1,1 @@
+"""Rods, bodies, clamps and joints by name, as they are at present."""

@@ -1,0 +1,50 @@
+"""What hinges, rails and joints have done along or about their axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ...forces.mechanisms import REMEMBERED
+from .present import Present
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What a hinge, a rail or a joint has done along or about its axis, where something resists that.
+
+    Attributes
+    ----------
+    value : float
+        Angle since the start, whole turns too [rad], or way along the axis [m].
+    exerted : float
+        Moment about the axis [N m], or force along it [N], of spring, damping, friction and limits together, on the
+        guided body or the second body of the joint.
+    beyond : float
+        Largest angle or way beyond a limit at the end of any step [rad, m].
+    """
+
+    value: float
+    exerted: float
+    beyond: float
+
+
+def slots_of_owner(present: Present, owner: str, guides: bool) -> dict[bool, int]:
+    """Slots of the mechanisms of a joint or of a guided body, by whether they slide."""
+    return {
+        mechanism.slides: index
+        for index, mechanism in enumerate(present.model.mechanisms)
+        if mechanism.owner == owner and mechanism.is_guide == guides
+    }
+
+
+def motion_of(present: Present, owner: str, slides: bool, guides: bool) -> Motion | None:
+    index = slots_of_owner(present, owner, guides).get(slides)
+    if index is None:
+        return None
+    mechanisms = present.evaluated().engine.mechanisms
+    first, gradient, axis = mechanisms.body[2 * index], -mechanisms.gradient[2 * index + 1], mechanisms.axis[index]
+    if first < len(present.state.body_rotation):  # not the world
+        axis = present.state.body_rotation[first] @ axis
+    exerted = (gradient[:3] if slides else gradient[3:]) @ axis
+    beyond = present.state.memory[mechanisms.memory[0] + REMEMBERED * index + 1]
+    return Motion(float(mechanisms.value[index]), float(exerted), float(beyond))

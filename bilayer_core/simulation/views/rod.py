@@ -1,0 +1,145 @@
+"""Rods and their layers at present."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...model.model import Model
+from ...model.strand_arrays import StrandArrays
+from .. import observation as observe
+from ..frame import Strand
+from .present import ByName, Present
+
+Array = np.ndarray
+
+
+class RodView:
+    """A rod as it is at present; every attribute is a copy.
+
+    A rod of the laminate is one curve. Where each layer is a rod of its own (model ``two_rod``), arrays hold their
+    nodes layer by layer, as those of the simulator do; what does not depend on the model is in `layers`.
+
+    Attributes
+    ----------
+    name : str
+    nodes, edges : Array
+        Indices in the arrays of the simulator and of frames, shape (nodes,), (edges,).
+    arc_length : Array
+        Of each node from the start of its curve, without load and eigenstrain [m], shape (nodes,).
+    positions, velocities : Array
+        [m], [m/s], shape (nodes, 3).
+    directors : Array
+        Director m1 of each edge, through the thickness from bottom to top, unit, shape (edges, 3).
+    strain : Array
+        Axial strain at each node, eigenstrain included, shape (nodes,).
+    curvature : Array
+        Curvature χ through the thickness at each node [1/m], shape (nodes,).
+    contact_forces : Array
+        Barrier and friction force on each node [N], shape (nodes, 3).
+    layers : ByName
+        Each `LayerView` by name.
+    """
+
+    def __init__(self, present: Present, name: str, strands: list[StrandArrays]):
+        self._present, self.name, self._strands = present, name, strands
+
+    def __repr__(self) -> str:
+        layers, tip = ", ".join(self.layers), self.positions[-1].tolist()
+        return f"rod {self.name} (layers {layers}): {len(self.nodes)} nodes, the last at {tip}"
+
+    @property
+    def nodes(self) -> Array:
+        return np.concatenate([np.arange(s.first_node, s.first_node + s.shown) for s in self._strands])
+
+    @property
+    def edges(self) -> Array:
+        return np.concatenate([np.arange(s.first_edge, s.first_edge + s.shown - 1) for s in self._strands])
+
+    @property
+    def arc_length(self) -> Array:
+        rest = self._present.model.rest_length
+        lengths = [rest[s.first_edge : s.first_edge + s.shown - 1] for s in self._strands]
+        return np.concatenate([np.concatenate([[0.0], np.cumsum(of_strand)]) for of_strand in lengths])
+
+    @property
+    def positions(self) -> Array:
+        return self._present.state.position[self.nodes]
+
+    @property
+    def velocities(self) -> Array:
+        return self._present.state.velocity[self.nodes]
+
+    @property
+    def directors(self) -> Array:
+        return self._present.state.director1[self.edges]
+
+    @property
+    def strain(self) -> Array:
+        return observe.node_strain(self._present.model, self._present.evaluated())[self.nodes]
+
+    @property
+    def curvature(self) -> Array:
+        return observe.node_curvature(self._present.model, self._present.evaluated())[self.nodes]
+
+    @property
+    def contact_forces(self) -> Array:
+        return observe.contact_forces(self._present.evaluated())[self.nodes]
+
+    @property
+    def layers(self) -> ByName[LayerView]:
+        described = [layer for s in self._strands for of in [observe.strand(s)] for layer in of.layers or (of,)]
+        views = {layer.layer: LayerView(self._present, layer) for layer in described}
+        return ByName(f"layers of {self.name}", views)
+
+
+class LayerView:
+    """A layer of a rod as it is at present, in both models alike; every attribute is a copy.
+
+    Attributes
+    ----------
+    name : str
+        ``ROD/LAYER``.
+    strain : Array
+        Axial strain in the middle of the layer at each of its nodes, eigenstrain included, shape (nodes,).
+    curvature : Array
+        Curvature χ through the thickness of the curve that carries it [1/m], shape (nodes,).
+    width, thickness : Array
+        Of its section [m], shape (nodes,).
+    """
+
+    def __init__(self, present: Present, layer: Strand):
+        self._present, self._layer, self.name = present, layer, layer.name
+
+    def __repr__(self) -> str:
+        strain = self.strain
+        return f"layer {self.name}: {len(strain)} nodes, strain {strain.min():.4g} to {strain.max():.4g}"
+
+    @property
+    def strain(self) -> Array:
+        nodes, stepper = self._layer.nodes, self._present.evaluated()
+        strain = observe.node_strain(self._present.model, stepper)[nodes]
+        return self._layer.strain_of(strain, observe.node_curvature(self._present.model, stepper)[nodes])
+
+    @property
+    def curvature(self) -> Array:
+        return observe.node_curvature(self._present.model, self._present.evaluated())[self._layer.nodes].copy()
+
+    @property
+    def width(self) -> Array:
+        return self._layer.width.copy()
+
+    @property
+    def thickness(self) -> Array:
+        return self._layer.thickness.copy()
+
+
+def rod_views(present: Present) -> ByName[RodView]:
+    """Every rod by name; copies of a pattern are rods of their own."""
+    return ByName("rods", {name: RodView(present, name, own) for name, own in _strands_of(present.model).items()})
+
+
+def _strands_of(model: Model) -> dict[str, list[StrandArrays]]:
+    strands: dict[str, list[StrandArrays]] = {}
+    for s in model.strands:
+        strands.setdefault(s.rod, []).append(s)
+    return strands
