@@ -31,8 +31,9 @@ demo: $(STAMP)  ## Run the gripper: simulation node, controller, log, picture.
 test: $(STAMP)  ## Run every test, the slow ones as well.
 	$(BIN)/python -m pytest -m "" -n $(JOBS) --dist worksteal
 
-lint: $(STAMP)  ## Check the code's style.
+lint: $(STAMP)  ## Check the code's style, and the types of what programs call.
 	$(BIN)/ruff check .
+	$(BIN)/mypy
 
 install: $(STAMP) kernels  ## Install into .venv, and compile the kernels.
 

@@ -64,7 +64,11 @@ setup(
     maintainer_email="maintainers@bilayer-sim.example",
     python_requires=">=3.11",
     packages=find_packages(include=["bilayer_core*", "bilayer_sim_ros*"]),
-    package_data={"bilayer_core.bench": ["references.json"], "bilayer_core.stress": ["mutants.toml"]},
+    package_data={
+        "bilayer_core": ["py.typed"],
+        "bilayer_sim_ros": ["py.typed"],
+        "bilayer_core.bench": ["references.json"], "bilayer_core.stress": ["mutants.toml"],
+    },
     data_files=data_files,
     zip_safe=False,
     install_requires=[
@@ -92,6 +96,7 @@ setup(
             "jsonschema>=4.20",
             "matplotlib>=3.8",
             "mcap-ros2-support>=0.5",
+            "mypy>=1.15",
             "pandas>=2.2",
             "pebble>=5.0",
             "pillow>=10.1",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 
 class BilayerError(Exception):
@@ -86,6 +87,6 @@ class SimulationError(BilayerError):
         self.time = time
         self.remedy = remedy
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         """For its way between processes."""
         return type(self), (self.reason, self.time, self.remedy)

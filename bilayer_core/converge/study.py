@@ -101,7 +101,7 @@ def _with_steps(scene: SceneConfig, part: float) -> tuple[str, ...]:
     method = INTEGRATORS[make_plan(scene).integrator]
     steps = choose_steps(scene, method)
     first = f"solver.dt={part * steps.dt!r}"
-    if not steps.adaptive:
+    if steps.tolerance is None:
         return (first,)
     tolerance = min(part ** (method.order + 1) * steps.tolerance, LARGEST_TOLERANCE)
     return first, f"solver.tolerance={tolerance!r}", f"solver.max_step={part * steps.longest!r}"
@@ -234,9 +234,8 @@ def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run], re
     values = {run: figures[name] for run, figures in found.items() if name in figures}
 
     def judge(coarser: str, finer: str, size: Callable[[Run], float]) -> Estimate:
-        three = (coarser, BASE, finer)
-        sizes = tuple(size(runs[run]) if run in values else None for run in three)
-        return estimate(sizes, tuple(values.get(run) for run in three))
+        sizes = size(runs[coarser]) if coarser in values else None, size(runs[BASE]), size(runs[finer])
+        return estimate(sizes, (values.get(coarser), values[BASE], values[finer]))
 
     over_steps = judge(COARSER_STEP, FINER_STEP, lambda run: run.step)
     return Row(

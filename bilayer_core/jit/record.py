@@ -34,12 +34,23 @@ from numba.extending import intrinsic, models, register_model
 from .unofficial import add_attributes, add_field
 
 WORD = 8
-Vector, Matrix, Stack, Tensor, DeepTensor = (types.Array(types.float64, n, "C") for n in range(1, 6))
-"""Arrays of floats with one to five indices."""
-Indices, IndexTable = (types.Array(types.int64, n, "C") for n in (1, 2))
-"""Arrays of integers."""
-Flags, FlagTable = (types.Array(types.boolean, n, "C") for n in (1, 2))
-"""Arrays of booleans."""
+if typing.TYPE_CHECKING:  # what programs that are not compiled get
+    Vector = np.ndarray
+    Matrix = np.ndarray
+    Stack = np.ndarray
+    Tensor = np.ndarray
+    DeepTensor = np.ndarray
+    Indices = np.ndarray
+    IndexTable = np.ndarray
+    Flags = np.ndarray
+    FlagTable = np.ndarray
+else:
+    Vector, Matrix, Stack, Tensor, DeepTensor = (types.Array(types.float64, n, "C") for n in range(1, 6))
+    """Arrays of floats with one to five indices."""
+    Indices, IndexTable = (types.Array(types.int64, n, "C") for n in (1, 2))
+    """Arrays of integers."""
+    Flags, FlagTable = (types.Array(types.boolean, n, "C") for n in (1, 2))
+    """Arrays of booleans."""
 NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean}
 DTYPES = {types.float64: np.dtype(np.float64), types.int64: np.dtype(np.int64), types.boolean: np.dtype(np.bool_)}
 _WORD_TYPE, _BYTES = ir.IntType(8 * WORD), ir.IntType(8).as_pointer()

@@ -39,7 +39,7 @@ class Override:
         """What begins a message about it."""
         return f"override {shortened(self.text)}"
 
-    def apply(self, data: dict) -> None:
+    def apply(self, data: dict[str, Any]) -> None:
         """Change the value in a complete scene, what its file leaves out included, in place.
 
         Raises

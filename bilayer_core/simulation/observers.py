@@ -25,8 +25,11 @@ class Observed(Protocol):
     description : Description
     """
 
-    time: float
-    description: Description
+    @property
+    def time(self) -> float: ...
+
+    @property
+    def description(self) -> Description: ...
 
     def frame(self) -> Frame:
         """A snapshot."""
@@ -129,5 +132,5 @@ def first_failure(work: Iterable[Callable[[], None]], failure: BaseException | N
                 failure = error
             elif str(error) != str(failure):
                 failure.add_note(str(error))
-    if failure is not before:
+    if failure is not None and failure is not before:
         raise failure

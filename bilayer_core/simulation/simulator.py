@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -74,13 +75,13 @@ class Simulator:
         self,
         scene: SceneConfig,
         *,
-        model="auto",
-        dimension="auto",
-        integrator="auto",
+        model: str = "auto",
+        dimension: str | int = "auto",
+        integrator: str = "auto",
         dt: float | None = None,
         tolerance: float | None = None,
         budget: bool = False,
-    ):
+    ) -> None:
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         method = INTEGRATORS[self.plan.integrator]
         self.steps = choose_steps(scene, method, dt, tolerance)
@@ -226,7 +227,7 @@ class Simulator:
         """What steps supplied, lost and made of energy; slots in `engine.energy_account`."""
         return self._state.account.copy()
 
-    def budget(self) -> dict:
+    def budget(self) -> dict[str, Any]:
         """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
 
         Raises
@@ -396,10 +397,10 @@ class Simulator:
             If it cannot be made; the state is that of the last step, or of the last part of it.
         """
         self.compile()
-        begin, before, found = self.time, self._state.step[0], None
+        begin, before = self.time, self._state.step[0]
+        found = self._integrate_once(until)
         while self._state.step[0] == before:
-            more = self._integrate_once(until)
-            found = more if found is None else found.followed_by(more)
+            found = found.followed_by(self._integrate_once(until))
         return StepReport.of(found, self.time, self.time - begin)
 
     def advance(self, until: float = math.inf) -> StepReport:
@@ -448,7 +449,7 @@ class Simulator:
             self.cpu_time += clock.thread_time() - begin
             self.wall_time += clock.perf_counter() - wall
         else:
-            self._compile_time += clock.thread_time() - begin
+            self._compile_time = (self._compile_time or 0.0) + clock.thread_time() - begin
 
     def run(
         self,
@@ -638,7 +639,7 @@ class Simulator:
         self._note(RESET, "")
         self.load_state(self._initial_state().flat())
 
-    def summary(self) -> dict:
+    def summary(self) -> dict[str, Any]:
         """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for
         ``--summary``.
         """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...kinematics.rotation import quaternion_from_matrix
 from .. import observation as observe
 from .motion import Motion, motion_of
 from .present import ByName, Present
@@ -43,7 +44,7 @@ class BodyView:
 
     @property
     def quaternion(self) -> Array:
-        return observe.quaternion_from_matrix(self._present.state.body_rotation[self._index])
+        return quaternion_from_matrix(self._present.state.body_rotation[self._index])
 
     @property
     def velocity(self) -> Array:
