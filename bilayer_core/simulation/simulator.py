@@ -566,10 +566,13 @@ class Simulator:
         schedule = Schedule([observer], self)
         schedule.start()
         self._attached.append(schedule)
+        stop_listening = self.listen(observer.note) if hasattr(observer, "note") else None
 
         def detach() -> None:
             if schedule in self._attached:
                 self._attached.remove(schedule)
+                if stop_listening is not None:
+                    stop_listening()
                 schedule.finish(True, self.termination)
 
         return detach

@@ -33,6 +33,7 @@ ALLOWED = {
     "validate": NUMERICS | {"beam2d", "record"},
     "bench": NUMERICS | {"converge", "record", "validate"},
     "stress": NUMERICS | {"record", "converge", "validate", "bench"},
+    "testing": NUMERICS | {"record", "stress"},
     "cli": NUMERICS | {"record", "view", "converge", "validate", "bench", "stress"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
