@@ -13,10 +13,14 @@ from bilayer_core.cli.options import Duration, Verb
 @click.command(cls=Verb)
 @click.argument("file", metavar="FILE.mcap")
 @click.option("--json", "as_json", is_flag=True, help="As JSON.")
-def info(file: str, as_json: bool) -> None:
+@click.option("--quantities", is_flag=True, help="List the quantities that export, plot and read_log know, with units.")
+def info(file: str, as_json: bool, quantities: bool) -> None:
     """Say what a log holds."""
     from bilayer_core.record.log_reader import read_info
 
+    if quantities:
+        _list_quantities(file, as_json)
+        return
     found = read_info(file)
     if as_json:
         click.echo(json.dumps(asdict(found), indent=2, ensure_ascii=False))
@@ -32,8 +36,24 @@ def info(file: str, as_json: bool) -> None:
     }
     for name, text in rows.items():
         click.echo(f"{name:10}{text}")
+    for lack in found.lacks:
+        click.echo(f"{'lacks':10}{lack}")
     for topic, content in found.topics.items():
         click.echo(f"  {topic:36}{content['type']:40}{content['count']} messages")
+
+
+def _list_quantities(file: str, as_json: bool) -> None:
+    from bilayer_core.record.log_source import LogSource
+
+    entries = LogSource(file).entries.values()
+    if as_json:
+        told = [{"name": of.name, "unit": of.unit, "axes": of.axes, "labels": of.labels} for of in entries]
+        click.echo(json.dumps(told, indent=2, ensure_ascii=False))
+        return
+    for entry in entries:
+        unit = f"[{entry.unit}]" if entry.unit else ""
+        of_nodes = "each node: " if entry.of_shape and entry.labels else "each node" if entry.of_shape else ""
+        click.echo(f"  {entry.name:44}{unit:12}{of_nodes}{' '.join(entry.labels)}".rstrip())
 
 
 @click.command(cls=Verb)

@@ -14,10 +14,12 @@ from bilayer_core.cli.bench import bench
 from bilayer_core.cli.check import check
 from bilayer_core.cli.compare import compare
 from bilayer_core.cli.converge import converge
+from bilayer_core.cli.export import export
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.new import new
 from bilayer_core.cli.options import Settings, VerbGroup
 from bilayer_core.cli.render import render
+from bilayer_core.cli.repair import repair
 from bilayer_core.cli.replay import replay
 from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import scenes, schema
@@ -53,7 +55,10 @@ def program() -> None:
     """
 
 
-for verb in (scenes, new, schema, check, run, converge, validate, bench, stress, info, replay, compare, view, render):
+SIMULATES = (scenes, new, schema, check, run, converge, validate, bench, stress)
+OF_LOGS = (info, repair, export, compare, replay, view, render)
+
+for verb in (*SIMULATES, *OF_LOGS):
     program.add_command(verb)
 
 

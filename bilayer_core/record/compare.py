@@ -1,8 +1,8 @@
-"""What two runs differ by, quantity by quantity."""
+"""What two runs differ by, quantity by quantity; of logs, some megabytes are in memory at once."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.quantities import QUATERNION, Quantity
+from bilayer_core.record.quantities import QUATERNION, Entry
 from bilayer_core.record.run_data import RunData
 
+Array = np.ndarray
 SAME_TIME = 1e-9
 """Two times that differ by less are one [s]: logs count nanoseconds."""
 OF_MACHINE = ("solver/cpu_time",)
@@ -94,49 +95,139 @@ def compare(first: RunData | str | Path, second: RunData | str | Path) -> Compar
             f"compare: the runs have no time in common: t = {one.times[0]:g} to {one.times[-1]:g} s, and "
             f"{other.times[0]:g} to {other.times[-1]:g} s"
         )
-    mine, others = one.quantities, other.quantities
+    mine, others = one.entries(), other.entries()
     both = [name for name in mine if name in others and name not in OF_MACHINE]
+    found: dict[str, QuantityDifference] = {}
+    for of_shape in (False, True):
+        names = [name for name in both if mine[name].of_shape is of_shape]
+        found |= _compared(_Rows(one, mine, names), _Rows(other, others, names), begin, end)
     return Comparison(
-        tuple(_compared(mine[name], others[name], begin, end) for name in both),
+        tuple(found[name] for name in both),
         (tuple(name for name in mine if name not in others), tuple(name for name in others if name not in mine)),
         (float(begin), float(end)),
     )
 
 
-def _compared(one: Quantity, other: Quantity, begin: float, end: float) -> QuantityDifference:
-    if one.values.shape[1:] != other.values.shape[1:]:
-        raise InputError(
-            f"compare: {one.name} has shape {one.values.shape[1:]} in one run and {other.values.shape[1:]} in the other"
-        )
-    mine, others = _within(one, begin, end), _within(other, begin, end)
-    if one.labels == QUATERNION and len(mine[0]) == len(others[0]):  # q and −q are one rotation
-        sign = np.sign(np.sum(mine[1] * others[1], axis=-1, keepdims=True))
-        others = others[0], np.where(sign < 0.0, -1.0, 1.0) * others[1]
-    interpolated = len(mine[0]) != len(others[0]) or not np.allclose(mine[0], others[0], rtol=0.0, atol=SAME_TIME)
-    if interpolated:
-        others = mine[0], _interpolated(other, mine[0])
-    with np.errstate(invalid="ignore"):
-        apart = np.abs(mine[1].astype(float) - others[1].astype(float)).reshape(len(mine[0]), -1)
-    apart = np.where(np.isnan(apart), 0.0, apart)  # where nothing can meet, the gap is infinite in both
-    if not apart.size:
-        return QuantityDifference(one.name, one.unit, 0.0, float(begin), 0.0, interpolated)
-    row = int(apart.max(axis=1).argmax())
-    largest, values = float(apart[row].max()), one.values[np.isfinite(one.values)]
-    extent = float(np.ptp(values)) if values.size else 0.0
-    part = largest / extent if extent else (0.0 if largest == 0.0 else np.inf)
-    return QuantityDifference(one.name, one.unit, largest, float(mine[0][row]), part, interpolated)
+class _Rows:
+    """Rows of quantities of a run that come at one rate, read one after the other: a window of them is in memory."""
+
+    def __init__(self, run: RunData, entries: Mapping[str, Entry], names: Sequence[str]):
+        self.entries = [entries[name] for name in names]
+        of_shape = bool(self.entries) and self.entries[0].of_shape
+        self.times = run.shape_times if of_shape else run.times
+        self._blocks = run.blocks(self.entries)
+        self._begin, self._held = 0, {name: [] for name in names}
+        self._end = 0
+
+    def blocks(self) -> Iterator[tuple[slice, dict[str, Array]]]:
+        """All rows, as they are read."""
+        return self._blocks
+
+    def window(self, begin: int, end: int) -> dict[str, Array]:
+        """Rows from `begin` to `end`, neither of which ever decreases."""
+        while self._end < end:
+            rows, block = next(self._blocks)
+            for name, values in block.items():
+                self._held[name].append(values)
+            self._end = rows.stop
+        found = {}
+        for name, parts in self._held.items():
+            whole = parts[0] if len(parts) == 1 else np.concatenate(parts)
+            found[name] = whole[begin - self._begin : end - self._begin]
+            self._held[name] = [whole[begin - self._begin :]]
+        self._begin = begin
+        return found
 
 
-def _within(quantity: Quantity, begin: float, end: float) -> tuple[np.ndarray, np.ndarray]:
-    inside = (quantity.times >= begin - SAME_TIME) & (quantity.times <= end + SAME_TIME)
-    return quantity.times[inside], quantity.values[inside]
+class _Largest:
+    """The largest difference of a quantity so far."""
+
+    def __init__(self, entry: Entry):
+        self.entry = entry
+        self.value, self.time = 0.0, None
+        self.least, self.most = np.inf, -np.inf
+
+    def see_range(self, values: Array) -> None:
+        """Note the range of the first run."""
+        finite = values[np.isfinite(values)]
+        if finite.size:
+            self.least, self.most = min(self.least, float(finite.min())), max(self.most, float(finite.max()))
+
+    def see(self, times: Array, one: Array, other: Array) -> None:
+        """Compare rows at the same times."""
+        if one.shape[1:] != other.shape[1:]:
+            raise InputError(
+                f"compare: {self.entry.name} has shape {one.shape[1:]} in one run and {other.shape[1:]} in the other"
+            )
+        if self.entry.labels == QUATERNION:
+            other = _turned_to(one, other)
+        with np.errstate(invalid="ignore"):
+            apart = np.abs(one.astype(float) - other.astype(float)).reshape(len(times), -1)
+        apart = np.where(np.isnan(apart), 0.0, apart)  # where nothing can meet, the gap is infinite in both
+        if apart.size and (self.time is None or apart.max() > self.value):
+            row = int(apart.max(axis=1).argmax())
+            self.value, self.time = float(apart[row].max()), float(times[row])
+
+    def told(self, begin: float, interpolated: bool) -> QuantityDifference:
+        """What came of it."""
+        extent = max(0.0, self.most - self.least)
+        part = self.value / extent if extent else (0.0 if self.value == 0.0 else np.inf)
+        time = float(begin) if self.time is None else self.time
+        return QuantityDifference(self.entry.name, self.entry.unit, self.value, time, part, interpolated)
 
 
-def _interpolated(quantity: Quantity, times: np.ndarray) -> np.ndarray:
-    """Its values at other times."""
-    flat = quantity.values.reshape(len(quantity.times), -1)
-    columns = [np.interp(times, quantity.times, column) for column in flat.T]
-    return np.stack(columns, axis=1).reshape(len(times), *quantity.values.shape[1:])
+def _compared(one: _Rows, other: _Rows, begin: float, end: float) -> dict[str, QuantityDifference]:
+    """Differences of quantities that come at one rate, over a span of time [s]."""
+    found = {entry.name: _Largest(entry) for entry in one.entries}
+    if not found:
+        return {}
+    first, last = np.searchsorted(one.times, (begin - SAME_TIME, end + SAME_TIME))
+    other_first, other_last = np.searchsorted(other.times, (begin - SAME_TIME, end + SAME_TIME))
+    interpolated = last - first != other_last - other_first or not np.allclose(
+        one.times[first:last], other.times[other_first:other_last], rtol=0.0, atol=SAME_TIME
+    )
+    for rows, block in one.blocks():
+        inside = slice(max(rows.start, first), min(rows.stop, last))
+        for name, values in block.items():
+            found[name].see_range(values)
+        if inside.start >= inside.stop or not len(other.times):
+            continue
+        times = one.times[inside]
+        if interpolated:
+            others = _interpolated(other, times)
+        else:
+            shift = int(other_first - first)
+            others = other.window(inside.start + shift, inside.stop + shift)
+        for name, values in block.items():
+            found[name].see(times, values[inside.start - rows.start : inside.stop - rows.start], others[name])
+    return {name: largest.told(begin, interpolated) for name, largest in found.items()}
+
+
+def _interpolated(of: _Rows, times: Array) -> dict[str, Array]:
+    """Values at other times, linear between rows; before the first and after the last, those."""
+    last = len(of.times) - 1
+    left = np.clip(np.searchsorted(of.times, times, side="right") - 1, 0, max(0, last - 1))
+    right = np.minimum(left + 1, last)
+    span = of.times[right] - of.times[left]
+    part = np.clip((times - of.times[left]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
+    window = of.window(int(left[0]), int(right[-1]) + 1)
+    found = {}
+    for entry in of.entries:
+        held = window[entry.name].astype(float)
+        before, after = held[left - left[0]], held[right - left[0]]
+        if entry.labels == QUATERNION:
+            after = _turned_to(before, after)
+        weight = part.reshape(-1, *[1] * (before.ndim - 1))
+        with np.errstate(invalid="ignore"):
+            found[entry.name] = np.where(weight > 0.0, before + weight * (after - before), before)
+    return found
+
+
+def _turned_to(one: Array, other: Array) -> Array:
+    """Quaternions with the sign that is nearer to others: q and −q are one rotation."""
+    if one.shape != other.shape:
+        return other
+    return np.where(np.sum(one * other, axis=-1, keepdims=True) < 0.0, -other, other)
 
 
 def rows(found: Comparison) -> Iterator[tuple[str, str, str, str]]:

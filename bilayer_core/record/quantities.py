@@ -23,12 +23,14 @@ A strand is ``<rod>/<layer>``. What stands under ``rod/`` comes at the rate of m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Protocol
 
 import numpy as np
 
+from bilayer_core.errors import InputError
 from bilayer_core.record.node_frames import node_order
 from bilayer_core.simulation.frame import Description
 
@@ -89,39 +91,90 @@ class Quantity:
         return f"Quantity({self.name}{unit}, shape {self.values.shape}{span})"
 
 
+@dataclass(frozen=True)
+class Entry:
+    """What a quantity is, and where its values are: in a `RunData`, and in the messages of a log.
+
+    Attributes
+    ----------
+    name, unit, axes, labels
+        As of `Quantity`.
+    attribute : str
+        Of `RunData`.
+    index : str or tuple
+        Into that: the key of a dictionary, or the index into each row of an array.
+    topic : str
+        That holds it in a log, by its name in `record.topics`.
+    columns : tuple
+        Index into the array of one message.
+    """
+
+    name: str
+    unit: str
+    attribute: str
+    index: str | tuple
+    topic: str
+    columns: tuple
+    axes: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+
+    @property
+    def of_shape(self) -> bool:
+        """Whether it comes at the rate of markers, for each node of a rod."""
+        return "node" in self.axes
+
+    def of(self, run: Run) -> Quantity:
+        """Its values in a run."""
+        held = getattr(run, self.attribute)
+        values = held[self.index] if isinstance(held, dict) else held[(slice(None), *self.index)]
+        return self.filled(run.shape_times if self.of_shape else run.times, values)
+
+    def filled(self, times: Array, values: Array) -> Quantity:
+        """The quantity with values."""
+        return Quantity(self.name, self.unit, times, _read_only(values), self.axes, self.labels)
+
+
+def entries(description: Description, terms: Iterable[str], figures: Iterable[str]) -> Iterator[Entry]:
+    """All quantities of a run with such energies and figures of the solver."""
+    every = slice(None)
+    for k, (channel, unit) in enumerate(zip(description.channels, description.channel_units, strict=True)):
+        yield Entry(f"stimulus/{channel}", unit, "stimulus", (k,), "stimulus_applied", (k,))
+    for k, term in enumerate(terms):
+        yield Entry(f"energy/{term}", "J", "energy", term, "energy", (k,))
+    for k, figure in enumerate(figures):
+        yield Entry(f"solver/{figure}", SOLVER_UNITS.get(figure, ""), "solver", figure, "solver", (k,))
+    yield Entry("com", "m", "com", (), "com", (), ("axis",), AXES)
+    for k, body in enumerate(description.bodies):
+        of, pose = f"body/{body.name}", f"body_pose/{body.name}"
+        yield Entry(f"{of}/position", "m", "body_positions", (k,), pose, (slice(0, 3),), ("axis",), AXES)
+        yield Entry(f"{of}/quaternion", "", "body_quaternions", (k,), pose, (slice(3, 7),), ("part",), QUATERNION)
+        for kind in ("contact", "clamp") if body.holds_rods else ("contact",):
+            topic = f"{kind}_wrench/{body.name}"
+            yield Entry(f"{of}/{kind}_wrench", "N, N m", f"{kind}_wrenches", (k,), topic, (), ("part",), WRENCH)
+    row_of = {int(node): k for k, node in enumerate(node_order(description))}
+    for strand in description.strands:
+        of, nodes = f"rod/{strand.name}", strand.nodes
+        frames = [row_of[node] for node in range(nodes.start, nodes.stop)]
+        of_axis, of_part = (("node", "axis"), AXES), (("node", "part"), QUATERNION)
+        yield Entry(f"{of}/position", "m", "positions", (nodes,), "points", (nodes, slice(0, 3)), *of_axis)
+        yield Entry(f"{of}/contact_force", "N", "contact_forces", (nodes,), "points", (nodes, slice(5, 8)), *of_axis)
+        yield Entry(f"{of}/frame", "", "material_frames", (frames,), "nodes", (frames, slice(3, 7)), *of_part)
+        yield Entry(f"{of}/strain", "", "strain", (nodes,), "points", (nodes, 3), ("node",))
+        yield Entry(f"{of}/curvature", "1/m", "curvature", (nodes,), "points", (nodes, 4), ("node",))
+
+
 def quantities_of(run: Run) -> Iterator[Quantity]:
     """All quantities of a run."""
+    for entry in entries(run.description, run.energy, run.solver):
+        yield entry.of(run)
 
-    def scalar(name: str, unit: str, values: Array, *, axes=(), labels=()) -> Quantity:
-        return Quantity(name, unit, run.times, _read_only(values), axes, labels)
 
-    channels = zip(run.description.channels, run.description.channel_units, strict=True)
-    for k, (channel, unit) in enumerate(channels):
-        yield scalar(f"stimulus/{channel}", unit, run.stimulus[:, k])
-    for term, energy in run.energy.items():
-        yield scalar(f"energy/{term}", "J", energy)
-    for figure, values in run.solver.items():
-        yield scalar(f"solver/{figure}", SOLVER_UNITS.get(figure, ""), values)
-    yield scalar("com", "m", run.com, axes=("axis",), labels=AXES)
-    for k, body in enumerate(run.description.bodies):
-        of = f"body/{body.name}"
-        yield scalar(f"{of}/position", "m", run.body_positions[:, k], axes=("axis",), labels=AXES)
-        yield scalar(f"{of}/quaternion", "", run.body_quaternions[:, k], axes=("part",), labels=QUATERNION)
-        yield scalar(f"{of}/contact_wrench", "N, N m", run.contact_wrenches[:, k], axes=("part",), labels=WRENCH)
-        if body.holds_rods:
-            yield scalar(f"{of}/clamp_wrench", "N, N m", run.clamp_wrenches[:, k], axes=("part",), labels=WRENCH)
-    row_of = {int(node): k for k, node in enumerate(node_order(run.description))}
-    for strand in run.description.strands:
-        of, frames = f"rod/{strand.name}", [row_of[n] for n in range(strand.nodes.start, strand.nodes.stop)]
-        shapes = (
-            ("position", "m", run.positions[:, strand.nodes], ("node", "axis"), AXES),
-            ("contact_force", "N", run.contact_forces[:, strand.nodes], ("node", "axis"), AXES),
-            ("frame", "", run.material_frames[:, frames], ("node", "part"), QUATERNION),
-            ("strain", "", run.strain[:, strand.nodes], ("node",), ()),
-            ("curvature", "1/m", run.curvature[:, strand.nodes], ("node",), ()),
-        )
-        for name, unit, values, axes, labels in shapes:
-            yield Quantity(f"{of}/{name}", unit, run.shape_times, _read_only(values), axes, labels)
+def unknown_quantity(name: str, known: Iterable[str], reason: str | None = None) -> InputError:
+    """The error that says that there is no such quantity, and which names are near it."""
+    near = ", ".join(get_close_matches(name, known, n=3, cutoff=0.3)) or "none is like it"
+    return InputError(
+        f"quantity {name!r}: {reason or f'there is none; near it: {near} (`bilayer info --quantities` lists all)'}"
+    )
 
 
 def _read_only(values: Array) -> Array:

@@ -1,0 +1,241 @@
+"""An MCAP file as channels and chunks: which messages it has is known from its indexes, without unpacking a chunk."""
+
+from __future__ import annotations
+
+import struct
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from bilayer_core.errors import InputError
+from bilayer_core.record.log_records import (
+    CHANNEL,
+    CHUNK,
+    DATA_END,
+    MAGIC,
+    MESSAGE,
+    MESSAGE_HEAD,
+    MESSAGE_INDEX,
+    SCHEMA,
+    DamagedChunk,
+    Place,
+    content,
+    parse,
+    read_index,
+    records_of,
+    unpacked,
+    walk,
+)
+
+MOST_BARE = 1 << 20
+"""Of messages that stand outside of chunks, as many as are read at once [bytes]."""
+
+
+@contextmanager
+def open_log(path: Path) -> Iterator[BinaryIO]:
+    """The open file; what shows that it is not a log, or is damaged, becomes an InputError."""
+    from mcap.exceptions import McapError
+
+    try:
+        with path.open("rb") as file:
+            if file.read(len(MAGIC)) != MAGIC:
+                raise InputError(f"{path}: is not an MCAP log: it does not begin as one")
+            yield file
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+    except DamagedChunk as error:
+        raise InputError(
+            f"{path}: is damaged: {error}; `bilayer repair` makes a log of what can still be read"
+        ) from error
+    except (McapError, struct.error, ValueError, RuntimeError) as error:  # RuntimeError: lz4's
+        # mcap says nothing of a record whose parts are longer than itself.
+        reason = str(error) or "a record in it ends too early"
+        raise InputError(f"{path}: is not an MCAP log, or is damaged: {reason}") from error
+
+
+@dataclass(frozen=True)
+class LogChannel:
+    """A topic in a file: its full name and ROS type, and what rosbag2 is told of it."""
+
+    topic: str
+    type: str
+    metadata: dict[str, str]
+
+
+@dataclass
+class _Chunk:
+    """A chunk, or messages that stand outside of one, with the times of the messages of each channel [ns]."""
+
+    place: Place
+    bare: bool
+    times: dict[int, np.ndarray]
+
+
+class LogFile:
+    """What an MCAP file holds, whole or cut off.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Attributes
+    ----------
+    path : Path
+    channels : dict
+        Number -> `LogChannel`.
+    has_index : bool
+        Whether the file was finished with an index.
+    topics : dict
+        Full name of each topic -> ROS type.
+
+    Raises
+    ------
+    InputError
+        If it is no MCAP file, or is damaged.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+        self.channels: dict[int, LogChannel] = {}
+        self._schemas: dict[int, str] = {}
+        self._chunks: list[_Chunk] = []
+        with open_log(self.path) as file:
+            summary = read_summary(file)
+            self.has_index = summary is not None and bool(summary.chunk_indexes or not summary.channels)
+            if self.has_index:
+                self._take(summary, file)
+            else:
+                self._scan(file)
+        self.topics = {channel.topic: channel.type for channel in self.channels.values()}
+
+    def times(self, topic: str) -> np.ndarray:
+        """When each message of a topic was logged [ns], in the order of the file."""
+        of = [times for chunk in self._chunks for number, times in chunk.times.items() if self._is(number, {topic})]
+        return np.concatenate(of) if of else np.empty(0, np.uint64)
+
+    def messages(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, time [ns] and data of each message of some topics (default all), in the order of the file.
+
+        Chunks that have none of them, or whose messages are all before `begin` [ns], are not unpacked.
+        """
+        with open_log(self.path) as file:
+            for chunk in self._chunks:
+                wanted = {
+                    number: self.channels[number].topic
+                    for number, times in chunk.times.items()
+                    if len(times) and int(times.max()) >= begin and self._is(number, topics)
+                }
+                if not wanted:
+                    continue
+                inside = self._inside(file, chunk)
+                for opcode, start, end in records_of(inside):
+                    if opcode != MESSAGE:
+                        continue
+                    number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
+                    if number in wanted:
+                        yield wanted[number], time, inside[start + MESSAGE_HEAD.size : end]
+
+    def _is(self, number: int, topics: set[str] | None) -> bool:
+        return number in self.channels and (topics is None or self.channels[number].topic in topics)
+
+    def _inside(self, file: BinaryIO, chunk: _Chunk) -> bytes:
+        data = content(file, chunk.place)
+        if chunk.bare:
+            return data
+        try:
+            return unpacked(data)
+        except DamagedChunk as error:
+            raise DamagedChunk(f"the chunk at byte {chunk.place.begin}: {error}") from error
+
+    def _take(self, summary, file: BinaryIO) -> None:
+        """The file's own index."""
+        self._schemas = {number: schema.name for number, schema in summary.schemas.items()}
+        for channel in summary.channels.values():
+            self._add_channel(channel)
+        for index in sorted(summary.chunk_indexes, key=lambda of: of.chunk_start_offset):
+            place = Place(CHUNK, index.chunk_start_offset + 9, index.chunk_length - 9)
+            self._chunks.append(_Chunk(place, False, {}))
+            file.seek(place.end)
+            indexes = file.read(index.message_index_length)
+            for opcode, start, end in records_of(indexes):
+                if opcode == MESSAGE_INDEX:
+                    self._add_index(indexes[start:end])
+            if not index.message_index_length:
+                self._look_into(file)
+
+    def _scan(self, file: BinaryIO) -> None:
+        """A file without an index, from record to record."""
+        indexed = True
+        for place in walk(file):
+            if place.opcode == MESSAGE_INDEX and self._chunks and not self._chunks[-1].bare:
+                if not self._add_index(content(file, place)):
+                    self._look_into(file)
+                indexed = True
+            elif place.opcode in (SCHEMA, CHANNEL, MESSAGE) and self._extend(place):
+                indexed = False
+            elif place.opcode in (SCHEMA, CHANNEL, MESSAGE, CHUNK):
+                if not indexed:
+                    self._look_into(file)
+                bare = place.opcode != CHUNK
+                place = Place(0, place.begin, place.end - place.begin) if bare else place
+                self._chunks.append(_Chunk(place, bare, {}))
+                indexed = False
+            elif place.opcode == DATA_END:
+                break
+        if self._chunks:
+            self._look_into(file)  # the last one may have lost a part of its indexes
+
+    def _extend(self, place: Place) -> bool:
+        """Add a record outside of chunks to the one before it."""
+        last = self._chunks[-1] if self._chunks else None
+        if last is None or not last.bare or last.place.end != place.begin or last.place.length > MOST_BARE:
+            return False
+        last.place = Place(0, last.place.offset, place.end - last.place.offset)
+        return True
+
+    def _look_into(self, file: BinaryIO) -> None:
+        """Take channels and times of the last chunk from the chunk itself."""
+        from mcap.records import Channel, Schema
+
+        times = defaultdict(list)
+        inside = self._inside(file, self._chunks[-1])
+        for opcode, start, end in records_of(inside):
+            if opcode == MESSAGE:
+                number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
+                times[number].append(time)
+            elif opcode == SCHEMA:
+                schema = parse(Schema, inside[start:end])
+                self._schemas[schema.id] = schema.name
+            elif opcode == CHANNEL:
+                self._add_channel(parse(Channel, inside[start:end]))
+        self._chunks[-1].times = {number: np.array(of, np.uint64) for number, of in times.items()}
+
+    def _add_channel(self, channel) -> None:
+        if channel.schema_id not in self._schemas:
+            raise InputError(f"{self.path}: is damaged: the type of {channel.topic} is missing")
+        self.channels[channel.id] = LogChannel(channel.topic, self._schemas[channel.schema_id], channel.metadata)
+
+    def _add_index(self, data: bytes) -> bool:
+        """Take a message index of the last chunk; False if it speaks of a channel that is not known yet."""
+        number, times = read_index(data)
+        if number not in self.channels:
+            return False
+        self._chunks[-1].times[number] = times
+        return True
+
+
+def read_summary(file: BinaryIO):
+    """The index of a finished file (`mcap.summary.Summary`), or None."""
+    from mcap.reader import SeekingReader
+
+    if file.seek(0, 2) < 2 * len(MAGIC):
+        return None
+    file.seek(-len(MAGIC), 2)
+    finished = file.read() == MAGIC
+    file.seek(0)
+    return SeekingReader(file).get_summary() if finished else None

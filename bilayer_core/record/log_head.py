@@ -1,0 +1,57 @@
+"""What a log of a run holds before its first message: scene, description, versions and settings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from bilayer_core import DISTRIBUTION
+from bilayer_core.errors import InputError
+from bilayer_core.record.description_text import from_text
+from bilayer_core.record.log_file import open_log
+from bilayer_core.record.log_records import ATTACHMENT, METADATA, content, parse, walk
+from bilayer_core.simulation.frame import Description
+
+_HEAD = ("description", "versions", "settings")
+"""Metadata that every log has before its first chunk."""
+
+
+@dataclass(frozen=True)
+class Head:
+    """What a log holds before its first message."""
+
+    description: Description
+    versions: dict[str, str]
+    settings: dict[str, str]
+    machine: dict[str, str]  # empty in older logs
+
+
+def read_head(path: Path) -> Head:
+    """Scene, description, versions and settings: all that comes before the first chunk."""
+    from mcap.records import Attachment, Metadata
+
+    metadata: dict[str, dict[str, str]] = {}
+    scene = None
+    with open_log(path) as file:
+        for place in walk(file):
+            if place.opcode == ATTACHMENT:
+                scene = parse(Attachment, content(file, place)).data.decode()
+            elif place.opcode == METADATA:
+                record = parse(Metadata, content(file, place))
+                metadata[record.name] = record.metadata
+            if scene is not None and "description" in metadata:
+                break
+    missing = [name for name in _HEAD if name not in metadata] + ([] if scene is not None else ["scene"])
+    if missing:
+        what = f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
+        raise InputError(f"{path}: is an MCAP file, but no log of bilayer_sim_ros, or is damaged: {what}")
+    versions = metadata["versions"]
+    try:
+        description = from_text(metadata["description"], scene)
+    except (KeyError, TypeError, ValueError):
+        writer = versions.get(DISTRIBUTION, "unknown")
+        raise InputError(
+            f"{path}: describes its run in another way than this version reads (it was written by {DISTRIBUTION} "
+            f"{writer}); run its scene again"
+        ) from None
+    return Head(description, versions, metadata["settings"], metadata.get("machine", {}))
