@@ -1,7 +1,7 @@
 """Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
 
-``load_scene``, ``Simulator``, ``estimate_error``, ``read_log``, ``compare`` and ``__version__`` are loaded at their
-first use: importing the package costs nothing.
+``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``read_log``, ``compare`` and ``__version__`` are
+loaded at their first use: importing the package costs nothing.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ if TYPE_CHECKING:  # what checkers of types take for true, without an import of 
     from bilayer_core.converge.study import estimate_error
     from bilayer_core.record.compare import compare
     from bilayer_core.record.log_reader import read_log
+    from bilayer_core.record.recorder import Recorder
     from bilayer_core.scene.loader import load_scene
     from bilayer_core.simulation.simulator import Simulator
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:  # what checkers of types take for true, without an import of 
 
 DISTRIBUTION = "bilayer_sim_ros"
 _HOME = {
+    "Recorder": "bilayer_core.record.recorder",
     "Simulator": "bilayer_core.simulation.simulator",
     "compare": "bilayer_core.record.compare",
     "estimate_error": "bilayer_core.converge.study",
@@ -27,7 +29,7 @@ _HOME = {
     "read_log": "bilayer_core.record.log_reader",
 }
 
-__all__ = ["Simulator", "__version__", "compare", "estimate_error", "load_scene", "read_log"]
+__all__ = ["Recorder", "Simulator", "__version__", "compare", "estimate_error", "load_scene", "read_log"]
 
 
 def __getattr__(name: str) -> object:

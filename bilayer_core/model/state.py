@@ -12,6 +12,7 @@ from .fingerprint import FREE, difference
 from .lit import light_of, part_seen
 from .mechanisms import start_rates
 from .model import Model
+from .override import no_overrides
 from .sizes import sizes_of
 
 Array = np.ndarray
@@ -69,7 +70,7 @@ class State:
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
     conditions: Array  # number of all that a state may be taken into another scene for, shape (1,)
     seal: Array  # checksum of a flat state, 0 before it is one, shape (1,)
-    override: Array  # value of each channel, then factor of each load, set from outside; NaN where schedules act
+    override: Array  # what is set from outside of channels, then of loads (`model.override`), shape (n, 4)
     pose_goal: Array  # of controlled bodies; see `simulation.poses`, shape (n_controlled, 26), zeros where none acts
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
 
@@ -225,7 +226,7 @@ def initial_state(
         transduction=_settled(model, before) if len(channels) else np.zeros(0),
         conditions=np.array([conditions]),
         seal=np.zeros(1),
-        override=np.full(len(channels) + len(model.scene.loads), np.nan),
+        override=no_overrides(len(channels) + len(model.scene.loads)),
         pose_goal=np.zeros((len(bodies.controlled), POSE_GOAL)),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),
     )

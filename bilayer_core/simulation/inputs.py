@@ -3,14 +3,15 @@
 ============ ========================================== ================================================================
 kind         values                                     from
 ============ ========================================== ================================================================
-``stimulus`` value in the unit of the channel           `Simulator.set_stimulus`
-``load``     factor                                     `Simulator.set_load`
+``stimulus`` value in the unit of the channel, over [s] `Simulator.set_stimulus`
+``load``     factor, over [s]                           `Simulator.set_load`
 ``pose``     position [m], quaternion, least time [s]   `Simulator.set_pose`
 ``until``    time [s]                                   whoever makes steps: where adaptive ones must end
 ``reset``    none                                       `Simulator.reset`
 ============ ========================================== ================================================================
 
 NaN stands for what is not given: of a stimulus or a load, its schedule acts again.
+Logs of earlier versions have no ``over``, which is 0 then: a jump.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from typing import Protocol
 
 Values = Sequence[float]
 STIMULUS, LOAD, POSE, UNTIL, RESET = "stimulus", "load", "pose", "until", "reset"
-SIZES = {STIMULUS: 1, LOAD: 1, POSE: 8, UNTIL: 1, RESET: 0}
+SIZES = {STIMULUS: 2, LOAD: 2, POSE: 8, UNTIL: 1, RESET: 0}
 """Number of values of each kind."""
 POSITION, QUATERNION, OVER = slice(0, 3), slice(3, 7), 7
 """Values of a pose."""
@@ -31,9 +32,9 @@ POSITION, QUATERNION, OVER = slice(0, 3), slice(3, 7), 7
 class Acted(Protocol):
     """What inputs act on: a `Simulator`."""
 
-    def set_stimulus(self, channel: str, value: float | None) -> None: ...
+    def set_stimulus(self, channel: str, value: float | None, *, over: float) -> None: ...
 
-    def set_load(self, name: str, factor: float | None) -> None: ...
+    def set_load(self, name: str, factor: float | None, *, over: float) -> None: ...
 
     def set_pose(self, name: str, position: Values | None, quaternion: Values | None, *, over: float) -> None: ...
 
@@ -64,9 +65,9 @@ class Input:
         """Do to a simulator what was done to the one that this is from; ends of steps are for who makes steps."""
         match self.kind:
             case "stimulus":
-                simulator.set_stimulus(self.name, _given(self.values[0]))
+                simulator.set_stimulus(self.name, _given(self.values[0]), over=self._over)
             case "load":
-                simulator.set_load(self.name, _given(self.values[0]))
+                simulator.set_load(self.name, _given(self.values[0]), over=self._over)
             case "pose":
                 position, quaternion = self.values[POSITION], self.values[QUATERNION]
                 simulator.set_pose(
@@ -75,6 +76,11 @@ class Input:
                     None if math.isnan(quaternion[0]) else quaternion,
                     over=self.values[OVER],
                 )
+
+    @property
+    def _over(self) -> float:
+        """Time within which a stimulus or a load gets there [s]."""
+        return self.values[1] if len(self.values) > 1 else 0.0
 
 
 def values_of_pose(position: Values | None, quaternion: Values | None, over: float) -> tuple[float, ...]:

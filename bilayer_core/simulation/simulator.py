@@ -19,6 +19,7 @@ from ..model.build import build_model
 from ..model.fingerprint import conditions_of, fingerprint_of
 from ..model.impacts import reason_of_stiffness
 from ..model.model import Model
+from ..model.override import acts, jump_to, ramp_to
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
 from ..scene.config import SceneConfig
@@ -261,14 +262,23 @@ class Simulator:
 
     # what changes it
 
-    def set_stimulus(self, channel: str, value: float | None) -> None:
-        """Set a channel from the next step on, in its unit; None gives it back to the scene's schedule.
+    def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0) -> None:
+        """Set a channel from the next step on, in its unit.
+
+        Parameters
+        ----------
+        channel : str
+        value : float or None
+            None gives it back to the scene's schedule.
+        over : float
+            Simulated time in which it gets there, linearly, from what it is now [s]; 0 is a jump. Steps follow a ramp
+            without beginning again, also one that is replaced by another on its way: what comes often is cheaper so.
 
         Raises
         ------
         InputError
-            If there is no such channel, or the value is not finite or out of the channel's range; nothing is changed
-            then.
+            If there is no such channel, the value is not finite or out of the channel's range, or `over` is no time, or
+            given without a value; nothing is changed then.
         """
         if channel not in self.scene.stimuli:
             known = ", ".join(self.scene.stimuli) or "none"
@@ -279,17 +289,25 @@ class Simulator:
                 f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
                 f"to {allowed.maximum:g} (unit {allowed.unit})"
             )
-        value = math.nan if value is None else float(value)
-        self._override(list(self.scene.stimuli).index(channel), value)
-        self._note(STIMULUS, channel, value)
+        self._override(list(self.scene.stimuli).index(channel), f"stimulus {channel!r}", value, over)
+        self._note(STIMULUS, channel, math.nan if value is None else float(value), float(over))
 
-    def set_load(self, name: str, factor: float | None) -> None:
-        """Multiply force and moment of a load by a factor from the next step on; None gives it back to its schedule.
+    def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
+        """Multiply force and moment of a load by a factor from the next step on.
+
+        Parameters
+        ----------
+        name : str
+        factor : float or None
+            None gives it back to its schedule.
+        over : float
+            As in `set_stimulus`.
 
         Raises
         ------
         InputError
-            If there is no such load, or the factor is not finite; nothing is changed then.
+            If there is no such load, the factor is not finite, or `over` is no time, or given without a factor; nothing
+            is changed then.
         """
         names = [load.name for load in self.scene.loads]
         if name not in names:
@@ -297,10 +315,9 @@ class Simulator:
             raise InputError(f"load {name!r}: no such load; the scene {self.scene.name!r} has: {known}")
         if factor is not None and not math.isfinite(factor):
             raise InputError(f"load {name!r}: a factor of {factor} is not allowed; it must be finite")
-        value = math.nan if factor is None else float(factor)
-        if self._override(len(self.scene.stimuli) + names.index(name), value):
+        if self._override(len(self.scene.stimuli) + names.index(name), f"load {name!r}", factor, over):
             self._state.has_history.fill(0.0)  # accelerations jump with a load
-        self._note(LOAD, name, value)
+        self._note(LOAD, name, math.nan if factor is None else float(factor), float(over))
 
     def set_pose(
         self,
@@ -338,14 +355,21 @@ class Simulator:
             self._state.has_history.fill(0.0)  # accelerations jump
         self._note(POSE, name, *values_of_pose(position, quaternion, over))
 
-    def _override(self, index: int, value: float) -> bool:
-        """Set a value of `State.override`; whether it was another."""
-        override = self._state.override
-        changes = not np.array_equal(override[index], value, equal_nan=True)
-        if changes:
+    def _override(self, index: int, what: str, value: float | None, over: float) -> bool:
+        """Set a row of `State.override`; whether anything jumps."""
+        if not (math.isfinite(over) and over >= 0.0):
+            raise InputError(f"{what}: over = {over} is not allowed; it must be a number of seconds from 0 up")
+        if over > 0.0 and value is None:
+            raise InputError(f"{what}: over = {over:g} s needs a value to get to; a schedule acts at once")
+        row, present = self._state.override[index], self._stepper.surroundings.present(self._state, index)
+        if value is not None and over > self._stepper.same_time:
+            row[:] = ramp_to(value, present, self.time, over)
+            return False
+        jumps = acts(row) if value is None else value != present
+        if jumps:
             self._stepper.restart(self._state)
-        override[index] = value
-        return changes
+        row[:] = jump_to(value)
+        return jumps
 
     def listen(self, note: Callable[[Input], None]) -> Callable[[], None]:
         """Have all that acts from outside told from now on; returns what ends that.

@@ -117,6 +117,11 @@ class Stepper:
         self.ledger: EnergyLedger | None = None
 
     @property
+    def same_time(self) -> float:
+        """Two times that differ by no more are one [s]."""
+        return self._same
+
+    @property
     def end(self) -> Configuration:
         """The configuration of the state after the last step or evaluation."""
         return self.engine.end

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..engine.actuation import Actuation, Paths
 from ..model.model import Model
+from ..model.override import acts, no_overrides, pieces_of, value_at
 from ..model.rest_strains import RestStrains
 from ..model.state import POSE_GOAL, State
 from ..scene.body import Prescribed
@@ -41,7 +42,7 @@ class Surroundings:
         self._channels = [channel.schedule for channel in scene.stimuli.values()]
         self._loads = [load.factor for load in scene.loads]
         self._ranges = np.array([c.maximum - c.minimum for c in scene.stimuli.values()], dtype=float)
-        self._begin, self._override = 0.0, np.full(len(self._channels) + len(self._loads), math.nan)
+        self._begin, self._override = 0.0, no_overrides(len(self._channels) + len(self._loads))
         self._pose_goal = np.zeros((len(model.bodies.controlled), POSE_GOAL))
         self._paths = paths_of(model, self._pose_goal)
         self.actuation: Actuation | None = None
@@ -50,7 +51,7 @@ class Surroundings:
     def stimulus_at(self, state: State, time: float) -> Array:
         """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's."""
         scheduled = [schedule.value(time) for schedule in self._channels]
-        return _overridden(scheduled, state.override[: len(scheduled)])
+        return _overridden(scheduled, state.override[: len(scheduled)], time)
 
     def rest_strains_of(self, transduction: Array) -> RestStrains:
         """Strains without stress from the filtered stimuli."""
@@ -71,7 +72,11 @@ class Surroundings:
         """
         time = float(state.time[0])
         scheduled = [load.value_before(time, ended) if ended else load.value(time) for load in self._loads]
-        return _overridden(scheduled, state.override[len(self._channels) :])
+        return _overridden(scheduled, state.override[len(self._channels) :], time)
+
+    def present(self, state: State, index: int) -> float:
+        """What a channel, or a load, by its number after those, is in a state."""
+        return float(np.concatenate([self.stimulus_at(state, float(state.time[0])), self.load_factor(state)])[index])
 
     def cover(self, time: float, override: Array, pose_goal: Array) -> None:
         """Have `actuation` hold what acts from `time` [s] on, and a little before, where something may jump.
@@ -80,7 +85,7 @@ class Surroundings:
         ----------
         time : float
         override : Array
-            Values of channels and factors of loads set from outside, NaN where schedules act (`State.override`).
+            What is set from outside of channels and loads, NaN where schedules act (`State.override`).
         pose_goal : Array
             How controlled bodies go to where they are asked to be (`State.pose_goal`).
         """
@@ -95,8 +100,7 @@ class Surroundings:
 
     def _pieces_about(self, time: float, afresh: bool = False) -> Actuation:
         schedules = zip([*self._channels, *self._loads], self._override.tolist(), strict=True)
-        acting = [schedule if math.isnan(value) else value for schedule, value in schedules]
-        rows = [_next_pieces(of, time - self._ahead, time + self._ahead) for of in acting]
+        rows = [_next_pieces(*of, time - self._ahead, time + self._ahead) for of in schedules]
         size = max((len(row) for row in rows), default=0)
         size = max(size, PIECES_AT_ONCE)  # so that it seldom changes
         padded = [row + [row[-1]] * (size - len(row)) for row in rows]
@@ -112,17 +116,18 @@ class Surroundings:
         return present
 
 
-def _overridden(scheduled: list[float], override: Array) -> Array:
-    """What schedules give, but what is set from outside where that is a number."""
-    return np.where(np.isnan(override), np.array(scheduled, dtype=float), override)
+def _overridden(scheduled: list[float], override: Array, time: float) -> Array:
+    """What schedules give at a time [s], but what is set from outside where anything is."""
+    given = [value_at(row, time) for row in override.tolist()]
+    return np.array([value if math.isnan(by) else by for value, by in zip(scheduled, given, strict=True)], dtype=float)
 
 
-def _next_pieces(schedule: Pieces | float, begin: float, end: float) -> list[Piece]:
-    """The pieces of a schedule, or of a value set from outside, from the one that ends at `begin` or later to one that
-    does not end before `end`.
+def _next_pieces(schedule: Pieces, override: list[float], begin: float, end: float) -> list[Piece]:
+    """The pieces of what is set from outside, or else those of a schedule from the one that ends at `begin` or later to
+    one that does not end before `end`.
     """
-    if not isinstance(schedule, Pieces):
-        return [Piece(math.inf, schedule)]
+    if acts(override):
+        return pieces_of(override)
     pieces = [schedule.piece(begin)]
     while math.isfinite(pieces[-1].until) and (len(pieces) < PIECES_AT_ONCE or pieces[-1].until <= end):
         pieces.append(schedule.piece(pieces[-1].until))

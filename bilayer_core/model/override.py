@@ -1,0 +1,52 @@
+"""What is set from outside of a channel or a load, in place of its schedule: a value, at once or by a ramp.
+
+A row of `State.override` has the value that is reached, and of a ramp from which value, from when and until when [s];
+the last two are 0 for a jump. Where a schedule acts, all are NaN.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..scene.piece import Piece
+
+Array = np.ndarray
+VALUE, START, BEGIN, END = range(4)
+PARTS = 4
+"""Of a row."""
+
+
+def no_overrides(count: int) -> Array:
+    """Rows of so many channels and loads of which none is set, shape (count, 4)."""
+    return np.full((count, PARTS), math.nan)
+
+
+def jump_to(value: float | None) -> Array:
+    """A row that acts at once; without a value that of a schedule."""
+    return np.full(PARTS, math.nan) if value is None else np.array([value, value, 0.0, 0.0])
+
+
+def ramp_to(value: float, start: float, begin: float, over: float) -> Array:
+    """A row that leads from a value to another, in a time from `begin` on [s]."""
+    return np.array([value, start, begin, begin + over])
+
+
+def acts(row: Sequence[float]) -> bool:
+    """Whether anything is set."""
+    return not math.isnan(row[VALUE])
+
+
+def pieces_of(row: Sequence[float]) -> list[Piece]:
+    """What is set, as pieces of a schedule: a ramp, if there is one, and the value that it reaches."""
+    value, start, begin, end = row
+    reached = Piece(math.inf, value)
+    return [Piece(end, start, begin, (value - start) / (end - begin)), reached] if end > begin else [reached]
+
+
+def value_at(row: Sequence[float], time: float) -> float:
+    """What is set at a time [s]; NaN if nothing is."""
+    pieces = pieces_of(row)
+    return pieces[-1 if time >= row[END] else 0].value(time)
