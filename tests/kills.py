@@ -28,7 +28,7 @@ SCENES = ("bending", "gripping", "swimming")
 BEAT = 0.02
 """Between two beats of the thread that notes whether the process can run [s]."""
 ENTRY = struct.Struct("<cdd")
-LONGEST_START = 120.0
+LONGEST_START = 240.0
 """Until the first frame, compilation of kernels included [s]."""
 
 WATCHED = """
