@@ -41,10 +41,12 @@ def _report(simulator) -> dict[str, Any]:
     from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
     from bilayer_core.model.validity import validity_figures
+    from bilayer_core.record.forecast import forecast
     from bilayer_core.record.topics import Rate, output_topics
 
     scene, plan, model = simulator.scene, simulator.plan, simulator.model
     figures = (*validity_figures(scene), *twist_figures(scene, plan.model, plan.dimension))
+    size = forecast(simulator)
     rates = {Rate.OUTPUT: scene.output.rate, Rate.DISPLAY: min(scene.output.rate, scene.output.marker_rate)}
     return {
         "scene": scene.name,
@@ -72,6 +74,7 @@ def _report(simulator) -> dict[str, Any]:
             {"topic": topic.full_name(), "type": topic.type, "rate": rates[topic.rate]}
             for topic in output_topics(simulator.description)
         ],
+        "log": {"bytes_per_second": round(size.per_second), "bytes": round(size.total)},
         "within_validity": list(told(figure for figure in figures if not figure.outside)),
         "warnings": [*plan.warnings, *told(impact_warnings(model))],
     }
@@ -191,6 +194,8 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
     yield "output, in simulated time"
     for stream in report["outputs"]:
         yield f"  {stream['topic']:36}{stream['type']:40}{stream['rate']:g} Hz"
+    log = report["log"]
+    yield from _block("log", [f"{_size(log['bytes_per_second'])} a second, {_size(log['bytes'])} for the whole scene"])
     yield "validity of the model"
     for text in report["within_validity"]:
         yield from _block("within", [text])
@@ -206,6 +211,11 @@ def _time(report: dict[str, Any]) -> str:
     if report["tolerance"] is None:
         return f"{duration:g} s in {round(duration / dt)} steps of {1e3 * dt:g} ms"
     return f"{duration:g} s, the first step {1e3 * dt:g} ms long, none longer than {1e3 * report['max_step']:g} ms"
+
+
+def _size(size: int) -> str:
+    """A size as told to users."""
+    return f"{size / 1e9:.3g} GB" if size >= 999.5e6 else f"{size / 1e6:.2g} MB" if size >= 1e5 else f"{size / 1e3:.2g} kB"
 
 
 def _block(name: str, lines: list[str]) -> Iterator[str]:

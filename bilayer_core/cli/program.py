@@ -19,6 +19,7 @@ from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.new import new
 from bilayer_core.cli.options import Settings, VerbGroup
 from bilayer_core.cli.render import render
+from bilayer_core.cli.plot import plot
 from bilayer_core.cli.repair import repair
 from bilayer_core.cli.replay import replay
 from bilayer_core.cli.run import run
@@ -56,7 +57,7 @@ def program() -> None:
 
 
 SIMULATES = (scenes, new, schema, check, run, converge, validate, bench, stress)
-OF_LOGS = (info, repair, export, compare, replay, view, render)
+OF_LOGS = (info, repair, export, compare, plot, replay, view, render)
 
 for verb in (*SIMULATES, *OF_LOGS):
     program.add_command(verb)

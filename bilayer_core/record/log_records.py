@@ -87,7 +87,7 @@ def parse(kind: type, data: bytes):
     stream = ReadDataStream(BytesIO(data))
     try:
         return kind.read(stream)
-    except (McapError, ValueError, struct.error) as error:
+    except (McapError, ValueError, struct.error, OverflowError, MemoryError) as error:
         raise DamagedChunk(f"{kind.__name__} cannot be parsed") from error
 
 

@@ -97,8 +97,7 @@ class RunData:
         """
         known = self.quantities
         if name not in known:
-            source = self.__dict__.get("source")
-            raise unknown_quantity(name, known, source and source.why_not(name))
+            raise unknown_quantity(name, known, self.why_not(name))
         return known[name]
 
     @cached_property
@@ -115,6 +114,11 @@ class RunData:
         if source is not None:
             return source.entries
         return {entry.name: entry for entry in entries(self.description, self.energy, self.solver)}
+
+    def why_not(self, name: str) -> str | None:
+        """Why a quantity that other logs have is not in this one; None if it is, or if no log has it."""
+        source = self.__dict__.get("source")
+        return None if source is None else source.why_not(name)
 
     def blocks(self, wanted: Sequence[Entry]) -> Iterator[tuple[slice, dict[str, np.ndarray]]]:
         """Values of quantities that come at one rate, in blocks of rows, by name: those of a log as they are read."""

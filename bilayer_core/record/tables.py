@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fnmatch import fnmatchcase
 
 import numpy as np
@@ -28,13 +28,27 @@ def chosen(source: LogSource, names: Sequence[str]) -> list[Entry]:
     """
     if not names:
         return list(source.entries.values())
-    found: dict[str, Entry] = {}
-    for name in names:
-        matching = [known for known in source.entries if fnmatchcase(known, name)] if PATTERN & set(name) else []
-        if not matching and name not in source.entries:
-            raise unknown_quantity(name, source.entries, source.why_not(name))
-        found |= {known: source.entries[known] for known in matching or [name]}
+    found = {known: source.entries[known] for name in names for known in chosen_names(source.entries, name, source.why_not)}
     return list(found.values())
+
+
+def chosen_names(known: Iterable[str], name: str, why_not: Callable[[str], str | None]) -> list[str]:
+    """The names that a pattern such as ``energy/*`` means, or the name itself.
+
+    Parameters
+    ----------
+    known : iterable of str
+    name : str
+    why_not : callable
+        Why a name that other logs have is not known here, if that is so.
+    """
+    known = list(known)
+    if name in known:
+        return [name]
+    matching = [one for one in known if fnmatchcase(one, name)] if PATTERN & set(name) else []
+    if not matching:
+        raise unknown_quantity(name, known, why_not(name))
+    return matching
 
 
 def component_unit(unit: str, label: str) -> str:

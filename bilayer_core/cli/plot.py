@@ -1,0 +1,59 @@
+"""The verb ``plot``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from bilayer_core.cli.options import Verb
+
+SUFFIX = ".mcap"
+
+
+@click.command(cls=Verb)
+@click.argument("logs_and_quantities", metavar="LOG.mcap... QUANTITY...", nargs=-1, required=True)
+@click.option("--out", metavar="FIGURE", help="Write a .pdf, .png or .svg instead of opening a window.")
+@click.option("--node", type=int, metavar="N", help="Which node of rods; -1 is the last one, the default.")
+@click.option("--width", default="single", metavar="W", help="Of the figure: single or double column, or millimetres.")
+@click.option("--label", "labels", multiple=True, metavar="TEXT", help="What the legend calls a log; once for each.")
+@click.option("--force", is_flag=True, help="Replace an existing file.")
+def plot(
+    logs_and_quantities: tuple[str, ...],
+    out: str | None,
+    node: int | None,
+    width: str,
+    labels: tuple[str, ...],
+    force: bool,
+) -> None:
+    """Draw quantities of logs over time: com.z, 'energy/*', rod/strip/laminate/position.z.
+
+    Quantities of one unit share a panel; those of several logs are drawn over each other. `bilayer info LOG
+    --quantities` lists all names.
+    """
+    from bilayer_core.errors import InputError
+    from bilayer_core.view.plot import WIDTHS, plot
+
+    logs = [word for word in logs_and_quantities if word.lower().endswith(SUFFIX)]
+    quantities = [word for word in logs_and_quantities if word not in logs]
+    if not logs:
+        raise InputError(f"plot: none of {', '.join(logs_and_quantities)} is a log; name at least one ({SUFFIX})")
+    if not quantities:
+        raise InputError(
+            f"plot: say which quantities, such as com.z; `bilayer info {logs[0]} --quantities` lists those of the log"
+        )
+    plot(logs, quantities, out, node, width if width in WIDTHS else _millimetres(width), labels, force)
+    if out:
+        click.echo(f"figure    {Path(out)}")
+
+
+def _millimetres(width: str) -> float:
+    from bilayer_core.errors import InputError
+
+    try:
+        found = float(width.removesuffix("mm"))
+    except ValueError:
+        found = 0.0
+    if not 30.0 <= found <= 1000.0:
+        raise InputError(f"--width: {width} is not allowed; it must be single, double, or 30 to 1000 (mm)")
+    return found

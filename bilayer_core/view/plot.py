@@ -1,0 +1,286 @@
+"""Figures of recorded quantities, as papers want them: units on the axes, small fonts, the width of a column.
+
+Quantities of one unit share a panel, panels share the axis of time. matplotlib is imported when a figure is drawn.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bilayer_core.errors import InputError
+from bilayer_core.record.log_reader import read_log
+from bilayer_core.record.paths import check_output_path, draft_of
+from bilayer_core.record.run_data import RunData
+from bilayer_core.record.tables import chosen_names, component_unit
+
+SUFFIXES = (".pdf", ".png", ".svg")
+MILLIMETRE = 1.0 / 25.4
+"""[inch]."""
+WIDTHS = {"single": 86.0, "double": 178.0}
+"""Of the columns of most journals [mm]."""
+PANEL_HEIGHT, FRAME_HEIGHT = 42.0, 14.0
+"""Of each panel, and of what is below the last one [mm]."""
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Okabe and Ito's, which the colour-blind tell apart."""
+DASHES = ("-", "--", ":", "-.")
+FONT_SIZE, DOTS = 8.0, 300.0
+"""[pt] and, of png files, [1/inch]."""
+PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
+WITH_PREFIX = ("m", "N", "J", "N m", "s", "m/s")
+KINDS = {"m": "position", "N": "force", "N m": "moment", "J": "energy", "1/m": "curvature"}
+"""What a panel with several quantities shows, by its unit."""
+MOST_LINES, INSIDE_LINES = 40, 6
+"""In one panel; up to the second number the legend stands inside of it."""
+MOST_POINTS = 20_000
+"""Of a line: more than a printed figure shows. Longer ones are drawn by the smallest and largest value of each part."""
+STYLE = {
+    "font.size": FONT_SIZE,
+    "axes.labelsize": FONT_SIZE,
+    "legend.fontsize": FONT_SIZE - 1.0,
+    "xtick.labelsize": FONT_SIZE - 1.0,
+    "ytick.labelsize": FONT_SIZE - 1.0,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.linewidth": 0.3,
+    "grid.alpha": 0.5,
+    "legend.frameon": False,
+    "pdf.fonttype": 42,  # text that journals accept and that stays text
+    "svg.fonttype": "none",
+    "savefig.dpi": DOTS,
+    "axes.unicode_minus": True,
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve: of a component of a quantity, from one log."""
+
+    run: int
+    name: str
+    unit: str
+    times: np.ndarray
+    values: np.ndarray
+
+
+def lines_of(run: RunData, number: int, wanted: Sequence[str], node: int | None = None) -> list[Line]:
+    """The curves of some quantities of a run.
+
+    Parameters
+    ----------
+    run : RunData
+    number : int
+        Of the run, among those that are drawn.
+    wanted : sequence of str
+        Names such as ``com``, ``com.z``, ``energy/*`` or ``rod/strip/laminate/position.z``.
+    node : int, optional
+        Which node of a rod, from the end if negative; by default the last one.
+
+    Raises
+    ------
+    InputError
+        If there is no such quantity, component or node.
+    """
+    found = []
+    for asked in wanted:
+        name, component = _split(asked, run)
+        for known in chosen_names(run.entries(), name, run.why_not):
+            quantity = run[known]
+            values, suffix = quantity.values, ""
+            if "node" in quantity.axes:
+                count = values.shape[1]
+                place = -1 if node is None else node
+                if not -count <= place < count:
+                    raise InputError(f"--node: {place} is not allowed; {known} has nodes 0 to {count - 1}")
+                values, suffix = values[:, place], f", node {place % count}"
+            if not quantity.labels:
+                if component:
+                    raise InputError(f"quantity {asked!r}: {known} has no components")
+                found.append(Line(number, known + suffix, quantity.unit, quantity.times, values))
+                continue
+            if component and component not in quantity.labels:
+                raise InputError(f"quantity {asked!r}: {known} has the components {', '.join(quantity.labels)}")
+            for k, label in enumerate(quantity.labels):
+                if component in ("", label):
+                    unit = component_unit(quantity.unit, label)
+                    found.append(Line(number, f"{known}.{label}{suffix}", unit, quantity.times, values[:, k]))
+    return found
+
+
+def plot(
+    logs: Sequence[str | Path],
+    quantities: Sequence[str],
+    out: str | Path | None = None,
+    node: int | None = None,
+    width: str | float = "single",
+    labels: Sequence[str] = (),
+    force: bool = False,
+) -> None:
+    """Draw quantities of logs over time, the same of several logs in one panel.
+
+    Parameters
+    ----------
+    logs : sequence of str or Path
+    quantities : sequence of str
+        As of `lines_of`.
+    out : str or Path, optional
+        A file that ends in .pdf, .png or .svg; without one a window is opened.
+    node : int, optional
+        As of `lines_of`.
+    width : str or float
+        ``single`` or ``double`` column, or a width [mm].
+    labels : sequence of str
+        What the legend calls each log; by default the names of their files.
+    force : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    InputError
+        If a log or quantity is not there, the file cannot be written, or matplotlib is missing.
+    """
+    if importlib.util.find_spec("matplotlib") is None:
+        raise InputError("plot: matplotlib is not installed; install it with: pip install 'bilayer_sim_ros[plot]'")
+    if out is not None:
+        if Path(out).suffix.lower() not in SUFFIXES:
+            raise InputError(f"{out}: must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
+        check_output_path(out, force, Path(out).suffix.lower())
+    if labels and len(labels) != len(logs):
+        raise InputError(f"--label: is given {len(labels)} times, and there are {len(logs)} logs; give one for each")
+    lines = []
+    for k, log in enumerate(logs):
+        try:
+            lines += lines_of(_run(log), k, quantities, node)
+        except InputError as error:
+            raise InputError(str(error) if str(log) in str(error) else f"{log}: {error}") from error
+    names = list(labels) or _short_names(logs)
+    import matplotlib
+    import matplotlib.pyplot as pyplot
+
+    with matplotlib.rc_context(STYLE):
+        if out is None and matplotlib.get_backend().lower() in ("agg", "pdf", "svg", "ps", "template"):
+            raise InputError("plot: there is no screen to show the figure on; give --out FIGURE.pdf, .png or .svg")
+        figure = draw(lines, names, width)
+        try:
+            if out is None:
+                pyplot.show()
+                return
+            with draft_of(out, force) as draft:
+                figure.savefig(draft, metadata={"Creator": "bilayer plot"} if draft.suffix == ".pdf" else None)
+        finally:
+            pyplot.close(figure)
+
+
+def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "single"):
+    """A figure of curves, by unit in panels; `names` are those of the runs."""
+    import matplotlib.pyplot as pyplot
+
+    panels: dict[str, list[Line]] = {}
+    for line in lines:
+        panels.setdefault(line.unit, []).append(line)
+    for unit, held in panels.items():
+        if len(held) > MOST_LINES:
+            raise InputError(
+                f"plot: {len(held)} curves [{unit or '1'}] in one panel cannot be told apart; name at most {MOST_LINES}, "
+                "or single components such as com.z"
+            )
+    inches = WIDTHS.get(width, width) * MILLIMETRE
+    height = (PANEL_HEIGHT * len(panels) + FRAME_HEIGHT) * MILLIMETRE
+    figure, all_axes = pyplot.subplots(
+        len(panels), sharex=True, squeeze=False, figsize=(inches, height), layout="constrained"
+    )
+    several = len({line.run for line in lines}) > 1
+    for axes, (unit, held) in zip(all_axes[:, 0], panels.items(), strict=True):
+        _draw_panel(axes, unit, held, names, several)
+    all_axes[-1, 0].set_xlabel("time [s]")
+    return figure
+
+
+def _draw_panel(axes, unit: str, held: list[Line], names: Sequence[str], several: bool) -> None:
+    factor, prefix = _prefix(unit, held)
+    own = list(dict.fromkeys(line.name for line in held))
+    short = _without_common(own)
+    for line in held:
+        first, second = (line.run, own.index(line.name)) if len(own) == 1 else (own.index(line.name), line.run)
+        told = [short[line.name]] * (len(own) > 1) + [names[line.run]] * several
+        axes.plot(
+            *_thinned(line.times, line.values / factor),
+            color=COLOURS[first % len(COLOURS)],
+            linestyle=DASHES[(second + first // len(COLOURS)) % len(DASHES)],
+            label=", ".join(told),
+        )
+    shown = f" [{prefix}{unit}]" if unit else ""
+    axes.set_ylabel(f"{_label(own, unit)}{shown}")
+    axes.margins(x=0.0)
+    if len(held) > 1:
+        inside = len(held) <= INSIDE_LINES
+        place = {"loc": "best"} if inside else {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
+        axes.legend(handlelength=1.6, labelspacing=0.2, **place)
+
+
+def _label(own: list[str], unit: str) -> str:
+    """What the quantities of a panel are, in one or two words."""
+    if len(own) == 1:
+        head, comma, node = own[0].partition(", ")
+        parts = head.split("/")
+        return "/".join(parts[1:] if parts[0] in ("rod", "body") else parts) if len(head) < 24 else parts[-1] + comma + node
+    starts = {name.partition("/")[0] for name in own}
+    return KINDS.get(unit) or (starts.pop() if len(starts) == 1 else "value")
+
+
+def _without_common(names: list[str]) -> dict[str, str]:
+    """Names without the words that all begin with: ``kinetic`` of ``energy/kinetic``, ``fx`` of ``….fx``."""
+    common = os.path.commonprefix(names)
+    cut = max(common.rfind("/"), common.rfind(".")) + 1
+    return {name: name[cut:] for name in names}
+
+
+def _prefix(unit: str, held: list[Line]) -> tuple[float, str]:
+    """Factor and SI prefix by which the largest value of a panel is at least 1."""
+    if unit not in WITH_PREFIX:
+        return 1.0, ""
+    finite = [np.abs(line.values[np.isfinite(line.values)]).max(initial=0.0) for line in held]
+    largest = max(finite, default=0.0)
+    if largest == 0.0:
+        return 1.0, ""
+    return next(((factor, name) for factor, name in PREFIXES if largest >= factor), PREFIXES[-1])
+
+
+def _thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A long curve by the extremes of its parts, which look the same."""
+    if len(times) <= MOST_POINTS:
+        return times, values
+    parts = np.array_split(np.arange(len(times)), MOST_POINTS // 2)
+    picked = sorted({int(at) for of in parts for at in (of[values[of].argmin()], of[values[of].argmax()])})
+    return times[picked], values[picked]
+
+
+def _run(log: str | Path) -> RunData:
+    run = read_log(log)
+    if not run.times.size:
+        raise InputError(f"{log}: holds no frame, there is nothing to draw")
+    return run
+
+
+def _split(asked: str, run: RunData) -> tuple[str, str]:
+    """Name and component of what is asked for."""
+    if asked in run.entries():
+        return asked, ""
+    name, dot, component = asked.rpartition(".")
+    return (name, component) if dot else (asked, "")
+
+
+def _short_names(logs: Sequence[str | Path]) -> list[str]:
+    """Names of the logs' files, with their directories where those are the same."""
+    stems = [Path(log).stem for log in logs]
+    return stems if len(set(stems)) == len(stems) else [str(Path(log).with_suffix("")) for log in logs]
+
+

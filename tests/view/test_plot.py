@@ -1,0 +1,107 @@
+"""Figures of recorded quantities: what they show, with which units, and what is refused."""
+
+import matplotlib
+import numpy as np
+import pytest
+import synthetic_run
+
+from bilayer_core import read_log
+from bilayer_core.cli import main
+from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.view.plot import MOST_POINTS, Line, draw, lines_of
+
+matplotlib.use("agg")
+TIMES = np.arange(0, 26) * 0.02
+ROD = "rod/arm_1/active"
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("logs")
+    for name, end in (("slow", 0.5), ("fast", 0.25)):
+        synthetic_run.run(McapRecorder(directory / f"{name}.mcap", rate=50.0, marker_rate=25.0), TIMES[TIMES <= end])
+    return directory
+
+
+@pytest.fixture
+def closing():
+    import matplotlib.pyplot as pyplot
+
+    yield
+    pyplot.close("all")
+
+
+def test_quantities_of_one_unit_share_a_panel_with_that_unit(logs, closing):
+    run = read_log(logs / "slow.mcap")
+    figure = draw(lines_of(run, 0, ["com.z", "energy/*", "body/ball/contact_wrench"]), ["slow"])
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == ["com.z [mm]", "energy [mJ]", "force [mN]", "moment [N m]"]
+    assert figure.axes[-1].get_xlabel() == "time [s]"
+    (line,) = figure.axes[0].get_lines()
+    np.testing.assert_allclose(line.get_ydata(), 1e3 * run.com[:, 2])
+    told = [text.get_text() for text in figure.axes[1].get_legend().get_texts()]
+    assert told == list(synthetic_run.TERMS)
+
+
+def test_several_logs_are_drawn_over_each_other_and_named(logs, closing, tmp_path):
+    runs = [read_log(logs / f"{name}.mcap") for name in ("slow", "fast")]
+    figure = draw([line for k, run in enumerate(runs) for line in lines_of(run, k, ["com.z"])], ["slow", "fast"])
+    (axes,) = figure.axes
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["slow", "fast"]
+    assert len({line.get_color() for line in axes.get_lines()}) == 2
+    assert [len(line.get_xdata()) for line in axes.get_lines()] == [26, 13]
+
+
+@pytest.mark.parametrize("suffix", ["pdf", "png", "svg"])
+def test_a_figure_has_the_width_of_a_column(suffix, logs, tmp_path):
+    out = tmp_path / f"figure.{suffix}"
+    assert main(["plot", str(logs / "slow.mcap"), "com.z", f"{ROD}/curvature", "--out", str(out)]) == 0
+    data = out.read_bytes()
+    if suffix == "png":
+        from PIL import Image
+
+        assert Image.open(out).width == round(86 / 25.4 * 300)
+    elif suffix == "svg":
+        assert b"com.z [mm]" in data and f"{86 / 25.4 * 72:.4g}"[:5].encode() in data
+    else:
+        assert data.startswith(b"%PDF") and b"/Type3" not in data
+
+
+def test_nodes_of_rods_are_counted_from_both_ends(logs):
+    run = read_log(logs / "slow.mcap")
+    values = run[f"{ROD}/position"].values
+    for node, name in ((None, "node 40"), (0, "node 0"), (-2, "node 39")):
+        (line,) = lines_of(run, 0, [f"{ROD}/position.x"], node)
+        assert line.name == f"{ROD}/position.x, {name}"
+        np.testing.assert_array_equal(line.values, values[:, -1 if node is None else node, 0])
+
+
+def test_long_curves_keep_their_extremes(closing):
+    times = np.arange(10 * MOST_POINTS) * 1e-3
+    values = np.sin(times)
+    values[123_457] = 7.0
+    figure = draw([Line(0, "a", "", times, values)], ["run"])
+    drawn = figure.axes[0].get_lines()[0]
+    assert len(drawn.get_xdata()) <= 2 * MOST_POINTS and drawn.get_ydata().max() == 7.0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["com.q"], "quantity 'com.q': com has the components x, y, z"),
+        (["coms"], "slow.mcap: quantity 'coms': there is none; near it: com"),
+        (["energy/bend.x"], "energy/bend has no components"),
+        ([f"{ROD}/strain", "--node", "41"], "--node: 41 is not allowed; rod/arm_1/active/strain has nodes 0 to 40"),
+        (["com", "--out", "a.jpg"], "must end in .pdf, .png or .svg"),
+        (["com", "--width", "huge"], "--width: huge is not allowed"),
+        (["com", "--label", "a", "--label", "b"], "--label: is given 2 times, and there are 1 logs"),
+        (["com"], "there is no screen to show the figure on"),
+        ([], "say which quantities, such as com.z"),
+        (["com", "nothing.mcap", "--out", "a.pdf"], "nothing.mcap: cannot be read"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told_with_what_can(words, message, logs, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["plot", str(logs / "slow.mcap"), *words]) == 2
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
