@@ -74,7 +74,7 @@ def read_info(path: str | Path) -> LogInfo:
     path = Path(path)
     head = read_head(path)
     counts: dict[str, int]
-    with _open(path) as file:
+    with open_log(path) as file:
         summary = _read_summary(file)
     if summary is not None:
         statistics = summary.statistics
@@ -239,18 +239,27 @@ class Head:
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[BinaryIO]:
+def open_log(path: Path) -> Iterator[BinaryIO]:
     """The open file; what shows that it is not a log becomes an InputError."""
-    from mcap.exceptions import McapError
-
     try:
-        with path.open("rb") as file:
+        with path.open("rb") as file, damage_told(path):
             yield file
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (McapError, struct.error, ValueError, RuntimeError) as error:  # RuntimeError: lz4's
+
+
+@contextmanager
+def damage_told(path: Path) -> Iterator[None]:
+    """What a reader of MCAP says of a file that is no log, or is damaged, becomes an InputError."""
+    from mcap.exceptions import McapError
+    from zstandard import ZstdError
+
+    try:
+        yield
+    except (McapError, ZstdError, struct.error, ValueError, KeyError, RuntimeError) as error:  # RuntimeError: lz4's
         # mcap says nothing of a record whose parts are longer than itself.
-        reason = str(error) or "a record in it ends too early"
+        reason = f"it does not say what {error} is" if isinstance(error, KeyError) else str(error)
+        reason = reason or "a record in it ends too early"
         raise InputError(f"{path}: is not an MCAP log, or is damaged: {reason}") from error
 
 
@@ -298,7 +307,7 @@ def read_messages(path: Path, topics: set[str] | None = None) -> Iterator[tuple[
 
     schemas: dict[int, str] = {}
     channels: dict[int, tuple[str, str]] = {}
-    with _open(path) as file:
+    with open_log(path) as file:
         for record in _records(file):
             if isinstance(record, Message):
                 known = channels.get(record.channel_id)
@@ -321,7 +330,7 @@ def read_head(path: Path) -> Head:
 
     metadata: dict[str, dict[str, str]] = {}
     scene = None
-    with _open(path) as file:
+    with open_log(path) as file:
         for record in _records(file):
             if isinstance(record, Attachment):
                 scene = record.data.decode()
@@ -349,14 +358,19 @@ def _read_summary(file: BinaryIO):
     """The index of a finished file, or None."""
     from mcap.reader import SeekingReader
 
+    return SeekingReader(file).get_summary() if is_finished(file) else None
+
+
+def is_finished(file: BinaryIO) -> bool:
+    """Whether a file ends as it begins, which one that was cut off, or is still written, does not."""
     if file.seek(0, 2) < 2 * _MAGIC_SIZE:
-        return None
+        return False
     file.seek(-_MAGIC_SIZE, 2)
     last = file.read()
     file.seek(0)
     first = file.read(_MAGIC_SIZE)
     file.seek(0)
-    return SeekingReader(file).get_summary() if first == last else None
+    return first == last
 
 
 def _read_ending(path: Path, summary) -> dict[str, str]:
@@ -365,5 +379,5 @@ def _read_ending(path: Path, summary) -> dict[str, str]:
 
     if not any(index.name == "run" for index in summary.metadata_indexes):
         return {}
-    with _open(path) as file:
+    with open_log(path) as file:
         return next(item.metadata for item in SeekingReader(file).iter_metadata() if item.name == "run")
