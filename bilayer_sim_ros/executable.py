@@ -72,9 +72,10 @@ def _parse(
     """The command line without its ROS part; refuses arguments that nobody would read."""
     width = max(18, *(len(parameter.name) for parameter in table)) + 2
     lines = [f"  {p.name:{width}}{p.description} (default: {p.default!r})" for p in table]
+    taken = f"[{argument.upper()}] " if argument else ""
     parser = argparse.ArgumentParser(
         prog=executable,
-        usage=f"{executable} {f'[{argument.upper()}] ' if argument else ''}[--debug] [--ros-args -p NAME:=VALUE ... --params-file FILE]",
+        usage=f"{executable} {taken}[--debug] [--ros-args -p NAME:=VALUE ... --params-file FILE]",
         epilog="parameters:\n" + "\n".join(lines),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

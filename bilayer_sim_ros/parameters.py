@@ -153,6 +153,9 @@ REPLAY_NODE = (
     NodeParameter("play.start_offset", 0.0, "part of the log's beginning that is left out [s]", 0.0),
     NodeParameter("play.playback_duration", -1.0, "how much of the log is played [s]; negative = to its end"),
     NodeParameter(
-        "play.clock_publish_frequency", 0.0, "messages on /clock per second [Hz]; 0 = none. A /clock in the log is not played", 0.0
+        "play.clock_publish_frequency",
+        0.0,
+        "messages on /clock per second [Hz]; 0 = none. A /clock in the log is not published",
+        0.0,
     ),
 )

@@ -186,8 +186,8 @@ class Player:
         """Ask for the next `count` messages at once, while paused (0: all); the result is how many there were."""
         return self._requests.ask(self._answering(partial(self._do_burst, count)))
 
-    def seek(self, position: float) -> Future:
-        """Ask to go to a time of the log [s]; what is paused stays so. The result is a text."""
+    def seek(self, position: int) -> Future:
+        """Ask to go to a time of the log [ns]; what is paused stays so. The result is a text."""
         return self._requests.ask(self._answering(partial(self._do_seek, position)))
 
     def set_rate(self, rate: float) -> Future:
@@ -354,12 +354,12 @@ class Player:
         self._clock.jump(self._next.time)
         return self._send_next()
 
-    def _do_seek(self, position: float) -> str:
+    def _do_seek(self, position: int) -> str:
         first, last = self._log.start, self._playback.end
-        if not (math.isfinite(position) and first <= nanoseconds(position) <= last):
+        if not first <= position <= last:
             span = f"{first / NANOSECONDS:.9g} to {last / NANOSECONDS:.9g} s"
-            raise InputError(f"a position of {position:.9g} s is not allowed; the log is played from {span}")
-        self._go_to(nanoseconds(position))
+            raise InputError(f"t = {position / NANOSECONDS:.9g} s is not in what is played, which is {span}")
+        self._go_to(position)
         return self._state()
 
     def _do_set_rate(self, rate: float) -> str:

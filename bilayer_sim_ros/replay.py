@@ -54,7 +54,8 @@ def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: th
 
     player = Player(log, topics, playback, moved=move, behind=warn_of_lag, finished=stop.set)
     offered = trigger_services(player) if parameters["services"] == "std_srvs" else rosbag2_services(node, player)
-    live = LiveParameters(node, REPLAY_NODE, {POSITION: player.seek, RATE: player.set_rate})
+    changes = {POSITION: lambda seconds: player.seek(nanoseconds(seconds)), RATE: player.set_rate}
+    live = LiveParameters(node, REPLAY_NODE, changes)
     services = Services(node, offered)
     kind = "std_srvs/Trigger" if parameters["services"] == "std_srvs" else "rosbag2_interfaces"
     span = f"t = {playback.first / NANOSECONDS:.9g} to {playback.end / NANOSECONDS:.9g} s"
@@ -76,7 +77,9 @@ def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: th
 
 def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
     """What parameters ask for of a log, or InputError."""
-    offset, duration, position = (parameters[f"play.{name}"] for name in ("start_offset", "playback_duration", "position"))
+    offset, duration, position = (
+        parameters[f"play.{name}"] for name in ("start_offset", "playback_duration", "position")
+    )
     length = (log.end - log.start) / NANOSECONDS
     if offset > length:
         raise InputError(f"parameter 'play.start_offset' is {offset:g}; {log.path} takes {length:.9g} s")

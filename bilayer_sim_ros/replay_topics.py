@@ -16,7 +16,7 @@ from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS
 from bilayer_core.record.indexed_log import Channel
 from bilayer_core.record.topics import LOG_NAMESPACE
-from bilayer_sim_ros.publishing import CLOCK_TOPIC, message_class
+from bilayer_sim_ros.message_types import CLOCK_TOPIC, message_class
 from bilayer_sim_ros.stored_qos import DEPTH, offered_profile
 
 CDR = "cdr"

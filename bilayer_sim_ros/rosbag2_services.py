@@ -6,10 +6,11 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
+from builtin_interfaces.msg import Time
 from rclpy.node import Node
 
 from bilayer_core.errors import BilayerError, InputError
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_core.record.cdr import NANOSECONDS
 from bilayer_sim_ros.player import Player
 from bilayer_sim_ros.services import Service
 
@@ -34,6 +35,9 @@ def rosbag2_services(node: Node, player: Player) -> list[Service]:
         # As rosbag2's player answers while it is in playback, which this one is as long as it lives.
         node.get_logger().warning("~/play: dismissed, as the log is being played; ~/seek goes to another time")
         return _done(False)
+
+    def seek(time: Time) -> Future:
+        return player.seek(time.sec * NANOSECONDS + time.nanosec)
 
     def answer(write: Callable[[Any, Any], None], refused: Any = None) -> Callable[[Any, Future], None]:
         """What writes a result into a response, or `refused`, with the reason in a warning."""
@@ -62,7 +66,7 @@ def rosbag2_services(node: Node, player: Player) -> list[Service]:
         Service("play", srv.Play, play, success),
         Service("play_next", srv.PlayNext, lambda _: player.play_next(), success),
         Service("burst", srv.Burst, lambda request: player.burst(request.num_messages), burst),
-        Service("seek", srv.Seek, lambda request: player.seek(to_seconds(request.time)), success),
+        Service("seek", srv.Seek, lambda request: seek(request.time), success),
         Service("stop", srv.Stop, lambda _: player.end(), nothing),
     ]
 

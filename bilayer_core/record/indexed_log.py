@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Self
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_reader import damage_told, is_finished, open_log
-from bilayer_core.record.mcap_log import QOS
+from bilayer_core.record.log_file import QOS, damage_told, is_finished, open_log
 
 
 @dataclass(frozen=True)

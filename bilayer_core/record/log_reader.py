@@ -5,10 +5,8 @@ A cut-off log is read up to its last whole record; the chunk that was being writ
 
 from __future__ import annotations
 
-import struct
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -20,6 +18,7 @@ from bilayer_core.errors import InputError
 from bilayer_core.record import encoders
 from bilayer_core.record.cdr import NANOSECONDS, Template, decode, nanoseconds, read_float64_multi_array
 from bilayer_core.record.description_text import from_text
+from bilayer_core.record.log_file import MAGIC_SIZE, is_finished, open_log
 from bilayer_core.record.node_frames import node_order
 from bilayer_core.record.run_data import RunData
 from bilayer_core.record.topics import LOG_NAMESPACE, MULTI_ARRAY, output_topics
@@ -27,7 +26,6 @@ from bilayer_core.simulation.frame import Description
 
 CUT_OFF = "cut off"
 _RECORD_HEAD = 9  # opcode and length of a record [bytes]
-_MAGIC_SIZE = 8
 _HEAD = ("description", "versions", "settings")
 """Metadata that every log has before its first chunk."""
 
@@ -238,37 +236,12 @@ class Head:
     machine: dict[str, str]  # empty in older logs
 
 
-@contextmanager
-def open_log(path: Path) -> Iterator[BinaryIO]:
-    """The open file; what shows that it is not a log becomes an InputError."""
-    try:
-        with path.open("rb") as file, damage_told(path):
-            yield file
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-
-
-@contextmanager
-def damage_told(path: Path) -> Iterator[None]:
-    """What a reader of MCAP says of a file that is no log, or is damaged, becomes an InputError."""
-    from mcap.exceptions import McapError
-    from zstandard import ZstdError
-
-    try:
-        yield
-    except (McapError, ZstdError, struct.error, ValueError, KeyError, RuntimeError) as error:  # RuntimeError: lz4's
-        # mcap says nothing of a record whose parts are longer than itself.
-        reason = f"it does not say what {error} is" if isinstance(error, KeyError) else str(error)
-        reason = reason or "a record in it ends too early"
-        raise InputError(f"{path}: is not an MCAP log, or is damaged: {reason}") from error
-
-
 class _WholeRecords:
     """The part of a file that ends with its last whole record."""
 
     def __init__(self, file: BinaryIO):
         size = file.seek(0, 2)
-        end = _MAGIC_SIZE
+        end = MAGIC_SIZE
         while end + _RECORD_HEAD <= size:
             file.seek(end + 1)
             length = int.from_bytes(file.read(8), "little")
@@ -276,7 +249,7 @@ class _WholeRecords:
                 break
             end += _RECORD_HEAD + length
         # The magic bytes after the last record of a finished file.
-        self._left = end + _MAGIC_SIZE if end + _MAGIC_SIZE == size else end
+        self._left = end + MAGIC_SIZE if end + MAGIC_SIZE == size else end
         self._file = file
         file.seek(0)
 
@@ -359,18 +332,6 @@ def _read_summary(file: BinaryIO):
     from mcap.reader import SeekingReader
 
     return SeekingReader(file).get_summary() if is_finished(file) else None
-
-
-def is_finished(file: BinaryIO) -> bool:
-    """Whether a file ends as it begins, which one that was cut off, or is still written, does not."""
-    if file.seek(0, 2) < 2 * _MAGIC_SIZE:
-        return False
-    file.seek(-_MAGIC_SIZE, 2)
-    last = file.read()
-    file.seek(0)
-    first = file.read(_MAGIC_SIZE)
-    file.seek(0)
-    return first == last
 
 
 def _read_ending(path: Path, summary) -> dict[str, str]:

@@ -1,0 +1,53 @@
+"""Log files as such: how they are opened, what shows that they are none, and whether they were finished."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from bilayer_core.errors import InputError
+
+MAGIC_SIZE = 8
+"""Of the bytes with which a finished file begins and ends."""
+QOS = "offered_qos_profiles"
+"""Metadata of a channel: the quality of service that its topic is offered with, in the form of rosbag2."""
+
+
+@contextmanager
+def open_log(path: Path) -> Iterator[BinaryIO]:
+    """The open file; what shows that it is not a log becomes an InputError."""
+    try:
+        with path.open("rb") as file, damage_told(path):
+            yield file
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+@contextmanager
+def damage_told(path: Path) -> Iterator[None]:
+    """What a reader of MCAP says of a file that is no log, or is damaged, becomes an InputError."""
+    from mcap.exceptions import McapError
+    from zstandard import ZstdError
+
+    try:
+        yield
+    except (McapError, ZstdError, struct.error, ValueError, KeyError, RuntimeError) as error:  # RuntimeError: lz4's
+        # mcap says nothing of a record whose parts are longer than itself.
+        reason = f"it does not say what {error} is" if isinstance(error, KeyError) else str(error)
+        reason = reason or "a record in it ends too early"
+        raise InputError(f"{path}: is not an MCAP log, or is damaged: {reason}") from error
+
+
+def is_finished(file: BinaryIO) -> bool:
+    """Whether a file ends as it begins, which one that was cut off, or is still written, does not."""
+    if file.seek(0, 2) < 2 * MAGIC_SIZE:
+        return False
+    file.seek(-MAGIC_SIZE, 2)
+    last = file.read()
+    file.seek(0)
+    first = file.read(MAGIC_SIZE)
+    file.seek(0)
+    return first == last
