@@ -35,8 +35,8 @@ def offered_profile(text: str) -> QoSProfile:
     try:
         entries = [dict(entry) for entry in yaml.safe_load(text) or []]
         profiles = [_profile(entry) for entry in entries]
-    except (yaml.YAMLError, AttributeError, TypeError, ValueError, OverflowError) as error:
-        reason = " ".join(str(error).split())
+    except (yaml.YAMLError, TypeError, ValueError, LookupError, OverflowError) as error:
+        reason = f"there is no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
         raise InputError(f"its quality of service is not in the form of rosbag2: {reason}") from error
     if not profiles:
         return QoSProfile(depth=DEPTH)
