@@ -55,3 +55,9 @@ def test_the_parameter_file_lists_every_parameter_with_its_default(root):
 @pytest.mark.parametrize("table", [SIM_NODE, REPLAY_NODE, RAMP_CONTROLLER])
 def test_every_default_is_allowed(table):
     assert accept_all(table, {}) == {p.name: p.default for p in table}
+
+
+@pytest.mark.parametrize("parameter", REPLAY_NODE, ids=lambda parameter: parameter.name)
+def test_the_readme_tells_every_parameter_of_the_player_with_its_default(root, parameter):
+    default = {"": "empty"}.get(parameter.default, f"`{str(parameter.default).replace('False', 'false')}`")
+    assert f"\n| `{parameter.name}` | {default} | " in (root / "README.md").read_text(encoding="utf-8")
