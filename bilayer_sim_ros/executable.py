@@ -46,7 +46,12 @@ def run(
         0 done, 2 bad input, 3 the simulation could not go on, `interrupted_code` after a signal.
     """
     argv = sys.argv if argv is None else [executable, *argv]
-    options = _parse(executable, table, remove_ros_args(argv)[1:], argument)
+    try:
+        arguments = remove_ros_args(argv)[1:]
+    except RuntimeError as error:
+        print(f"{executable}: {_not_understood(error)}", file=sys.stderr)
+        return InputError.exit_code
+    options = _parse(executable, table, arguments, argument)
     given = {argument: options.argument} if argument is not None and options.argument is not None else {}
     stop, interrupted = threading.Event(), threading.Event()
 
@@ -97,7 +102,7 @@ def _run_node(
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
-        raise InputError(f"ROS arguments are not understood: {error}") from error
+        raise _not_understood(error) from error
     executor = SingleThreadedExecutor()
     thread = threading.Thread(target=_spin, args=(executor,), name="executor", daemon=True)
     try:
@@ -110,6 +115,12 @@ def _run_node(
         rclpy.try_shutdown()
         if thread.ident is not None:
             thread.join()
+
+
+def _not_understood(error: RuntimeError) -> InputError:
+    """What rclpy says of its arguments, without the places in its sources."""
+    reason = str(error).partition(", at ")[0].removeprefix("Failed to parse ROS arguments: ")
+    return InputError(f"ROS arguments are not understood: {reason}")
 
 
 def _spin(executor: SingleThreadedExecutor) -> None:
