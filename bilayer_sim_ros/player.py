@@ -125,6 +125,7 @@ class Player:
                 f"log; at least {SHORTEST_LOOP / 1e9:g} s are needed"
             )
         self._log = log
+        self._topics = {channel.number: channel.topic for channel in log.channels}
         self._outlet = outlet
         self._playback = playback
         self._moved, self._behind, self._finished = moved, behind, finished
@@ -333,7 +334,7 @@ class Player:
         sent = self._step(self._playback.loop)
         if sent is None:
             raise InputError(f"there is no message after t = {self.position:.9g} s; seek to an earlier time")
-        return f"paused at t = {sent.time / NANOSECONDS:.9g} s"
+        return f"sent {self._topics[sent.channel]} of t = {sent.time / NANOSECONDS:.9g} s"
 
     def _do_burst(self, count: int) -> int:
         sent = 0

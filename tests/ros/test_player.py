@@ -142,8 +142,8 @@ def test_a_paused_player_sends_one_message_when_it_is_asked_for_the_next(play):
     player = play(counted(3), paused=True)
     assert ask(player.is_paused()) == (True, "paused at t = 0 s")
     assert values(player) == []
-    assert ask(player.play_next()) == "paused at t = 0 s"
-    assert ask(player.play_next()) == "paused at t = 0.1 s"
+    assert ask(player.play_next()) == "sent /a of t = 0 s"
+    assert ask(player.play_next()) == "sent /a of t = 0.1 s"
     assert values(player) == [0, 1]
     assert player.paused and player.position == 0.1
 

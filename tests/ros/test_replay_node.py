@@ -130,11 +130,11 @@ def test_services_and_live_parameters_move_a_paused_player(start, connect, domai
         return answer.success, answer.message
 
     assert said("is_paused") == (True, "paused at t = 0.4 s")
-    assert said("play_next") == (True, "paused at t = 0.4 s")
+    assert said("play_next") == (True, "sent /bilayer_sim/number of t = 0.4 s")
     assert set_parameter(client, "play.position", 7.25).successful
     assert get_parameter(client, "play.position") == 7.25
     assert said("is_paused") == (True, "paused at t = 7.25 s")
-    assert said("play_next") == (True, "paused at t = 7.3 s")
+    assert said("play_next") == (True, "sent /bilayer_sim/number of t = 7.3 s")
     assert get_parameter(client, "play.position") == 7.3
     refused = set_parameter(client, "play.position", 12.0)
     assert not refused.successful and refused.reason == "t = 12 s is not in what is played, which is 0 to 9.9 s"
