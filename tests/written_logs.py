@@ -2,6 +2,7 @@
 
 import struct
 
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, IndexType, Writer
 
 from bilayer_core.record.cdr import HEADER
@@ -56,6 +57,17 @@ def write_log(
         if finish:
             writer.finish()
     return path
+
+
+def damage(path):
+    """Damage the chunk in the middle of a finished log."""
+    with path.open("rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes
+    chunk = chunks[len(chunks) // 2]
+    content = bytearray(path.read_bytes())
+    for place in range(chunk.chunk_start_offset + 60, chunk.chunk_start_offset + chunk.chunk_length - 4):
+        content[place] ^= 0x55
+    path.write_bytes(content)
 
 
 WITHOUT_INDEX = {"index_types": IndexType.NONE, "use_chunking": False}

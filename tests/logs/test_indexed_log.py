@@ -1,7 +1,6 @@
 import pytest
-from mcap.reader import make_reader
 from mcap.writer import CompressionType
-from written_logs import WITHOUT_INDEX, number, value_of, write_log
+from written_logs import WITHOUT_INDEX, damage, number, value_of, write_log
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.indexed_log import IndexedLog
@@ -90,13 +89,7 @@ def test_a_missing_file_and_a_directory_are_refused(tmp_path):
 @pytest.mark.parametrize("compression", list(CompressionType))
 def test_a_damaged_chunk_is_told_when_it_is_read(tmp_path, compression):
     path = write_log(tmp_path / "run.mcap", counted(), compression=compression)
-    content = bytearray(path.read_bytes())
-    with path.open("rb") as file:
-        chunks = make_reader(file).get_summary().chunk_indexes
-    chunk = chunks[len(chunks) // 2]
-    for place in range(chunk.chunk_start_offset + 60, chunk.chunk_start_offset + chunk.chunk_length - 4):
-        content[place] ^= 0x55
-    path.write_bytes(content)
+    damage(path)
     with IndexedLog(path) as log:
         with pytest.raises(InputError, match=r"run\.mcap: .*damaged"):
             list(log.messages(numbers(log).values(), 0))

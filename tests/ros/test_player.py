@@ -5,7 +5,7 @@ import time
 import tracemalloc
 
 import pytest
-from written_logs import LATCHED, number, value_of, write_log
+from written_logs import LATCHED, damage, number, value_of, write_log
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.indexed_log import IndexedLog
@@ -47,8 +47,12 @@ def play(tmp_path):
     """Starts players of logs with given messages."""
     started = []
 
-    def begin(messages, latched=None, delay=0.0, begin=0.0, duration=1e9, first=None, behind=print, **options):
+    def begin(
+        messages, latched=None, delay=0.0, begin=0.0, duration=1e9, first=None, behind=print, damaged=False, **options
+    ):
         path = write_log(tmp_path / f"{len(started)}.mcap", messages, qos=dict.fromkeys(latched or {}, LATCHED))
+        if damaged:
+            damage(path)
         log = IndexedLog(path)
         start = log.start + round(begin * SECOND)
         end = min(log.end, start + round(duration * SECOND))
@@ -291,13 +295,8 @@ def test_an_offset_begins_with_what_was_valid_then(play):
     assert player.outlet.sent == [("/map", 3), ("/map", 5), ("/a", 9)]
 
 
-def test_a_damaged_place_ends_playing_but_only_refuses_a_seek(play, tmp_path):
-    player = play(counted(100), paused=True)
-    path = player.log.path
-    content = bytearray(path.read_bytes())
-    half = len(content) // 3
-    content[half : half + 400] = bytes(400)
-    path.write_bytes(content)
+def test_a_damaged_place_ends_playing_but_only_refuses_a_seek(play):
+    player = play(counted(100), paused=True, damaged=True)
     with pytest.raises(InputError, match="damaged"):
         for position in range(100):
             ask(player.seek(position * SECOND // 10))
@@ -308,7 +307,7 @@ def test_a_damaged_place_ends_playing_but_only_refuses_a_seek(play, tmp_path):
     ask(player.resume())
     assert player.finished.wait(LIMIT)
     assert isinstance(player.error, InputError) and player.error.exit_code == 2
-    assert values(player) == list(range(len(values(player))))
+    assert 20 < len(values(player)) < 60 and values(player) == list(range(len(values(player))))
 
 
 def test_a_log_is_never_in_memory_as_a_whole(tmp_path):
