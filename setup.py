@@ -51,7 +51,7 @@ data_files = [
 if {"bdist_wheel", "editable_wheel"} & set(sys.argv):
     # `ros2 run` looks for executables in lib/<package>. colcon puts the console scripts there (`options` below);
     # pip puts them into bin, so a wheel carries launchers that call them.
-    data_files.append((f"lib/{NAME}", ["resource/sim_node", "resource/ramp_controller"]))
+    data_files.append((f"lib/{NAME}", ["resource/sim_node", "resource/replay_node", "resource/ramp_controller"]))
 
 setup(
     name=NAME,
@@ -113,6 +113,7 @@ setup(
         "console_scripts": [
             "bilayer = bilayer_core.cli:main",
             "sim_node = bilayer_sim_ros.sim_node:main",
+            "replay_node = bilayer_sim_ros.replay_node:main",
             "ramp_controller = bilayer_sim_ros.ramp_controller:main",
         ],
     },

@@ -31,6 +31,8 @@ class NodeParameter:
         Whether `minimum` itself is excluded.
     choices : tuple of str
         All values of a text parameter; empty when any text will do.
+    live : bool
+        Whether it may be set while the node runs; others are read once, at the start.
     """
 
     name: str
@@ -39,6 +41,7 @@ class NodeParameter:
     minimum: float = -math.inf
     above_minimum: bool = False
     choices: tuple[str, ...] = ()
+    live: bool = False
 
     @property
     def allowed(self) -> str:
@@ -131,4 +134,28 @@ RAMP_CONTROLLER = (
     NodeParameter("hold", False, "go on sending the end value until interrupted"),
     NodeParameter("resume", False, "call the simulation's service ~/resume once the stimulus topic is connected"),
     NodeParameter("connection_timeout", 180.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
+)
+
+REPLAY_NODE = (
+    NodeParameter("log", "", "MCAP log to play, with an index; may also be the command's argument"),
+    NodeParameter(
+        "services",
+        "std_srvs",
+        "types of the services: std_srvs (Trigger), or rosbag2 (those of rosbag2_interfaces, where they are installed)",
+        choices=("std_srvs", "rosbag2"),
+    ),
+    NodeParameter("play.rate", 1.0, "seconds of the log per second", 0.0, above_minimum=True, live=True),
+    NodeParameter(
+        "play.position", 0.0, "time of the log [s], about once a second; setting it seeks, and keeps paused", live=True
+    ),
+    NodeParameter("play.loop", False, "begin again at the end"),
+    NodeParameter("play.start_paused", False, "wait for the service ~/resume at the start"),
+    NodeParameter("play.start_offset", 0.0, "part of the log's beginning that is left out [s]", 0.0),
+    NodeParameter("play.playback_duration", -1.0, "how much of the log is played [s]; negative = to its end"),
+    NodeParameter(
+        "play.clock_publish_frequency",
+        0.0,
+        "messages on /clock per second [Hz]; 0 = none. A /clock in the log is not published",
+        0.0,
+    ),
 )

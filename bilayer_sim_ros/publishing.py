@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -13,14 +11,7 @@ from bilayer_core.record.encoders import FrameEncoder
 from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec, output_topics
 from bilayer_core.simulation.frame import Description, Frame
 from bilayer_sim_ros.conversions import to_time
-
-CLOCK_TOPIC = "/clock"
-
-
-def message_class(ros_type: str) -> type:
-    """Class of a message type such as ``std_msgs/msg/Float64``."""
-    package, name = ros_type.split("/msg/")
-    return getattr(importlib.import_module(f"{package}.msg"), name)
+from bilayer_sim_ros.message_types import CLOCK_TOPIC, message_class
 
 
 def quality_of_service(spec: TopicSpec) -> QoSProfile:

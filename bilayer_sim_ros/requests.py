@@ -1,4 +1,4 @@
-"""What other threads ask of the one that simulates."""
+"""What other threads ask of the one that simulates, or plays."""
 
 from __future__ import annotations
 
@@ -14,9 +14,16 @@ Action = Callable[[Future], None]
 
 
 class Requests:
-    """Requests in the order in which they came; any thread asks, one serves."""
+    """Requests in the order in which they came; any thread asks, one serves.
 
-    def __init__(self):
+    Parameters
+    ----------
+    ended : str
+        What requests are told that come too late.
+    """
+
+    def __init__(self, ended: str = "the simulation has ended"):
+        self._ended = ended
         self._queue: queue.SimpleQueue[tuple[Future, Action] | None] = queue.SimpleQueue()
         self._closed = threading.Event()
 
@@ -60,4 +67,4 @@ class Requests:
             except queue.Empty:
                 return
             if request is not None:
-                request[0].set_exception(InputError("the simulation has ended"))
+                request[0].set_exception(InputError(self._ended))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
@@ -18,35 +20,64 @@ from bilayer_core.errors import BilayerError
 LAST_ANSWERS = 1.0
 
 
+@dataclass(frozen=True)
+class Service:
+    """One service.
+
+    Attributes
+    ----------
+    name : str
+        Under the node's own.
+    type : type
+        Of requests and responses.
+    ask : callable
+        Has what a request says done; returns the future of what came of it. `BilayerError` is a refusal.
+    answer : callable
+        Writes that into a response, from the future, which is done.
+    """
+
+    name: str
+    type: type
+    ask: Callable[[Any], Future]
+    answer: Callable[[Any, Future], None]
+
+
+def trigger(name: str, ask: Callable[[], Future]) -> Service:
+    """A service without arguments, whose answer is a text: the future's, or why it was refused."""
+    return Service(name, Trigger, lambda _: ask(), _say)
+
+
+def _say(response: Trigger.Response, future: Future) -> None:
+    try:
+        response.message, response.success = future.result(), True
+    except BilayerError as error:
+        response.message, response.success = str(error), False
+
+
 class Services:
     """Services of a node, each answered from a future; messages and other requests are served meanwhile.
 
     Parameters
     ----------
     node : Node
-    asks : mapping
-        Name under the node's own -> what asks, and returns the future of what to say; `BilayerError` is a refusal.
+    services : iterable of Service
     """
 
-    def __init__(self, node: Node, asks: Mapping[str, Callable[[], Future]]):
+    def __init__(self, node: Node, services: Iterable[Service]):
         self._node = node
         self._unanswered = 0
         self._all_answered = threading.Condition()
         group = ReentrantCallbackGroup()
-        for name, ask in asks.items():
-            node.create_service(Trigger, f"~/{name}", partial(self._answer, ask), callback_group=group)
+        for service in services:
+            answer = partial(self._answer, service)
+            node.create_service(service.type, f"~/{service.name}", answer, callback_group=group)
 
-    async def _answer(
-        self, ask: Callable[[], Future], _: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
+    async def _answer(self, service: Service, request: Any, response: Any) -> Any:
         with self._all_answered:
             self._unanswered += 1
-        future = ask()
+        future = service.ask(request)
         await self._in_executor(future)
-        try:
-            response.message, response.success = future.result(), True
-        except BilayerError as error:
-            response.message, response.success = str(error), False
+        service.answer(response, future)
         with self._all_answered:
             self._unanswered -= 1
             self._all_answered.notify_all()

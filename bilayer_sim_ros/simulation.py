@@ -23,7 +23,7 @@ from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.parameters import Value
 from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
-from bilayer_sim_ros.services import Services
+from bilayer_sim_ros.services import Services, trigger
 from bilayer_sim_ros.status import Status
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 from bilayer_sim_ros.worker import SimulationWorker
@@ -83,7 +83,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         inputs.notify = worker.wake
     _subscribe(node, inputs, description.channels)
     _subscribe_commands(node, commands, simulator.model)
-    services = Services(node, {name: getattr(worker, name) for name in ("pause", "resume", "step", "reset")})
+    services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
     state = "paused" if parameters["start_paused"] else "running"
     node.get_logger().info(f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}")
     worker.start()

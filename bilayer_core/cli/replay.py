@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bilayer_core.cli.nodes import become_replay_node
 from bilayer_core.cli.options import Duration, Verb, set_option
 from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
@@ -34,6 +35,9 @@ THENCE = "From there on; null: its schedule."
 @click.option("--load", "loads", multiple=True, metavar="NAME=FACTOR", help=THENCE)
 @click.option("--duration", type=Duration(), help="How long to go on; default: to the end of the log's run.")
 @click.option("--log", "new", metavar="NEW.mcap", help="Write a log of what comes then.")
+@click.option("--ros", "publishes", is_flag=True, help="Publish its messages as a ROS 2 node, replay_node, does.")
+@click.option("--rate", type=float, metavar="R", help="Seconds of the log per second, for --ros.")
+@click.option("--loop", is_flag=True, help="Begin again at the end, for --ros.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
 def replay(
@@ -47,16 +51,32 @@ def replay(
     loads: tuple[str, ...],
     duration: float | None,
     new: str | None,
+    publishes: bool,
+    rate: float | None,
+    loop: bool,
     force: bool,
     quiet: bool,
 ) -> int:
-    """Make the run of a log again: to verify it (--verify), or another one from an instant on (--from).
+    """Make the run of a log again: to verify it (--verify), or another one from an instant on (--from). Or publish
+    its messages on ROS 2 (--ros).
 
     Exit code 1 if --verify finds a difference.
     """
-    if verifies == (moment is not None):
-        raise InputError("replay: say either --verify, to compare the run with its log, or --from T, to go on from T")
+    if verifies + (moment is not None) + publishes != 1:
+        raise InputError(
+            "replay: say either --verify, to compare the run with its log, or --from T, to go on from T, or --ros, to "
+            "publish its messages"
+        )
     changes = {"--set": overrides, "--stimulus": stimuli, "--load": loads, "--duration": duration, "--log": new}
+    if publishes:
+        others = {**changes, "--tolerance": tolerance, "--json": json_file, "--force": force, "--quiet": quiet}
+        given = [option for option, value in others.items() if value is not None and value is not False and value != ()]
+        if given:
+            raise InputError(f"{given[0]}: is not for --ros")
+        become_replay_node(log, rate, loop)
+    for option, value in (("--rate", rate), ("--loop", loop)):
+        if value is not None and value is not False:
+            raise InputError(f"{option}: is for --ros")
     if verifies:
         given = [option for option, value in changes.items() if value]
         if given:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import struct
 from collections import defaultdict
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -17,7 +15,6 @@ from bilayer_core.record.log_records import (
     CHANNEL,
     CHUNK,
     DATA_END,
-    MAGIC,
     MESSAGE,
     MESSAGE_HEAD,
     MESSAGE_INDEX,
@@ -31,31 +28,10 @@ from bilayer_core.record.log_records import (
     unpacked,
     walk,
 )
+from bilayer_core.record.opening import is_finished, open_log
 
 MOST_BARE = 1 << 20
 """Of messages that stand outside of chunks, as many as are read at once [bytes]."""
-
-
-@contextmanager
-def open_log(path: Path) -> Iterator[BinaryIO]:
-    """The open file; what shows that it is not a log, or is damaged, becomes an InputError."""
-    from mcap.exceptions import McapError
-
-    try:
-        with path.open("rb") as file:
-            if file.read(len(MAGIC)) != MAGIC:
-                raise InputError(f"{path}: is not an MCAP log: it does not begin as one")
-            yield file
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except DamagedChunk as error:
-        raise InputError(
-            f"{path}: is damaged: {error}; `bilayer repair` makes a log of what can still be read"
-        ) from error
-    except (McapError, struct.error, ValueError, RuntimeError) as error:  # RuntimeError: lz4's
-        # mcap says nothing of a record whose parts are longer than itself.
-        reason = str(error) or "a record in it ends too early"
-        raise InputError(f"{path}: is not an MCAP log, or is damaged: {reason}") from error
 
 
 @dataclass(frozen=True)
@@ -233,9 +209,6 @@ def read_summary(file: BinaryIO):
     """The index of a finished file (`mcap.summary.Summary`), or None."""
     from mcap.reader import SeekingReader
 
-    if file.seek(0, 2) < 2 * len(MAGIC):
-        return None
-    file.seek(-len(MAGIC), 2)
-    finished = file.read() == MAGIC
+    finished = is_finished(file)
     file.seek(0)
     return SeekingReader(file).get_summary() if finished else None

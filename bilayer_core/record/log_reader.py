@@ -13,10 +13,11 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
-from bilayer_core.record.log_file import LogFile, open_log
+from bilayer_core.record.log_file import LogFile
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.log_records import METADATA, content, parse, walk
 from bilayer_core.record.log_source import LogSource
+from bilayer_core.record.opening import open_log
 from bilayer_core.record.run_data import RunData
 from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
 from bilayer_core.simulation.frame import Description

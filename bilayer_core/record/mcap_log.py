@@ -21,7 +21,7 @@ from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_in
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import INPUTS, DisplayGate, Rate, TopicSpec, input_topics
+from bilayer_core.record.topics import INPUTS, QOS, DisplayGate, Rate, TopicSpec, input_topics
 from bilayer_core.simulation.frame import Description, Frame
 from bilayer_core.simulation.inputs import STIMULUS, Input
 
@@ -31,8 +31,6 @@ SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 SUFFIX = ".mcap"
 SCENE_ATTACHMENT = "scene.yaml"
-QOS = "offered_qos_profiles"
-"""Metadata of a channel: the quality of service that its topic is offered with, in the form of rosbag2."""
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 

@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS
-from bilayer_core.record.log_file import open_log, read_summary
+from bilayer_core.record.log_file import read_summary
 from bilayer_core.record.log_reader import REPAIRED
 from bilayer_core.record.log_records import (
     ATTACHMENT,
@@ -42,6 +42,7 @@ from bilayer_core.record.log_records import (
     unpacked,
     walk,
 )
+from bilayer_core.record.opening import open_log
 from bilayer_core.record.paths import check_output_path, draft_of
 
 SUFFIX = ".mcap"

@@ -14,6 +14,8 @@ from bilayer_core.simulation.frame import Description
 
 LOG_NAMESPACE = "/bilayer_sim"
 FRAME_ID = "world"
+QOS = "offered_qos_profiles"
+"""Metadata of a channel: the quality of service that its topic is offered with, in the form of rosbag2."""
 
 
 class Rate(Enum):

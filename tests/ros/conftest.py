@@ -123,15 +123,15 @@ class Client:
             self._executor.spin_once(timeout_sec=0.05)
         self.drain()
 
-    def request(self, name):
+    def request(self, name, node=NODE):
         """Call the node's service `name`; the future of its answer."""
-        client = self.node.create_client(Trigger, f"{NODE}/{name}")
+        client = self.node.create_client(Trigger, f"{node}/{name}")
         self.spin_until(client.service_is_ready, f"the service {name}")
         return client.call_async(Trigger.Request())
 
-    def call(self, name) -> Trigger.Response:
+    def call(self, name, node=NODE) -> Trigger.Response:
         """Call the node's service `name`; its answer."""
-        future = self.request(name)
+        future = self.request(name, node)
         self.spin_until(future.done, f"an answer of {name}")
         return future.result()
 

@@ -47,11 +47,11 @@ def test_the_bundled_scenes_are_found(prefix, run):
 def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
     assert (prefix / "share/ament_index/resource_index/packages/bilayer_sim_ros").is_file()
     configuration = ("config/sim_node.yaml", "config/scenes/gripping.yaml", "config/templates/strip.yaml")
-    for name in ("package.xml", *configuration, "launch/simulation.launch.py"):
+    for name in ("package.xml", *configuration, "launch/simulation.launch.py", "launch/replay.launch.py"):
         assert (prefix / "share/bilayer_sim_ros" / name).is_file()
 
 
-@pytest.mark.parametrize("name", ["sim_node", "ramp_controller"])
+@pytest.mark.parametrize("name", ["sim_node", "replay_node", "ramp_controller"])
 def test_executables_are_where_ros2_run_looks_for_them(prefix, run, name):
     shown = run(prefix / "lib/bilayer_sim_ros" / name, "--help")
     assert shown.returncode == 0, shown.stderr

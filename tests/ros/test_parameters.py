@@ -2,7 +2,7 @@ import pytest
 import yaml
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.parameters import RAMP_CONTROLLER, SIM_NODE, NodeParameter, accept_all
+from bilayer_sim_ros.parameters import RAMP_CONTROLLER, REPLAY_NODE, SIM_NODE, NodeParameter, accept_all
 
 RATE = NodeParameter("rate", 50.0, "messages per second [Hz]", minimum=0.0, above_minimum=True)
 MODE = NodeParameter("mode", "hold", "what acts", choices=("hold", "zero"))
@@ -52,6 +52,12 @@ def test_the_parameter_file_lists_every_parameter_with_its_default(root):
     assert content["/**"]["ros__parameters"] == {p.name: p.default for p in SIM_NODE}
 
 
-@pytest.mark.parametrize("table", [SIM_NODE, RAMP_CONTROLLER])
+@pytest.mark.parametrize("table", [SIM_NODE, REPLAY_NODE, RAMP_CONTROLLER])
 def test_every_default_is_allowed(table):
     assert accept_all(table, {}) == {p.name: p.default for p in table}
+
+
+@pytest.mark.parametrize("parameter", REPLAY_NODE, ids=lambda parameter: parameter.name)
+def test_the_readme_tells_every_parameter_of_the_player_with_its_default(root, parameter):
+    default = {"": "empty"}.get(parameter.default, f"`{str(parameter.default).replace('False', 'false')}`")
+    assert f"\n| `{parameter.name}` | {default} | " in (root / "README.md").read_text(encoding="utf-8")

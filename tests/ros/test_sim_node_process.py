@@ -104,6 +104,12 @@ def test_an_argument_that_nobody_reads_is_refused(start, domain):
     assert "unrecognized arguments: bending" in node.output
 
 
+def test_a_missing_file_of_parameters_is_refused_in_one_line(start, domain):
+    node = start("sim_node", domain, arguments=["--ros-args", "--params-file", "none.yaml"])
+    assert node.wait() == 2
+    assert "none.yaml" in node.output and len(node.output.splitlines()) == 1
+
+
 def test_help_lists_the_parameters(start, domain):
     node = start("sim_node", domain, arguments=["--help"])
     assert node.wait() == 0

@@ -1,0 +1,119 @@
+"""A log on ROS topics: its messages go out by their time, services and parameters pause, seek and step."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Mapping
+from concurrent.futures import Future
+
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from bilayer_core.errors import BilayerError, InputError
+from bilayer_core.record.cdr import NANOSECONDS, nanoseconds
+from bilayer_core.record.indexed_log import IndexedLog
+from bilayer_sim_ros.live_parameters import LiveParameters
+from bilayer_sim_ros.parameters import REPLAY_NODE, Value
+from bilayer_sim_ros.player import Playback, Player
+from bilayer_sim_ros.replay_topics import ReplayTopics
+from bilayer_sim_ros.rosbag2_services import rosbag2_services
+from bilayer_sim_ros.services import Service, Services, trigger
+
+LAG_PERIOD = 5.0
+"""Real time between two warnings that messages come late [s]."""
+POSITION, RATE = "play.position", "play.rate"
+
+
+def play(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
+    """Play a log until its end or until `stop` is set; raises what playing stopped with."""
+    if not parameters["log"]:
+        raise InputError("no log is given: replay_node LOG.mcap, or the parameter 'log'")
+    with IndexedLog(parameters["log"]) as log:
+        _play(node, log, parameters, stop)
+
+
+def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: threading.Event) -> None:
+    playback = playback_of(log, parameters)
+    logger = node.get_logger()
+    topics = ReplayTopics(node, log.channels, playback.clock_rate > 0.0, logger.warning)
+    if not topics.channels:
+        raise InputError(f"{log.path}: holds no topic that can be published")
+
+    def move(position: float) -> None:
+        node.executor.create_task(show, position)
+
+    def show(position: float) -> None:
+        live.show({POSITION: position, RATE: player.rate})
+
+    def warn_of_lag(lag: float) -> None:
+        logger.warning(
+            f"cannot keep up with {RATE} = {player.rate:g}: messages go out {lag:.2f} s later than it asks by now, "
+            "none is left out",
+            throttle_duration_sec=LAG_PERIOD,
+        )
+
+    player = Player(log, topics, playback, moved=move, behind=warn_of_lag, finished=stop.set)
+    offered = trigger_services(player) if parameters["services"] == "std_srvs" else rosbag2_services(node, player)
+    changes = {POSITION: lambda seconds: player.seek(nanoseconds(seconds)), RATE: player.set_rate}
+    live = LiveParameters(node, REPLAY_NODE, changes)
+    services = Services(node, offered)
+    kind = "std_srvs/Trigger" if parameters["services"] == "std_srvs" else "rosbag2_interfaces"
+    span = f"t = {playback.first / NANOSECONDS:.9g} to {playback.end / NANOSECONDS:.9g} s"
+    logger.info(
+        f"{'paused' if playback.paused else 'playing'} {log.path}, {span}, {len(topics.channels)} topics; "
+        f"services ({kind}): {' '.join(f'~/{service.name}' for service in offered)}"
+    )
+    player.start()
+    try:
+        stop.wait()
+    finally:
+        player.stop()
+        services.finish()
+    if player.error is not None:
+        raise player.error
+    late = f"; {player.lag:.2f} s later than {RATE} asked" if player.lag else ""
+    logger.info(f"ended at t = {player.position:.9g} s{late}")
+
+
+def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
+    """What parameters ask for of a log, or InputError."""
+    offset, duration, position = (
+        parameters[f"play.{name}"] for name in ("start_offset", "playback_duration", "position")
+    )
+    length = (log.end - log.start) / NANOSECONDS
+    if offset > length:
+        raise InputError(f"parameter 'play.start_offset' is {offset:g}; {log.path} takes {length:.9g} s")
+    begin = log.start + nanoseconds(offset)
+    end = log.end if duration < 0.0 else min(log.end, begin + nanoseconds(min(duration, length)))
+    first = nanoseconds(position) if position else begin
+    if not log.start <= first <= end:
+        span = f"{log.start / NANOSECONDS:.9g} to {end / NANOSECONDS:.9g} s"
+        raise InputError(f"parameter '{POSITION}' is {position:.9g}; {log.path} is played from {span}")
+    return Playback(
+        begin=begin,
+        end=end,
+        first=first,
+        rate=parameters[RATE],
+        loop=parameters["play.loop"],
+        paused=parameters["play.start_paused"],
+        clock_rate=parameters["play.clock_publish_frequency"],
+    )
+
+
+def trigger_services(player: Player) -> list[Service]:
+    """Services whose requests say nothing, and whose answers are a success and a text."""
+
+    def say_whether_paused(response: Trigger.Response, future: Future) -> None:
+        try:
+            response.success, response.message = future.result()
+        except BilayerError as error:
+            response.success, response.message = False, str(error)
+
+    return [
+        trigger("pause", player.pause),
+        trigger("resume", player.resume),
+        trigger("toggle_paused", player.toggle_paused),
+        Service("is_paused", Trigger, lambda _: player.is_paused(), say_whether_paused),
+        trigger("play_next", player.play_next),
+        trigger("stop", player.end),
+    ]

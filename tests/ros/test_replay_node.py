@@ -1,0 +1,307 @@
+"""Logs that `replay_node` plays to another process over DDS."""
+
+import importlib
+import os
+import re
+import signal
+import subprocess
+import time
+from functools import partial
+
+import numpy as np
+import pytest
+import synthetic_run
+from processes import bilayer, command, environment
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64
+from written_logs import LATCHED, number, value_of, write_log
+
+from bilayer_core.record.log_reader import read_messages
+from bilayer_core.record.mcap_log import McapRecorder
+
+NODE = "/bilayer_replay"
+PAUSED = {"play.start_paused": True}
+DEEP = QoSProfile(depth=1000)
+
+
+@pytest.fixture(scope="module")
+def run_log(tmp_path_factory):
+    """Half a second of a run, all topics."""
+    path = tmp_path_factory.mktemp("logs") / "run.mcap"
+    synthetic_run.run(McapRecorder(path, 50.0, 20.0), np.linspace(0.0, 0.5, 26))
+    return path
+
+
+@pytest.fixture
+def counted_log(tmp_path):
+    """A log of numbers, one a tenth of a second: an old one, that says nothing of quality of service."""
+
+    def write(name="counted.mcap", count=100, period=0.1, first=0.0):
+        messages = [("/bilayer_sim/number", index * period, number(first + index)) for index in range(count)]
+        return write_log(tmp_path / name, messages)
+
+    return write
+
+
+def listen(client, topic, ros_type=Float64, qos=DEEP):
+    """A list that grows with the bytes of every message, once a publisher is there."""
+    found = []
+    subscription = client.node.create_subscription(ros_type, topic, found.append, qos, raw=True)
+    client.spin_until(lambda: subscription.get_publisher_count() > 0, f"a publisher of {topic}")
+    return found
+
+
+def numbers(found):
+    return [value_of(data) for data in found]
+
+
+def set_parameter(client, name, value, node=NODE):
+    """The result."""
+    service = client.node.create_client(SetParameters, f"{node}/set_parameters")
+    client.spin_until(service.service_is_ready, "set_parameters")
+    wished = Parameter(name, value=value).to_parameter_msg()
+    future = service.call_async(SetParameters.Request(parameters=[wished]))
+    client.spin_until(future.done, "an answer")
+    return future.result().results[0]
+
+
+def get_parameter(client, name, node=NODE):
+    service = client.node.create_client(GetParameters, f"{node}/get_parameters")
+    client.spin_until(service.service_is_ready, "get_parameters")
+    future = service.call_async(GetParameters.Request(names=[name]))
+    client.spin_until(future.done, "an answer")
+    return future.result().values[0].double_value
+
+
+def message_class(ros_type):
+    package, _, name = ros_type.split("/")
+    return getattr(importlib.import_module(f"{package}.msg"), name)
+
+
+def test_every_message_arrives_byte_for_byte_on_the_topics_of_the_node_and_no_clock(start, connect, domain, run_log):
+    node = start("replay_node", domain, PAUSED, [str(run_log)])
+    client = connect(node)
+    logged, types = {}, {}
+    for topic, ros_type, _, data in read_messages(run_log):
+        types[topic] = ros_type
+        if data is not None:
+            logged.setdefault(topic, []).append(data)
+    assert len(logged.pop("/clock")) == 26 and len(logged) > 10
+    received = {
+        topic: listen(client, topic.replace("/bilayer_sim", NODE), message_class(types[topic])) for topic in logged
+    }
+    assert client.node.count_publishers("/clock") == 0
+    assert client.call("resume", NODE).success
+    client.spin_to_the_end()
+    assert node.wait() == 0, node.output
+    # DDS pads what it carries to a multiple of four bytes.
+    padded = {topic: [data + bytes(-len(data) % 4) for data in messages] for topic, messages in logged.items()}
+    assert received == padded
+    assert "services (std_srvs/Trigger): ~/pause ~/resume ~/toggle_paused ~/is_paused ~/play_next ~/stop" in node.output
+
+
+def test_two_logs_play_side_by_side_under_the_names_of_their_nodes(start, connect, domain, counted_log):
+    nodes = {}
+    for name, first in (("one", 0.0), ("two", 1000.0)):
+        log = counted_log(f"{name}.mcap", count=3, first=first)
+        nodes[name] = start("replay_node", domain, PAUSED, [str(log), "--ros-args", "-r", f"__node:={name}"])
+    client = connect(nodes["one"])
+    heard = {name: listen(client, f"/{name}/number") for name in nodes}
+    assert client.call("play_next", "/two").success
+    client.spin_until(lambda: heard["two"], "the message")
+    assert client.call("resume", "/one").success
+    client.spin_to_the_end()
+    assert numbers(heard["one"]) == [0, 1, 2]
+    assert numbers(heard["two"]) == [1000]
+    assert nodes["two"].running
+    assert client.node.count_publishers("/bilayer_sim/number") == 0
+
+
+def test_services_and_live_parameters_move_a_paused_player(start, connect, domain, counted_log):
+    node = start("replay_node", domain, PAUSED | {"play.position": 0.4}, [str(counted_log())])
+    client = connect(node)
+    heard = listen(client, f"{NODE}/number")
+
+    def said(name):
+        answer = client.call(name, NODE)
+        return answer.success, answer.message
+
+    assert said("is_paused") == (True, "paused at t = 0.4 s")
+    assert said("play_next") == (True, "sent /bilayer_sim/number of t = 0.4 s")
+    assert set_parameter(client, "play.position", 7.25).successful
+    assert get_parameter(client, "play.position") == 7.25
+    assert said("is_paused") == (True, "paused at t = 7.25 s")
+    assert said("play_next") == (True, "sent /bilayer_sim/number of t = 7.3 s")
+    assert get_parameter(client, "play.position") == 7.3
+    refused = set_parameter(client, "play.position", 12.0)
+    assert not refused.successful and refused.reason == "t = 12 s is not in what is played, which is 0 to 9.9 s"
+    for value in (0.0, -1.0, float("nan"), "fast"):
+        refused = set_parameter(client, "play.rate", value)
+        assert not refused.successful and "allowed is a finite number > 0" in refused.reason
+    assert not set_parameter(client, "play.loop", True).successful
+    assert set_parameter(client, "play.rate", 1e-3).successful
+    assert said("toggle_paused")[1].startswith("playing at t = 7.3")
+    assert said("is_paused")[0] is False
+    assert said("play_next") == (False, "the log is being played: call pause first")
+    assert set_parameter(client, "play.rate", 50).successful  # an integer will do
+    client.spin_to_the_end()
+    assert node.wait() == 0
+    assert numbers(heard) == [4, *range(73, 100)]
+
+
+def test_a_stop_ends_the_node_and_is_answered(start, connect, domain, counted_log):
+    node = start("replay_node", domain, PAUSED, [str(counted_log())])
+    answer = connect(node).call("stop", NODE)
+    assert (answer.success, answer.message) == (True, "stopped at t = 0 s")
+    assert node.wait(30) == 0
+
+
+def test_offset_duration_and_rate_bound_what_is_sent_and_the_clock_follows(start, connect, domain, counted_log):
+    parameters = {"play.start_offset": 1.0, "play.playback_duration": 0.5, "play.clock_publish_frequency": 100.0}
+    node = start("replay_node", domain, PAUSED | parameters | {"log": counted_log(), "play.rate": 0.5})
+    client = connect(node)
+    heard, clock = listen(client, f"{NODE}/number"), client.listen(Clock, "/clock")
+    begin = time.monotonic()
+    assert client.call("resume", NODE).success
+    client.spin_to_the_end()
+    assert time.monotonic() - begin >= 1.0
+    assert node.wait() == 0
+    assert numbers(heard) == [10, 11, 12, 13, 14, 15]
+    times = [message.clock.sec + message.clock.nanosec * 1e-9 for message in clock]
+    assert times == sorted(times) and times[0] == 1.0 and times[-1] <= 1.5 and len(set(times)) > 20
+
+
+@pytest.mark.parametrize("number_of_signal", [signal.SIGINT, signal.SIGTERM])
+def test_a_loop_goes_on_until_a_signal_ends_the_node_with_0(start, connect, domain, counted_log, number_of_signal):
+    log = counted_log(count=5, period=0.02)
+    node = start("replay_node", domain, {"play.loop": True}, [str(log)])
+    client = connect(node)
+    heard = listen(client, f"{NODE}/number")
+    client.spin_until(lambda: len(heard) > 11, "three passes")
+    node.send(number_of_signal)
+    node.send(number_of_signal)
+    assert node.wait(30) == 0, node.output
+    assert "Traceback" not in node.output and "ended at t = " in node.output
+
+
+def test_topics_are_offered_as_they_were_and_late_listeners_get_what_is_latched(start, connect, domain, tmp_path):
+    best_effort = "- history: keep_last\n  depth: 3\n  reliability: best_effort\n  durability: volatile\n"
+    messages = [("/map", 0.0, number(1)), ("/map", 2.0, number(2)), ("/fast", 3.0, number(3)), ("/old", 3.0, number(4))]
+    messages += [("/broken", 3.0, number(5))]
+    qos = {"/map": LATCHED, "/fast": best_effort, "/broken": "- history: 99\n"}
+    log = write_log(tmp_path / "run.mcap", messages, qos=qos)
+    node = start("replay_node", domain, PAUSED | {"play.start_offset": 2.5}, [str(log)])
+    client = connect(node)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    heard = listen(client, "/map", qos=latched)
+    client.spin_until(lambda: heard, "what is latched")
+    assert set_parameter(client, "play.position", 1.0).successful
+    client.spin_until(lambda: len(heard) > 1, "what was latched before")
+    late = listen(client, "/map", qos=latched)
+    client.spin_until(lambda: late, "what is latched now")
+    assert (numbers(heard), numbers(late)) == ([2, 1], [1])
+    offered = {}
+    for topic in ("/map", "/fast", "/old", "/broken"):
+        (found,) = client.spin_until(partial(client.node.get_publishers_info_by_topic, topic), f"{topic}")
+        offered[topic] = found.qos_profile
+    reliable, volatile = ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE
+    assert {topic: (profile.reliability, profile.durability) for topic, profile in offered.items()} == {
+        "/map": (reliable, DurabilityPolicy.TRANSIENT_LOCAL),
+        "/fast": (ReliabilityPolicy.BEST_EFFORT, volatile),
+        "/old": (reliable, volatile),
+        "/broken": (reliable, volatile),
+    }
+    assert "topic /broken: its quality of service is not in the form of rosbag2" in node.output
+
+
+def test_what_cannot_be_published_is_named_once_and_the_rest_is_played(start, connect, domain, tmp_path):
+    topics = ("/good", "/alien", "/alien_too", "/misnamed", "/no topic")
+    types = {"/alien": "aliens/msg/Ship", "/alien_too": "aliens/msg/Ship", "/misnamed": "Float64"}
+    log = write_log(tmp_path / "run.mcap", [(topic, 0.1 * k, number(k)) for k in range(3) for topic in topics], types)
+    node = start("replay_node", domain, PAUSED, [str(log)])
+    client = connect(node)
+    heard = listen(client, "/good")
+    client.call("resume", NODE)
+    client.spin_to_the_end()
+    assert node.wait() == 0 and numbers(heard) == [0, 1, 2]
+    assert node.output.count("aliens/msg/Ship cannot be imported") == 1
+    assert "/alien, /alien_too" in node.output
+    assert "'Float64' is no type of a message, such as 'std_msgs/msg/Float64': /misnamed" in node.output
+    assert "/no topic" in node.output
+    assert "Traceback" not in node.output
+
+
+def test_the_command_plays_a_log_and_tells_that_it_cannot_keep_up(counted_log, domain, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    done = bilayer("replay", counted_log(count=20_000, period=0.01), "--ros", "--rate", "1e6")
+    assert done.returncode == 0, done.stderr
+    assert "playing " in done.stderr and "cannot keep up with play.rate = 1e+06" in done.stderr
+    assert re.search(r"ended at t = 199\.99 s; \d\.\d\d s later than play\.rate asked", done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--rate", "0"], "--rate: 0 is not allowed; it must be a finite number > 0"),
+        (["--from", "1"], "say either --verify"),
+        (["--stimulus", "humidity=1"], "--stimulus: is not for --ros"),
+        (["--force"], "--force: is not for --ros"),
+    ],
+)
+def test_options_that_the_command_cannot_heed_are_refused(counted_log, arguments, said):
+    done = bilayer("replay", counted_log(), "--ros", *arguments)
+    assert done.returncode == 2 and said in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_rate_and_loop_without_ros_are_refused(counted_log):
+    for option in (["--loop"], ["--rate", "2"]):
+        done = bilayer("replay", counted_log(), "--verify", *option)
+        assert done.returncode == 2 and f"{option[0]}: is for --ros" in done.stderr
+
+
+def test_where_ros_is_missing_the_command_says_so_with_exit_code_2(counted_log, tmp_path):
+    absent = tmp_path / "absent"
+    absent.mkdir()
+    (absent / "rclpy.py").write_text("raise ModuleNotFoundError(\"No module named 'rclpy'\", name='rclpy')\n")
+    surroundings = environment()
+    surroundings["PYTHONPATH"] = f"{absent}{os.pathsep}{surroundings['PYTHONPATH']}"
+    run = [*command("replay", counted_log(), "--ros")]
+    done = subprocess.run(run, env=surroundings, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 2
+    assert "pip install 'bilayer_sim_ros[ros]'" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it(run_log, tmp_path):
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(run_log.read_bytes()[:-100])
+    done = bilayer("replay", cut, "--ros")
+    assert done.returncode == 2
+    assert f"{cut}: has no index" in done.stderr and f"bilayer repair {cut} NEW.mcap" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({}, "no log is given"),
+        ({"log": "none.mcap"}, "none.mcap: cannot be read"),
+        ({"play.raet": 2.0}, "no parameter 'play.raet': did you mean 'play.rate'?"),
+        ({"play.rate": 0.0}, "'play.rate' is 0.0; allowed is a finite number > 0"),
+        ({"play.loop": 1}, "'play.loop' is 1; allowed is true or false"),
+        ({"services": "rosbag"}, "one of std_srvs, rosbag2"),
+        ({"play.start_offset": 99.0}, "'play.start_offset' is 99; "),
+        ({"play.position": 99.0}, "'play.position' is 99; "),
+        ({"services": "rosbag2"}, "rosbag2_interfaces"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_a_bad_parameter_ends_the_player_with_exit_code_2_and_one_message(start, domain, counted_log, parameters, said):
+    log = {} if said == "no log is given" else {"log": counted_log()}
+    node = start("replay_node", domain, log | parameters)
+    assert node.wait() == 2
+    assert said in node.output
+    assert "Traceback" not in node.output
