@@ -56,15 +56,15 @@ ADD, DELETE = 0, 2
 _IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float = ARROW_FORCE) -> np.ndarray:
+def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarray = ARROW_FORCE) -> np.ndarray:
     """Ends of the lines of arrows: a shaft and two barbs each; those of a zero force are all where it acts.
 
     Parameters
     ----------
     origins, forces : ndarray
         [m, N], shape (arrows, 3).
-    unit : float
-        Force from which arrows grow [N].
+    unit : float or ndarray
+        Force from which arrows grow [N], of all or of each, shape (arrows, 1).
 
     Returns
     -------
@@ -184,20 +184,30 @@ class MarkerEncoder:
                 pose[:] = own
             else:
                 _place(pose, frame.body_positions[body], frame.body_quaternions[body], own)
-        for points, part, unit in self._clamp_arrows:
-            wrenches = frame.clamp_wrenches[self._holding, part]
-            points[:] = force_arrows(frame.body_positions[self._holding], wrenches, unit)
         self._template.set_time(frame.time)
 
         forces = frame.contact_forces
         touching = np.flatnonzero(np.einsum("ij,ij->i", forces, forces) > ARROW_SHOWN**2)
         self._arrow_action[0] = ADD if len(touching) else DELETE
         self._arrow_count[0] = 6 * len(touching)
+        arrows = self._arrows(frame, touching)
         message = self._template.to_bytes()
         if not len(touching):
             return message[: self._arrows_offset] + message[self._arrows_start :]
-        arrows = force_arrows(frame.positions[touching], forces[touching])
         return message[: self._arrows_start] + arrows.astype("<f8").tobytes() + message[self._arrows_start :]
+
+    def _arrows(self, frame: Frame, touching: np.ndarray) -> np.ndarray:
+        """Write the arrows of clamps, and return those of contacts, all made at once [m], shape (6 touching, 3)."""
+        wrenches, held = frame.clamp_wrenches[self._holding], frame.body_positions[self._holding]
+        origins = [*(held for _ in self._clamp_arrows), frame.positions[touching]]
+        forces = [*(wrenches[:, part] for _, part, _ in self._clamp_arrows), frame.contact_forces[touching]]
+        units = [unit for _, _, unit in self._clamp_arrows for _ in held] + [ARROW_FORCE] * len(touching)
+        arrows = force_arrows(np.concatenate(origins), np.concatenate(forces), np.array(units)[:, None])
+        begin = 0
+        for points, _, _ in self._clamp_arrows:
+            points[:] = arrows[begin : begin + len(points)]
+            begin += len(points)
+        return arrows[begin:]
 
 
 def _place(pose_out: np.ndarray, position: np.ndarray, quaternion: np.ndarray, own: np.ndarray) -> None:

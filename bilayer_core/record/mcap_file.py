@@ -9,18 +9,33 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import BinaryIO
 
-_MESSAGE = struct.Struct("<BQHIQQ")
-"""Opcode, length, channel, sequence, log time and publish time [ns] of a message record, before its data."""
-_MESSAGE_HEAD = 2 + 4 + 8 + 8  # of that what the length counts [bytes]
+MESSAGE = 5
+"""Opcode of messages."""
+_MESSAGE = struct.Struct("<BQH")
+"""Opcode, length and channel of a message record, before `_MOMENT` and its data."""
+_MOMENT = struct.Struct("<IQQ")
+"""Sequence, log time and publish time [ns] of a message."""
+_MESSAGE_HEAD = 2 + _MOMENT.size  # of what is before the data the part that the length counts [bytes]
 _INDEX = struct.Struct("<BQHI")
 """Opcode, length, channel and length of the entries of a message index record, before its entries."""
 _INDEX_HEAD = 2 + 4  # of that what the length counts [bytes]
 _FOOTER = struct.Struct("<BQQQ")
 """What of the footer the checksum of the summary counts."""
 _FOOTER_SIZE = 8 + 8 + 4
+
+
+def message_head(channel: int, size: int) -> tuple[bytes, int]:
+    """What stands before `size` bytes of data in a message record, and where in it `time_and_sequence` stands."""
+    head = _MESSAGE.pack(MESSAGE, _MESSAGE_HEAD + size, channel)
+    return head + bytes(_MOMENT.size), len(head)
+
+
+def time_and_sequence(time: int, sequence: int) -> bytes:
+    """Of a message record, what says when it is of [ns], and which one it is."""
+    return _MOMENT.pack(sequence, time, time)
 
 
 class McapFile:
@@ -60,7 +75,7 @@ class McapFile:
     @property
     def waiting(self) -> bool:
         """Whether a message waits for its chunk to be written."""
-        return bool(self._index)
+        return any(self._index.values())
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:
         """Write an attachment."""
@@ -94,19 +109,30 @@ class McapFile:
             metadata=dict(metadata),
         )
         self._channels.append(channel)
-        self._counts[channel.id] = 0
+        self._counts[channel.id], self._index[channel.id] = 0, []
         self._chunk += self._bytes_of(channel)
         return channel.id
 
     def add_message(self, channel: int, time: int, sequence: int, data: bytes) -> None:
         """Put a message of a time [ns] into the chunk in hand, and write that if it is full."""
-        chunk, index = self._chunk, self._index.get(channel)
-        if index is None:
-            index = self._index[channel] = []
-        index += (time, len(chunk))
-        chunk += _MESSAGE.pack(self._opcodes.MESSAGE, _MESSAGE_HEAD + len(data), channel, sequence, time, time)
-        chunk += data
-        if len(chunk) > self._chunk_size:
+        head = _MESSAGE.pack(MESSAGE, _MESSAGE_HEAD + len(data), channel)
+        self.add_records(head + time_and_sequence(time, sequence) + data, [(channel, 0)], time)
+
+    def add_records(self, records: bytes | bytearray, places: Sequence[tuple[int, int]], time: int) -> None:
+        """Put message records of one time [ns] into the chunk in hand, and write that if it is full.
+
+        Parameters
+        ----------
+        records : bytes
+        places : sequence of (int, int)
+            Channel of each record, and where it begins.
+        time : int
+        """
+        begin, index = len(self._chunk), self._index
+        for channel, place in places:
+            index[channel] += (time, begin + place)
+        self._chunk += records
+        if len(self._chunk) > self._chunk_size:
             self._write_chunk()
 
     def flush(self) -> None:
@@ -161,14 +187,15 @@ class McapFile:
         )
 
     def _begin_chunk(self) -> None:
-        self._chunk, self._index = bytearray(), {}
+        self._chunk = bytearray()
+        self._index: dict[int, list[int]] = {channel.id: [] for channel in self._channels}
         """Records of the chunk in hand; of each channel in it time and place of each message in turn."""
 
     def _write_chunk(self) -> None:
         """Write the chunk in hand with its index, and begin another."""
         import lz4.frame
 
-        chunk, indexes = self._chunk, self._index
+        chunk, indexes = self._chunk, {channel: index for channel, index in self._index.items() if index}
         times = [time for index in indexes.values() for time in index[::2]]
         start, end = min(times), max(times)
         self._span = [min(start, self._span[0]) if self._chunks else start, max(end, self._span[1])]

@@ -18,6 +18,7 @@ from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_input
+from bilayer_core.record.frame_block import FrameBlock
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
 from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
@@ -249,6 +250,8 @@ class _LogFile:
         self._gate = gate
         self._encoder = FrameEncoder(description)
         self._file = open_alone(path, force)
+        self._large = [spec.name for spec in self._encoder.topics if spec.rate is Rate.DISPLAY]
+        self._block: FrameBlock | None = None
         self._sequence = 0
         self._unflushed_since: float | None = None
         self._synced = clock.monotonic()
@@ -281,14 +284,20 @@ class _LogFile:
             if item.kind == STIMULUS:
                 self._add(f"stimulus/{item.name}", nanoseconds(item.time), encode_float64(item.values[0]))
         else:
-            stamp = nanoseconds(item.time)
-            display = self._gate.is_due(item.time)
-            for spec in self._encoder.topics:
-                if display or spec.rate is not Rate.DISPLAY:
-                    self._add(spec.name, stamp, self._encoder.encode(spec.name, item))
+            self._write_frame(item)
             self._sequence += 1
         if self._unflushed_since is None:
             self._unflushed_since = clock.monotonic()
+
+    def _write_frame(self, frame: Frame) -> None:
+        if self._block is None:
+            self._block = FrameBlock(self._encoder.small_messages(frame), self._topics)
+        stamp, display = nanoseconds(frame.time), self._gate.is_due(frame.time)
+        self._block.fill(frame, self._sequence)
+        self._log.add_records(self._block.records, self._block.places, stamp)
+        if display:
+            for name in self._large:
+                self._add(name, stamp, self._encoder.encode(name, frame))
 
     def _add(self, name: str, stamp: int, data: bytes) -> None:
         self._log.add_message(self._topics[name], stamp, self._sequence, data)
