@@ -30,10 +30,24 @@ class Backlog(Generic[Item]):
         self._changed = threading.Condition(threading.Lock())
         self._urgent = self._closed = False
 
-    def offer(self, item: Item) -> bool:
-        """Hand an item over if there is room for it; whether there was. Never waits."""
+    def put(self, item: Item, patience: float | None = None) -> bool:
+        """Hand an item over when there is room for it.
+
+        Parameters
+        ----------
+        item : Item
+        patience : float, optional
+            Longest wait for room [s]; without one as long as it takes.
+
+        Returns
+        -------
+        bool
+            Whether it was handed over: there was room in time, and the queue is not closed.
+        """
         with self._changed:
-            if len(self._items) >= self._capacity:
+            if len(self._items) >= self._capacity and patience != 0.0:
+                self._changed.wait_for(lambda: self._closed or len(self._items) < self._capacity, patience)
+            if self._closed or len(self._items) >= self._capacity:
                 return False
             self._append(item)
             return True
@@ -43,15 +57,6 @@ class Backlog(Generic[Item]):
         with self._changed:
             self._urgent = self._urgent or urgent
             self._append(item)
-
-    def put(self, item: Item) -> bool:
-        """Hand an item over when there is room for it; false if nobody takes any more."""
-        with self._changed:
-            while len(self._items) >= self._capacity and not self._closed:
-                self._changed.wait()
-            if not self._closed:
-                self._append(item)
-            return not self._closed
 
     def take(self, timeout: float | None) -> list[Item]:
         """All items there are, once there is one and more have gathered; none after a time [s] without any."""

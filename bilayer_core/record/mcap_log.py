@@ -13,7 +13,7 @@ import time as clock
 from contextlib import ExitStack
 from pathlib import Path
 
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError, OutputError, SimulationError
 from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
@@ -32,7 +32,7 @@ GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wa
 FLUSH_PERIOD = 0.4  # longest time that a message then waits for its chunk to be written [s of wall time]
 SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
-PATIENCE = 10.0  # without anything written, after which a log that holds nothing up is given up [s of wall time]
+LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
 SCENE_ATTACHMENT = "scene.yaml"
 QOS = "offered_qos_profiles"
@@ -55,10 +55,11 @@ class McapRecorder:
         Rate of the large messages made to be looked at (`Rate.DISPLAY`) [Hz].
     force : bool
         Replace an existing file.
-    waits : bool
-        What happens when the disk is 64 frames behind, or takes no more. True: `observe` waits, nothing is lost, and a
-        disk that fails is an error of the run. False: neither ever holds the run up or ends it. Whole frames are
-        left out and counted, but no input and not the last frame; what failed is in `failure`, and `close` raises it.
+    patience : float, optional
+        Longest time for which a disk that is 64 frames behind holds the run up [s]. Without one `observe` waits as long
+        as it takes, nothing is lost, and a disk that fails is an error of the run. With one, 0 included, the disk never
+        ends the run: whole frames are left out and counted, but no input and not the last frame. What failed is in
+        `failure`, and `close` raises it.
 
     Attributes
     ----------
@@ -78,14 +79,14 @@ class McapRecorder:
         rate: float = 50.0,
         marker_rate: float = 20.0,
         force: bool = False,
-        waits: bool = True,
+        patience: float | None = None,
     ):
         self.path = check_output_path(path, force, SUFFIX)
         refuse_file_in_use(self.path)
         self.rate = rate
         self.dropped = 0
         self._gate = DisplayGate(rate, marker_rate)
-        self._force, self._waits = force, waits
+        self._force, self._patience = force, patience
         self._last_time = 0.0
         self._left_out: Frame | None = None
         self._backlog: Backlog[Frame | Input | dict[str, str]] = Backlog(QUEUE_LENGTH, GATHERING_PERIOD)
@@ -118,28 +119,30 @@ class McapRecorder:
         self._thread.start()
 
     def observe(self, frame: Frame) -> None:
-        """Hand a frame to the writer, as `waits` says. Raises SimulationError if that is true and writing failed."""
+        """Hand a frame to the writer, as `patience` says; without it, SimulationError is raised once writing failed."""
         self._refuse_unstarted()
-        if self._waits:
+        if self._patience is None:
             self._put(frame)
-        elif self._failure is None and self._backlog.offer(frame):
-            self._left_out = None
-        else:
+        elif not self._put_in_time(frame):
             self.dropped += 1
             self._left_out = frame
             return
-        self._last_time = frame.time
+        self._left_out, self._last_time = None, frame.time
 
     def note(self, told: Input) -> None:
-        """Log something that acts from outside; waits and raises as `observe` does, but is never left out."""
+        """Log something that acts from outside; likewise, but it is never left out."""
         self._refuse_unstarted()
-        if self._waits:
+        if self._patience is None:
             self._put(told)
         elif self._failure is None:
             self._backlog.add(told)
 
+    def _put_in_time(self, frame: Frame) -> bool:
+        """Wait no more for a disk for which one wait was in vain, until it has caught up."""
+        return self._failure is None and self._backlog.put(frame, self._patience if self._left_out is None else 0.0)
+
     def close(self, complete: bool, termination: str = "") -> None:
-        """Write what is left and finish the file. Raises SimulationError if anything could not be written.
+        """Write what is left and finish the file.
 
         Parameters
         ----------
@@ -147,6 +150,11 @@ class McapRecorder:
             Whether the run reached its end.
         termination : str
             Why it ended, for `read_info`; by default ``"completed"`` or ``"stopped"``.
+
+        Raises
+        ------
+        SimulationError
+            If anything could not be written; with a patience, OutputError.
         """
         if self._thread is None:
             return
@@ -168,15 +176,15 @@ class McapRecorder:
         self._raise_failure()
 
     def _join(self, thread: threading.Thread) -> None:
-        """Wait for the writer; one that need not be waited for is given up once it has written nothing for long."""
+        """Wait for the writer; with a patience it is given up once it has written nothing for long."""
         written = -1
         while thread.is_alive():
-            if not self._waits and written == self._written:
-                text = f"the log {self.path} could not be finished: nothing of it was taken in {PATIENCE:g} s"
-                self._failure = SimulationError(text, self._last_time)
+            if self._patience is not None and written == self._written:
+                text = f"the log {self.path} could not be finished: nothing of it was taken in {LONGEST_SILENCE:g} s"
+                self._failure = OutputError(text)
                 return
             written = self._written
-            thread.join(None if self._waits else PATIENCE)
+            thread.join(None if self._patience is None else LONGEST_SILENCE)
 
     def _refuse_unstarted(self) -> None:
         if self._thread is None and self._failure is None:
@@ -196,8 +204,8 @@ class McapRecorder:
         """What `close` raises, as things stand."""
         if not isinstance(self._failure, OSError):
             return self._failure
-        reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}"
-        return SimulationError(f"{reason}; {self._kept}", self._last_time)
+        reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}; {self._kept}"
+        return SimulationError(reason, self._last_time) if self._patience is None else OutputError(reason)
 
     def _what_is_kept(self) -> str:
         """After a failure, as who reads the file will find it."""
