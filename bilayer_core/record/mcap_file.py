@@ -109,7 +109,7 @@ class McapFile:
             metadata=dict(metadata),
         )
         self._channels.append(channel)
-        self._counts[channel.id], self._index[channel.id] = 0, []
+        self._index[channel.id] = []
         self._chunk += self._bytes_of(channel)
         return channel.id
 
@@ -177,7 +177,7 @@ class McapFile:
         return self._records.Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
-            channel_message_counts={channel: count for channel, count in self._counts.items() if count},
+            channel_message_counts=self._counts,
             chunk_count=len(self._chunks),
             message_count=sum(self._counts.values()),
             message_start_time=self._span[0],
@@ -195,7 +195,8 @@ class McapFile:
         """Write the chunk in hand with its index, and begin another."""
         import lz4.frame
 
-        chunk, indexes = self._chunk, {channel: index for channel, index in self._index.items() if index}
+        chunk, used = self._chunk, (item for item in self._index.items() if item[1])
+        indexes = dict(sorted(used, key=lambda item: item[1][1]))  # by the first message of each channel
         times = [time for index in indexes.values() for time in index[::2]]
         start, end = min(times), max(times)
         self._span = [min(start, self._span[0]) if self._chunks else start, max(end, self._span[1])]
@@ -214,7 +215,7 @@ class McapFile:
             size = 8 * len(index)
             records += _INDEX.pack(self._opcodes.MESSAGE_INDEX, _INDEX_HEAD + size, channel, size)
             records += struct.pack(f"<{len(index)}Q", *index)
-            self._counts[channel] += len(index) // 2
+            self._counts[channel] = self._counts.get(channel, 0) + len(index) // 2
         self._put(records)
         self._chunks.append(
             self._records.ChunkIndex(
