@@ -49,6 +49,10 @@ def to_diagnostics(status: Status, name: str, real_time_factor: float) -> Diagno
         message = f"slower than asked for: {status.real_time_factor:.3g} not {real_time_factor:g}"
     else:
         message = "running"
+    if status.log.failure:
+        message += ", without its log"
+    elif status.dropped:
+        message += f", and {status.dropped} frames were left out of the log: the disk is too slow"
     per_step = status.iterations / status.steps if status.steps else math.nan
     values = {
         "simulated time [s]": f"{status.time:.6g}",
@@ -58,9 +62,12 @@ def to_diagnostics(status: Status, name: str, real_time_factor: float) -> Diagno
         "Newton iterations per step": f"{per_step:.3g}",
         "largest residual [m/s]": f"{status.residual:.3g}",
         "waited for a stimulus [s]": f"{status.waited:.3g}",
+        "frames left out of the log": str(status.log.dropped),
+        "log": status.log.failure or "OK",
     }
+    level = DiagnosticStatus.WARN if late or status.dropped or status.waited >= PATIENCE else DiagnosticStatus.OK
     report = DiagnosticStatus(
-        level=DiagnosticStatus.WARN if late or status.waited >= PATIENCE else DiagnosticStatus.OK,
+        level=DiagnosticStatus.ERROR if status.log.failure else level,
         name=f"{name}: simulation",
         message=message,
         hardware_id=name,

@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from bilayer_core.errors import InputError
+from bilayer_core.errors import InputError, OutputError
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.simulation.frame import Description, Frame
 from bilayer_core.simulation.inputs import Input
 from bilayer_core.simulation.observers import first_failure
 
 RRD_ENDING = ".rrd"
+
+
+@dataclass(frozen=True)
+class LogStatus:
+    """How a log is doing.
+
+    Attributes
+    ----------
+    dropped : int
+        Frames left out of it, as the disk was too slow.
+    failure : str
+        Why it is not written further; empty as long as it is.
+    """
+
+    dropped: int = 0
+    failure: str = ""
 
 
 class Recording:
@@ -23,6 +40,8 @@ class Recording:
         MCAP file and rerun file to write; empty means none.
     rate, marker_rate : float
         Of all messages, and of the large ones made to be looked at [Hz].
+    patience : float
+        Longest time for which a disk that is behind may hold the simulation up [s].
     run : int
         Runs before this one, each ended by a reset; from the second run on the number is part of the file names:
         ``<name>_1.mcap``.
@@ -33,10 +52,13 @@ class Recording:
         At once: a file exists already or has another ending, or its directory cannot be written to.
     """
 
-    def __init__(self, log_path: str, rrd_path: str, rate: float, marker_rate: float, run: int = 0):
-        self._settings = (log_path, rrd_path, rate, marker_rate)
+    def __init__(self, log_path: str, rrd_path: str, rate: float, marker_rate: float, patience: float, run: int = 0):
+        self._settings = (log_path, rrd_path, rate, marker_rate, patience)
         self._run = run
-        self._log = McapRecorder(self._new_file(log_path), rate, marker_rate) if log_path else None
+        self._lost: OutputError | None = None
+        self._log: McapRecorder | None = None
+        if log_path:
+            self._log = McapRecorder(self._new_file(log_path), rate, marker_rate, patience=patience)
         rrd = None
         if rrd_path:
             if not rrd_path.endswith(RRD_ENDING):
@@ -63,10 +85,24 @@ class Recording:
         """Whether any file is written."""
         return bool(self._recorders)
 
+    @property
+    def log_status(self) -> LogStatus:
+        """How the log is doing; one that is not written is well."""
+        failure = str(self._lost or (self._log and self._log.failure) or "")
+        return LogStatus(self._log.dropped if self._log else 0, failure)
+
     def start(self, description: Description) -> None:
-        """Begin the files."""
-        for recorder in self._recorders:
-            recorder.start(description)
+        """Begin the files. One that cannot be written is an error in the first run; in a later one `close` tells."""
+        for recorder in list(self._recorders):
+            try:
+                recorder.start(description)
+            except OutputError as error:
+                if not self._run:
+                    raise
+                self._lost = error
+                self._recorders.remove(recorder)
+        if self._log not in self._recorders:
+            self._log = None
 
     def observe(self, frame: Frame) -> None:
         """Hand on a frame."""
@@ -79,5 +115,7 @@ class Recording:
             self._log.note(told)
 
     def close(self, complete: bool, termination: str) -> None:
-        """Finish all files, each even if another cannot be."""
-        first_failure(partial(recorder.close, complete, termination) for recorder in self._recorders)
+        """Finish all files, each even if another cannot be. Raises OutputError if one could not be written."""
+        first_failure((partial(recorder.close, complete, termination) for recorder in self._recorders), self._lost)
+        if self._lost is not None:
+            raise self._lost

@@ -30,8 +30,12 @@ from bilayer_sim_ros.worker import SimulationWorker
 
 COMPILATION_PERIOD = 5.0
 """Between two messages about compilation [s]."""
+UNPACED_PATIENCE = 0.25
+"""Longest wait for the disk of a simulation that goes as fast as it can, and has no rhythm to keep [s]."""
 WARNING_PERIOD = 1.0
 """Real time between two warnings about refused messages [s]."""
+DROPPING_PERIOD = 10.0
+"""Real time between two warnings about frames that a log lacks [s]."""
 
 
 def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
@@ -39,7 +43,8 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     scene = load_scene(parameters["scene"])
     rate = parameters["rate"] or scene.output.rate
     rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
-    recording = Recording(parameters["log"], rerun_path, rate, scene.output.marker_rate)
+    patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
+    recording = Recording(parameters["log"], rerun_path, rate, scene.output.marker_rate, patience)
     simulator = Simulator(
         scene,
         model=parameters["model"],
@@ -92,19 +97,29 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     finally:
         worker.stop()
         services.finish()
+    if worker.log_status.dropped:
+        node.get_logger().warning(f"the log lacks {worker.log_status.dropped} frames: the disk was too slow")
     if worker.error is not None:
         raise worker.error
     node.get_logger().info(f"ended at t = {simulator.time:.6g} s; CPU time of the steps: {simulator.cpu_time:.3f} s")
 
 
 def _diagnostics(node: Node, real_time_factor: float) -> Callable[[Status], None]:
-    """What publishes a status on /diagnostics, and says once if no controller answers."""
+    """What publishes a status on /diagnostics, and says if no controller answers, and what a log lacks."""
     publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
     name = node.get_fully_qualified_name()
-    missed = False
+    missed, failure = False, ""
 
     def publish(status: Status) -> None:
-        nonlocal missed
+        nonlocal missed, failure
+        if status.log.failure and status.log.failure != failure:
+            node.get_logger().error(f"{status.log.failure}; the simulation goes on without it")
+        elif status.dropped:
+            node.get_logger().warning(
+                f"the disk is slower than the log: {status.log.dropped} frames are left out so far, but no input",
+                throttle_duration_sec=DROPPING_PERIOD,
+            )
+        failure = status.log.failure
         if status.waited >= PATIENCE and not missed:
             node.get_logger().warning(
                 f"lockstep: simulated time stands still at t = {status.time:.6g} s, as no stimulus has come for "

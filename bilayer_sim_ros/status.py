@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from bilayer_core.simulation.stepper import StepReport
+from bilayer_sim_ros.recording import LogStatus, Recording
 
 # Real time between two reports [s].
 STATUS_PERIOD = 1.0
@@ -14,7 +15,7 @@ STATUS_PERIOD = 1.0
 
 @dataclass
 class Status:
-    """How the run is doing: since the status before, except for `time`, `paused` and `waited`.
+    """How the run is doing: since the status before, except for `time`, `paused`, `waited` and `log`.
 
     Attributes
     ----------
@@ -29,6 +30,9 @@ class Status:
         Largest of the last velocity corrections of steps [m/s].
     waited : float
         Real time for which there has been no step because no controller answers [s].
+    log : LogStatus
+    dropped : int
+        Frames left out of the log.
     """
 
     time: float
@@ -39,6 +43,8 @@ class Status:
     iterations: int = 0
     residual: float = 0.0
     waited: float = 0.0
+    log: LogStatus = LogStatus()
+    dropped: int = 0
 
 
 class StatusReporter:
@@ -53,9 +59,9 @@ class StatusReporter:
     def __init__(self, report: Callable[[Status], None]):
         self._report = report
 
-    def start(self, simulated: float, waited: float = 0.0) -> None:
+    def start(self, simulated: float, waited: float = 0.0, log: LogStatus | None = None) -> None:
         """Count from simulated time `simulated` [s] and now on."""
-        self._status = Status(simulated, False, waited=waited)
+        self._status = Status(simulated, False, waited=waited, log=log or LogStatus())
         self._since = time.monotonic()
 
     def add(self, step: StepReport) -> None:
@@ -71,7 +77,7 @@ class StatusReporter:
         """When the next report is due, on the monotonic clock [s]."""
         return self._since + STATUS_PERIOD
 
-    def report_when_due(self, simulated: float, paused: bool, waiting: bool) -> None:
+    def report_when_due(self, simulated: float, paused: bool, waiting: bool, recording: Recording) -> None:
         """Report at simulated time `simulated` [s], if it is time to."""
         real = time.monotonic() - self._since
         if real < STATUS_PERIOD:
@@ -80,5 +86,7 @@ class StatusReporter:
         status.real_time_factor = (simulated - status.time) / real
         status.time, status.paused = simulated, paused
         status.waited = status.waited + real if waiting and status.steps == 0 else 0.0
+        log, before = recording.log_status, status.log.dropped
+        status.log, status.dropped = log, log.dropped - before
         self._report(status)
-        self.start(simulated, status.waited)
+        self.start(simulated, status.waited, log)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Protocol
 
-from bilayer_core.errors import InputError
+from bilayer_core.errors import InputError, OutputError
 from bilayer_core.simulation.frame import Frame
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
@@ -19,7 +19,7 @@ from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.lockstep import Control
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.periods import Periods
-from bilayer_sim_ros.recording import Recording
+from bilayer_sim_ros.recording import LogStatus, Recording
 from bilayer_sim_ros.requests import Requests
 from bilayer_sim_ros.status import Status, StatusReporter
 
@@ -69,7 +69,7 @@ class SimulationWorker:
     Attributes
     ----------
     error : Exception or None
-        Why the worker ended, unless it was stopped or reached the duration.
+        Why the worker ended, unless it was stopped or reached the duration; or what was lost before a reset.
     """
 
     def __init__(
@@ -106,6 +106,11 @@ class SimulationWorker:
         self._single_steps: deque[Future] = deque()
         self._thread = threading.Thread(target=self._work, name="simulation")
         self.error: Exception | None = None
+
+    @property
+    def log_status(self) -> LogStatus:
+        """How the log of the present run is doing, or has done."""
+        return self._recording.log_status
 
     def start(self) -> None:
         """Start the thread."""
@@ -148,7 +153,7 @@ class SimulationWorker:
                 if self._may_advance:
                     self._advance()
                 waiting = self._wants_to_advance and self._control.waiting
-                self._reporter.report_when_due(self._simulator.time, self._paused, waiting)
+                self._reporter.report_when_due(self._simulator.time, self._paused, waiting, self._recording)
                 self._show_again_when_due()
             if not self._stopping.is_set():
                 complete, termination = True, Termination.COMPLETED.value
@@ -275,7 +280,10 @@ class SimulationWorker:
     def _do_reset(self, answer: Future) -> None:
         following = self._recording.of_next_run()
         self._drop_single_steps("the simulation was reset before the next frame")
-        self._finish_recording(False, "reset", self._simulator.reset)
+        try:
+            self._finish_recording(False, "reset", self._simulator.reset)
+        except OutputError as error:
+            self.error = self.error or error  # told when the node ends
         self._recording = following
         self._control.reset()
         self._commands.reset()

@@ -10,8 +10,6 @@ from ..forces.joints import Joints
 from ..integrators.method import Method
 from ..integrators.sdirk2 import METHOD as SELF_STARTING
 from ..model.contact_points import contact_point_names
-from ..model.force_list import Kind, kinds
-from ..model.force_slots import NAMES
 from ..model.model import Model
 from ..model.records.outcome import CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS
 from ..model.records.parts import Mechanisms
@@ -179,14 +177,6 @@ class Engine:
     def mechanisms(self) -> Mechanisms:
         """Turns and ways that something resists, likewise."""
         return self._storage.problem.mechanisms
-
-    @property
-    def energies(self) -> dict[str, float]:
-        """Of the conservative forces at the configuration evaluated last [J]; what others lose or supply is no
-        energy.
-        """
-        kind, values = kinds(), dict(zip(NAMES, self.sums.energy.tolist(), strict=True))
-        return {name: values[name] for name in self._model.forces if kind[name] is Kind.CONSERVATIVE}
 
     @property
     def touching(self) -> Array:

@@ -20,6 +20,11 @@ def nanoseconds(time: float) -> int:
     return round(time * NANOSECONDS)
 
 
+def stamp_of(time: int) -> bytes:
+    """A ``builtin_interfaces/Time``, without padding before it, of a time [ns]."""
+    return _STAMP.pack(*divmod(time, NANOSECONDS))
+
+
 class Template:
     """A message whose layout is fixed; written field by field, then overwritten and copied out once a frame.
 
@@ -27,11 +32,13 @@ class Template:
     ----------
     fields : dict
         Name -> (offset in the message [bytes], dtype, shape) of each array that changes.
+    stamps : list of int
+        Where times stand that `set_time` overwrites [bytes].
     """
 
     def __init__(self) -> None:
         self._buffer = bytearray(HEADER)
-        self._stamps: list[int] = []
+        self.stamps: list[int] = []
         self.fields: dict[str, tuple[int, np.dtype, tuple[int, ...]]] = {}
 
     def align(self, size: int) -> None:
@@ -53,7 +60,7 @@ class Template:
     def stamp(self) -> None:
         """Append a time that `set_time` overwrites."""
         self.align(4)
-        self._stamps.append(len(self._buffer))
+        self.stamps.append(len(self._buffer))
         self._buffer += bytes(_STAMP.size)
 
     def header(self, frame_id: str) -> None:
@@ -76,9 +83,9 @@ class Template:
 
     def set_time(self, time: float) -> None:
         """Write simulation time [s] into every stamp."""
-        seconds, rest = divmod(nanoseconds(time), NANOSECONDS)
-        for offset in self._stamps:
-            _STAMP.pack_into(self._buffer, offset, seconds, rest)
+        stamp = stamp_of(nanoseconds(time))
+        for offset in self.stamps:
+            self._buffer[offset : offset + _STAMP.size] = stamp
 
     def __len__(self) -> int:
         return len(self._buffer)
@@ -88,7 +95,7 @@ class Template:
         return bytes(self._buffer)
 
 
-def decode(data: bytes | bytearray, field: tuple[int, np.dtype, tuple[int, ...]]) -> np.ndarray:
+def decode(data: bytes | bytearray | memoryview, field: tuple[int, np.dtype, tuple[int, ...]]) -> np.ndarray:
     """View of one field (an item of `Template.fields`) of a message, without a copy."""
     offset, dtype, shape = field
     return np.frombuffer(data, dtype, int(np.prod(shape)), offset if np.prod(shape) else 0).reshape(shape)

@@ -12,7 +12,7 @@ import numpy as np
 from bilayer_core.record.cdr import Template, read_float64_multi_array
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
-from bilayer_core.record.topics import FRAME_ID, output_topics
+from bilayer_core.record.topics import FRAME_ID, Rate, output_topics
 from bilayer_core.simulation.frame import Description, Frame
 from bilayer_core.simulation.inputs import Input
 
@@ -130,33 +130,33 @@ class FrameEncoder:
     def __init__(self, description: Description):
         self.topics = output_topics(description)
         self._node_frames = NodeFrames(description)
-        self._energy: tuple[tuple[str, ...], Callable[[Frame], bytes]] = ((), lambda frame: b"")
+        self._energy: tuple[tuple[str, ...], SmallMessage] = ((), SmallMessage(multi_array_template(())))
         self._encoders: dict[str, Callable[[Frame], bytes]] = {
-            "/clock": _simple(clock_template(), None),
-            "stimulus_applied": _simple(
+            "/clock": SmallMessage(clock_template()),
+            "stimulus_applied": SmallMessage(
                 multi_array_template((name, 1) for name in description.channels), lambda frame: frame.stimulus
             ),
-            "com": _simple(stamped_template(3), lambda frame: frame.com),
+            "com": SmallMessage(stamped_template(3), lambda frame: frame.com),
             "energy": self._encode_energy,
-            "solver": _simple(
+            "solver": SmallMessage(
                 multi_array_template((name, 1) for name in SOLVER_LABELS),
                 lambda frame: [getattr(frame, name) for name in SOLVER_LABELS],
             ),
-            "state": _simple(multi_array_template(state_labels(description)), lambda frame: frame.state),
+            "state": SmallMessage(multi_array_template(state_labels(description)), lambda frame: frame.state),
             "nodes": self._nodes_encoder(),
             "points": self._points_encoder(description),
             "markers": MarkerEncoder(description, self._node_frames).encode,
         }
         for index, body in enumerate(description.bodies):
-            self._encoders[f"body_pose/{body.name}"] = _simple(
+            self._encoders[f"body_pose/{body.name}"] = SmallMessage(
                 stamped_template(7),
                 lambda frame, i=index: np.concatenate([frame.body_positions[i], frame.body_quaternions[i]]),
             )
-            self._encoders[f"contact_wrench/{body.name}"] = _simple(
+            self._encoders[f"contact_wrench/{body.name}"] = SmallMessage(
                 stamped_template(6), lambda frame, i=index: frame.contact_wrenches[i]
             )
             if body.holds_rods:
-                self._encoders[f"clamp_wrench/{body.name}"] = _simple(
+                self._encoders[f"clamp_wrench/{body.name}"] = SmallMessage(
                     stamped_template(6), lambda frame, i=index: frame.clamp_wrenches[i]
                 )
 
@@ -164,14 +164,21 @@ class FrameEncoder:
         """The message of topic `name` (a `TopicSpec.name`) for `frame`; give it to ``publish`` as it is."""
         return self._encoders[name](frame)
 
+    def small_messages(self, frame: Frame) -> dict[str, SmallMessage]:
+        """Encoders of all topics of `Rate.OUTPUT` by name, in order; of the run of which `frame` is one."""
+        found = {spec.name: self._encoders[spec.name] for spec in self.topics if spec.rate is Rate.OUTPUT}
+        return found | {"energy": self._energy_message(frame)}
+
     def _encode_energy(self, frame: Frame) -> bytes:
+        return self._energy_message(frame)(frame)
+
+    def _energy_message(self, frame: Frame) -> SmallMessage:
         # The terms are known from the first frame on and do not change in a run.
-        terms, encode = self._energy
-        if terms != tuple(frame.energy):
+        if self._energy[0] != tuple(frame.energy):
             template = multi_array_template((name, 1) for name in frame.energy)
-            encode = _simple(template, lambda frame: list(frame.energy.values()))
-            self._energy = (tuple(frame.energy), encode)
-        return encode(frame)
+            message = SmallMessage(template, lambda frame: list(frame.energy.values()))
+            self._energy = (tuple(frame.energy), message)
+        return self._energy[1]
 
     def _nodes_encoder(self) -> Callable[[Frame], bytes]:
         nodes = self._node_frames
@@ -202,14 +209,23 @@ class FrameEncoder:
         return encode
 
 
-def _simple(template: Template, values: Callable[[Frame], np.ndarray] | None) -> Callable[[Frame], bytes]:
-    """Encoder of a message with stamps and at most one array, ``data``, which `values` takes from the frame."""
-    data = template.views().get("data")
+class SmallMessage:
+    """Encoder of a message with stamps and at most one array, ``data``.
 
-    def encode(frame: Frame) -> bytes:
-        if values is not None:
-            data[:] = values(frame)
-        template.set_time(frame.time)
-        return template.to_bytes()
+    Parameters
+    ----------
+    template : Template
+    values : callable, optional
+        Takes that array from a frame.
+    """
 
-    return encode
+    def __init__(self, template: Template, values: Callable[[Frame], np.ndarray | list[float]] | None = None):
+        self.template, self.values = template, values
+        self._data = template.views().get("data")
+
+    def __call__(self, frame: Frame) -> bytes:
+        """The message for `frame`."""
+        if self.values is not None:
+            self._data[:] = self.values(frame)
+        self.template.set_time(frame.time)
+        return self.template.to_bytes()

@@ -23,8 +23,8 @@ import numpy as np
 
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
 from bilayer_core.record.cdr import Template
-from bilayer_core.record.colours import strain_colours
 from bilayer_core.record.node_frames import NodeFrames, layer_rows
+from bilayer_core.record.ribbons import Ribbons
 from bilayer_core.record.topics import FRAME_ID
 from bilayer_core.simulation.frame import Description, Frame, ShapeInfo
 
@@ -56,15 +56,15 @@ ADD, DELETE = 0, 2
 _IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float = ARROW_FORCE) -> np.ndarray:
+def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarray = ARROW_FORCE) -> np.ndarray:
     """Ends of the lines of arrows: a shaft and two barbs each; those of a zero force are all where it acts.
 
     Parameters
     ----------
     origins, forces : ndarray
         [m, N], shape (arrows, 3).
-    unit : float
-        Force from which arrows grow [N].
+    unit : float or ndarray
+        Force from which arrows grow [N], of all or of each, shape (arrows, 1).
 
     Returns
     -------
@@ -106,12 +106,12 @@ class MarkerEncoder:
     def __init__(self, description: Description, node_frames: NodeFrames):
         self._nodes = node_frames
         template = Template()
-        self._layers = list(zip(description.layers, layer_rows(description), strict=True))
+        layers = list(zip(description.layers, layer_rows(description), strict=True))
         self._holding = np.flatnonzero([body.holds_rods for body in description.bodies])
         arrows = CLAMP_ARROWS if len(self._holding) else ()
         shapes = len(description.bodies) + len(description.obstacles) + len(description.joints)
-        template.put("<u4", len(self._layers) + shapes + len(arrows) + 1)
-        for index, (layer, rows) in enumerate(self._layers):
+        template.put("<u4", len(layers) + shapes + len(arrows) + 1)
+        for index, (layer, rows) in enumerate(layers):
             count = 2 * (rows.stop - rows.start)
             _head(template, f"strands/{layer.name}", LINE_LIST, (1.0, 1.0, 1.0, 1.0), scale_field=f"spacing{index}")
             template.put("<u4", count)
@@ -159,10 +159,15 @@ class MarkerEncoder:
 
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
-        layers = range(len(self._layers))
-        self._points = [views[f"points{i}"].reshape(-1, 2, 3) for i in layers]
-        self._colours = [views[f"colours{i}"].reshape(-1, 2, 4) for i in layers]
-        self._spacings = [views[f"spacing{i}"] for i in layers]
+        layers = range(len(description.layers))
+        self._ribbons = Ribbons(
+            description,
+            node_frames,
+            STRAIN_LIMIT,
+            points=[views[f"points{i}"].reshape(-1, 2, 3) for i in layers],
+            colours=[views[f"colours{i}"].reshape(-1, 2, 4) for i in layers],
+            spacings=[views[f"spacing{i}"] for i in layers],
+        )
         self._clamp_arrows = [(views[name], part, unit) for name, _, part, unit in arrows]
         self._joint_poses = [views[f"joint{i}"] for i in range(len(description.joints))]
         self._body_poses = [views[f"pose{i}"] for i in range(len(description.bodies))]
@@ -171,16 +176,7 @@ class MarkerEncoder:
         """The message for `frame`."""
         nodes = self._nodes
         nodes.update(frame)
-        steps = nodes.positions[1:] - nodes.positions[:-1]
-        lengths = np.sqrt(np.einsum("ij,ij->i", steps, steps))
-        for index, (layer, rows) in enumerate(self._layers):
-            middles = nodes.positions[rows] + layer.offset[:, None] * nodes.normals[rows]
-            half = 0.5 * layer.width[:, None] * nodes.widths[rows]
-            np.subtract(middles, half, out=self._points[index][:, 0])
-            np.add(middles, half, out=self._points[index][:, 1])
-            strain = layer.strain_of(frame.strain[layer.nodes], frame.curvature[layer.nodes])
-            self._colours[index][:] = strain_colours(strain, STRAIN_LIMIT)[:, None, :]
-            self._spacings[index][0] = lengths[rows.start : rows.stop - 1].mean()
+        self._ribbons.show(frame)
         for index, pose in enumerate(self._body_poses):
             _place(pose, frame.body_positions[index], frame.body_quaternions[index], self._own_poses[index])
         for (body, own), pose in zip(self._joints, self._joint_poses, strict=True):
@@ -188,20 +184,30 @@ class MarkerEncoder:
                 pose[:] = own
             else:
                 _place(pose, frame.body_positions[body], frame.body_quaternions[body], own)
-        for points, part, unit in self._clamp_arrows:
-            wrenches = frame.clamp_wrenches[self._holding, part]
-            points[:] = force_arrows(frame.body_positions[self._holding], wrenches, unit)
         self._template.set_time(frame.time)
 
         forces = frame.contact_forces
         touching = np.flatnonzero(np.einsum("ij,ij->i", forces, forces) > ARROW_SHOWN**2)
         self._arrow_action[0] = ADD if len(touching) else DELETE
         self._arrow_count[0] = 6 * len(touching)
+        arrows = self._arrows(frame, touching)
         message = self._template.to_bytes()
         if not len(touching):
             return message[: self._arrows_offset] + message[self._arrows_start :]
-        arrows = force_arrows(frame.positions[touching], forces[touching])
         return message[: self._arrows_start] + arrows.astype("<f8").tobytes() + message[self._arrows_start :]
+
+    def _arrows(self, frame: Frame, touching: np.ndarray) -> np.ndarray:
+        """Write the arrows of clamps, and return those of contacts, all made at once [m], shape (6 touching, 3)."""
+        wrenches, held = frame.clamp_wrenches[self._holding], frame.body_positions[self._holding]
+        origins = [*(held for _ in self._clamp_arrows), frame.positions[touching]]
+        forces = [*(wrenches[:, part] for _, part, _ in self._clamp_arrows), frame.contact_forces[touching]]
+        units = [unit for _, _, unit in self._clamp_arrows for _ in held] + [ARROW_FORCE] * len(touching)
+        arrows = force_arrows(np.concatenate(origins), np.concatenate(forces), np.array(units)[:, None])
+        begin = 0
+        for points, _, _ in self._clamp_arrows:
+            points[:] = arrows[begin : begin + len(points)]
+            begin += len(points)
+        return arrows[begin:]
 
 
 def _place(pose_out: np.ndarray, position: np.ndarray, quaternion: np.ndarray, own: np.ndarray) -> None:

@@ -8,17 +8,19 @@ A log holds the topics of `bilayer_core.record.topics` as ROS 2 messages (profil
 from __future__ import annotations
 
 import os
-import queue
 import threading
 import time as clock
 from contextlib import ExitStack
 from pathlib import Path
 
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError, OutputError, SimulationError
+from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_input
+from bilayer_core.record.frame_block import FrameBlock
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
+from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
 from bilayer_core.record.topics import INPUTS, QOS, DisplayGate, Rate, TopicSpec, input_topics
@@ -26,9 +28,11 @@ from bilayer_core.simulation.frame import Description, Frame
 from bilayer_core.simulation.inputs import STIMULUS, Input
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
-FLUSH_PERIOD = 0.5  # longest time a message waits for its chunk to be written [s of wall time]
+GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wakes ten times a second [s of wall time]
+FLUSH_PERIOD = 0.4  # longest time that a message then waits for its chunk to be written [s of wall time]
 SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
+LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
 SCENE_ATTACHMENT = "scene.yaml"
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
@@ -37,8 +41,7 @@ _INFINITE = "{sec: 9223372036, nsec: 854775807}"
 class McapRecorder:
     """Observer that writes an MCAP log; importing this module does not import mcap.
 
-    Nothing is dropped: when the writer is 64 frames behind, `observe` waits for it. What was handed over more than
-    about a second ago survives a crash of the process or of the machine.
+    What was handed over more than about a second ago survives a crash of the process or of the machine.
 
     Parameters
     ----------
@@ -50,6 +53,16 @@ class McapRecorder:
         Rate of the large messages made to be looked at (`Rate.DISPLAY`) [Hz].
     force : bool
         Replace an existing file.
+    patience : float, optional
+        Longest time for which a disk that is 64 frames behind holds the run up [s]. Without one `observe` waits as long
+        as it takes, nothing is lost, and a disk that fails is an error of the run. With one, 0 included, the disk never
+        ends the run: whole frames are left out and counted, but no input and not the last frame. What failed is in
+        `failure`, and `close` raises it.
+
+    Attributes
+    ----------
+    dropped : int
+        Frames that were left out so far.
 
     Raises
     ------
@@ -58,17 +71,32 @@ class McapRecorder:
         the file exists, or with `force` another program is writing it.
     """
 
-    def __init__(self, path: str | Path, rate: float = 50.0, marker_rate: float = 20.0, force: bool = False):
+    def __init__(
+        self,
+        path: str | Path,
+        rate: float = 50.0,
+        marker_rate: float = 20.0,
+        force: bool = False,
+        patience: float | None = None,
+    ):
         self.path = check_output_path(path, force, SUFFIX)
         refuse_file_in_use(self.path)
         self.rate = rate
+        self.dropped = 0
         self._gate = DisplayGate(rate, marker_rate)
-        self._force = force
+        self._force, self._patience = force, patience
         self._last_time = 0.0
-        self._queue: queue.Queue = queue.Queue(QUEUE_LENGTH)
+        self._left_out: Frame | None = None
+        self._backlog: Backlog[Frame | Input | dict[str, str]] = Backlog(QUEUE_LENGTH, GATHERING_PERIOD)
         self._thread: threading.Thread | None = None
+        self._written = 0
         self._failure: Exception | None = None
         self._kept = ""
+
+    @property
+    def failure(self) -> str:
+        """Why the log could not be written further; empty as long as it can."""
+        return str(self._failure_of_run() or "")
 
     def start(self, description: Description) -> None:
         """Open the file; write scene and settings, and flush them.
@@ -89,16 +117,30 @@ class McapRecorder:
         self._thread.start()
 
     def observe(self, frame: Frame) -> None:
-        """Hand a frame to the writer; waits when the writer is behind. Raises SimulationError once writing failed."""
-        self._put(frame)
-        self._last_time = frame.time
+        """Hand a frame to the writer, as `patience` says; without it, SimulationError is raised once writing failed."""
+        self._refuse_unstarted()
+        if self._patience is None:
+            self._put(frame)
+        elif not self._put_in_time(frame):
+            self.dropped += 1
+            self._left_out = frame
+            return
+        self._left_out, self._last_time = None, frame.time
 
     def note(self, told: Input) -> None:
-        """Log something that acts from outside; waits as `observe` does."""
-        self._put(told)
+        """Log something that acts from outside; likewise, but it is never left out."""
+        self._refuse_unstarted()
+        if self._patience is None:
+            self._put(told)
+        elif self._failure is None:
+            self._backlog.add(told)
+
+    def _put_in_time(self, frame: Frame) -> bool:
+        """Wait no more for a disk for which one wait was in vain, until it has caught up."""
+        return self._failure is None and self._backlog.put(frame, self._patience if self._left_out is None else 0.0)
 
     def close(self, complete: bool, termination: str = "") -> None:
-        """Write what is left and finish the file. Raises SimulationError if anything could not be written.
+        """Write what is left and finish the file.
 
         Parameters
         ----------
@@ -106,38 +148,62 @@ class McapRecorder:
             Whether the run reached its end.
         termination : str
             Why it ended, for `read_info`; by default ``"completed"`` or ``"stopped"``.
+
+        Raises
+        ------
+        SimulationError
+            If anything could not be written; with a patience, OutputError.
         """
         if self._thread is None:
             return
-        termination = termination or ("completed" if complete else "stopped")
+        if self._left_out is not None and self._failure is None:
+            self._backlog.add(self._left_out)
+            self._last_time = self._left_out.time
+            self.dropped -= 1
         ending = {
             "complete": "true" if complete else "false",
-            "termination": termination,
+            "termination": termination or ("completed" if complete else "stopped"),
             "last_time": repr(float(self._last_time)),
+            **({"dropped_frames": str(self.dropped)} if self.dropped else {}),
         }
+        self._backlog.add(ending, urgent=True)
         try:
-            self._put(ending)
-            self._thread.join()
+            self._join(self._thread)
         finally:
             self._thread = None
         self._raise_failure()
 
-    def _put(self, item: Frame | Input | dict[str, str]) -> None:
+    def _join(self, thread: threading.Thread) -> None:
+        """Wait for the writer; with a patience it is given up once it has written nothing for long."""
+        written = -1
+        while thread.is_alive():
+            if self._patience is not None and written == self._written:
+                text = f"the log {self.path} could not be finished: nothing of it was taken in {LONGEST_SILENCE:g} s"
+                self._failure = OutputError(text)
+                return
+            written = self._written
+            thread.join(None if self._patience is None else LONGEST_SILENCE)
+
+    def _refuse_unstarted(self) -> None:
         if self._thread is None and self._failure is None:
             raise RuntimeError("the recorder has not been started, or is closed")
-        while True:
+
+    def _put(self, item: Frame | Input) -> None:
+        self._raise_failure()
+        if not self._backlog.put(item):
             self._raise_failure()
-            try:
-                return self._queue.put(item, timeout=0.1)
-            except queue.Full:
-                continue
 
     def _raise_failure(self) -> None:
-        if isinstance(self._failure, OSError):
-            reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}"
-            raise SimulationError(f"{reason}; {self._kept}", self._last_time) from self._failure
-        if self._failure is not None:
-            raise self._failure
+        failure = self._failure_of_run()
+        if failure is not None:
+            raise failure from self._failure
+
+    def _failure_of_run(self) -> Exception | None:
+        """What `close` raises, as things stand."""
+        if not isinstance(self._failure, OSError):
+            return self._failure
+        reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}; {self._kept}"
+        return SimulationError(reason, self._last_time) if self._patience is None else OutputError(reason)
 
     def _what_is_kept(self) -> str:
         """After a failure, as who reads the file will find it."""
@@ -163,21 +229,20 @@ class McapRecorder:
                 failure = failure or error  # what fails after that, such as to close the file, follows from it
         if failure is not None:
             self._kept = self._what_is_kept()
-        self._failure = failure
+            self._failure = self._failure or failure
+        self._backlog.close()
 
     def _write_all(self, log: _LogFile) -> None:
         while True:
-            try:
-                item = self._queue.get(timeout=log.time_to_flush())
-            except queue.Empty:
-                log.flush()
-                continue
-            if isinstance(item, dict):
-                log.finish(item)
-                return
-            log.write(item)
+            for item in self._backlog.take(log.time_to_flush()):
+                if isinstance(item, dict):
+                    log.finish(item)
+                    return
+                log.write(item)
+                self._written += 1
             if log.time_to_flush() == 0.0:
                 log.flush()
+                self._written += 1
 
 
 class _LogFile:
@@ -185,14 +250,14 @@ class _LogFile:
 
     def __init__(self, path: Path, force: bool, description: Description, gate: DisplayGate):
         import mcap
-        from mcap.writer import CompressionType, Writer
 
         from bilayer_core.simulation.observation import machine, versions
 
         self._gate = gate
         self._encoder = FrameEncoder(description)
         self._file = open_alone(path, force)
-        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE, compression=CompressionType.LZ4)
+        self._large = [spec.name for spec in self._encoder.topics if spec.rate is Rate.DISPLAY]
+        self._block: FrameBlock | None = None
         self._sequence = 0
         self._unflushed_since: float | None = None
         self._synced = clock.monotonic()
@@ -200,24 +265,21 @@ class _LogFile:
             undo.callback(self._file.close)
             undo.callback(_delete, path)
             used = {**versions(), "mcap": mcap.__version__}
-            self._writer.start(profile="ros2", library=f"bilayer_sim_ros {used['bilayer_sim_ros']}")
-            scene = description.scene_text.encode()
-            self._writer.add_attachment(0, 0, SCENE_ATTACHMENT, "application/yaml", scene)
-            self._writer.add_metadata("versions", used)
-            self._writer.add_metadata("machine", machine())
+            self._log = McapFile(self._file, CHUNK_SIZE, "ros2", f"bilayer_sim_ros {used['bilayer_sim_ros']}")
+            self._log.add_attachment(SCENE_ATTACHMENT, "application/yaml", description.scene_text.encode())
+            self._log.add_metadata("versions", used)
+            self._log.add_metadata("machine", machine())
             settings = {key: text for key, text in description.settings.items() if key not in used}
-            self._writer.add_metadata("settings", settings)
-            self._writer.add_metadata("description", to_text(description))
+            self._log.add_metadata("settings", settings)
+            self._log.add_metadata("description", to_text(description))
             schemas: dict[str, int] = {}
             self._topics: dict[str, int] = {}
             for spec in (*self._encoder.topics, *input_topics(description)):
                 if spec.type not in schemas:
-                    text = schema_text(spec.type).encode()
-                    schemas[spec.type] = self._writer.register_schema(spec.type, "ros2msg", text)
-                self._topics[spec.name] = self._writer.register_channel(
-                    spec.full_name(), "cdr", schemas[spec.type], {QOS: _profile(spec)}
-                )
-            self._writer.flush()
+                    schemas[spec.type] = self._log.add_schema(spec.type, schema_text(spec.type))
+                channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: _profile(spec)})
+                self._topics[spec.name] = channel
+            self._log.flush()
             self._sync()
             undo.pop_all()
 
@@ -228,17 +290,23 @@ class _LogFile:
             if item.kind == STIMULUS:
                 self._add(f"stimulus/{item.name}", nanoseconds(item.time), encode_float64(item.values[0]))
         else:
-            stamp = nanoseconds(item.time)
-            display = self._gate.is_due(item.time)
-            for spec in self._encoder.topics:
-                if display or spec.rate is not Rate.DISPLAY:
-                    self._add(spec.name, stamp, self._encoder.encode(spec.name, item))
+            self._write_frame(item)
             self._sequence += 1
         if self._unflushed_since is None:
             self._unflushed_since = clock.monotonic()
 
+    def _write_frame(self, frame: Frame) -> None:
+        if self._block is None:
+            self._block = FrameBlock(self._encoder.small_messages(frame), self._topics)
+        stamp, display = nanoseconds(frame.time), self._gate.is_due(frame.time)
+        self._block.fill(frame, self._sequence)
+        self._log.add_records(self._block.records, self._block.places, stamp)
+        if display:
+            for name in self._large:
+                self._add(name, stamp, self._encoder.encode(name, frame))
+
     def _add(self, name: str, stamp: int, data: bytes) -> None:
-        self._writer.add_message(self._topics[name], stamp, data, stamp, self._sequence)
+        self._log.add_message(self._topics[name], stamp, self._sequence, data)
 
     def time_to_flush(self) -> float | None:
         """Wall time until `flush` is due [s], None if there is nothing to flush."""
@@ -248,9 +316,9 @@ class _LogFile:
 
     def flush(self) -> None:
         """Write the chunk in hand; every second also to the disk."""
-        self._writer.flush()
+        self._log.flush()
         self._unflushed_since = None
-        if clock.monotonic() - self._synced >= SYNC_PERIOD - FLUSH_PERIOD:
+        if clock.monotonic() - self._synced >= SYNC_PERIOD - FLUSH_PERIOD - GATHERING_PERIOD:
             self._sync()
 
     def _sync(self) -> None:
@@ -261,9 +329,9 @@ class _LogFile:
 
     def finish(self, ending: dict[str, str]) -> None:
         """Write the metadata ``run`` and the file's index."""
-        self._writer.flush()
-        self._writer.add_metadata("run", ending)
-        self._writer.finish()
+        self._log.flush()
+        self._log.add_metadata("run", ending)
+        self._log.finish()
         self._file.flush()
         self._sync()
 

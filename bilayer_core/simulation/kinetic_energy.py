@@ -7,6 +7,8 @@ import numpy as np
 from ..model.model import Model
 from ..model.state import State
 
+_UNIT = np.eye(3)
+
 
 def kinetic_energy(model: Model, state: State) -> float:
     """Of nodes, of edges about their tangents, and of free bodies [J]."""
@@ -15,6 +17,7 @@ def kinetic_energy(model: Model, state: State) -> float:
     for slot, body in enumerate(model.bodies.body_of_free):
         velocity, spin = state.body_velocity[body], state.body_angular_velocity[body]
         rotation, second = state.body_rotation[body], model.bodies.second_moment[slot]
-        inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
+        trace = second[0, 0] + second[1, 1] + second[2, 2]
+        inertia = rotation @ (trace * _UNIT - second) @ rotation.T
         kinetic += 0.5 * float(model.bodies.mass[slot] * velocity @ velocity + spin @ inertia @ spin)
     return kinetic

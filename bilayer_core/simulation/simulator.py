@@ -25,6 +25,7 @@ from ..model.state import State, initial_state, refuse_out_of_plane
 from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observation as observe
+from .capture import make_frame
 from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
 from .frame import Description, Frame
@@ -258,7 +259,7 @@ class Simulator:
     def frame(self) -> Frame:
         """A snapshot."""
         self.compile()
-        return observe.make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
+        return make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
 
     # what changes it
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from ..model.records.step import Configuration
 from ..model.state import NOT_KNOWN, State
 from .collapse import collapsed
 from .energy_budget import EnergyLedger
+from .frame_tables import FrameTables
 from .remedies import remedy
 from .step_choice import Steps
 from .surroundings import Surroundings
@@ -125,6 +127,11 @@ class Stepper:
     def end(self) -> Configuration:
         """The configuration of the state after the last step or evaluation."""
         return self.engine.end
+
+    @cached_property
+    def tables(self) -> FrameTables:
+        """What frames of this model are made with."""
+        return FrameTables(self.model, self.engine)
 
     @property
     def stimulus(self) -> np.ndarray:

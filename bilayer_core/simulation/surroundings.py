@@ -43,6 +43,7 @@ class Surroundings:
         self._loads = [load.factor for load in scene.loads]
         self._ranges = np.array([c.maximum - c.minimum for c in scene.stimuli.values()], dtype=float)
         self._begin, self._override = 0.0, no_overrides(len(self._channels) + len(self._loads))
+        self._overriding = self._override.tobytes()
         self._pose_goal = np.zeros((len(model.bodies.controlled), POSE_GOAL))
         self._paths = paths_of(model, self._pose_goal)
         self.actuation: Actuation | None = None
@@ -89,13 +90,14 @@ class Surroundings:
         pose_goal : Array
             How controlled bodies go to where they are asked to be (`State.pose_goal`).
         """
-        moved = not np.array_equal(pose_goal, self._pose_goal)
+        moved = pose_goal.size > 0 and not np.array_equal(pose_goal, self._pose_goal)
         if moved:
             self._pose_goal = pose_goal.copy()
             self._paths = paths_of(self.model, pose_goal)
         known = self._begin <= time and time + self._ahead < self.actuation.horizon[0]
-        if moved or not (known and np.array_equal(override, self._override, equal_nan=True)):
-            self._begin, self._override = time, override.copy()
+        overriding = override.tobytes()  # several times as fast to compare as arrays
+        if moved or not known or overriding != self._overriding:
+            self._begin, self._override, self._overriding = time, override.copy(), overriding
             self.actuation = self._pieces_about(time, afresh=moved)
 
     def _pieces_about(self, time: float, afresh: bool = False) -> Actuation:

@@ -2,7 +2,10 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from bilayer_sim_ros.conversions import to_diagnostics, to_seconds, to_time
+from bilayer_sim_ros.recording import LogStatus
 from bilayer_sim_ros.status import Status
+
+LEFT_OUT = "and 2 frames were left out of the log: the disk is too slow"
 
 
 @pytest.mark.parametrize(
@@ -24,9 +27,12 @@ def test_simulated_time_becomes_a_stamp_to_the_nanosecond(seconds, expected):
         (Status(1.0, False, waited=1.0), 1.0, DiagnosticStatus.OK, "waiting for a stimulus at t = 1 s"),
         (Status(1.0, False, waited=5.0), 1.0, DiagnosticStatus.WARN, "waiting for a stimulus at t = 1 s"),
         (Status(1.0, True, waited=1.0), 1.0, DiagnosticStatus.OK, "waiting for a stimulus at t = 1 s"),
+        (Status(1.0, True, log=LogStatus(dropped=9)), 1.0, DiagnosticStatus.OK, "paused"),
+        (Status(1.0, True, log=LogStatus(9), dropped=2), 1.0, DiagnosticStatus.WARN, f"paused, {LEFT_OUT}"),
+        (Status(1.0, True, log=LogStatus(9, "full")), 1.0, DiagnosticStatus.ERROR, "paused, without its log"),
     ],
 )
-def test_diagnostics_warn_when_the_simulation_is_slower_than_asked_for(status, asked, level, message):
+def test_diagnostics_warn_when_the_simulation_is_too_slow_or_its_log_lacks_something(status, asked, level, message):
     report = to_diagnostics(status, "/bilayer_sim", asked).status[0]
     assert (report.level, report.message) == (level, message)
 

@@ -1,0 +1,132 @@
+"""The node and its log on a disk that hangs, or is full: steps keep their rhythm, and what is lost is told."""
+
+import resource
+import signal
+import threading
+import time
+
+import pytest
+from acted_scenes import pushed
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from slow_disks import Valve
+from std_msgs.msg import Float64
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.record import mcap_log
+from bilayer_core.record.encoders import decode_input
+from bilayer_core.record.log_reader import read_info, read_log, read_messages
+from bilayer_core.record.mcap_log import QUEUE_LENGTH
+from bilayer_core.record.replay import verify
+from bilayer_core.record.topics import INPUTS
+from bilayer_core.scene.schedule import Hold
+from bilayer_core.simulation.inputs import STIMULUS
+from bilayer_sim_ros.commands import Commands
+from bilayer_sim_ros.lockstep import Asynchronous
+from bilayer_sim_ros.pacing import Pacer
+from bilayer_sim_ros.recording import Recording
+from bilayer_sim_ros.stimulus import Channel, StimulusInputs
+from bilayer_sim_ros.worker import SimulationWorker
+
+RATE, DURATION, STALL = 200.0, 2.4, 1.5
+
+
+class Nobody:
+    """Subscribes to nothing."""
+
+    wanted = False
+
+
+@pytest.fixture
+def valve(monkeypatch):
+    valve = Valve()
+    monkeypatch.setattr(mcap_log, "open_alone", valve.file)
+    yield valve
+    valve.open()
+
+
+class Timed(Recording):
+    """Notes how long the stepping thread was held up by the log [s]."""
+
+    longest = 0.0
+
+    def observe(self, frame):
+        begin = time.monotonic()
+        super().observe(frame)
+        self.longest = max(self.longest, time.monotonic() - begin)
+
+
+def test_while_the_disk_hangs_steps_keep_their_rhythm_and_the_log_still_replays(tmp_path, valve):
+    log, statuses, finished = tmp_path / "run.mcap", [], threading.Event()
+    simulator = Simulator(load_scene(pushed()))
+    simulator.compile()
+    inputs = StimulusInputs([Channel("heat", 0.0, 1.0, Hold(type="hold", value=0.0))], 0.0, "hold")
+    recording = Timed(str(log), "", RATE, 20.0, patience=0.0)
+    worker = SimulationWorker(
+        simulator,
+        control=Asynchronous(inputs),
+        commands=Commands(lambda reason: None),
+        publisher=Nobody(),
+        recording=recording,
+        rate=RATE,
+        pacer=Pacer(1.0),
+        duration=DURATION,
+        report=statuses.append,
+        finished=finished.set,
+    )
+    sent, begin = 0, time.monotonic()
+    worker.start()
+    time.sleep(0.3)
+    valve.shut()
+    assert valve.stalled.wait(20.0)
+    at_stall, end = simulator.time, time.monotonic() + STALL
+    while time.monotonic() < end:
+        sent += 1
+        inputs.receive("heat", (sent % 10) / 10)
+        time.sleep(0.02)
+    went_on = simulator.time - at_stall
+    valve.open()
+    assert finished.wait(60.0)
+    worker.stop()
+    assert worker.error is None and time.monotonic() - begin < 60.0
+    assert went_on > 0.6 * STALL  # of 1.0 on a machine that does nothing else
+    assert recording.longest < 0.5 * STALL
+    dropped = worker.log_status.dropped
+    assert dropped > 0.5 * STALL * RATE - QUEUE_LENGTH and worker.log_status.failure == ""
+    assert statuses[-1].log.dropped > 0 and sum(status.dropped for status in statuses) == statuses[-1].log.dropped
+    told = [decode_input(data) for _, _, _, data in read_messages(log, {INPUTS.full_name()}) if data is not None]
+    heats = [of for of in told if of.kind == STIMULUS and at_stall < of.time < at_stall + went_on]
+    assert len(heats) > 0.5 * sent
+    times = read_log(log).times
+    assert len(times) < DURATION * RATE - dropped + 10 and times[-1] == pytest.approx(DURATION)
+    result = verify(log)
+    assert result.passed and result.states == len(times)
+
+
+def test_on_a_full_disk_the_node_goes_on_tells_and_ends_with_exit_code_3(start, connect, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    node = start("sim_node", domain, {"scene": "bending", "log": log, "rate": 200, "start_paused": True})
+    client = connect(node)
+    reports = client.listen(DiagnosticArray, "/diagnostics")
+    send = client.sender(Float64, "/bilayer_sim/stimulus/swelling")
+    assert client.call("resume").success
+    room = log.stat().st_size + 300_000
+    resource.prlimit(node.pid, resource.RLIMIT_FSIZE, (room, room))
+
+    def failed():
+        return reports[-1].status[0].level == DiagnosticStatus.ERROR
+
+    client.spin_until(failed, "an error in the diagnostics")
+    values = {value.key: value.value for value in reports[-1].status[0].values}
+    assert reports[-1].status[0].message.endswith(", without its log")
+    assert "run.mcap could not be written: File too large; it can be read up to t = " in values["log"]
+    before = float(values["simulated time [s]"])
+    send(Float64(data=0.1))
+    count = len(reports)
+    client.spin_until(lambda: len(reports) > count + 1, "more diagnostics")
+    later = {value.key: value.value for value in reports[-1].status[0].values}
+    assert float(later["simulated time [s]"]) > before
+    node.send(signal.SIGINT)
+    assert node.wait() == 3, node.output
+    assert node.output.count("the simulation goes on without it") == 1
+    assert "sim_node: the log" in node.output and "Traceback" not in node.output
+    assert not read_info(log).complete and len(read_log(log).times) > 1
