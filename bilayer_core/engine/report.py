@@ -58,7 +58,7 @@ class IntegrationReport:
     restarts : int
         Steps of the method that stands in for one with a history.
     error : float
-        That of the attempt that failed, in tolerances.
+        That of the attempt that failed, or what it made of energy, over what is allowed.
     regularised : int
         Factorised matrices to which masses were added, or from which what is negative in the contact of rods was left
         out, because the Hessian was not positive definite.

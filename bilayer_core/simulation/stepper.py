@@ -16,7 +16,7 @@ from ..engine.report import FAILURES, IntegrationReport
 from ..errors import InputError, SimulationError
 from ..integrators.method import Method
 from ..model.model import Model
-from ..model.records.status import INPUTS_END, TOO_INACCURATE
+from ..model.records.status import GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
 from ..model.records.step import Configuration
 from ..model.state import NOT_KNOWN, State
 from .collapse import collapsed
@@ -209,6 +209,8 @@ class Stepper:
             text = f"the error of {end}, stays above the tolerance "
             return text + f"({found.error * tolerance:.3g} of the longest rod, allowed {tolerance:.3g})"
         text = f"{FAILURES[found.status]} in {end}"
+        if found.status == GAINS_ENERGY:
+            return f"{text} ({found.error:.3g} times what the account of energy allows)"
         if math.isfinite(found.residual):
             text += f" (correction left {found.residual:.3g} m/s, allowed {self.steps.newton_tolerance:.3g} m/s, "
             text += f"{found.iterations} iterations)"
