@@ -82,7 +82,7 @@ class Counts:
     )
     lengths: Vector  # shortest, longest, and last step [s]
     residuals: Vector  # of the last step, and the largest [m/s]
-    failure: Vector  # of the last attempt: length [s], residual [m/s], error or energy made, over what is allowed, iterations
+    failure: Vector  # last length [s], residual [m/s], error (or energy made) over what is allowed, iterations
 
 
 @record
