@@ -17,12 +17,12 @@ again, shorter, unless its own part is less than `SMALL` of that. The shortest s
 much by itself, which is what rounding and a loose tolerance of Newton's method leave, and less than `MOST` times as
 much with those before it; otherwise a run stops.
 
-Driving ends this: a prescribed body that moves, a flow, forces that follow. All that is asked where bodies alone drive
-is that no single step makes more than `LARGEST_STEP_GAIN` of the largest energy beyond the error of its quadrature, as
-far as shorter ones do not. A stimulus that changes does not end it. What it
-supplies has the error of its quadrature, |(Σ bᵢ sᵢ − ½(s₀ + s₁))·Δη|; what steps make beyond that is summed, and each
-step forgets `FORGOTTEN` of the sum, so that runs of any length are judged alike. Limits are then `LARGEST_DRIVEN_GAIN`
-and `SMALL_DRIVEN`.
+Driving ends this. What stimuli and prescribed bodies supply has the error of its quadrature: W = h Σ bᵢ Pᵢ − Σ bᵢ sᵢ·Δη
+differs from that by trapezoids, W̃. So what steps make is summed over a while (each step forgets `FORGOTTEN` of the sum,
+so that runs of any length are judged alike), W − W̃ is summed as well, with its sign, and what the first sum has beyond
+the size of the second is made by no quadrature. (Sizes of W − W̃ step by step would excuse steps that make energy, where
+errors of the quadrature go to and fro.) Limits are then `LARGEST_DRIVEN_GAIN` and `SMALL_DRIVEN`. A flow, and
+forces that follow, may supply without end: there nothing is asked.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -44,12 +44,13 @@ from ..kinematics.rotating import inertia_tensor
 from ..kinematics.vector import row
 from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES, slot_of
-from ..model.records.outcome import CONTACT_ERROR, FRACTION
+from ..model.records.outcome import CONTACT_ERROR, FRACTION, GAINED
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of
 from .powers import (
+    BY_BODIES,
     BY_FLOW,
     DRIVEN,
     LOSING,
@@ -64,11 +65,12 @@ from .powers import (
 )
 
 ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
-FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN, MADE = range(6, 13)
+FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN, MADE, UNSURE = range(6, 14)
 """Slots of `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
 barriers take up and contact damping takes [W]; T + V less all that was supplied, and the lowest that was since driving
 ended; the largest energy of the run; what steps have made or, below zero, lost; the potential of gravity at the start
-[J]; 1 if all these are of the state; what steps have made lately [J].
+[J]; 1 if all these are of the state; what steps have made lately, and by how much two quadratures of what was supplied
+differ there [J].
 """
 QUESTIONED = 2.0
 """In `OPEN`: of a state that someone has changed, or that is of other conditions. Its account is kept if it may be its
@@ -79,7 +81,6 @@ LARGEST_GAIN = 9e-4
 SMALL = 1e-3
 LARGEST_DRIVEN_GAIN = 0.02
 SMALL_DRIVEN = 5e-4
-LARGEST_STEP_GAIN = 0.1
 MOST = 2.0
 FORGOTTEN = 5e-4
 ROUNDING = 1e-11
@@ -260,7 +261,7 @@ def close_step_account(p, state, work, h, beyond, end):
         strained, mean = work.strain[i] - work.start_strain[i], work.mean_force[i] / h
         grows |= strained != 0.0
         done[SUPPLIED] -= mean * strained
-        unsure += abs((mean - 0.5 * (work.start_force[i] + work.end_force[i])) * strained)
+        unsure -= (mean - 0.5 * (work.start_force[i] + work.end_force[i])) * strained
     copy(work.end_force, state.law_force)
     energy, barriers, scale = _energies(p, state, end)
     missed = abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP])
@@ -277,24 +278,26 @@ def close_step_account(p, state, work, h, beyond, end):
     missed += DAMPING_SHARE * h * abs(damping - account[POWER_DAMPING])
     account[POWER_DAMPING] = damping
     p.outcome.figures[CONTACT_ERROR] = missed
-    if done[DRIVEN] != 0.0:
-        account[LOWEST], account[MADE] = account[FREE], 0.0
-        if done[DRIVEN] == BY_FLOW:
-            return NONE
-        gain -= unsure + abs(by_powers - 0.5 * h * (power + done[SUPPLYING]))
-        return SOME if gain > LARGEST_STEP_GAIN * account[LARGEST] else NONE
-    gain -= unsure
-    account[MADE] = max((1.0 - FORGOTTEN) * account[MADE] + gain, 0.0)
-    if grows:
+    if done[DRIVEN] == BY_FLOW:
+        account[LOWEST], account[MADE], account[UNSURE] = account[FREE], 0.0, 0.0
+        return NONE
+    if done[DRIVEN] == BY_BODIES:
+        unsure += by_powers - 0.5 * h * (power + done[SUPPLYING])
+    made = (1.0 - FORGOTTEN) * account[MADE] + gain
+    account[MADE] = max(made, 0.0)
+    account[UNSURE] = (1.0 - FORGOTTEN) * account[UNSURE] + unsure if made > 0.0 else 0.0
+    if grows or done[DRIVEN] == BY_BODIES:
         account[LOWEST] = account[FREE]
-        return _too_much(account[MADE], gain, LARGEST_DRIVEN_GAIN * account[LARGEST], SMALL_DRIVEN)
+        made -= abs(account[UNSURE])
+        return _too_much(p, made, gain, LARGEST_DRIVEN_GAIN * account[LARGEST], SMALL_DRIVEN)
     account[LOWEST] = min(account[LOWEST], account[FREE])
-    return _too_much(account[FREE] - account[LOWEST], gain, LARGEST_GAIN * account[LARGEST], SMALL)
+    return _too_much(p, account[FREE] - account[LOWEST], gain, LARGEST_GAIN * account[LARGEST], SMALL)
 
 
 @kernel
-def _too_much(made, gain, allowed, small):
+def _too_much(p, made, gain, allowed, small):
     """What a step makes that gains so much, and with the steps before it so much [J]."""
     if made <= allowed or gain <= small * allowed:
         return NONE
+    p.outcome.figures[GAINED] = made / allowed
     return SOME if gain <= allowed and made <= MOST * allowed else MUCH

@@ -19,6 +19,7 @@ from ..model.records.outcome import (
     CONFIGURATION,
     CONTACT_ERROR,
     FACTORISATIONS,
+    GAINED,
     GAINS,
     GAP,
     ITERATIONS,
@@ -81,7 +82,7 @@ class Counts:
     )
     lengths: Vector  # shortest, longest, and last step [s]
     residuals: Vector  # of the last step, and the largest [m/s]
-    failure: Vector  # length [s], residual [m/s], error, in tolerances, and iterations of the last attempt
+    failure: Vector  # last length [s], residual [m/s], error (or energy made) over what is allowed, iterations
 
 
 @record
@@ -292,7 +293,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
                     numbers[7] += of_contact > 1.0
                     break
                 status = GAINS_ENERGY if error <= 1.0 and gains != NONE else TOO_INACCURATE
-                error = max(error, of_contact)
+                error = figures[GAINED] if status == GAINS_ENERGY else max(error, of_contact)
             if h <= GROWTH_LIMIT * shortest:
                 shortest = _shortest(run, begin)
             if status >= TOO_INACCURATE:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from ..model.records.status import (
     BEYOND,
     BLOCKED,
+    COLLAPSED,
     CONVERGED,
     GAINS_ENERGY,
     INDEFINITE,
@@ -24,6 +25,7 @@ FAILURES = {
     NOT_FINITE: "the potential or its gradient is not finite",
     BLOCKED: "prescribed motion would push a surface through another one",
     BEYOND: "the end of the step, beyond its last stage, lies behind a surface",
+    COLLAPSED: "an edge has hardly any of its length left",
     UNSETTLED: "normal forces and friction do not settle on each other",
     GAINS_ENERGY: "steps make energy however short they are",
     TOO_INACCURATE: "the error of the step stays above the tolerance",
@@ -42,7 +44,7 @@ class IntegrationReport:
     status : int
         Why it ended, from `model.records.status`.
     pair : int
-        Near pair that blocks prescribed motion, −1 if none.
+        Near pair that blocks prescribed motion, or edge that has collapsed, −1 if none.
     iterations, factorisations, settlings : int
         Exact Hessians factorised and further corrections taken with a kept one; the former alone; how often friction
         was frozen anew. Failed attempts are included.
@@ -58,7 +60,7 @@ class IntegrationReport:
     restarts : int
         Steps of the method that stands in for one with a history.
     error : float
-        That of the attempt that failed, in tolerances.
+        That of the attempt that failed, or what it made of energy, over what is allowed.
     regularised : int
         Factorised matrices to which masses were added, or from which what is negative in the contact of rods was left
         out, because the Hessian was not positive definite.

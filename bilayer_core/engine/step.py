@@ -20,7 +20,7 @@ from ..model.records.outcome import (
     SWAPPED,
 )
 from ..model.records.problem import Problem
-from ..model.records.status import BEYOND, BLOCKED, CONVERGED, MAX_ITERATIONS, READY
+from ..model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, MAX_ITERATIONS, READY
 from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of, lagged
 from .ends import write_twist
@@ -28,6 +28,10 @@ from .light import see_light
 from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, VALUE, WITHOUT_INERTIA
 
 configuration_at = record_at(Configuration)
+LEAST_LENGTH = 0.01
+"""Part of its natural length that an edge must have: one that has hardly any turns by what Newton's method leaves, and
+with it the faces of its rod.
+"""
 
 
 @kernel
@@ -135,8 +139,8 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     Returns
     -------
     status : int
-        In `Outcome`: the blocking pair, −1 if none, the number in `work.configurations` of the last configuration,
-        numbers of iterations, factorisations and settlings, the largest residual and the gap.
+        In `Outcome`: the blocking pair or collapsed edge, −1 if none, the number in `work.configurations` of
+        the last configuration, numbers of iterations, factorisations and settlings, the largest residual and the gap.
     """
     stage, previous, figures = work.stage, work.first, p.outcome.figures
     s, e, t = 0, 1, 2
@@ -190,6 +194,11 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
                 state.strain_acceleration[:] = 0.0
             state.has_history[0] = _compare_touched(p.sums, state.touched)
     copy(work.transduction, state.transduction)
+    edge = _collapsed(p.strands, configuration_at(work.configurations[e]))
+    if edge >= 0:
+        copy(start_state.values, state.values)
+        figures[RESIDUAL] = math.inf
+        return _leave(p, COLLAPSED, edge, e)
     status = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
     copy(p.memory, state.memory)
     if status != READY:
@@ -201,6 +210,15 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     last = configuration_at(work.configurations[e])
     p.outcome.counts[GAINS] = call(p.calls.close_step_account, (p, state, work, h, ends > stages, last))
     return _leave(p, CONVERGED, -1, e)
+
+
+@kernel
+def _collapsed(strands, at):
+    """The first edge that has less than `LEAST_LENGTH` of its length left; −1 without one."""
+    for k in range(strands.edge_count):
+        if not at.length[k] >= LEAST_LENGTH * strands.rest_length[k]:
+            return k
+    return -1
 
 
 @kernel

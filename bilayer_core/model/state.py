@@ -64,7 +64,7 @@ class State:
     fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
     strain_rate: Array  # of elements with viscosity [1/s], gaps with damped impacts, and mechanisms [m/s, rad/s]
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
-    account: Array  # of energy; see `engine.energy_account`, shape (13,)
+    account: Array  # of energy; see `engine.energy_account`, shape (14,)
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
     light_rate: Array  # of m1·l and V of each lit element over the last step [1/s], shape (n_lit, 2)
     transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
@@ -220,7 +220,7 @@ def initial_state(
         fluid_force=np.zeros((with_history * in_fluid, 3)),
         strain_rate=strain_rate,
         strain_acceleration=np.zeros(with_history * len(strain_rate)),
-        account=np.zeros(13),
+        account=np.zeros(14),
         law_force=np.zeros(len(model.law_channel)),
         light_rate=np.zeros((len(model.lit_law), 2)),
         transduction=_settled(model, before) if len(channels) else np.zeros(0),

@@ -11,12 +11,11 @@ import math
 
 import numpy as np
 
+from ..engine.step import LEAST_LENGTH
 from ..errors import Remedy
 from ..model.model import Model
 
 Array = np.ndarray
-LEAST_LENGTH = 0.01
-"""Part of its natural length that an edge must have."""
 SHARPEST = math.radians(175.0)
 """By which two edges may turn at a joint."""
 CANTILEVER = 3.516
@@ -40,18 +39,18 @@ def collapsed(model: Model, position: Array) -> str:
     part = length / model.rest_length
     if part.size and part.min() < LEAST_LENGTH:
         edge = int(part.argmin())
-        return f"edge {_of_strand(model, edge)} has {100 * part[edge]:.2g} % of its length left"
+        return f"edge {edge_of_strand(model, edge)} has {100 * part[edge]:.2g} % of its length left"
     bends = np.arange(model.bend_count)
     bends = bends[np.maximum(model.joint_a[bends], model.joint_b[bends]) < model.edge_count]
     first, second = model.joint_a[bends], model.joint_b[bends]
     cosine = np.einsum("ij,ij->i", edges[first], edges[second]) / (length[first] * length[second])
     if cosine.size and cosine.min() < math.cos(SHARPEST):
         bend, turn = int(cosine.argmin()), math.degrees(math.acos(max(cosine.min(), -1.0)))
-        return f"the joint behind edge {_of_strand(model, int(first[bend]))} is folded by {turn:.1f}°"
+        return f"the joint behind edge {edge_of_strand(model, int(first[bend]))} is folded by {turn:.1f}°"
     return ""
 
 
-def _of_strand(model: Model, edge: int) -> str:
+def edge_of_strand(model: Model, edge: int) -> str:
     """An edge's number within its strand, and the strand."""
     strand = next(s for s in reversed(model.strands) if s.first_edge <= edge)
     return f"{edge - strand.first_edge} of {strand.name}"

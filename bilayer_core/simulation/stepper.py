@@ -14,13 +14,14 @@ from ..engine.integrate import TIME_ROUNDING, StepControl
 from ..engine.modes import EVALUATE_STATE
 from ..engine.newton import LAST_DIGITS
 from ..engine.report import FAILURES, IntegrationReport
+from ..engine.step import LEAST_LENGTH
 from ..errors import InputError, SimulationError
 from ..integrators.method import Method
 from ..model.model import Model
-from ..model.records.status import INPUTS_END, TOO_INACCURATE
+from ..model.records.status import COLLAPSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
 from ..model.records.step import Configuration
 from ..model.state import NOT_KNOWN, State
-from .collapse import collapsed
+from .collapse import collapsed, edge_of_strand
 from .energy_budget import EnergyLedger
 from .frame_tables import FrameTables
 from .remedies import remedy
@@ -220,7 +221,12 @@ class Stepper:
             tolerance = self.steps.tolerance
             text = f"the error of {end}, stays above the tolerance "
             return text + f"({found.error * tolerance:.3g} of the longest rod, allowed {tolerance:.3g})"
+        if found.status == COLLAPSED:
+            edge = f"edge {edge_of_strand(self.model, found.pair)}"
+            return f"{edge} has less than {100 * LEAST_LENGTH:g} % of its length left in {end}"
         text = f"{FAILURES[found.status]} in {end}"
+        if found.status == GAINS_ENERGY:
+            return f"{text} ({found.error:.3g} times what the account of energy allows)"
         if math.isfinite(found.residual):
             text += f" (correction left {found.residual:.3g} m/s, allowed {self.steps.newton_tolerance:.3g} m/s, "
             text += f"{found.iterations} iterations)"
@@ -229,10 +235,13 @@ class Stepper:
     def _failure(self, found: IntegrationReport, begin: float, state: State, gap: float) -> SimulationError:
         """What is told of steps that cannot go on from a state."""
         why, part = self._why(found, begin), collapsed(self.model, state.position)
-        why = f"{why}: {part}, which a linear material cannot hold" if part else why
+        folded = found.status == COLLAPSED or bool(part)
+        if found.status != COLLAPSED and part:
+            why = f"{why}: {part}"
+        why = f"{why}, which a linear material cannot hold" if folded else why
         moving = np.concatenate([state.velocity, state.body_velocity])
         mass = self.model.node_mass.sum() + self.model.bodies.mass.sum()
         of_energy = math.sqrt(2.0 * state.account[LARGEST] / mass)
         speed = max(float(np.linalg.norm(moving, axis=1).max()), of_energy)
-        change = remedy(found, self.steps, self._method, self.model, gap, speed, bool(part))
+        change = remedy(found, self.steps, self._method, self.model, gap, speed, folded)
         return SimulationError(why, begin, change)
