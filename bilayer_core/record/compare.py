@@ -11,7 +11,7 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.quantities import QUATERNION, Entry
-from bilayer_core.record.run_data import RunData
+from bilayer_core.record.recorded import Recorded
 
 Array = np.ndarray
 SAME_TIME = 1e-9
@@ -78,7 +78,7 @@ class Comparison:
         return "Comparison(equal)" if self.equal else f"Comparison({len(self.differences)} quantities; {told})"
 
 
-def compare(first: RunData | str | Path, second: RunData | str | Path) -> Comparison:
+def compare(first: Recorded | str | Path, second: Recorded | str | Path) -> Comparison:
     """Compare two runs, or logs, over the time that both have.
 
     Raises
@@ -86,7 +86,7 @@ def compare(first: RunData | str | Path, second: RunData | str | Path) -> Compar
     InputError
         If they have no time in common, or robots with other nodes.
     """
-    one, other = (run if isinstance(run, RunData) else read_log(run) for run in (first, second))
+    one, other = (run if isinstance(run, Recorded) else read_log(run) for run in (first, second))
     if not (one.times.size and other.times.size):
         raise InputError("compare: a run without frames has nothing to compare")
     begin, end = max(one.times[0], other.times[0]), min(one.times[-1], other.times[-1])
@@ -111,7 +111,7 @@ def compare(first: RunData | str | Path, second: RunData | str | Path) -> Compar
 class _Rows:
     """Rows of quantities of a run that come at one rate, read one after the other: a window of them is in memory."""
 
-    def __init__(self, run: RunData, entries: Mapping[str, Entry], names: Sequence[str]):
+    def __init__(self, run: Recorded, entries: Mapping[str, Entry], names: Sequence[str]):
         self.entries = [entries[name] for name in names]
         of_shape = bool(self.entries) and self.entries[0].of_shape
         self.times = run.shape_times if of_shape else run.times

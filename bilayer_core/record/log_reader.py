@@ -17,6 +17,7 @@ from bilayer_core.record.log_file import LogFile
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.log_records import METADATA, content, parse, walk
 from bilayer_core.record.log_source import LogSource
+from bilayer_core.record.logged_run import LoggedRun
 from bilayer_core.record.opening import open_log
 from bilayer_core.record.run_data import RunData
 from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
@@ -148,7 +149,7 @@ def read_log(path: str | Path) -> RunData:
     InputError
         If the file is no log; where something is asked for, if that is damaged, or the log does not hold it.
     """
-    return RunData.of_log(LogSource(path))
+    return LoggedRun(LogSource(path))
 
 
 def read_messages(

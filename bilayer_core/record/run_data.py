@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bilayer_core.record.quantities import AXES, Entry, Quantity, entries, quantities_of, unknown_quantity
+from bilayer_core.record.quantities import Entry, Quantity, entries, quantities_of
+from bilayer_core.record.recorded import Recorded
 from bilayer_core.simulation.frame import Description, Strand
-
-if TYPE_CHECKING:
-    import pandas
-    import xarray
-
-    from bilayer_core.record.log_source import LogSource
 
 
 @dataclass(frozen=True, repr=False)
-class RunData:
+class RunData(Recorded):
     """A run as arrays; the first axis of every array is time.
 
     Attributes
@@ -67,96 +61,14 @@ class RunData:
     strain: np.ndarray
     curvature: np.ndarray
 
-    @classmethod
-    def of_log(cls, source: LogSource) -> RunData:
-        """The run of a log, whose arrays are read when they are asked for."""
-        run = object.__new__(cls)
-        run.__dict__.update(
-            source=source,
-            description=source.description,
-            times=source.times["time"],
-            shape_times=source.times["shape_time"],
-        )
-        return run
-
-    def __getattr__(self, name: str) -> object:
-        """Called for what is not there yet: what a log holds at one rate is read at once."""
-        source = self.__dict__.get("source")
-        if source is None or name not in self.__dataclass_fields__:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-        self.__dict__.update(source.attributes_with(name))
-        return self.__dict__[name]
-
-    def __getitem__(self, name: str) -> Quantity:
-        """The quantity of a name; see `record.quantities`.
-
-        Raises
-        ------
-        InputError
-            If there is none, with the nearest names.
-        """
-        known = self.quantities
-        if name not in known:
-            raise unknown_quantity(name, known, self.why_not(name))
-        return known[name]
-
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:
-        """All quantities by name; those of a log are read when they are looked up."""
-        source = self.__dict__.get("source")
-        if source is not None:
-            return _OfLog(self, source)
+        """All quantities by name."""
         return {quantity.name: quantity for quantity in quantities_of(self)}
 
     def entries(self) -> dict[str, Entry]:
         """What is known of each quantity beside its values, by name."""
-        source = self.__dict__.get("source")
-        if source is not None:
-            return source.entries
         return {entry.name: entry for entry in entries(self.description, self.energy, self.solver)}
-
-    def why_not(self, name: str) -> str | None:
-        """Why a quantity that other logs have is not in this one; None if it is, or if no log has it."""
-        source = self.__dict__.get("source")
-        return None if source is None else source.why_not(name)
-
-    def blocks(self, wanted: Sequence[Entry]) -> Iterator[tuple[slice, dict[str, np.ndarray]]]:
-        """Values of quantities that come at one rate, in blocks of rows, by name: those of a log as they are read."""
-        source = self.__dict__.get("source")
-        if source is not None:
-            yield from source.blocks(wanted)
-        elif wanted:
-            found = {entry.name: entry.of(self).values for entry in wanted}
-            yield slice(0, len(found[wanted[0].name])), found
-
-    def to_dataframe(self) -> pandas.DataFrame:
-        """All but shapes of rods as columns over time, such as ``body/ball/position.z``; needs pandas."""
-        import pandas
-
-        columns = {}
-        for name in [name for name in self.quantities if not name.startswith("rod/")]:
-            quantity = self.quantities[name]
-            if not quantity.axes:
-                columns[quantity.name] = quantity.values
-            for k, label in enumerate(quantity.labels):
-                columns[f"{quantity.name}.{label}"] = quantity.values[:, k]
-        return pandas.DataFrame(columns, index=pandas.Index(self.times, name="time"))
-
-    def to_xarray(self) -> xarray.Dataset:
-        """All quantities with their units; those of rods are over ``shape_time`` and have nodes of their own; needs
-        xarray.
-        """
-        import xarray
-
-        variables = {}
-        for quantity in self.quantities.values():
-            of_shape = quantity.name.startswith("rod/")
-            strand = quantity.name.rpartition("/")[0]
-            names = {"node": f"node of {strand}", "axis": "axis", "part": f"part of {len(quantity.labels)}"}
-            axes = ("shape_time" if of_shape else "time", *(names[axis] for axis in quantity.axes))
-            variables[quantity.name] = (axes, quantity.values, {"units": quantity.unit})
-        coordinates = {"time": self.times, "shape_time": self.shape_times, "axis": list(AXES)}
-        return xarray.Dataset(variables, coordinates, {"scene": self.description.scene_name})
 
     def __repr__(self) -> str:
         span = f"t = {self.times[0]:g} to {self.times[-1]:g} s" if self.times.size else "empty"
@@ -169,27 +81,3 @@ class RunData:
     def strain_of(self, layer: Strand) -> np.ndarray:
         """Axial strain in the middle of one of the description's `layers`, shape (shapes, its nodes)."""
         return layer.strain_of(self.strain[:, layer.nodes], self.curvature[:, layer.nodes])
-
-
-class _OfLog(Mapping):
-    """The quantities of a log: names are known at once, values are read when they are looked up, and kept."""
-
-    def __init__(self, run: RunData, source: LogSource):
-        self._run, self._source = run, source
-        self._read: dict[str, Quantity] = {}
-
-    def __getitem__(self, name: str) -> Quantity:
-        if name not in self._read:
-            entry = self._source.entries[name]
-            known = entry.attribute in self._run.__dict__
-            self._read[name] = entry.of(self._run) if known else self._source.read(entry)
-        return self._read[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._source.entries
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._source.entries)
-
-    def __len__(self) -> int:
-        return len(self._source.entries)

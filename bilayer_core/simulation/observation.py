@@ -130,8 +130,11 @@ def _points(model: Model, state: State) -> tuple[Array, Array]:
 class Sources(Protocol):
     """Where the functions below find the last evaluation: a stepper, or copies of what it left (`capture`)."""
 
-    model: Model
-    tables: FrameTables
+    @property
+    def model(self) -> Model: ...
+
+    @property
+    def tables(self) -> FrameTables: ...
 
     @property
     def end(self) -> Any:
@@ -147,7 +150,7 @@ def contact_forces(of: Sources) -> Array:
     return -of.engine.sums.contact_point[: of.model.node_count + of.model.point_count]
 
 
-def between_bodies(of: Sources) -> list:
+def between_bodies(of: Sources) -> list[Any]:
     """Joints and mechanisms, as far as there are any: what exerts forces on bodies beside contact."""
     engine, tables = of.engine, of.tables
     joints = [engine.joints] if tables.has_joints else []

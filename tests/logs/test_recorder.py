@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from sample_scenes import everything
 
-from bilayer_core import Recorder, Simulator, load_scene
+from bilayer_core import Recorder, Simulator, compare, load_scene
 from bilayer_core.errors import InputError
+from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.memory import MemoryRecorder
 
 
@@ -106,7 +107,7 @@ def test_what_cannot_be_recorded_is_refused(simulator, asked, fault):
 def test_a_recorder_shows_itself_within_a_line(simulator):
     recorder = Recorder(simulator, rate=100.0)
     simulator.run(0.02)
-    assert repr(recorder).startswith("Recorder(everything: t = 0 to 0.02 s, 3 frames; ") and len(repr(recorder)) < 400
+    assert repr(recorder).startswith("Recorder(sample: t = 0 to 0.02 s, 3 frames; ") and len(repr(recorder)) < 400
 
 
 def test_what_is_recorded_changes_no_step():
@@ -118,3 +119,16 @@ def test_what_is_recorded_changes_no_step():
         ends.append(simulator.save_state())
     assert recorder.times.size > 10
     np.testing.assert_array_equal(*ends)
+
+
+def test_recorded_runs_are_compared_with_each_other_and_with_logs(simulator, tmp_path):
+    recorder = Recorder(simulator, ["com", "body/*/position"], rate=simulator.scene.output.rate)
+    simulator.run(0.05, observers=[McapRecorder(tmp_path / "run.mcap")])
+    recorder.stop()
+    found = compare(tmp_path / "run.mcap", recorder)
+    assert [of.name for of in found.differences] == ["com", "body/hub/position", "body/ball/position"]
+    assert all(of.largest == 0.0 for of in found.differences)
+    other = Simulator(load_scene(everything(), {"gravity.2": -1.0}))
+    again = Recorder(other, "com", rate=simulator.scene.output.rate)
+    other.run(0.05)
+    assert 0.0 < compare(recorder, again)["com"].largest < 1e-6

@@ -255,7 +255,7 @@ def test_inputs_are_told_before_the_step_from_which_on_they_act():
     at = told[1].time
     assert at == pytest.approx(0.04)
     assert told[0] == Input(0, 0.0, UNTIL, "", (told[0].values[0],)) and told[0].values[0] == pytest.approx(0.04)
-    assert told[1] == Input(steps, at, STIMULUS, "heat", (0.5,))
+    assert told[1] == Input(steps, at, STIMULUS, "heat", (0.5, 0.0))
     assert (told[2].kind, told[2].name) == (LOAD, "push") and math.isnan(told[2].values[0])
     assert told[3].kind == UNTIL and len(told) == 4
 
