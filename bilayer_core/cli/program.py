@@ -18,8 +18,8 @@ from bilayer_core.cli.export import export
 from bilayer_core.cli.logs import info, view
 from bilayer_core.cli.new import new
 from bilayer_core.cli.options import Settings, VerbGroup
-from bilayer_core.cli.render import render
 from bilayer_core.cli.plot import plot
+from bilayer_core.cli.render import render
 from bilayer_core.cli.repair import repair
 from bilayer_core.cli.replay import replay
 from bilayer_core.cli.run import run

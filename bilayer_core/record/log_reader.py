@@ -150,9 +150,7 @@ def read_log(path: str | Path) -> RunData:
     return RunData.of_log(LogSource(path))
 
 
-def read_messages(
-    path: str | Path, topics: set[str] | None = None
-) -> Iterator[tuple[str, str, int, bytes | None]]:
+def read_messages(path: str | Path, topics: set[str] | None = None) -> Iterator[tuple[str, str, int, bytes | None]]:
     """Topic, ROS type, time [ns] and data of each message of `topics` (default all), in the order of the file.
 
     Each topic is announced first with the data None, even if no message follows.

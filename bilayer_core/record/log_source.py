@@ -135,7 +135,9 @@ class LogSource:
             return self._shapes()
         values = self._values(wanted)
         description, count = self.description, len(self.times[TIME])
-        of = {attribute: np.full((count, len(description.bodies), width), np.nan) for attribute, width in _WIDTHS.items()}
+        of = {
+            attribute: np.full((count, len(description.bodies), width), np.nan) for attribute, width in _WIDTHS.items()
+        }
         of["clamp_wrenches"][:, [k for k, body in enumerate(description.bodies) if not body.holds_rods]] = 0.0
         of |= {"stimulus": np.full((count, len(description.channels)), np.nan), "com": np.full((count, 3), np.nan)}
         of |= {"energy": {}, "solver": {}}

@@ -366,5 +366,3 @@ def _count(number: int, what: str) -> str:
 
 def _bytes(number: int) -> str:
     return f"{number / 1e6:.3g} MB" if number >= 100_000 else f"{number} bytes"
-
-

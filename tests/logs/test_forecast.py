@@ -37,7 +37,9 @@ def recorder(scene, directory):
 def test_a_forecast_changes_nothing_and_is_the_same_again():
     simulator = Simulator(load_scene("gripping"))
     before = simulator.save_state().tobytes()
-    assert forecast(simulator).total == pytest.approx(forecast(simulator).total, rel=1e-2)  # chunks end by the clock, too
+    assert forecast(simulator).total == pytest.approx(
+        forecast(simulator).total, rel=1e-2
+    )  # chunks end by the clock, too
     assert simulator.save_state().tobytes() == before
 
 

@@ -59,7 +59,9 @@ def test_a_log_without_what_acted_says_that_it_cannot_be_replayed(log, tmp_path,
     assert compare(log, old).equal
 
 
-@pytest.mark.parametrize("topic", ["clamp_wrench/wall", "solver", "com", "energy", "points", "nodes", "stimulus_applied"])
+@pytest.mark.parametrize(
+    "topic", ["clamp_wrench/wall", "solver", "com", "energy", "points", "nodes", "stimulus_applied"]
+)
 def test_a_log_without_a_topic_has_all_else(topic, log, tmp_path, capsys):
     old = stripped(log, tmp_path / "old.mcap", topics=[f"/bilayer_sim/{topic}"])
     assert any(f"/bilayer_sim/{topic}: its quantities" in lack for lack in read_info(old).lacks)

@@ -163,7 +163,11 @@ def test_messages_without_a_description_of_their_channel_are_told(log, damaged):
 def test_bad_names_are_refused_and_nothing_is_overwritten_or_left(log, tmp_path, capsys):
     other = tmp_path / "other.mcap"
     other.write_bytes(b"precious")
-    for new, message in ((log, "is the log that is to be repaired"), (other, "exists already"), (tmp_path / "a", "must end")):
+    for new, message in (
+        (log, "is the log that is to be repaired"),
+        (other, "exists already"),
+        (tmp_path / "a", "must end"),
+    ):
         assert main(["repair", str(log), str(new)]) == 2
         assert message in capsys.readouterr().err
     assert other.read_bytes() == b"precious"
