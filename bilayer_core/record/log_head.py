@@ -8,7 +8,7 @@ from pathlib import Path
 from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
 from bilayer_core.record.description_text import from_text
-from bilayer_core.record.log_file import open_log
+from bilayer_core.record.log_chunks import open_log
 from bilayer_core.record.log_records import ATTACHMENT, METADATA, content, parse, walk
 from bilayer_core.simulation.frame import Description
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
-from bilayer_core.record.log_file import LogFile, open_log
+from bilayer_core.record.log_chunks import LogFile, open_log
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.log_records import METADATA, content, parse, walk
 from bilayer_core.record.log_source import LogSource

@@ -11,7 +11,7 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.record import encoders
 from bilayer_core.record.cdr import NANOSECONDS, Template, read_float64_multi_array
-from bilayer_core.record.log_file import LogFile
+from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.node_frames import node_order
 from bilayer_core.record.quantities import Entry, Quantity, entries

@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS
-from bilayer_core.record.log_file import open_log, read_summary
+from bilayer_core.record.log_chunks import open_log, read_summary
 from bilayer_core.record.log_reader import REPAIRED
 from bilayer_core.record.log_records import (
     ATTACHMENT,

@@ -11,7 +11,7 @@ from bilayer_core import compare, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.record import log_records
-from bilayer_core.record.log_file import LogFile
+from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_reader import read_info, read_state
 from bilayer_core.record.mcap_log import McapRecorder
 
@@ -41,10 +41,10 @@ def log(tmp_path_factory):
 @pytest.fixture
 def unpacked(monkeypatch):
     """How many chunks have been unpacked."""
-    from bilayer_core.record import log_file
+    from bilayer_core.record import log_chunks
 
     counted, unpack = [], log_records.unpacked
-    monkeypatch.setattr(log_file, "unpacked", lambda data: counted.append(1) or unpack(data))
+    monkeypatch.setattr(log_chunks, "unpacked", lambda data: counted.append(1) or unpack(data))
     return counted
 
 
