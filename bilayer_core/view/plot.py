@@ -201,6 +201,7 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
     for axes, (unit, held) in zip(all_axes[:, 0], panels.items(), strict=True):
         _draw_panel(axes, unit, held, names, several)
     all_axes[-1, 0].set_xlabel("time [s]")
+    figure.align_ylabels()
     return figure
 
 
