@@ -74,7 +74,7 @@ setup(
     install_requires=[
         "click>=8.1",
         "lz4>=4.3",
-        "mcap>=1.6,<2",
+        "mcap>=1.6,<2",  # brings zstandard
         "numba>=0.67,<0.69",  # all tests pass with 0.68 and with 0.67
         "platformdirs>=4",
         "numpy>=1.26",
@@ -88,6 +88,7 @@ setup(
         "ros": [f"{wheel} ; {ROS_PLATFORM}" for wheel in ROS_WHEELS],
         "viewer": ["rerun-sdk>=0.41,<0.42", "pillow>=10.1"],
         "plot": ["matplotlib>=3.8"],
+        "export": ["pyarrow>=15"],
         "sweep": ["dask>=2024.8", "distributed>=2024.8"],
         "stress": ["matplotlib>=3.8", "pebble>=5.0"],
         "bench": ["matplotlib>=3.8", "mujoco>=4.0", "pyelastica>=1.0"],
@@ -100,6 +101,7 @@ setup(
             "pandas>=2.2",
             "pebble>=5.0",
             "pillow>=10.1",
+            "pyarrow>=15",
             "pytest>=8",
             "pytest-timeout>=2.3",
             "pytest-xdist>=3.6",

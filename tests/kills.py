@@ -17,6 +17,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from processes import environment
@@ -137,10 +138,11 @@ def loss(log: Path, diary: Path, killed: float) -> Loss:
     noted = entries(diary)
     last = info.last_time if frames else -1.0
     lost = [wall for kind, moment, wall in noted if kind == b"f" and moment > last + 1e-9]
-    missing = killed - lost[0] if lost else 0.0
-    beats = [wall for kind, _, wall in noted if kind == b"b" and lost and wall >= lost[0]]
-    pauses = [later - earlier for earlier, later in zip([*lost[:1], *beats], [*beats, killed], strict=True)]
-    return Loss(frames, missing, sum(pause for pause in pauses if pause > 5 * BEAT))
+    if not lost:
+        return Loss(frames, 0.0, 0.0)
+    moments = [lost[0], *(wall for kind, _, wall in noted if kind == b"b" and wall >= lost[0]), killed]
+    pauses = [later - earlier for earlier, later in pairwise(moments)]
+    return Loss(frames, killed - lost[0], sum(pause for pause in pauses if pause > 5 * BEAT))
 
 
 def kills(count: int, directory: Path, seed: int, node_domain: int, longest: float = 1.5) -> Iterator:

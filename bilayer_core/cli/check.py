@@ -215,7 +215,9 @@ def _time(report: dict[str, Any]) -> str:
 
 def _size(size: int) -> str:
     """A size as told to users."""
-    return f"{size / 1e9:.3g} GB" if size >= 999.5e6 else f"{size / 1e6:.2g} MB" if size >= 1e5 else f"{size / 1e3:.2g} kB"
+    return (
+        f"{size / 1e9:.3g} GB" if size >= 999.5e6 else f"{size / 1e6:.2g} MB" if size >= 1e5 else f"{size / 1e3:.2g} kB"
+    )
 
 
 def _block(name: str, lines: list[str]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""A log as files that other tools read: csv, parquet, npz. What is in memory is some megabytes, however long the log."""
+"""A log as files that other tools read: csv, parquet, npz. Some megabytes of it are in memory, however long it is."""
 
 from __future__ import annotations
 
@@ -201,5 +201,3 @@ def _draft_of_directory(out: Path, force: bool) -> Iterator[Path]:
         raise unwritable(out, error) from error
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-
-

@@ -264,5 +264,3 @@ def _values(profile) -> Array:
     from bilayer_core.scene.profile import extremes
 
     return np.array(extremes(profile))
-
-

@@ -13,7 +13,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
-from bilayer_core.record.log_file import LogFile
+from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.log_records import METADATA, content, parse, walk
 from bilayer_core.record.log_source import LogSource
@@ -152,9 +152,7 @@ def read_log(path: str | Path) -> RunData:
     return LoggedRun(LogSource(path))
 
 
-def read_messages(
-    path: str | Path, topics: set[str] | None = None
-) -> Iterator[tuple[str, str, int, bytes | None]]:
+def read_messages(path: str | Path, topics: set[str] | None = None) -> Iterator[tuple[str, str, int, bytes | None]]:
     """Topic, ROS type, time [ns] and data of each message of `topics` (default all), in the order of the file.
 
     Each topic is announced first with the data None, even if no message follows.

@@ -11,11 +11,11 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.record import encoders
 from bilayer_core.record.cdr import NANOSECONDS, Template, read_float64_multi_array
-from bilayer_core.record.log_file import LogFile
+from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.node_frames import node_order
 from bilayer_core.record.quantities import Entry, Quantity, entries
-from bilayer_core.record.topics import LOG_NAMESPACE, MULTI_ARRAY, Rate, output_topics
+from bilayer_core.record.topics import LOG_NAMESPACE, Rate, output_topics
 from bilayer_core.simulation.frame import Description
 
 Array = np.ndarray
@@ -99,10 +99,12 @@ class LogSource:
         self._topics: dict[str, _Topic] = {}
         self.times: dict[str, Array] = {}
         lacks: list[str] = []
+        stamps = {name: self._file.times(_full(name)) for names in groups.values() for name in names}
+        begun = any(len(of) for of in stamps.values())  # what comes later does not lack in a log of no frame yet
         for group, names in groups.items():
-            stamps = {name: self._file.times(_full(name)) for name in names}
-            held = {name: of for name, of in stamps.items() if len(of)}
-            lacks += [_full(name) for name in names if _full(name) not in self._file.topics or (held and name not in held)]
+            held = {name: stamps[name] for name in names if len(stamps[name]) or not begun}
+            missing = [name for name in names if name not in held]
+            lacks += [_full(name) for name in missing if held or _full(name) not in self._file.topics]
             self.times[group] = self._align(held)
         self.lacks = tuple(lacks)
         terms, figures = (self._topics[name].labels if name in self._topics else () for name in ("energy", "solver"))
@@ -133,7 +135,9 @@ class LogSource:
             return self._shapes()
         values = self._values(wanted)
         description, count = self.description, len(self.times[TIME])
-        of = {attribute: np.full((count, len(description.bodies), width), np.nan) for attribute, width in _WIDTHS.items()}
+        of = {
+            attribute: np.full((count, len(description.bodies), width), np.nan) for attribute, width in _WIDTHS.items()
+        }
         of["clamp_wrenches"][:, [k for k, body in enumerate(description.bodies) if not body.holds_rods]] = 0.0
         of |= {"stimulus": np.full((count, len(description.channels)), np.nan), "com": np.full((count, 3), np.nan)}
         of |= {"energy": {}, "solver": {}}
@@ -236,7 +240,10 @@ class LogSource:
 
     def _layout(self, name: str, stamps: Array) -> _Topic:
         """Where the array is in the messages of a topic."""
-        if self._file.topics[_full(name)] == MULTI_ARRAY:
+        labelled = name in ("stimulus_applied", "energy", "solver")
+        if labelled and not len(stamps):
+            return _Topic(name, 1, 0, np.dtype(float), (len(self.description.channels),), stamps)
+        if labelled:
             _, _, data = next(self._file.messages({_full(name)}))
             labels, values = read_float64_multi_array(data)
             offset = len(data) - values.nbytes

@@ -58,6 +58,7 @@ class NodeFrames:
         self.normals = np.empty((node_count, 3))
         self.widths = np.empty((node_count, 3))
         self._frame: Frame | None = None
+        self._compute(self.positions[:0])  # compiled now, and not where a log's first frame waits for it
 
     def update(self, frame: Frame) -> None:
         """Compute all of these for `frame`, once for several calls with the same one."""
@@ -65,8 +66,13 @@ class NodeFrames:
             return
         np.take(frame.positions, self.order, axis=0, out=self.positions)
         np.take(frame.directors, self._edge_order, axis=0, out=self._directors)
+        self._compute(self.positions)
+        self._frame = frame
+
+    def _compute(self, positions: np.ndarray) -> None:
+        """Frames at as many nodes as there are positions."""
         frames_at_nodes(
-            self.positions,
+            positions,
             self._directors,
             self._edge_before,
             self._edge_after,
@@ -75,4 +81,3 @@ class NodeFrames:
             self.normals,
             self.widths,
         )
-        self._frame = frame

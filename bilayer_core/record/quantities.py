@@ -136,7 +136,6 @@ class Entry:
 
 def entries(description: Description, terms: Iterable[str], figures: Iterable[str]) -> Iterator[Entry]:
     """All quantities of a run with such energies and figures of the solver."""
-    every = slice(None)
     for k, (channel, unit) in enumerate(zip(description.channels, description.channel_units, strict=True)):
         yield Entry(f"stimulus/{channel}", unit, "stimulus", (k,), "stimulus_applied", (k,))
     for k, term in enumerate(terms):

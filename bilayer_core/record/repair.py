@@ -17,7 +17,7 @@ from typing import BinaryIO
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS
-from bilayer_core.record.log_file import read_summary
+from bilayer_core.record.log_chunks import read_summary
 from bilayer_core.record.log_reader import REPAIRED
 from bilayer_core.record.log_records import (
     ATTACHMENT,
@@ -367,5 +367,3 @@ def _count(number: int, what: str) -> str:
 
 def _bytes(number: int) -> str:
     return f"{number / 1e6:.3g} MB" if number >= 100_000 else f"{number} bytes"
-
-

@@ -28,7 +28,9 @@ def chosen(source: LogSource, names: Sequence[str]) -> list[Entry]:
     """
     if not names:
         return list(source.entries.values())
-    found = {known: source.entries[known] for name in names for known in chosen_names(source.entries, name, source.why_not)}
+    found = {
+        known: source.entries[known] for name in names for known in chosen_names(source.entries, name, source.why_not)
+    }
     return list(found.values())
 
 

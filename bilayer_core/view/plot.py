@@ -189,8 +189,8 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
     for unit, held in panels.items():
         if len(held) > MOST_LINES:
             raise InputError(
-                f"plot: {len(held)} curves [{unit or '1'}] in one panel cannot be told apart; name at most {MOST_LINES}, "
-                "or single components such as com.z"
+                f"plot: {len(held)} curves [{unit or '1'}] in one panel cannot be told apart; name at most "
+                f"{MOST_LINES}, or single components such as com.z"
             )
     inches = WIDTHS.get(width, width) * MILLIMETRE
     height = (PANEL_HEIGHT * len(panels) + FRAME_HEIGHT) * MILLIMETRE
@@ -201,6 +201,7 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
     for axes, (unit, held) in zip(all_axes[:, 0], panels.items(), strict=True):
         _draw_panel(axes, unit, held, names, several)
     all_axes[-1, 0].set_xlabel("time [s]")
+    figure.align_ylabels()
     return figure
 
 
@@ -231,7 +232,11 @@ def _label(own: list[str], unit: str) -> str:
     if len(own) == 1:
         head, comma, node = own[0].partition(", ")
         parts = head.split("/")
-        return "/".join(parts[1:] if parts[0] in ("rod", "body") else parts) if len(head) < 24 else parts[-1] + comma + node
+        return (
+            "/".join(parts[1:] if parts[0] in ("rod", "body") else parts)
+            if len(head) < 24
+            else parts[-1] + comma + node
+        )
     starts = {name.partition("/")[0] for name in own}
     return KINDS.get(unit) or (starts.pop() if len(starts) == 1 else "value")
 
@@ -282,5 +287,3 @@ def _short_names(logs: Sequence[str | Path]) -> list[str]:
     """Names of the logs' files, with their directories where those are the same."""
     stems = [Path(log).stem for log in logs]
     return stems if len(set(stems)) == len(stems) else [str(Path(log).with_suffix("")) for log in logs]
-
-

@@ -81,7 +81,7 @@ def programs(log: Path, other: Path, cut: Path, out: Path) -> dict[str, str]:
     node = "rod/arm_0/active/strain"
     return {
         "`bilayer info`": command("info", log),
-        "`read_log(…)[\"com\"]`": read.format(path=str(log)) + "print(run['com'])",
+        '`read_log(…)["com"]`': read.format(path=str(log)) + "print(run['com'])",
         "`read_log(…)` of a rod": read.format(path=str(log)) + f"print(run['{node}'])",
         "`bilayer repair`": command("repair", cut, out / "repaired.mcap", "--force"),
         "`bilayer export --csv`": command("export", log, "--csv", out / "csv", "--force"),

@@ -125,15 +125,14 @@ def test_a_missing_library_is_told_with_what_installs_it(log, tmp_path, monkeypa
 
 
 def test_a_log_without_frames_is_exported_as_tables_without_rows(tmp_path):
-    synthetic_run.run(McapRecorder(tmp_path / "run.mcap"), [0.0])
-    data = (tmp_path / "run.mcap").read_bytes()
-    from bilayer_core.record.log_file import LogFile
-
-    (tmp_path / "cut.mcap").write_bytes(data[: LogFile(tmp_path / "run.mcap")._chunks[0].place.begin])
-    export(tmp_path / "run.mcap", tmp_path / "one.npz", NPZ)
-    export(tmp_path / "run.mcap", tmp_path / "one.csv", CSV, ["com"])
-    assert len(pandas.read_csv(tmp_path / "one.csv")) == 1
-    from bilayer_core.errors import InputError
-
-    with pytest.raises(InputError, match="holds no quantity to export"):
-        export(tmp_path / "cut.mcap", tmp_path / "none.npz", NPZ)
+    recorder = McapRecorder(tmp_path / "run.mcap")
+    recorder.start(synthetic_run.description())
+    recorder.close(True)
+    export(tmp_path / "run.mcap", tmp_path / "run.npz", NPZ)
+    export(tmp_path / "run.mcap", tmp_path / "run.csv", CSV)
+    export(tmp_path / "run.mcap", tmp_path / "run.parquet", PARQUET, ["rod/arm_0/active/strain"])
+    table = pandas.read_csv(tmp_path / "run.csv")
+    assert len(table) == 0 and "com.z [m]" in table
+    assert list(pandas.read_parquet(tmp_path / "run.parquet")) == ["time", "node", "strain"]
+    with np.load(tmp_path / "run.npz") as data:
+        assert data["com"].size == data["time"].size == 0

@@ -1,6 +1,6 @@
 """Logs of programs that are killed at random moments: ten by default; more, and others:
 
-    KILLS=200 KILLS_SEED=7 pytest -m "" -s tests/logs/test_kills.py
+KILLS=200 KILLS_SEED=7 pytest -m "" -s tests/logs/test_kills.py
 """
 
 import os

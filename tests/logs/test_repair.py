@@ -10,7 +10,7 @@ from rosbags.highlevel import AnyReader
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_file import LogFile
+from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_reader import read_info, read_messages
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.repair import repair
@@ -163,7 +163,11 @@ def test_messages_without_a_description_of_their_channel_are_told(log, damaged):
 def test_bad_names_are_refused_and_nothing_is_overwritten_or_left(log, tmp_path, capsys):
     other = tmp_path / "other.mcap"
     other.write_bytes(b"precious")
-    for new, message in ((log, "is the log that is to be repaired"), (other, "exists already"), (tmp_path / "a", "must end")):
+    for new, message in (
+        (log, "is the log that is to be repaired"),
+        (other, "exists already"),
+        (tmp_path / "a", "must end"),
+    ):
         assert main(["repair", str(log), str(new)]) == 2
         assert message in capsys.readouterr().err
     assert other.read_bytes() == b"precious"

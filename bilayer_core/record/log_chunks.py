@@ -82,7 +82,11 @@ class LogFile:
         self._chunks: list[_Chunk] = []
         with open_log(self.path) as file:
             summary = read_summary(file)
-            self.has_index = summary is not None and bool(summary.chunk_indexes or not summary.channels)
+            self.has_index = summary is not None and (
+                bool(summary.chunk_indexes)
+                or not summary.channels
+                or (summary.statistics is not None and summary.statistics.message_count == 0)
+            )
             if self.has_index:
                 self._take(summary, file)
             else:

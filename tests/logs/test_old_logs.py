@@ -1,0 +1,110 @@
+"""Logs of older versions, or of which something was taken out, say what they lack in words that help."""
+
+import numpy as np
+import pytest
+import synthetic_run
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+
+from bilayer_core import Simulator, compare, load_scene, read_log
+from bilayer_core.cli import main
+from bilayer_core.errors import InputError
+from bilayer_core.record.log_reader import read_info
+from bilayer_core.record.mcap_log import McapRecorder
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    simulator = Simulator(load_scene("bending"))
+    simulator.set_stimulus("swelling", 0.5)
+    simulator.run(0.1, observers=[McapRecorder(path)])
+    return path
+
+
+def stripped(log, path, topics=(), metadata=(), qos=True):
+    """A copy without some topics and metadata records, and without the quality of service."""
+    with log.open("rb") as source, path.open("wb") as target:
+        reader, writer = make_reader(source), Writer(target, compression=CompressionType.LZ4)
+        writer.start("ros2")
+        for item in reader.iter_attachments():
+            writer.add_attachment(item.create_time, item.log_time, item.name, item.media_type, item.data)
+        for item in reader.iter_metadata():
+            if item.name not in metadata:
+                writer.add_metadata(item.name, item.metadata)
+        summary, numbers = reader.get_summary(), {}
+        for number, channel in summary.channels.items():
+            if channel.topic not in topics:
+                schema = summary.schemas[channel.schema_id]
+                schema_number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                of = channel.metadata if qos else {}
+                numbers[number] = writer.register_channel(channel.topic, "cdr", schema_number, of)
+        for _, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.id in numbers:
+                writer.add_message(numbers[channel.id], message.log_time, message.data, message.publish_time)
+        writer.finish()
+    return path
+
+
+def test_a_log_of_this_version_lacks_nothing(log):
+    assert read_info(log).lacks == ()
+
+
+def test_a_log_without_what_acted_says_that_it_cannot_be_replayed(log, tmp_path, capsys):
+    old = stripped(log, tmp_path / "old.mcap", topics=["/bilayer_sim/inputs"])
+    assert main(["info", str(old)]) == 0
+    assert "lacks     /bilayer_sim/inputs, what acted on the run: it cannot be replayed" in capsys.readouterr().out
+    assert main(["replay", str(old), "--verify"]) == 2
+    assert "does not hold what acted on the run" in capsys.readouterr().err
+    assert compare(log, old).equal
+
+
+@pytest.mark.parametrize(
+    "topic", ["clamp_wrench/wall", "solver", "com", "energy", "points", "nodes", "stimulus_applied"]
+)
+def test_a_log_without_a_topic_has_all_else(topic, log, tmp_path, capsys):
+    old = stripped(log, tmp_path / "old.mcap", topics=[f"/bilayer_sim/{topic}"])
+    assert any(f"/bilayer_sim/{topic}: its quantities" in lack for lack in read_info(old).lacks)
+    whole, run = read_log(log), read_log(old)
+    missing = [name for name in whole.quantities if name not in run.quantities]
+    assert missing and len(run.times) == len(whole.times)
+    for name in run.quantities:
+        np.testing.assert_array_equal(run[name].values, whole[name].values, err_msg=name)
+    if topic not in ("energy", "solver"):  # whose parts only the topic itself names
+        with pytest.raises(InputError, match=rf"{missing[0]}.*does not hold it: it has no /bilayer_sim/{topic}"):
+            run[missing[0]]
+    table = run.to_dataframe()
+    assert len(table) == len(run.times) and not set(missing) & set(table)
+    assert main(["export", str(old), "--npz", str(tmp_path / "old.npz")]) == 0
+    found = compare(log, old)
+    assert set(found.only[0]) == set(missing) and found.only[1] == ()
+
+
+def test_what_a_log_does_not_hold_is_no_number(log, tmp_path):
+    old = read_log(stripped(log, tmp_path / "old.mcap", topics=["/bilayer_sim/com", "/bilayer_sim/nodes"]))
+    assert np.isnan(old.com).all() and np.isnan(old.material_frames).all()
+    assert np.isfinite(old.positions).all() and np.isfinite(old.stimulus).all()
+
+
+def test_older_metadata_is_told(log, tmp_path):
+    old = read_info(stripped(log, tmp_path / "old.mcap", metadata=["machine", "run"], qos=False))
+    assert (old.complete, old.termination) == (False, "cut off")
+    assert any(lack.startswith("the machine it was made on") for lack in old.lacks)
+    assert any(lack.startswith("the quality of service") for lack in old.lacks)
+
+
+def test_a_log_without_states_says_so(log, tmp_path, capsys):
+    old = stripped(log, tmp_path / "old.mcap", topics=["/bilayer_sim/state"])
+    assert any("/bilayer_sim/state: no run can go on" in lack for lack in read_info(old).lacks)
+    for words in (["replay", old, "--verify"], ["run", "bending", "--from-state", old]):
+        assert main([*map(str, words), "--quiet"]) == 2
+        assert "holds no state" in capsys.readouterr().err
+
+
+def test_a_log_without_any_frame_is_read_as_empty(tmp_path):
+    recorder = McapRecorder(tmp_path / "run.mcap")
+    recorder.start(synthetic_run.description())
+    recorder.close(False)
+    run = read_log(tmp_path / "run.mcap")
+    assert len(run.times) == len(run.com) == len(run.positions) == 0 and run["com"].values.shape == (0, 3)
+    assert "empty" in repr(run)
