@@ -179,7 +179,7 @@ class Description:
 
 @dataclass(frozen=True)
 class Frame:
-    """One observation of a run. Arrays are copies that nobody writes to afterwards.
+    """One observation of a run. Arrays are copies that nobody writes to afterwards, some of them read-only.
 
     Attributes
     ----------
