@@ -1,4 +1,4 @@
-"""Files on disks that take nothing for a while, or come to an end."""
+"""Files on disks that take nothing for a while, or are full."""
 
 import threading
 
@@ -36,6 +36,22 @@ class _Behind:
 
     def write(self, data):
         self._valve.wait()
+        return self._file.write(data)
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+
+class Full:
+    """A file that takes some bytes, and then says that the disk is full."""
+
+    def __init__(self, file, room):
+        self._file, self._room = file, room
+
+    def write(self, data):
+        self._room -= len(data)
+        if self._room < 0:
+            raise OSError(28, "No space left on device")
         return self._file.write(data)
 
     def __getattr__(self, name):

@@ -64,24 +64,34 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarr
     origins, forces : ndarray
         [m, N], shape (arrows, 3).
     unit : float or ndarray
-        Force from which arrows grow [N], of all or of each, shape (arrows, 1).
+        Force from which arrows grow [N], of all or of each, shape (arrows,).
 
     Returns
     -------
     ndarray
         Pairs of points [m], shape (6 arrows, 3).
     """
-    size = np.linalg.norm(forces, axis=1, keepdims=True)
-    direction = np.divide(forces, size, out=np.tile([0.0, 0.0, 1.0], (len(forces), 1)), where=size > 0.0)
+    x, y, z = forces.T
+    size = np.sqrt(x * x + y * y + z * z)
+    direction = np.zeros(forces.shape)
+    direction[:, 2] = 1.0
+    np.divide(forces, size[:, None], out=direction, where=size[:, None] > 0.0)
     length = ARROW_DECADE * np.log10(1 + size / unit)
-    x, y, z = direction.T
-    zero = np.zeros_like(x)
     # Across the arrow: direction × z, or direction × x if it is upright.
-    sideways = np.where(np.abs(z) > 0.9, (zero, z, -y), (y, -x, zero)).T
-    sideways = sideways * (HEAD_HALF_WIDTH * length / np.linalg.norm(sideways, axis=1, keepdims=True))
-    tip = origins + length * direction
-    base = tip - HEAD_SHARE * length * direction
-    return np.stack([origins, tip, tip, base + sideways, tip, base - sideways], axis=1).reshape(-1, 3)
+    x, y, z = direction.T
+    upright, sideways = np.abs(z) > 0.9, np.empty(forces.shape)
+    sideways[:, 0], sideways[:, 1], sideways[:, 2] = across = (
+        np.where(upright, 0.0, y),
+        np.where(upright, z, -x),
+        np.where(upright, -y, 0.0),
+    )
+    sideways *= (HEAD_HALF_WIDTH * length / np.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2))[:, None]
+    tip = origins + length[:, None] * direction
+    base = tip - (HEAD_SHARE * length)[:, None] * direction
+    points = np.empty((len(forces), 6, 3))
+    points[:, 0], points[:, 1], points[:, 2], points[:, 4] = origins, tip, tip, tip
+    points[:, 3], points[:, 5] = base + sideways, base - sideways
+    return points.reshape(-1, 3)
 
 
 def shape_marker(shape: ShapeInfo) -> tuple[int, tuple[float, ...], np.ndarray]:
@@ -202,7 +212,7 @@ class MarkerEncoder:
         origins = [*(held for _ in self._clamp_arrows), frame.positions[touching]]
         forces = [*(wrenches[:, part] for _, part, _ in self._clamp_arrows), frame.contact_forces[touching]]
         units = [unit for _, _, unit in self._clamp_arrows for _ in held] + [ARROW_FORCE] * len(touching)
-        arrows = force_arrows(np.concatenate(origins), np.concatenate(forces), np.array(units)[:, None])
+        arrows = force_arrows(np.concatenate(origins), np.concatenate(forces), np.array(units))
         begin = 0
         for points, _, _ in self._clamp_arrows:
             points[:] = arrows[begin : begin + len(points)]

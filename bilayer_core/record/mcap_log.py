@@ -196,7 +196,7 @@ class McapRecorder:
     def _raise_failure(self) -> None:
         failure = self._failure_of_run()
         if failure is not None:
-            raise failure from self._failure
+            raise failure from (None if failure is self._failure else self._failure)
 
     def _failure_of_run(self) -> Exception | None:
         """What `close` raises, as things stand."""

@@ -39,32 +39,34 @@ class Ribbons:
     ):
         self._nodes, self._limit = nodes, strain_limit
         self._points, self._colours, self._spacings = points, colours, spacings
-        layers, self._rows = description.layers, layer_rows(description)
+        layers, own = description.layers, layer_rows(description)
         everywhere, rows = np.arange(description.node_count), np.arange(len(nodes.order))
         self._node = np.concatenate([everywhere[layer.nodes] for layer in layers])
-        self._row = np.concatenate([rows[own] for own in self._rows])
-        self._offset, width, self._curvature = (
+        self._row = np.concatenate([rows[of] for of in own])
+        offset, width, self._curvature = (
             np.concatenate([getattr(layer, name) for layer in layers]) for name in ("offset", "width", "curvature")
         )
-        self._half_width = 0.5 * width[:, None]
-        ends = np.cumsum([0, *(own.stop - own.start for own in self._rows)]).tolist()
+        self._offset, self._half_width = offset[:, None], 0.5 * width[:, None]
+        ends = np.cumsum([0, *(of.stop - of.start for of in own)]).tolist()
         self._parts = [slice(begin, end) for begin, end in zip(ends[:-1], ends[1:], strict=True)]
+        self._edges = [slice(of.start, of.stop - 1) for of in own]
 
     def show(self, frame: Frame) -> None:
         """Write those of a frame, to which `nodes` was updated."""
         nodes, row, node = self._nodes, self._row, self._node
         middles = nodes.positions.take(row, axis=0)
-        middles += self._offset[:, None] * nodes.normals.take(row, axis=0)
+        middles += self._offset * nodes.normals.take(row, axis=0)
         half = self._half_width * nodes.widths.take(row, axis=0)
-        left, right = middles - half, middles + half
-        strain = strain_at(self._offset, frame.strain.take(node), frame.curvature.take(node), self._curvature)
-        colours = strain_colours(strain, self._limit)
+        bars = np.empty((len(row), 2, 3))
+        np.subtract(middles, half, out=bars[:, 0])
+        np.add(middles, half, out=bars[:, 1])
+        strain = strain_at(self._offset[:, 0], frame.strain.take(node), frame.curvature.take(node), self._curvature)
+        colours = strain_colours(strain, self._limit)[:, None]
         steps = nodes.positions[1:] - nodes.positions[:-1]
         lengths = np.sqrt(np.einsum("ij,ij->i", steps, steps))
-        for part, own, points, shown, spacing in zip(
-            self._parts, self._rows, self._points, self._colours, self._spacings, strict=True
+        for part, edges, points, shown, spacing in zip(
+            self._parts, self._edges, self._points, self._colours, self._spacings, strict=True
         ):
-            points[:, 0], points[:, 1] = left[part], right[part]
-            shown[:] = colours[part, None]
-            edges = lengths[own.start : own.stop - 1]
-            spacing[0] = edges.sum() / len(edges)
+            points[:] = bars[part]
+            shown[:] = colours[part]
+            spacing[0] = np.add.reduce(lengths[edges]) / (edges.stop - edges.start)

@@ -69,6 +69,7 @@ class Capture:
         engine.evaluate_end()
         sums = engine.sums
         self.flat = state.flat()
+        self.flat.flags.writeable = False  # parts of it are handed out as they are
         self.state = _State(self.flat, self.tables.places_in(state))
         self.end = _End(at.length.copy(), at.tangent.copy(), at.director1.copy(), at.arm.copy())
         self.sums = _Sums(

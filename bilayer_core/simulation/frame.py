@@ -188,7 +188,7 @@ class Description:
 
 @dataclass(frozen=True, repr=False)
 class Frame:
-    """One observation of a run. Arrays are copies that nobody writes to afterwards.
+    """One observation of a run. Arrays are copies that nobody writes to afterwards, some of them read-only.
 
     Attributes
     ----------

@@ -2,10 +2,10 @@
 
     python tests/benchmarks/log_cost.py [SCENE ...] [--repeats N] [--node]
 
-Each scene is run with a log and without one in turn, as `bilayer run --log` does, or with --node as the node does, paced
-at real time with no subscriber; the least of all runs counts. All but the steps themselves is told as the difference of
-the two, and by how much the steps become dearer is told beside it, as caches are shared: that is the uncertain part, of
-which a busy machine makes more. "Start" is what is paid once a run: opening the file, describing the scene, closing.
+Each scene is run with a log and without one in turn, as `bilayer run --log` does, or with --node as the node does, at
+real time and with no subscriber; the least of all runs counts. All but the steps themselves is told as the difference
+of the two. By how much the steps become dearer is told beside it: caches are shared, which a busy machine makes worse.
+"Start" is what is paid once a run: describing the scene, opening and closing the file.
 """
 
 import argparse

@@ -12,6 +12,7 @@ from kills import kill
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
+from slow_disks import Full
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, OutputError, SimulationError
@@ -264,24 +265,8 @@ def test_a_full_disk_surfaces_as_an_error_of_the_run(tmp_path):
         recorder.close(True)
 
 
-class FullDisk:
-    """A file that takes some bytes and then says that the disk is full."""
-
-    def __init__(self, file, room):
-        self._file, self._room = file, room
-
-    def write(self, data):
-        self._room -= len(data)
-        if self._room < 0:
-            raise OSError(28, "No space left on device")
-        return self._file.write(data)
-
-    def __getattr__(self, name):
-        return getattr(self._file, name)
-
-
 def test_a_disk_that_fills_up_stops_the_run_and_is_told_again_at_the_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(mcap_log, "open_alone", lambda path, force: FullDisk(path.open("xb"), 300_000))
+    monkeypatch.setattr(mcap_log, "open_alone", lambda path, force: Full(path.open("xb"), 300_000))
     recorder = McapRecorder(tmp_path / "run.mcap")
     recorder.start(synthetic_run.description())
     with pytest.raises(SimulationError, match=r"run\.mcap could not be written: No space left") as raised:

@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pytest
 import synthetic_run
-from slow_disks import Valve
+from slow_disks import Full, Valve
 
 from bilayer_core.errors import OutputError
 from bilayer_core.record import mcap_log
@@ -114,22 +114,6 @@ def test_with_a_patience_a_full_disk_ends_nothing_before_the_log_is_closed(tmp_p
         recorder.start(synthetic_run.description())
 
 
-class Full:
-    """A file that takes some bytes, and then says that the disk is full."""
-
-    def __init__(self, file, room):
-        self._file, self._room = file, room
-
-    def write(self, data):
-        self._room -= len(data)
-        if self._room < 0:
-            raise OSError(28, "No space left on device")
-        return self._file.write(data)
-
-    def __getattr__(self, name):
-        return getattr(self._file, name)
-
-
 def test_with_a_patience_a_disk_that_fills_up_is_told_and_the_run_goes_on(tmp_path, monkeypatch):
     path = tmp_path / "run.mcap"
     monkeypatch.setattr(mcap_log, "open_alone", lambda path, force: Full(path.open("xb"), 300_000))
@@ -147,3 +131,14 @@ def test_with_a_patience_a_disk_that_fills_up_is_told_and_the_run_goes_on(tmp_pa
         recorder.close(True)
     assert raised.value.exit_code == 3 and "stopped at" not in str(raised.value)
     assert len(read_log(path).times) > 0
+
+
+@pytest.mark.parametrize("patience", [None, 0.0])
+def test_an_error_of_the_writer_itself_is_raised_as_it_is(tmp_path, monkeypatch, patience):
+    monkeypatch.setattr(mcap_log._LogFile, "write", lambda self, item: [][0])
+    recorder = McapRecorder(tmp_path / "run.mcap", patience=patience)
+    recorder.start(synthetic_run.description())
+    recorder.observe(synthetic_run.frame(0.0))
+    with pytest.raises(IndexError) as raised:
+        recorder.close(True)
+    assert raised.value.__cause__ is None

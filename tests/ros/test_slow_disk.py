@@ -8,10 +8,11 @@ import time
 import pytest
 from acted_scenes import pushed
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from slow_disks import Valve
+from slow_disks import Full, Valve
 from std_msgs.msg import Float64
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.errors import OutputError
 from bilayer_core.record import mcap_log
 from bilayer_core.record.encoders import decode_input
 from bilayer_core.record.log_reader import read_info, read_log, read_messages
@@ -44,6 +45,29 @@ def valve(monkeypatch):
     valve.open()
 
 
+def no_inputs():
+    """Of the scene's one channel."""
+    return StimulusInputs([Channel("heat", 0.0, 1.0, Hold(type="hold", value=0.0))], 0.0, "hold")
+
+
+def worker_of(simulator, inputs, recording, duration, report=lambda status: None):
+    """The node's worker in real time, and what is set when it has ended."""
+    finished = threading.Event()
+    worker = SimulationWorker(
+        simulator,
+        control=Asynchronous(inputs),
+        commands=Commands(lambda reason: None),
+        publisher=Nobody(),
+        recording=recording,
+        rate=RATE,
+        pacer=Pacer(1.0),
+        duration=duration,
+        report=report,
+        finished=finished.set,
+    )
+    return worker, finished
+
+
 class Timed(Recording):
     """Notes how long the stepping thread was held up by the log [s]."""
 
@@ -56,23 +80,11 @@ class Timed(Recording):
 
 
 def test_while_the_disk_hangs_steps_keep_their_rhythm_and_the_log_still_replays(tmp_path, valve):
-    log, statuses, finished = tmp_path / "run.mcap", [], threading.Event()
-    simulator = Simulator(load_scene(pushed()))
+    log, statuses = tmp_path / "run.mcap", []
+    simulator, inputs = Simulator(load_scene(pushed())), no_inputs()
     simulator.compile()
-    inputs = StimulusInputs([Channel("heat", 0.0, 1.0, Hold(type="hold", value=0.0))], 0.0, "hold")
     recording = Timed(str(log), "", RATE, 20.0, patience=0.0)
-    worker = SimulationWorker(
-        simulator,
-        control=Asynchronous(inputs),
-        commands=Commands(lambda reason: None),
-        publisher=Nobody(),
-        recording=recording,
-        rate=RATE,
-        pacer=Pacer(1.0),
-        duration=DURATION,
-        report=statuses.append,
-        finished=finished.set,
-    )
+    worker, finished = worker_of(simulator, inputs, recording, DURATION, statuses.append)
     sent, begin = 0, time.monotonic()
     worker.start()
     time.sleep(0.3)
@@ -100,6 +112,28 @@ def test_while_the_disk_hangs_steps_keep_their_rhythm_and_the_log_still_replays(
     assert len(times) < DURATION * RATE - dropped + 10 and times[-1] == pytest.approx(DURATION)
     result = verify(log)
     assert result.passed and result.states == len(times)
+
+
+def test_a_log_lost_before_a_reset_is_told_at_the_end_and_the_next_one_is_whole(tmp_path, monkeypatch):
+    first, open_alone = tmp_path / "run.mcap", mcap_log.open_alone
+
+    def no_room_for_the_first(path, force):
+        return Full(path.open("xb"), 60_000) if path == first else open_alone(path, force)
+
+    monkeypatch.setattr(mcap_log, "open_alone", no_room_for_the_first)
+    simulator = Simulator(load_scene(pushed()))
+    simulator.compile()
+    worker, finished = worker_of(simulator, no_inputs(), Recording(str(first), "", RATE, 20.0, 0.0), 3.0)
+    worker.start()
+    while not worker.log_status.failure:
+        assert not finished.is_set()
+        time.sleep(0.01)
+    assert worker.reset().result(20.0) == "reset to t = 0 s"
+    assert worker.log_status.failure == ""
+    time.sleep(0.2)
+    worker.stop()
+    assert isinstance(worker.error, OutputError) and "run.mcap could not be written: No space" in str(worker.error)
+    assert verify(tmp_path / "run_1.mcap").passed
 
 
 def test_on_a_full_disk_the_node_goes_on_tells_and_ends_with_exit_code_3(start, connect, domain, tmp_path):
