@@ -61,8 +61,8 @@ def one_of(what: str, found: object, allowed: Iterable[str]) -> str:
 
 
 def shortened(text: str, most: int = LONGEST_TEXT) -> str:
-    """Text that can be printed, cut off where it gets long."""
-    printed = text[: most + 1].encode(errors="backslashreplace").decode()
+    """Text that can be printed, in one line, cut off where it gets long."""
+    printed = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text[: most + 1])
     return printed if len(text) <= most else f"{printed[:most]}..."
 
 

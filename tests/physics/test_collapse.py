@@ -2,10 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 from sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.engine.step import LEAST_LENGTH
 from bilayer_core.errors import SimulationError
 from bilayer_core.simulation.collapse import collapsed
 
@@ -38,6 +40,20 @@ def test_with_fixed_steps_the_remedy_is_adaptive_ones_as_well():
     expected = {"materials.gel.retardation_time", "solver.dt", "solver.integrator"}
     assert set(stop.value.remedy.changes) == expected
     assert ", and leave `solver.dt` out for adaptive steps" in str(stop.value.remedy)
+
+
+@pytest.mark.parametrize("integrator", ["implicit_midpoint", "sdirk2"])
+@pytest.mark.parametrize("turns", [40.0, -70.0])
+def test_no_step_ends_with_an_edge_that_has_no_length_left(integrator, turns):
+    """Such an edge turns by what Newton's method leaves: faces of its rod would then be anywhere."""
+    simulator = Simulator(load_scene(coiling(turns, dt=2e-5, integrator=integrator)))
+    rest, least = simulator.model.rest_length, math.inf
+    with pytest.raises(SimulationError, match="which a linear material cannot hold"):
+        while simulator.time < 0.05:
+            simulator.step()
+            edges = np.linalg.norm(np.diff(simulator.positions, axis=0), axis=1)
+            least = min(least, float((edges / rest).min()))
+    assert LEAST_LENGTH <= least < 0.9
 
 
 def bent(angle, stretch=1.0):

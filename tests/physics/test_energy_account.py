@@ -6,7 +6,18 @@ from budgets import driven
 from sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.engine.energy_account import ENERGY, FREE, LARGEST, LARGEST_GAIN, LOWEST, NUMERICAL
+from bilayer_core.engine.energy_account import (
+    ENERGY,
+    FREE,
+    LARGEST,
+    LARGEST_DRIVEN_GAIN,
+    LARGEST_GAIN,
+    LOWEST,
+    NUMERICAL,
+)
+from bilayer_core.errors import SimulationError
+from bilayer_core.stress.parameters import Parameters
+from bilayer_core.stress.robots import scene_of
 from bilayer_core.validate.impacts import thrown
 from bilayer_core.validate.motion import let_go
 
@@ -146,6 +157,42 @@ def test_a_slow_stimulus_does_not_excuse_steps_that_make_energy(integrator):
     simulator = Simulator(load_scene(content), dt=8.4e-4, integrator=integrator)
     assert rises(simulator, 0.2) < 0.1
     assert simulator.statistics.gaining > 0
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_noise_on_a_stimulus_does_not_excuse_steps_that_make_energy(seed):
+    """A strip of two rods rings, too fast for its steps, while the quadrature of its stimulus errs to and fro."""
+    layers = [layer("low", 1.6e-3, eigenstrain={"stimulus": "heat", "gain": -0.04}), layer("high", 1.05e-3)]
+    for one in layers:
+        one["natural_curvature"] = -32.0
+    strip = rod(layers, length=0.112, stations=21, width=0.0112, clamp_start="wall")
+    values = np.random.default_rng(seed).normal(0.5, 0.05, 400).tolist()
+    noise = {"type": "table", "times": np.linspace(0.0, 0.712, 400).tolist(), "values": values}
+    soft = {"gel": {**GEL, "youngs_modulus": 2.8e7}}
+    content = scene([strip], bodies=[fixed()], materials=soft, stimuli={"heat": {"schedule": noise}})
+    solver = {"integrator": "implicit_midpoint", "dt": 2.18e-4, "model": "two_rod", "dimension": 2}
+    simulator = Simulator(load_scene(content), **solver)
+    assert rises(simulator, 0.285) < 3 * LARGEST_DRIVEN_GAIN  # twice what is allowed, and what was forgotten
+    assert simulator.statistics.gaining > 0
+
+
+BAT = {"robot": "bat", "length": 1.54e-3, "slenderness": 9e3, "stations": 6, "youngs_modulus": 2.5e6, "barrier": 3.5e-5}
+BAT |= {"contact_stiffness": 5e11, "threshold": 1.2e-5, "eigenstrain": 0.0, "damped": False, "dimension": 2}
+
+
+@pytest.mark.parametrize("gravity", [0.0, 0.3])
+@pytest.mark.parametrize("model", ["two_rod", "laminate"])
+@pytest.mark.parametrize(("speed", "dt"), [(12.3, 1e-5), (12.3, 3e-5), (12.3, 9e-5), (3.0, 3e-5)])
+def test_no_step_that_a_body_drives_makes_energy_however_short(speed, dt, model, gravity):
+    """A ball hits a film whose barrier is much too stiff for the steps of the midpoint rule, which ends within it."""
+    parameters = Parameters(**BAT, speed=speed, dt=dt, model=model, gravity=gravity, integrator="implicit_midpoint")
+    simulator = Simulator(load_scene(scene_of(parameters)))
+    try:
+        simulator.run(40 * dt)
+    except SimulationError as stop:
+        assert stop.remedy.changes
+    account = simulator.energy_account
+    assert account[NUMERICAL] < 3 * LARGEST_DRIVEN_GAIN * account[LARGEST]
 
 
 @pytest.mark.parametrize("start", [1.0e-2, 1.0001e-2, 1.02e-2, 1.05e-2, 1.0999e-2])

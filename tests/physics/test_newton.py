@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 
 
 def coiling(turns, model, dimension):
-    """A straight strip, held at one end, that wants to be a coil; each round of statics takes one correction, or two."""
+    """A straight strip, held at one end, that wants to be a coil; a round of statics takes one correction, or two."""
     layers = [layer("low", 0.5e-3), layer("high", 0.5e-3)]
     for one in layers:
         one["natural_curvature"] = 2.0 * math.pi * turns / 0.05

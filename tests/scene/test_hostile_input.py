@@ -275,3 +275,9 @@ def test_the_largest_table_is_read_in_time(tmp_path):
     begin = time.monotonic()
     assert len(load_scene(with_table(tmp_path, "lamp.csv")).stimuli["lamp"].schedule.values) == 250_000
     assert time.monotonic() - begin < LONGEST
+
+
+@pytest.mark.parametrize("value", ["name\nname", "a\r\nb", "x\u2028y", "tab\there", "\x1b[31mred"])
+def test_what_an_override_holds_breaks_no_line_of_a_message(value):
+    told = refusal(scene([rod([layer()])]), [f"schema={value}"])
+    assert len(told.splitlines()) == 1 and told.isprintable()

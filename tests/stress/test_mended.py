@@ -12,8 +12,11 @@ MENDED = {
     "all/0103": "the midpoint rule in a heavy fluid made energy at the ends of steps",
     "all/0213": "a jump within a fixed step supplied what depended on the step",
     "all/0222": "likewise",
+    "all/0488": "the remedy of a refusal ended in a step whose edge had no length left",
     "all/0578": "a refusal's remedy passed through",
+    "all/0336": "the shortest step that a body drove made ten thousand times the energy of the run",
     "all/0700": "many of the shortest steps, each of which was allowed some, made energy together",
+    "all/0769": "noise on a stimulus excused steps that made energy",
 }
 
 
@@ -22,3 +25,4 @@ MENDED = {
 def test_what_failed_once_does_not(name):
     record = execute(all_cases()[name])
     assert record.outcome is not Outcome.FAILED, record.reason
+    assert record.remedy_works is not False, record.remedy
