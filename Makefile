@@ -11,11 +11,11 @@ BIN := $(VENV)/bin
 SOURCED_ROS := $(shell test -n "$$AMENT_PREFIX_PATH" && $(PYTHON) -c 'import rclpy' 2>/dev/null && echo yes)
 ifeq ($(SOURCED_ROS),yes)
 ROS := sourced
-EXTRAS := viewer,test
+EXTRAS := viewer,film,test
 VENV_OPTIONS := --system-site-packages
 else
 ROS := wheels
-EXTRAS := ros,viewer,test
+EXTRAS := ros,viewer,film,test
 endif
 STAMP := $(VENV)/installed-with-ros-$(ROS)
 # Tests that together run all pieces of the engine; `make bounds` says which are missing.
@@ -63,7 +63,8 @@ $(STAMP): setup.py pyproject.toml | system
 kernels: $(STAMP)  ## Compile the kernels, once for each state of the sources.
 	$(BIN)/python -m bilayer_core.jit.compile_all
 
-# What the system must supply: Python's module venv, and for pictures Mesa's Vulkan driver, which needs no graphics card.
+# What the system must supply: Python's module venv, and Mesa's software drivers, which need no graphics card: of OpenGL for
+# pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`).
 # Debian and Ubuntu packages are installed where this command may, else the line to paste is printed.
 system:
 	@command -v $(PYTHON) >/dev/null || { \
@@ -77,6 +78,9 @@ system:
 	ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json 2>/dev/null | grep -q . && \
 	    PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libvulkan.so.1 || \
 	    missing="$$missing mesa-vulkan-drivers libvulkan1"; \
+	PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL.so.1 && \
+	    PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL_ || \
+	    missing="$$missing libegl1 libegl-mesa0 libgl1-mesa-dri"; \
 	test -n "$$missing" || exit 0; \
 	if test "$$(id -u)" = 0; then sudo=; elif sudo -n true 2>/dev/null; then sudo=sudo; else sudo=no; fi; \
 	if test "$$sudo" != no && command -v apt-get >/dev/null; then \

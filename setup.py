@@ -87,6 +87,7 @@ setup(
     extras_require={
         "ros": [f"{wheel} ; {ROS_PLATFORM}" for wheel in ROS_WHEELS],
         "viewer": ["rerun-sdk>=0.41,<0.42", "pillow>=10.1"],
+        "film": ["imageio-ffmpeg>=0.6", "pillow>=10.1", "vtk>=9.5"],
         "plot": ["matplotlib>=3.8"],
         "export": ["pyarrow>=15"],
         "sweep": ["dask>=2024.8", "distributed>=2024.8"],

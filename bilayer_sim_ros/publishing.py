@@ -8,9 +8,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
 from bilayer_core.record.encoders import FrameEncoder
+from bilayer_core.record.events import Event
 from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec, output_topics
 from bilayer_core.simulation.frame import Description, Frame
 from bilayer_sim_ros.conversions import to_time
+from bilayer_sim_ros.events import EventPublisher
 from bilayer_sim_ros.message_types import CLOCK_TOPIC, message_class
 
 
@@ -40,11 +42,12 @@ class FramePublisher:
             for spec in self._encoder.topics
             if clock or spec.name != CLOCK_TOPIC
         ]
+        self._events = EventPublisher(node, description)
 
     @property
     def wanted(self) -> bool:
         """Whether anybody subscribes to anything."""
-        return any(publisher.get_subscription_count() > 0 for _, publisher in self._topics)
+        return self._events.wanted or any(of.get_subscription_count() > 0 for _, of in self._topics)
 
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send `frame` on every topic that has a subscriber and is due, or on every one of them."""
@@ -52,6 +55,11 @@ class FramePublisher:
         for spec, publisher in self._topics:
             if (display or spec.rate is not Rate.DISPLAY) and publisher.get_subscription_count() > 0:
                 publisher.publish(self._encoder.encode(spec.name, frame))
+        self._events.publish(frame)
+
+    def tell(self, event: Event) -> None:
+        """Send an event that frames do not show."""
+        self._events.tell(event)
 
 
 class ClockPublisher:

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from bilayer_core.errors import InputError, OutputError
+from bilayer_core.record.events import Event
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.simulation.frame import Description, Frame
 from bilayer_core.simulation.inputs import Input
@@ -113,6 +114,11 @@ class Recording:
         """Log something that acts from outside."""
         if self._log:
             self._log.note(told)
+
+    def tell(self, event: Event) -> None:
+        """Log an event that frames do not show."""
+        if self._log:
+            self._log.tell(event)
 
     def close(self, complete: bool, termination: str) -> None:
         """Finish all files, each even if another cannot be. Raises OutputError if one could not be written."""

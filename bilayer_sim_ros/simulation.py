@@ -16,6 +16,7 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
 from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_core.model.model import Model
+from bilayer_core.record.events import Event, late_stimulus
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.conversions import PATIENCE, to_diagnostics
 from bilayer_sim_ros.lockstep import SHORTEST_PERIOD, Asynchronous, Lockstep, tick_rate
@@ -30,6 +31,8 @@ from bilayer_sim_ros.worker import SimulationWorker
 
 COMPILATION_PERIOD = 5.0
 """Between two messages about compilation [s]."""
+FALLBACKS = {"hold": "the last value stays", "zero": "zero acts", "schedule": "the scene's schedule acts"}
+"""What an event says of each `stimulus_fallback`."""
 UNPACED_PATIENCE = 0.25
 """Longest wait for the disk of a simulation that goes as fast as it can, and has no rhythm to keep [s]."""
 WARNING_PERIOD = 1.0
@@ -81,8 +84,12 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         pacer=Pacer(parameters["real_time_factor"]),
         duration=parameters["duration"] or math.inf,
         paused=parameters["start_paused"],
-        report=_diagnostics(node, parameters["real_time_factor"]),
+        report=_diagnostics(node, parameters["real_time_factor"], lambda event: worker.tell(event)),
         finished=stop.set,
+    )
+    fallback = FALLBACKS[parameters["stimulus_fallback"]]
+    inputs.late = lambda time, name: worker.tell(
+        late_stimulus(time, f"none on {name} for {parameters['stimulus_timeout']:g} s", fallback)
     )
     if lockstep:
         inputs.notify = worker.wake
@@ -104,7 +111,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     node.get_logger().info(f"ended at t = {simulator.time:.6g} s; CPU time of the steps: {simulator.cpu_time:.3f} s")
 
 
-def _diagnostics(node: Node, real_time_factor: float) -> Callable[[Status], None]:
+def _diagnostics(node: Node, real_time_factor: float, tell: Callable[[Event], None]) -> Callable[[Status], None]:
     """What publishes a status on /diagnostics, and says if no controller answers, and what a log lacks."""
     publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
     name = node.get_fully_qualified_name()
@@ -125,6 +132,7 @@ def _diagnostics(node: Node, real_time_factor: float) -> Callable[[Status], None
                 f"lockstep: simulated time stands still at t = {status.time:.6g} s, as no stimulus has come for "
                 f"{status.waited:.0f} s; a controller has to answer each time on /clock"
             )
+            tell(late_stimulus(status.time, f"no answer for {status.waited:.0f} s", "simulated time stands still"))
         missed = status.waited >= PATIENCE
         if publisher.get_subscription_count() > 0:
             publisher.publish(to_diagnostics(status, name, real_time_factor))

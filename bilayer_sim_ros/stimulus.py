@@ -56,6 +56,9 @@ class StimulusInputs:
         Whether a message has come since `ask`.
     notify : callable
         Called after each message, in the thread that received it.
+    late : callable
+        Called in the stepping thread with the simulated time [s] and a channel whose messages stay away for longer than
+        the timeout; once until the next message.
     """
 
     def __init__(self, channels: Sequence[Channel], timeout: float, fallback: str):
@@ -65,6 +68,7 @@ class StimulusInputs:
         self._lock = threading.Lock()
         self.answered = False
         self.notify: Callable[[], None] = lambda: None
+        self.late: Callable[[float, str], None] = lambda time, name: None
         self.reset()
 
     def reset(self) -> None:
@@ -73,6 +77,7 @@ class StimulusInputs:
             self._received: dict[str, float] = {}
         self._heard: dict[str, float] = {}
         self._acting: dict[str, float | None] = {}
+        self._late: set[str] = set()
 
     def ask(self) -> None:
         """Let `answered` say from now on whether a message has come."""
@@ -112,6 +117,11 @@ class StimulusInputs:
                 value = self._fallback_value(channel, self._acting.get(name))
                 if value != self._acting.get(name):
                     changes[name] = value
+                if name in self._heard and name not in self._late:
+                    self._late.add(name)
+                    self.late(time, name)
+            else:
+                self._late.discard(name)
         self._acting.update(changes)
         return changes
 

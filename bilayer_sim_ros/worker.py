@@ -11,6 +11,7 @@ from concurrent.futures import Future
 from typing import Protocol
 
 from bilayer_core.errors import InputError, OutputError
+from bilayer_core.record.events import Event
 from bilayer_core.simulation.frame import Frame
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
@@ -38,6 +39,9 @@ class Publisher(Protocol):
 
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send what somebody listens to: what is due, or everything."""
+
+    def tell(self, event: Event) -> None:
+        """Send an event that frames do not show."""
 
 
 class SimulationWorker:
@@ -125,6 +129,11 @@ class SimulationWorker:
     def wake(self) -> None:
         """Look at once whether what was waited for has come."""
         self._requests.wake()
+
+    def tell(self, event: Event) -> None:
+        """Publish and log an event that frames do not show; called in the worker's thread."""
+        self._publisher.tell(event)
+        self._recording.tell(event)
 
     def pause(self) -> Future:
         """Ask for a pause. The future's result says what happened; InputError if it could not be done."""

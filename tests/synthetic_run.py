@@ -95,6 +95,7 @@ def frame(time: float, duration: float = 4.0) -> Frame:
     node_count = len(positions)
     forces = np.concatenate([*forces, np.zeros((1, 3))])
     spin = 0.6 * lift / LIFT
+    touching = tuple((f"arm_{arm}", "ball") for arm in range(ARMS)) if holding else (("ball", "ground"),)
     wrenches = np.zeros((2, 6))
     wrenches[1, :3] = -forces.sum(axis=0)
     energies = {name: (index + 1) * 1e-4 * closing**2 for index, name in enumerate(TERMS)}
@@ -121,6 +122,7 @@ def frame(time: float, duration: float = 4.0) -> Frame:
         residual=3e-7,
         substeps=20,
         cpu_time=0.7 * time,
+        contacts=touching,
         state=np.concatenate([positions.ravel(), np.zeros(3 * node_count), [round(time / 1e-3)]]),
     )
 

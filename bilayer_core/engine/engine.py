@@ -11,6 +11,7 @@ from ..integrators.method import Method
 from ..integrators.sdirk2 import METHOD as SELF_STARTING
 from ..model.contact_points import contact_point_names
 from ..model.model import Model
+from ..model.records.contacts import RodContact, Surfaces
 from ..model.records.outcome import CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS
 from ..model.records.parts import Mechanisms
 from ..model.records.problem import Sums
@@ -167,6 +168,16 @@ class Engine:
     def sums(self) -> Sums:
         """What forces added at the configuration evaluated last."""
         return self._storage.problem.sums
+
+    @property
+    def surfaces(self) -> Surfaces:
+        """Points and surfaces that are near each other, with their gaps there."""
+        return self._storage.problem.surfaces
+
+    @property
+    def rod_contact(self) -> RodContact:
+        """Rods that meet there."""
+        return self._storage.problem.rod_contact
 
     @property
     def joints(self) -> Joints:

@@ -1,7 +1,8 @@
-"""The diverging colour map of strain, the same in markers and in the viewer.
+"""Colour maps, the same in markers, in the viewer and in pictures.
 
-Blue is shortened, light grey unstrained, red stretched. The map is linear in Oklab between five colours whose
-lightness falls equally on both sides, so that equal differences of strain look equally large.
+Of strain and curvature: blue is shortened, light grey unstrained, red stretched; the map is linear in Oklab between
+five colours whose lightness falls equally on both sides, so that equal differences look equally large. Of pressure:
+from light grey over yellow and orange to dark red, ever darker.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 ANCHORS = ("#1b3a8c", "#4f8fe0", "#eceae6", "#ee7b51", "#9c1030")
+PRESSURE_ANCHORS = ("#dcdad6", "#f6c945", "#ee7b31", "#c2252c", "#5c0a2e")
 STEPS = 257
 
 # Ottosson, "A perceptual color space for image processing" (2020)
@@ -28,22 +30,28 @@ _TO_LAB = np.array(
 )
 
 
-def _build_map() -> np.ndarray:
-    """The colours as sRGBA from 0 to 1, shape (STEPS, 4), float32."""
-    encoded = np.array([[int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)] for text in ANCHORS])
+def _build_map(anchors: tuple[str, ...]) -> np.ndarray:
+    """Colours as sRGBA from 0 to 1, shape (STEPS, 4), float32."""
+    encoded = np.array([[int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)] for text in anchors])
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     lab = np.cbrt(linear @ _TO_CONE.T) @ _TO_LAB.T
-    at = np.linspace(0, len(ANCHORS) - 1, STEPS)
-    blend = np.stack([np.interp(at, np.arange(len(ANCHORS)), channel) for channel in lab.T], axis=1)
+    at = np.linspace(0, len(anchors) - 1, STEPS)
+    blend = np.stack([np.interp(at, np.arange(len(anchors)), channel) for channel in lab.T], axis=1)
     linear = ((blend @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_CONE).T).clip(0, 1)
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     return np.concatenate([encoded, np.ones((STEPS, 1))], axis=1).astype(np.float32)
 
 
-STRAIN_MAP = _build_map()
+STRAIN_MAP = _build_map(ANCHORS)
+PRESSURE_MAP = _build_map(PRESSURE_ANCHORS)
+
+
+def map_colours(values: np.ndarray, low: float, high: float, colours: np.ndarray) -> np.ndarray:
+    """Colours of `values` from a map whose ends are those of `low` and `high`: sRGBA from 0 to 1, shape + (4,)."""
+    index = np.rint((values - low) * ((STEPS - 1) / (high - low)))
+    return colours[np.clip(index, 0, STEPS - 1).astype(np.intp)]
 
 
 def strain_colours(strain: np.ndarray, limit: float) -> np.ndarray:
     """Colours of `strain`, full blue at -`limit` and full red at +`limit`: sRGBA from 0 to 1, float32, shape + (4,)."""
-    index = np.rint((strain / limit + 1) * ((STEPS - 1) / 2))
-    return STRAIN_MAP[np.clip(index, 0, STEPS - 1).astype(np.intp)]
+    return map_colours(strain, -limit, limit, STRAIN_MAP)

@@ -11,11 +11,12 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.record import encoders
 from bilayer_core.record.cdr import NANOSECONDS, Template, read_float64_multi_array
+from bilayer_core.record.event_messages import decode_event
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.node_frames import node_order
 from bilayer_core.record.quantities import Entry, Quantity, entries
-from bilayer_core.record.topics import LOG_NAMESPACE, Rate, output_topics
+from bilayer_core.record.topics import EVENTS, LOG_NAMESPACE, Rate, output_topics
 from bilayer_core.simulation.frame import Description
 
 Array = np.ndarray
@@ -130,6 +131,8 @@ class LogSource:
 
     def attributes_with(self, name: str) -> dict[str, object]:
         """That attribute of `RunData`, and all others that come at the same rate."""
+        if name == EVENTS.name:
+            return {name: tuple(decode_event(data) for _, _, data in self._file.messages({EVENTS.full_name()}))}
         wanted = [entry for entry in self.entries.values() if entry.of_shape == (name in _OF_SHAPES)]
         if name in _OF_SHAPES:
             return self._shapes()

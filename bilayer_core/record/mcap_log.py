@@ -18,12 +18,14 @@ from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_input
+from bilayer_core.record.event_messages import encode_event
+from bilayer_core.record.events import Event, EventDetector
 from bilayer_core.record.frame_block import FrameBlock
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
 from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import INPUTS, QOS, DisplayGate, Rate, TopicSpec, input_topics
+from bilayer_core.record.topics import EVENTS, INPUTS, QOS, DisplayGate, Rate, TopicSpec, input_topics
 from bilayer_core.simulation.frame import Description, Frame
 from bilayer_core.simulation.inputs import STIMULUS, Input
 
@@ -87,7 +89,7 @@ class McapRecorder:
         self._force, self._patience = force, patience
         self._last_time = 0.0
         self._left_out: Frame | None = None
-        self._backlog: Backlog[Frame | Input | dict[str, str]] = Backlog(QUEUE_LENGTH, GATHERING_PERIOD)
+        self._backlog: Backlog[Frame | Input | Event | dict[str, str]] = Backlog(QUEUE_LENGTH, GATHERING_PERIOD)
         self._thread: threading.Thread | None = None
         self._written = 0
         self._failure: Exception | None = None
@@ -139,6 +141,14 @@ class McapRecorder:
         """Wait no more for a disk for which one wait was in vain, until it has caught up."""
         return self._failure is None and self._backlog.put(frame, self._patience if self._left_out is None else 0.0)
 
+    def tell(self, event: Event) -> None:
+        """Log an event that frames do not show; it is not left out either."""
+        self._refuse_unstarted()
+        if self._patience is None:
+            self._put(event)
+        elif self._failure is None:
+            self._backlog.add(event)
+
     def close(self, complete: bool, termination: str = "") -> None:
         """Write what is left and finish the file.
 
@@ -188,7 +198,7 @@ class McapRecorder:
         if self._thread is None and self._failure is None:
             raise RuntimeError("the recorder has not been started, or is closed")
 
-    def _put(self, item: Frame | Input) -> None:
+    def _put(self, item: Frame | Input | Event) -> None:
         self._raise_failure()
         if not self._backlog.put(item):
             self._raise_failure()
@@ -255,6 +265,7 @@ class _LogFile:
 
         self._gate = gate
         self._encoder = FrameEncoder(description)
+        self._events = EventDetector(description)
         self._file = open_alone(path, force)
         self._large = [spec.name for spec in self._encoder.topics if spec.rate is Rate.DISPLAY]
         self._block: FrameBlock | None = None
@@ -283,14 +294,17 @@ class _LogFile:
             self._sync()
             undo.pop_all()
 
-    def write(self, item: Frame | Input) -> None:
-        """Write the messages of a frame, or of what acts from outside."""
+    def write(self, item: Frame | Input | Event) -> None:
+        """Write the messages of a frame, of what acts from outside, or of an event."""
         if isinstance(item, Input):
             self._add(INPUTS.name, nanoseconds(item.time), encode_input(item))
             if item.kind == STIMULUS:
                 self._add(f"stimulus/{item.name}", nanoseconds(item.time), encode_float64(item.values[0]))
+        elif isinstance(item, Event):
+            self._add_events([item])
         else:
             self._write_frame(item)
+            self._add_events(self._events.see(item))
             self._sequence += 1
         if self._unflushed_since is None:
             self._unflushed_since = clock.monotonic()
@@ -304,6 +318,10 @@ class _LogFile:
         if display:
             for name in self._large:
                 self._add(name, stamp, self._encoder.encode(name, frame))
+
+    def _add_events(self, events: list[Event]) -> None:
+        for event in events:
+            self._add(EVENTS.name, nanoseconds(event.time), encode_event(event))
 
     def _add(self, name: str, stamp: int, data: bytes) -> None:
         self._log.add_message(self._topics[name], stamp, self._sequence, data)
@@ -329,6 +347,7 @@ class _LogFile:
 
     def finish(self, ending: dict[str, str]) -> None:
         """Write the metadata ``run`` and the file's index."""
+        self._add_events(self._events.end(float(ending["last_time"])))
         self._log.flush()
         self._log.add_metadata("run", ending)
         self._log.finish()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.record.encoders import SOLVER_LABELS
+from bilayer_core.record.events import EventDetector
 from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.run_data import RunData
 from bilayer_core.simulation.frame import Description, Frame
@@ -47,6 +48,9 @@ class MemoryRecorder:
             node_frames.update(frame)
             return node_frames.quaternions.astype(np.float32)
 
+        detector = EventDetector(self.description)
+        events = [event for frame in frames for event in detector.see(frame)]
+
         return RunData(
             description=self.description,
             times=stack("time"),
@@ -64,4 +68,5 @@ class MemoryRecorder:
             material_frames=np.array([material_frames(frame) for frame in frames]),
             strain=stack("strain", np.float32),
             curvature=stack("curvature", np.float32),
+            events=(*events, *detector.end(frames[-1].time)),
         )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
+from bilayer_core.record.events import Event
 from bilayer_core.record.quantities import Entry, Quantity, entries, quantities_of
 from bilayer_core.record.recorded import Recorded
 from bilayer_core.simulation.frame import Description, Strand
@@ -42,6 +43,8 @@ class RunData(Recorded):
         Unit quaternions x y z w of the axes m1 m2 m3 at the nodes of strands, shape (shapes, strand nodes, 4), float32.
     strain, curvature : ndarray
         Of every node [1, 1/m], shape (shapes, node_count), float32.
+    events : tuple of Event
+        What happened, in the order of time; empty for older logs.
     """
 
     description: Description
@@ -60,6 +63,7 @@ class RunData(Recorded):
     material_frames: np.ndarray
     strain: np.ndarray
     curvature: np.ndarray
+    events: tuple[Event, ...] = field(default_factory=tuple)
 
     @cached_property
     def quantities(self) -> Mapping[str, Quantity]:

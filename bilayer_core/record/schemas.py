@@ -57,6 +57,20 @@ geometry_msgs/Vector3 torque
 std_msgs/Header header
 geometry_msgs/Wrench wrench
 """,
+    "rcl_interfaces/Log": """\
+byte DEBUG=10
+byte INFO=20
+byte WARN=30
+byte ERROR=40
+byte FATAL=50
+builtin_interfaces/Time stamp
+uint8 level
+string name
+string msg
+string file
+string function
+uint32 line
+""",
     "rosgraph_msgs/Clock": """\
 builtin_interfaces/Time clock
 """,

@@ -108,6 +108,10 @@ Labels are ``step``, ``time`` [s] and ``kind:name``, whose size is the number of
 """
 
 
+EVENTS = TopicSpec("events", "rcl_interfaces/msg/Log", Rate.EVENT)
+"""What happened, in words (`record.events`)."""
+
+
 def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
     """The topics on which single channels are set; a log holds each value at the time from which it acted."""
     return tuple(TopicSpec(f"stimulus/{name}", "std_msgs/msg/Float64", Rate.EVENT) for name in description.channels)
@@ -115,7 +119,7 @@ def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
 
 def input_topics(description: Description) -> tuple[TopicSpec, ...]:
     """What a log holds beside `output_topics`."""
-    return (INPUTS, *stimulus_topics(description))
+    return (INPUTS, EVENTS, *stimulus_topics(description))
 
 
 class DisplayGate:

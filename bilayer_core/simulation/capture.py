@@ -11,6 +11,7 @@ import numpy as np
 from ..kinematics.rotation import quaternion_from_matrix
 from ..model.state import State
 from . import observation as observe
+from .contact_pairs import Pairs
 from .fluid_energy import energy_of_fluid
 from .frame import Frame
 from .statistics import RunStatistics, center_of_mass
@@ -82,6 +83,8 @@ class Capture:
         between = [_Between(of.body, of.gradient.copy()) for of in observe.between_bodies(stepper)]
         self.joints = between[0] if self.tables.has_joints else None
         self.mechanisms = between[-1] if self.tables.has_mechanisms else None
+        self.owners = stepper.contact_owners
+        self.touching = self.owners.touching(engine)
         of_fluid = len(self.model.fluid_mass) > 0
         self.fluid_energy = energy_of_fluid(self.model, at, state.velocity, state.spin) if of_fluid else None
 
@@ -106,6 +109,9 @@ class Capture:
     def body_quaternions(self) -> Array:
         return np.array([quaternion_from_matrix(of) for of in self.state.body_rotation]).reshape(-1, 4)
 
+    def contacts(self) -> Pairs:
+        return self.owners.names_of(self.touching)
+
     def com(self) -> Array:
         return center_of_mass(self.model, self.state)
 
@@ -127,6 +133,7 @@ _DERIVED: dict[str, Callable[[Capture], Any]] = {
     "contact_wrenches": observe.contact_wrenches,
     "clamp_wrenches": observe.clamp_wrenches,
     "com": Capture.com,
+    "contacts": Capture.contacts,
     "energy": Capture.energy,
 }
 """How attributes of a `Frame` are computed."""
@@ -168,4 +175,5 @@ def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStati
         substeps=statistics.substeps,
         cpu_time=cpu_time,
         state=capture.flat,
+        rejected=(statistics.rejected, statistics.inaccurate, statistics.gaining),
     )

@@ -232,6 +232,11 @@ class Frame:
         CPU seconds of the stepping thread up to here [s].
     state : ndarray
         Flat state for a restart; parts and shapes as in `Description.state_layout`.
+    contacts : tuple of (str, str)
+        Names of what touches: a rod, a body or an obstacle, and another; see `simulation.contact_pairs`.
+    rejected : tuple of int
+        Attempts at steps that were made again, shorter, since the start of the run; those of them whose error was too
+        large; those that made energy.
     """
 
     time: float
@@ -257,6 +262,8 @@ class Frame:
     substeps: int
     cpu_time: float
     state: np.ndarray
+    contacts: tuple[tuple[str, str], ...] = field(default_factory=tuple)  # which leaves no attribute of the class
+    rejected: tuple[int, int, int] = (0, 0, 0)
 
     def __repr__(self) -> str:
         counts = f"{len(self.positions)} nodes, {len(self.body_positions)} bodies"

@@ -22,6 +22,7 @@ from ..model.records.status import COLLAPSED, GAINS_ENERGY, INPUTS_END, TOO_INAC
 from ..model.records.step import Configuration
 from ..model.state import NOT_KNOWN, State
 from .collapse import collapsed, edge_of_strand
+from .contact_pairs import ContactOwners
 from .energy_budget import EnergyLedger
 from .frame_tables import FrameTables
 from .remedies import remedy
@@ -133,6 +134,11 @@ class Stepper:
     def tables(self) -> FrameTables:
         """What frames of this model are made with."""
         return FrameTables(self.model, self.engine)
+
+    @cached_property
+    def contact_owners(self) -> ContactOwners:
+        """Whose what touches is."""
+        return ContactOwners(self.model)
 
     @property
     def stimulus(self) -> np.ndarray:

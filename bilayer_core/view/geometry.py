@@ -48,6 +48,13 @@ def ribbon_vertices(strand: Strand, positions: np.ndarray, material_frames: np.n
     return (middles[:, :, None] + corners).astype(np.float32)
 
 
+def ribbon_normals(material_frames: np.ndarray) -> np.ndarray:
+    """Normals of those corners, each of the face that it is on, shape (times, nodes, CORNERS, 3), float32."""
+    across, along = rotated(material_frames, 0), rotated(material_frames, 1)
+    faces = (across, across, -across, -across, -along, -along, along, along)
+    return np.stack(faces, axis=-2).astype(np.float32)
+
+
 def ribbon_triangles(nodes: int) -> np.ndarray:
     """Vertex indices of the surface of a ribbon with its ends closed, for vertices as above, shape (triangles, 3)."""
     first = CORNERS * np.arange(nodes - 1)[:, None, None]
@@ -56,6 +63,58 @@ def ribbon_triangles(nodes: int) -> np.ndarray:
     ends = np.array([[4, 5, 7, 6], [last + 4, last + 6, last + 7, last + 5]])
     corners = np.concatenate([(first + quads).reshape(-1, 4), ends])
     return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.uint32)
+
+
+_ARROW_SIDES = 10
+SLIMMEST_ARROW = 0.06  # radius of the shaft of a short arrow, in lengths of it
+
+
+def arrow_mesh(origins: np.ndarray, vectors: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Arrows with heads three times as wide as their shafts, which have one radius unless they are short.
+
+    Parameters
+    ----------
+    origins, vectors : ndarray
+        [m], shape (n, 3).
+    radius : float
+        [m].
+
+    Returns
+    -------
+    vertices, normals, triangles : ndarray
+        Shapes (v, 3), (v, 3), (t, 3).
+    """
+    count, sides = len(origins), _ARROW_SIDES
+    length = np.linalg.norm(vectors, axis=1)[:, None]
+    axis = vectors / np.maximum(length, np.finfo(float).tiny)
+    radius = np.minimum(radius, SLIMMEST_ARROW * length)
+    other = np.where(np.abs(axis[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    first = np.cross(axis, other)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    second = np.cross(axis, first)
+    turn = 2 * np.pi * np.arange(sides) / sides
+    circle = np.cos(turn)[:, None] * first[:, None] + np.sin(turn)[:, None] * second[:, None]
+    neck = np.maximum(length - 7.0 * radius, 0.6 * length)[:, :, None] * axis[:, None]
+    radius = radius[:, :, None]
+    tip = length[:, :, None] * axis[:, None]
+    none = np.zeros_like(neck)
+    along = (none, neck, neck, neck, neck, tip)
+    wide, outwards = (1.0, 1.0, 1.0, 3.0, 3.0, 0.0), (1, 1, 0, 0, 1, 1)  # shaft, underside of the head, head
+    rings = [origins[:, None] + at + width * radius * circle for at, width in zip(along, wide, strict=True)]
+    normals = [circle if out else -np.broadcast_to(axis[:, None], circle.shape) for out in outwards]
+    vertices = np.stack(rings, axis=1).reshape(-1, 3)
+    place = np.arange(sides)
+    beside = (place + 1) % sides
+    quads = np.concatenate(
+        [np.stack([place, beside, beside + sides, place + sides], axis=1) + sides * row for row in (0, 2, 4)]
+    )
+    quads = (6 * sides * np.arange(count)[:, None, None] + quads).reshape(-1, 4)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    return (
+        vertices.astype(np.float32),
+        np.stack(normals, axis=1).reshape(-1, 3).astype(np.float32),
+        triangles.astype(np.uint32),
+    )
 
 
 Colours = tuple[tuple[int, int, int], tuple[int, int, int]]
@@ -145,13 +204,13 @@ def plane_mesh(
         [m], shape (3,).
     half_size, cell : float
         Radius of the disc and edge of a square [m]. The squares keep their places when the centre changes.
-    colours : three of (red, green, blue)
-        Of the two squares, and of the rim into which they fade.
+    colours : two or three of (red, green, blue)
+        Of the two squares, and of the rim into which they fade; without that they become transparent.
 
     Returns
     -------
     vertices, colours, triangles : ndarray
-        Shapes (v, 3), (v, 3) uint8, (t, 3).
+        Shapes (v, 3), (v, 3) or with an opacity (v, 4) uint8, (t, 3).
     """
     normal, point = rotated(np.array(plane.quaternion), 2), np.array(plane.position)
     across = np.cross([0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0], normal)
@@ -169,13 +228,16 @@ def plane_mesh(
     vertices = point + at[..., :1] * across + at[..., 1:] * along
     distance = np.linalg.norm(at - middle, axis=-1, keepdims=True) / half_size
     fade = np.clip((distance - 0.35) / 0.65, 0.0, 1.0) ** 1.5
-    light, dark, rim = (np.array(colour, float) for colour in colours)
+    light, dark, *rim = (np.array(colour, float) for colour in colours)
     own = np.where(((i + j) % 2 == 0)[:, None, None], light, dark)
-    shades = (1 - fade) * own + fade * rim
+    if rim:
+        shades = (1 - fade) * own + fade * rim[0]
+    else:
+        shades = np.concatenate([np.broadcast_to(own, (*fade.shape[:2], 3)), 255 * (1 - fade)], axis=-1)
     quads = 4 * np.arange(len(i))[:, None] + np.arange(4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     return (
         vertices.reshape(-1, 3).astype(np.float32),
-        np.rint(shades).astype(np.uint8).reshape(-1, 3),
+        np.rint(shades).astype(np.uint8).reshape(-1, shades.shape[-1]),
         triangles.astype(np.uint32),
     )

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import numpy as np
 import rerun.blueprint as rrb
 
 from bilayer_core.record.run_data import RunData
 from bilayer_core.simulation.observation import versions
-from bilayer_core.view.arrows import REACTIONS, reaction_arrows
-from bilayer_core.view.scales import Scales
+from bilayer_core.view.arrows import reaction_arrows
+from bilayer_core.view.camera import is_worth_following
+from bilayer_core.view.colouring import Colouring
+from bilayer_core.view.scales import Scales, place_moving_eye
+from bilayer_core.view.theme import BACKGROUND
 
 TIMELINE = "sim_time"
-BACKGROUND = (28, 30, 34)
+MIDDLE = "world/middle"
+"""Entity that the camera follows."""
+EVENTS = "events"
+GRAVITY = "gravity"
 CHANNEL_COLOURS = (
     (90, 168, 255),
     (255, 159, 67),
@@ -23,11 +30,30 @@ CHANNEL_COLOURS = (
 )
 
 
-def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
-    """The robot at the left, large, over its legend; curves at the right."""
-    robot = _robot(scales, reactions=True)
+def energy_groups(run: RunData) -> dict[str, dict[str, np.ndarray]]:
+    """Energies that ever act, by name of the axes that show them [mJ]: gravity, whose zero is anywhere, would flatten
+    the others.
+    """
+    acting = {name: 1e3 * values for name, values in run.energy.items() if np.any(values)}
+    groups = {
+        "energy": {name: values for name, values in acting.items() if name != GRAVITY},
+        GRAVITY: {name: values for name, values in acting.items() if name == GRAVITY},
+    }
+    return {group: series for group, series in groups.items() if series}
+
+
+def entity_name(name: str) -> str:
+    """Of a curve in the recording."""
+    return name.split(" [")[0].replace(" ", "_").replace(",", "")
+
+
+def blueprint(run: RunData, scales: Scales, colouring: Colouring) -> rrb.Blueprint:
+    """The robot at the left, large, over its legend; curves at the right, in tabs with each energy on axes of its own
+    and with what happened.
+    """
+    robot = _robot(run, scales)
     legend = rrb.Spatial2DView(
-        name="Strain",
+        name=colouring.title,
         origin="legend",
         background=BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(x_range=[-12, 269], y_range=[-4, 40]),
@@ -36,37 +62,46 @@ def blueprint(run: RunData, scales: Scales) -> rrb.Blueprint:
     plots = [("stimulus", "Stimulus")] if run.description.channels else []
     plots += [("contact_force", "Contact force [N]")] if run.contact_forces.any() else []
     plots += [("clamp_force", "Force on clamps [N]")] if run.clamp_wrenches.any() else []
-    plots += [("height", "Height of mass centres [mm]"), ("energy", "Energy [mJ]"), ("solver", "Solver")]
-    curves = [
-        rrb.TimeSeriesView(name=name, origin=f"plots/{group}", plot_legend=rrb.Corner2D.LeftTop)
-        for group, name in plots
-    ]
+    groups = energy_groups(run)
+    plots += [("height", "Height of mass centres [mm]")]
+    plots += [(name, f"{name.capitalize()} [mJ]") for name in groups] + [("solver", "Solver")]
+    alone = [(f"{group}/{entity_name(name)}", f"{name} [mJ]") for group, series in groups.items() for name in series]
+    tabs: list = [rrb.Vertical(*map(_curves, plots), name="Curves")]
+    tabs += [rrb.Grid(*map(_curves, alone), name="Energies")] if alone else []
+    right: rrb.Container | rrb.View = rrb.Tabs(*tabs)
+    if run.events:
+        right = rrb.Vertical(right, rrb.TextLogView(name="Events", origin=EVENTS), row_shares=[5, 1])
     content = rrb.Horizontal(
         rrb.Vertical(robot, rrb.Horizontal(legend, text, column_shares=[3, 5]), row_shares=[9, 2]),
-        rrb.Vertical(*curves),
+        right,
         column_shares=[5, 3],
     )
     return _whole(content, time_panel="collapsed")
 
 
-def robot_alone(run: RunData, scales: Scales, reactions: bool = False) -> rrb.Blueprint:
-    """The robot for pictures, with or without what its clamps bear; the viewer's notices, at the upper right, appear
-    over the text beside it.
-    """
-    text = rrb.TextDocumentView(name="Run", origin="summary")
-    return _whole(rrb.Horizontal(_robot(scales, reactions), text, column_shares=[4, 1]), time_panel="hidden")
+def _curves(plot: tuple[str, str]) -> rrb.TimeSeriesView:
+    path, name = plot
+    return rrb.TimeSeriesView(name=name, origin=f"plots/{path}", plot_legend=rrb.Corner2D.LeftTop)
 
 
-def _robot(scales: Scales, reactions: bool) -> rrb.Spatial3DView:
-    hidden = {} if reactions else {f"world/{name}": rrb.EntityBehavior(visible=False) for name in REACTIONS}
+def _robot(run: RunData, scales: Scales) -> rrb.Spatial3DView:
+    """The robot; the eye follows it where it would be small for one that stands still."""
+    eye, target = place_moving_eye(run)
+    still, moving = (float(np.linalg.norm(a - b)) for a, b in ((scales.eye, scales.target), (eye, target)))
+    follows = is_worth_following(still, moving)
+    if not follows:
+        eye, target = scales.eye, scales.target
     return rrb.Spatial3DView(
         name="Robot",
         origin="world",
         background=BACKGROUND,
         line_grid=False,
-        overrides=hidden,
         eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
+            kind=rrb.Eye3DKind.Orbital,
+            position=eye,
+            look_target=target,
+            eye_up=(0.0, 0.0, 1.0),
+            tracking_entity=MIDDLE if follows else None,
         ),
     )
 
@@ -82,18 +117,17 @@ def _whole(content: rrb.Container | rrb.View, time_panel: str) -> rrb.Blueprint:
     )
 
 
-def summary(run: RunData, scales: Scales) -> str:
+def summary(run: RunData, scales: Scales, colouring: Colouring) -> str:
     """What is shown and at which scales, in Markdown."""
     description = run.description
     nodes = sum(strand.nodes.stop - strand.nodes.start for strand in description.strands)
     settings = [f"{name} {_short(text)}" for name, text in description.settings.items() if name not in versions()]
-    percent = 100 * scales.strain_limit
     lines = [
         f"**{description.scene_name}: {description.title}**",
         "",
         f"Strands: {len(description.strands)}, nodes: {nodes}, simulated: {run.times[-1] - run.times[0]:.6g} s.",
         "",
-        f"- **Colour:** axial strain, from −{percent:g} % (blue) over 0 (grey) to +{percent:g} % (red).",
+        f"- **Colour:** {colouring.sentence()}.",
     ]
     if run.contact_forces.any():
         lines.append(f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.")

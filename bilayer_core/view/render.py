@@ -1,13 +1,9 @@
-"""Pictures of a run without a screen: the robot alone, cut to the part of the view in which it moves."""
+"""Pictures and films of a run without a screen: the robot alone, as large as the camera allows."""
 
 from __future__ import annotations
 
-import io
-import shutil
-import tempfile
-from collections.abc import Sequence
-from contextlib import ExitStack
-from functools import partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,139 +11,241 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.paths import draft_of
-from bilayer_core.view.rerun_view import require_rerun
-from bilayer_core.view.scales import SHOWN_SLOPE, choose_scales, seen_from, visible_points
+from bilayer_core.view.arrows import contact_arrows, reaction_arrows
+from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
+from bilayer_core.view.colouring import STRAIN, choose_colouring
+from bilayer_core.view.moments import Moment, Moments
+from bilayer_core.view.scales import choose_scales
+from bilayer_core.view.stage import FINER, FINER_OF_FILMS, Stage, require_vtk
+from bilayer_core.view.theme import Theme, theme_of
 
 if TYPE_CHECKING:
     from PIL import Image
 
-WINDOW_SIZE = "2040x1180"  # four fifths of the width for the robot
-MARGIN = 0.16  # round what is to be seen, in its longer side
-HEADROOM = 0.1  # for the time, in heights
-ASPECTS = (0.7, 2.6)  # least and largest width over height of a picture
-SHORT_PERIOD = 0.02  # between two looks once all meshes are loaded [s]
+AREA = 1280 * 720  # of a picture whose size is not given [pixels]
+ASPECTS = (0.7, 2.6)  # least and largest width over height of one
+FILM_SIZE = (1280, 720)
+SHEET_INSETS = Insets(top=0.10, bottom=0.06, side=0.05)
+DEEPEST = 40.0  # radius of the ground, in sizes of the robot: squares of a run that goes far are still seen
+
+
+@dataclass(frozen=True)
+class Look:
+    """How pictures look, as `bilayer render` is asked for it.
+
+    Attributes
+    ----------
+    camera : Camera
+    theme : Theme
+    colour : str
+        One of `colouring.QUANTITIES`.
+    size : tuple of int or None
+        Width and height; None suits what is to be seen.
+    reactions : bool
+        Whether to draw the forces and moments of rods on the bodies that hold them.
+    """
+
+    camera: Camera
+    theme: Theme
+    colour: str = STRAIN
+    size: tuple[int, int] | None = None
+    reactions: bool = False
+
+    @classmethod
+    def of(cls, camera: str = AUTO, background: str = "dark", **others: object) -> Look:
+        """From the words of the command line; InputError if one is not known."""
+        return cls(parse_camera(camera), theme_of(background), **others)
 
 
 class Studio:
-    """A log in a viewer without a window, for as many pictures as are wanted; use it in a ``with`` block.
+    """A log, for as many pictures as are wanted.
 
     Parameters
     ----------
     path : str or Path
         MCAP log.
-    reactions : bool
-        Whether to draw the forces and moments of rods on the bodies that hold them.
+    look : Look
 
     Raises
     ------
     InputError
-        The log cannot be read or holds no frame, or the viewer or a Vulkan driver is missing.
+        The log cannot be read or holds no frame, or VTK or an OpenGL driver is missing.
     """
 
-    def __init__(self, path: str | Path, reactions: bool = False):
-        require_rerun()
-        self._reactions = reactions
-        self._path = Path(path)
-        self._run = read_log(path)
-        self._stack = ExitStack()
-        self._loaded = False
+    def __init__(self, path: str | Path, look: Look):
+        require_vtk()
+        self._path, self._look = Path(path), look
+        self._run = run = read_log(path)
+        if not len(run.times) or not len(run.shape_times):
+            raise InputError(f"{path}: the log holds no shape, there is nothing to draw")
+        self._scales = choose_scales(run)
+        self._colouring = choose_colouring(run, look.colour)
+        self._moments = Moments(run, [self._colouring.values(run, layer) for layer in run.description.layers])
+        self._arrows = {"contact_forces": contact_arrows(run, self._scales)}
+        if look.reactions:
+            self._arrows |= reaction_arrows(run, self._scales)
 
-    def __enter__(self) -> Studio:
-        from bilayer_core.view.layout import robot_alone
-        from bilayer_core.view.rrd_writer import write_recording
-        from bilayer_core.view.viewer_process import HeadlessViewer
+    @property
+    def first(self) -> float:
+        """Time of the first shape [s]."""
+        return float(max(self._run.times[0], self._run.shape_times[0]))
 
-        with self._stack as stack:
-            directory = tempfile.mkdtemp(prefix="bilayer_render_")
-            stack.callback(shutil.rmtree, directory, ignore_errors=True)
-            recording = Path(directory) / "run.rrd"
-            with draft_of(recording, force=True) as draft:
-                write_recording(self._run, draft, partial(robot_alone, reactions=self._reactions))
-            self._scales = choose_scales(self._run)
-            self._viewer = stack.enter_context(HeadlessViewer(WINDOW_SIZE))
-            self._viewer.open(recording)
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._stack.close()
+    @property
+    def last(self) -> float:
+        """Time of the last one [s]."""
+        return float(min(self._run.times[-1], self._run.shape_times[-1]))
 
     def spread(self, count: int) -> list[float]:
         """Times evenly over the run, from its start to its end [s]."""
-        times = self._run.times
-        return [float(time) for time in np.linspace(times[0], times[-1], count)] if count > 1 else [float(times[-1])]
+        return np.linspace(self.first, self.last, count).tolist() if count > 1 else [self.last]
 
     def picture(self, path: str | Path, time: float | None = None) -> None:
         """Write the picture at `time` [s] (default: the end)."""
         from bilayer_core.view import sheet
 
-        moment = self.spread(1)[0] if time is None else time
-        sheet.save_png(sheet.write_time(self._pictures([moment])[0], moment, sheet.decimals_for([moment])), path)
+        moment = self.last if time is None else time
+        (picture,) = self.pictures([moment], Insets(), 0.0, time_text([moment]))
+        sheet.save_png(picture, path)
 
     def sheet(self, path: str | Path, times: Sequence[float]) -> None:
-        """Write pictures at `times` [s] as one."""
+        """Write pictures at `times` [s] as one, over one colour bar and one scale bar."""
         from bilayer_core.view import sheet
 
-        sheet.save_png(sheet.put_together(self._pictures(times), list(times), self._legend()), path)
+        setting = self._set(times, SHEET_INSETS, 0.0)
+        pictures = list(self._draw(setting))
+        columns, scale = sheet.layout_of(len(pictures), *setting.size)
+        small = setting.metres_per_pixel / scale
+        footer = self._overlay((sheet.width_of(columns, scale, setting.size), sheet.FOOTER_HEIGHT), small, sheet.TEXT)
+        sheet.save_png(sheet.put_together(pictures, time_text(times), footer, self._look.theme), path)
 
-    def gif(self, path: str | Path, times: Sequence[float]) -> None:
-        """Write pictures at `times` [s] as an animation."""
+    def gif(self, path: str | Path, times: Sequence[float], rate: float, note: str = "") -> None:
+        """Write pictures at `times` [s] as an animation of so many pictures a second."""
         from bilayer_core.view import sheet
 
-        sheet.save_gif(self._pictures(times), list(times), path)
+        pictures = self.pictures(times, Insets(), rate, time_text(times, note), sheet.GIF_SIZE)
+        sheet.save_gif(list(pictures), rate, path)
 
-    def _pictures(self, times: Sequence[float]) -> list[Image.Image]:
-        """Pictures at `times`, all cut alike."""
-        from PIL import Image
+    def film(self, path: str | Path, times: Sequence[float], rate: float, note: str = "") -> None:
+        """Write pictures at `times` [s] as a film of so many pictures a second."""
+        from bilayer_core.view.film import require_ffmpeg, save_mp4
 
-        first, last = self._run.times[0], self._run.times[-1]
+        require_ffmpeg()
+        setting = self._set(times, Insets(), rate, FILM_SIZE)
+        save_mp4(self._written(setting, time_text(times, note), FINER_OF_FILMS), setting.size, rate, path)
+
+    def pictures(
+        self, times: Sequence[float], insets: Insets, rate: float, texts: list[str], longest: int | None = None
+    ) -> Iterator[Image.Image]:
+        """Pictures at `times` [s], with all that is written on them.
+
+        Parameters
+        ----------
+        times : sequence of float
+        insets : Insets
+        rate : float
+            Pictures a second of film; 0 if it is none.
+        texts : list of str
+            What is written on each beside the bars.
+        longest : int, optional
+            The longer side of pictures whose size is not given [pixels].
+        """
+        return self._written(self._set(times, insets, rate, longest=longest), texts)
+
+    def _written(self, setting: _Setting, texts: list[str], finer: float = FINER) -> Iterator[Image.Image]:
+        overlay = self._overlay(setting.size, setting.metres_per_pixel)
+        for picture, text in zip(self._draw(setting, finer), texts, strict=True):
+            yield overlay.write(picture, text)
+
+    def _set(
+        self,
+        times: Sequence[float],
+        insets: Insets,
+        rate: float,
+        size: tuple[int, int] | None = None,
+        longest: int | None = None,
+    ) -> _Setting:
+        """What is seen at `times`, from where, and how large."""
         for time in times:
-            if not first <= time <= last:
-                raise InputError(f"{self._path}: holds {first:g} s to {last:g} s, and not {time:g} s")
-        box, pictures = None, []
-        for time in times:
-            self._viewer.set_time(time)
-            whole = Image.open(io.BytesIO(self._look())).convert("RGB")
-            box = box or self._part_with_robot(times, whole.size)
-            pictures.append(whole.crop(box))
-        return pictures
+            if not self.first <= time <= self.last:
+                raise InputError(f"{self._path}: holds {self.first:g} s to {self.last:g} s, and not {time:g} s")
+        moments = [self._moments.at(time) for time in times]
+        every = [self._moments.all_points(moment, self._scales.metres_per_newton) for moment in moments]
+        robot = [self._moments.robot_points(moment) for moment in moments]
+        camera = self._look.camera
+        size = self._look.size or size
+        if size is None:
+            aspect = _aspect_of(camera, shots(camera, every, robot, 1.5, insets, rate), every, robot)
+            height = (AREA / aspect) ** 0.5
+            shrunk = 1.0 if longest is None else longest / max(height, aspect * height)
+            size = (2 * round(0.5 * shrunk * aspect * height), 2 * round(0.5 * shrunk * height))
+        found = shots(camera, every, robot, size[0] / size[1], insets, rate)
+        return _Setting(moments, found, size, found[0].metres_per_height / size[1])
 
-    def _look(self) -> bytes:
-        """The view; the first one waits for all that is still being loaded."""
-        if self._loaded:
-            return self._viewer.picture("Robot", SHORT_PERIOD)
-        self._loaded = True
-        return self._viewer.picture("Robot")
+    def _draw(self, setting: _Setting, finer: float = FINER) -> Iterator[Image.Image]:
+        scales, targets = self._scales, np.array([shot.target for shot in setting.shots])
+        middle = 0.5 * (targets.min(axis=0) + targets.max(axis=0))
+        way = 0.5 * float(np.linalg.norm(np.ptp(targets, axis=0)))
+        seen = max(shot.metres_per_height for shot in setting.shots)
+        radius = min(scales.size + 2.0 * scales.extent, DEEPEST * scales.size) + way + seen
+        stage = Stage(
+            self._run,
+            self._moments,
+            self._colouring,
+            self._look.theme,
+            setting.size,
+            (middle, radius, scales.cell),
+            scales.size,
+            self._arrows,
+            finer,
+        )
+        try:
+            for moment, shot in zip(setting.moments, setting.shots, strict=True):
+                yield stage.draw(moment, shot)
+        finally:
+            stage.close()
 
-    def _part_with_robot(self, times: Sequence[float], size: tuple[int, int]) -> tuple[int, int, int, int]:
-        """Left, upper, right and lower edge of what holds the robot at all `times`, in pixels of a picture."""
+    def _overlay(self, size: tuple[int, int], metres_per_pixel: float, text_size: int | None = None):
+        from bilayer_core.view.overlay import Overlay
 
-        def nearest(of: np.ndarray) -> np.ndarray:
-            return np.unique(np.clip(np.searchsorted(of, times, side="right") - 1, 0, len(of) - 1))
+        return Overlay(size, self._look.theme, self._colouring, metres_per_pixel, self._notes(), text_size)
 
-        run, scales = self._run, self._scales
-        points = visible_points(run, nearest(run.shape_times), nearest(run.times), scales.metres_per_newton)
-        slopes = seen_from(scales.eye, scales.target, points) * (1, -1)
-        width, height = size
-        pixels = 0.5 * np.array(size) + slopes * (0.5 * height / SHOWN_SLOPE)
-        low, high = pixels.min(axis=0), pixels.max(axis=0)
-        half = 0.5 * (high - low) + MARGIN * (high - low).max()
-        least, most = ASPECTS
-        half = np.array([max(half[0], least * half[1]), max(half[1], half[0] / most)])
-        middle = 0.5 * (low + high)
-        left, upper = np.clip(middle - half - (0, HEADROOM * 2 * half[1]), 0, size)
-        right, lower = np.clip(middle + half, 0, size)
-        return int(left), int(upper), int(np.ceil(right)), int(np.ceil(lower))
-
-    def _legend(self) -> str:
-        """What colours, arrows and squares mean."""
-        run, percent = self._run, 100 * self._scales.strain_limit
-        parts = [f"{run.description.scene_name}: axial strain from -{percent:g} % (blue) to +{percent:g} % (red)"]
+    def _notes(self) -> list[str]:
+        """What arrows and squares mean."""
+        run, notes = self._run, []
         if run.contact_forces.any():
-            parts.append("contact forces (green)")
-        if self._reactions and run.clamp_wrenches.any():
-            parts.append("force (blue) and moment (purple) of rods on bodies")
-        if any(obstacle.shape.kind == "plane" for obstacle in run.description.obstacles):
-            parts.append(f"squares of {1e3 * self._scales.cell:g} mm")
-        return ", ".join(parts)
+            notes.append(f"green: contact force, {10 / self._scales.metres_per_newton:.3g} mN for 10 mm")
+        if len(self._arrows) > 1:
+            notes.append("blue, purple: force and moment of rods on bodies")
+        planes = any(obstacle.shape.kind == "plane" for obstacle in run.description.obstacles)
+        return notes + ([f"squares of {1e3 * self._scales.cell:g} mm"] if planes else [])
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """Moments with the eye of each, size of pictures and how many metres a pixel is."""
+
+    moments: list[Moment]
+    shots: list[Shot]
+    size: tuple[int, int]
+    metres_per_pixel: float
+
+
+def _aspect_of(camera: Camera, found: list[Shot], every: list[np.ndarray], robot: list[np.ndarray]) -> float:
+    """Width over height of what is seen of the points that the camera holds, as far as pictures are so wide."""
+    axes, follows = camera.axes, len({tuple(shot.eye) for shot in found}) > 1
+    spans = []
+    for shot, points in zip(found, robot if follows else every, strict=True):
+        x, y, z = ((points - shot.eye) @ axes.T).T
+        depth = -z if shot.half_height is None else np.full(len(z), shot.half_height / HALF_SLOPE)
+        spans.append([(x / depth).min(), (x / depth).max(), (y / depth).min(), (y / depth).max()])
+    left, right, low, high = np.array(spans).T
+    wide, tall = right.max() - left.min(), 1.25 * (high.max() - low.min())
+    return float(np.clip(wide / max(tall, 1e-12), *ASPECTS))
+
+
+def time_text(times: Sequence[float], note: str = "") -> list[str]:
+    """Times with decimals that tell them apart."""
+    from bilayer_core.view.sheet import decimals_for
+
+    decimals = decimals_for(list(times))
+    return [f"{time:.{decimals}f} s{note}" for time in times]

@@ -13,24 +13,25 @@ from bilayer_core.errors import InputError
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.record.paths import check_output_path, draft_of
 from bilayer_core.record.run_data import RunData
+from bilayer_core.view.colouring import STRAIN
 
 RRD_SUFFIX = ".rrd"
 
 
-def write_rrd(run: RunData, rrd_path: str | Path, force: bool = True) -> None:
+def write_rrd(run: RunData, rrd_path: str | Path, force: bool = True, colour: str = STRAIN) -> None:
     """Write a run as a rerun recording with its layout inside; with `force` an existing file is replaced."""
     require_rerun()
     from bilayer_core.view.rrd_writer import write_recording
 
     with draft_of(check_output_path(rrd_path, force, RRD_SUFFIX), force) as draft:
-        write_recording(run, draft)
+        write_recording(run, draft, colour)
 
 
-def convert_log(mcap_path: str | Path, rrd_path: str | Path) -> None:
+def convert_log(mcap_path: str | Path, rrd_path: str | Path, colour: str = STRAIN) -> None:
     """Convert an MCAP log, whole or cut off, to a rerun recording. An existing recording is replaced."""
     from bilayer_core.record.log_reader import read_log
 
-    write_rrd(read_log(mcap_path), rrd_path)
+    write_rrd(read_log(mcap_path), rrd_path, colour=colour)
 
 
 class RrdRecorder(MemoryRecorder):
@@ -64,16 +65,16 @@ class RrdRecorder(MemoryRecorder):
             write_rrd(self.run_data(), self.path, self._force)
 
 
-def open_viewer(path: str | Path, web: bool = False) -> None:
+def open_viewer(path: str | Path, web: bool = False, colour: str = STRAIN) -> None:
     """Show an ``.rrd`` or ``.mcap`` file in the rerun viewer (or a browser) and wait until it is closed."""
     require_rerun()
     from bilayer_core.view.viewer_process import show
 
-    with _as_recording(path) as recording:
+    with _as_recording(path, colour) as recording:
         show(recording, web)
 
 
-def screenshot(path: str | Path, png_path: str | Path, time: float | None = None) -> None:
+def screenshot(path: str | Path, png_path: str | Path, time: float | None = None, colour: str = STRAIN) -> None:
     """Picture of an ``.rrd`` or ``.mcap`` file at `time` [s] (default: the end), made without a screen.
 
     Raises InputError naming the missing Debian packages when there is no Vulkan driver.
@@ -82,14 +83,14 @@ def screenshot(path: str | Path, png_path: str | Path, time: float | None = None
     from bilayer_core.view.viewer_process import take_picture
 
     check_output_path(png_path, force=True, suffix=".png")
-    with _as_recording(path) as recording:
+    with _as_recording(path, colour) as recording:
         picture = take_picture(recording, time)
     with draft_of(png_path, force=True) as draft:
         draft.write_bytes(picture)
 
 
 @contextmanager
-def _as_recording(path: str | Path) -> Iterator[Path]:
+def _as_recording(path: str | Path, colour: str) -> Iterator[Path]:
     """The file itself, or the recording that a log was converted to, deleted afterwards."""
     path = Path(path)
     if path.suffix.lower() == RRD_SUFFIX:
@@ -100,7 +101,7 @@ def _as_recording(path: str | Path) -> Iterator[Path]:
     directory = Path(tempfile.mkdtemp(prefix="bilayer_view_"))
     try:
         recording = directory / f"{path.stem}.rrd"
-        convert_log(path, recording)
+        convert_log(path, recording, colour)
         yield recording
     finally:
         shutil.rmtree(directory, ignore_errors=True)

@@ -2,63 +2,84 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.colours import STRAIN_MAP, strain_colours
+from bilayer_core.record.events import LEVEL_NAMES
 from bilayer_core.record.node_frames import layer_rows
 from bilayer_core.record.run_data import RunData
 from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import Arrows, contact_arrows, reaction_arrows
-from bilayer_core.view.layout import CHANNEL_COLOURS, TIMELINE, blueprint, summary
-from bilayer_core.view.scales import Scales, choose_scales
+from bilayer_core.view.colouring import STRAIN, Colouring, choose_colouring
+from bilayer_core.view.layout import (
+    CHANNEL_COLOURS,
+    EVENTS,
+    MIDDLE,
+    TIMELINE,
+    blueprint,
+    energy_groups,
+    entity_name,
+    summary,
+)
+from bilayer_core.view.scales import Scales, choose_scales, middles_of
+from bilayer_core.view.theme import (
+    ARROW_COLOUR,
+    BACKGROUND,
+    BALL_COLOURS,
+    JOINT_COLOURS,
+    OBSTACLE_COLOURS,
+    REACTION_COLOURS,
+    SIDE_SHADE,
+)
 
+GROUND_COLOURS = ((74, 79, 88), (62, 66, 74), BACKGROUND)
 CHUNK = 150  # frames in a chunk: chunks are what the viewer loads, caches and drops
-SIDE_SHADE = 0.55  # brightness of the narrow faces of ribbons
-GROUND_COLOURS = ((74, 79, 88), (62, 66, 74), (28, 30, 34))
-OBSTACLE_COLOURS = ((112, 122, 138), (98, 107, 122))
-BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
-JOINT_COLOURS = ((205, 210, 218), (150, 156, 166))
-HUB_COLOUR = (128, 140, 160)
-ARROW_COLOUR = (64, 224, 148)
-REACTION_COLOURS = {"clamp_forces": (80, 160, 255), "clamp_moments": (200, 110, 235)}
 LEGEND_HEIGHT = 14  # pixels of the colour bar
-Layout = Callable[[RunData, Scales], rrb.Blueprint]
+EVENT_COLOURS = {"flight": (255, 214, 90), "contact": (64, 224, 148), "stimulus": (255, 130, 110)}
+PLAIN_COLOUR = (200, 204, 210)
 
 
-def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = blueprint) -> None:
-    """Write `run` to an ``.rrd`` file; InputError if it holds no frame, OSError if the file cannot be written."""
+def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) -> None:
+    """Write `run` to an ``.rrd`` file; InputError if it holds no frame, OSError if the file cannot be written.
+
+    Parameters
+    ----------
+    run : RunData
+    rrd_path : str or Path
+    colour : str
+        What the colours of rods say, from `colouring.QUANTITIES`.
+    """
     if not len(run.times) or not len(run.shape_times):
         raise InputError(f"{run.description.scene_name}: the run holds no frame, there is nothing to show")
-    scales = choose_scales(run)
+    scales, colouring = choose_scales(run), choose_colouring(run, colour)
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
-    recording.send_blueprint(layout(run, scales), make_active=False, make_default=True)
-    _send(recording, run, scales)
+    recording.send_blueprint(blueprint(run, scales, colouring), make_active=False, make_default=True)
+    _send(recording, run, scales, colouring)
     Path(rrd_path).write_bytes(memory.drain_as_bytes())
     recording.disconnect()
 
 
-def _send(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+def _send(recording: rr.RecordingStream, run: RunData, scales: Scales, colouring: Colouring) -> None:
     """All of a run."""
     recording.send_recording_name(f"{run.description.scene_name}: {run.description.title}")
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    recording.log("summary", rr.TextDocument(summary(run, scales), media_type="text/markdown"), static=True)
-    _log_legend(recording, scales)
+    recording.log("summary", rr.TextDocument(summary(run, scales, colouring), media_type="text/markdown"), static=True)
+    _log_legend(recording, colouring)
     _log_obstacles(recording, run, scales)
-    _send_strands(recording, run, scales)
+    _send_strands(recording, run, colouring)
     _send_bodies(recording, run, scales)
+    _send_middle(recording, run)
     _send_joints(recording, run)
     _send_arrows(recording, "world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
     for name, arrows in reaction_arrows(run, scales).items():
         _send_arrows(recording, f"world/{name}", REACTION_COLOURS[name], arrows, scales)
     _send_series(recording, run)
+    _send_events(recording, run)
 
 
 def _chunks(count: int):
@@ -74,16 +95,14 @@ def _bytes(colours: np.ndarray) -> np.ndarray:
     return np.rint(colours * 255).astype(np.uint8)
 
 
-def _log_legend(recording: rr.RecordingStream, scales: Scales) -> None:
-    """The colour bar of strain with three labels."""
-    bar = np.tile(_bytes(STRAIN_MAP[:, :3]), (LEGEND_HEIGHT, 1, 1))
+def _log_legend(recording: rr.RecordingStream, colouring: Colouring) -> None:
+    """The colour bar with its labels."""
+    bar = np.tile(_bytes(colouring.colour_map[:, :3]), (LEGEND_HEIGHT, 1, 1))
     recording.log("legend", rr.Image(bar), static=True)
-    limit = 100 * scales.strain_limit
-    steps = len(STRAIN_MAP)
-    ticks = [[x, LEGEND_HEIGHT + 8] for x in (6, steps / 2, steps - 6)]
-    labels = rr.Points2D(
-        ticks, labels=[f"−{limit:g} %", "0", f"+{limit:g} %"], radii=0.01, colors=(200, 200, 200), show_labels=True
-    )
+    steps = bar.shape[1]
+    ticks = [[min(max(6.0, place * steps), steps - 6.0), LEGEND_HEIGHT + 8] for place, _ in colouring.ticks]
+    texts = [text for _, text in colouring.ticks]
+    labels = rr.Points2D(ticks, labels=texts, radii=0.01, colors=(200, 200, 200), show_labels=True)
     recording.log("legend/ticks", labels, static=True)
 
 
@@ -108,17 +127,17 @@ def _mesh(parts: geometry.Mesh) -> rr.Mesh3D:
     )
 
 
-def _send_strands(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+def _send_strands(recording: rr.RecordingStream, run: RunData, colouring: Colouring) -> None:
     for layer, rows in zip(run.description.layers, layer_rows(run.description), strict=True):
         path = f"world/strands/{layer.name}"
         positions, frames = run.positions[:, layer.nodes], run.material_frames[:, rows]
-        nodes, strain = positions.shape[1], run.strain_of(layer)
+        nodes, values = positions.shape[1], colouring.values(run, layer)
         triangles = geometry.ribbon_triangles(nodes)
         recording.log(path, rr.Mesh3D.from_fields(triangle_indices=triangles), static=True)
         shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
         for part in _chunks(len(run.shape_times)):
             vertices = geometry.ribbon_vertices(layer, positions[part], frames[part])
-            colours = _bytes(strain_colours(strain[part], scales.strain_limit)[:, :, None, :3] * shade)
+            colours = _bytes(colouring.colours(values[part])[:, :, None, :3] * shade)
             sizes = [nodes * geometry.CORNERS] * len(vertices)
             recording.send_columns(
                 path,
@@ -130,18 +149,13 @@ def _send_strands(recording: rr.RecordingStream, run: RunData, scales: Scales) -
 
 
 def _send_bodies(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
-    width = max(strand.width.max() for strand in run.description.strands)
-    thickness = max(strand.thickness.max() for strand in run.description.strands)
+    """Bodies as they are; one without a surface has a pose alone."""
     for index, body in enumerate(run.description.bodies):
         path = f"world/bodies/{body.name}"
-        if body.shape is None:
-            half = (0.6 * width, 0.6 * width, 2.2 * thickness)
-            shape = rr.Boxes3D(half_sizes=[half], colors=HUB_COLOUR, fill_mode="solid")
-        elif body.shape.kind == "plane":
-            shape = _plane(body.shape, scales)
-        else:
-            shape = _mesh(geometry.shape_mesh(body.shape, BALL_COLOURS))
-        recording.log(path, shape, static=True)
+        if body.shape is not None:
+            plane = body.shape.kind == "plane"
+            shape = _plane(body.shape, scales) if plane else _mesh(geometry.shape_mesh(body.shape, BALL_COLOURS))
+            recording.log(path, shape, static=True)
         for part in _chunks(len(run.times)):
             recording.send_columns(
                 path,
@@ -150,6 +164,15 @@ def _send_bodies(recording: rr.RecordingStream, run: RunData, scales: Scales) ->
                     translation=run.body_positions[part, index], quaternion=run.body_quaternions[part, index]
                 ),
             )
+
+
+def _send_middle(recording: rr.RecordingStream, run: RunData) -> None:
+    """The middle of the rods, which the camera follows."""
+    middles = middles_of(run)  # the viewer follows what it draws, and draws points of no size
+    recording.log(MIDDLE, rr.Points3D.from_fields(radii=0.0), static=True)
+    recording.send_columns(
+        MIDDLE, _time(run.shape_times), rr.Points3D.columns(positions=middles).partition([1] * len(middles))
+    )
 
 
 def _send_joints(recording: rr.RecordingStream, run: RunData) -> None:
@@ -202,7 +225,7 @@ def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
                 if not body.prescribed
             },
         },
-        "energy": {name: 1e3 * values for name, values in run.energy.items() if np.any(values)},
+        **energy_groups(run),
         "solver": {"iterations per step": run.solver["iterations"] / np.maximum(run.solver["substeps"], 1)},
     }
     if np.isfinite(run.solver["min_gap"]).all():  # infinite where nothing can touch
@@ -217,10 +240,23 @@ def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
         _send_curve(recording, "plots/contact_force", "on nodes, sizes summed", index, run.shape_times, total)
 
 
+def _send_events(recording: rr.RecordingStream, run: RunData) -> None:
+    """What happened, as text."""
+    if not run.events:
+        return
+    colours = [EVENT_COLOURS.get(event.name, PLAIN_COLOUR) for event in run.events]
+    columns = rr.TextLog.columns(
+        text=[event.text for event in run.events],
+        level=[LEVEL_NAMES.get(event.level, "INFO") for event in run.events],
+        color=colours,
+    )
+    recording.send_columns(EVENTS, _time(np.array([event.time for event in run.events])), columns)
+
+
 def _send_curve(
     recording: rr.RecordingStream, group: str, name: str, index: int, times: np.ndarray, values: np.ndarray
 ) -> None:
-    path = f"{group}/{name.split(' [')[0].replace(' ', '_').replace(',', '')}"
+    path = f"{group}/{entity_name(name)}"
     colour = CHANNEL_COLOURS[index % len(CHANNEL_COLOURS)]
     recording.log(path, rr.SeriesLines(names=name, colors=colour, widths=2), static=True)
     for part in _chunks(len(times)):

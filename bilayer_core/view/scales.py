@@ -17,6 +17,7 @@ VIEW_DIRECTION = np.array([0.62, -0.72, 0.30])  # from what is looked at to the 
 SHOWN_SLOPE = 0.52  # tangent of the angle over and under the line of sight that the viewer shows
 VIEW_SLOPE = 0.44  # the part of it that is filled
 VIEW_ASPECT = 1.5  # width of the view over its height
+ROOM = 1.15  # times as far as rods alone ask for: bodies and arrows are beside them
 VIEW_FRAMES = 200  # how many frames of a run decide on the camera
 
 
@@ -78,6 +79,26 @@ def choose_scales(run: RunData) -> Scales:
         target=target,
         extent=extent,
     )
+
+
+def middles_of(run: RunData) -> np.ndarray:
+    """Middle of the box about the rods over time [m], shape (shapes, 3)."""
+    of_rods = _of_rods(run)
+    return 0.5 * (of_rods.min(axis=1) + of_rods.max(axis=1)).astype(float)
+
+
+def place_moving_eye(run: RunData) -> tuple[np.ndarray, np.ndarray]:
+    """Eye and what it looks at in the first frame, of one that then moves as the middle of the robot does: as near as
+    the rods are in the picture all the time.
+    """
+    middles = middles_of(run)
+    every = slice(None, None, max(1, len(middles) // VIEW_FRAMES))
+    eye, target = place_eye((_of_rods(run) - middles[:, None])[every].reshape(-1, 3))
+    return middles[0] + ROOM * (eye - target), middles[0]
+
+
+def _of_rods(run: RunData) -> np.ndarray:
+    return np.concatenate([run.positions[:, strand.nodes] for strand in run.description.strands], axis=1)
 
 
 def reference_of(forces: np.ndarray) -> float:

@@ -1,34 +1,26 @@
-"""Pictures put together: the part that shows the robot, times written on it, sheets, animations. Plain pillow."""
+"""Pictures put together: sheets with their times, animations. Plain pillow."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from bilayer_core.record.paths import draft_of
-from bilayer_core.view.layout import BACKGROUND
+from bilayer_core.view.theme import Theme
+
+if TYPE_CHECKING:
+    from bilayer_core.view.overlay import Overlay
 
 SHEET_WIDTH = 1120  # of a sheet, at most [pixels]
 GIF_SIZE = 480  # longer side of an animation, at most [pixels]
 SHEET_ASPECT = 2.0  # width over height of a sheet that is aimed at
 GAP = 6  # between the pictures of a sheet [pixels]
-MARGIN = 10  # of text [pixels]
-TEXT_COLOUR = (225, 228, 232)
-FOOTER_COLOUR = (150, 155, 163)
-FOOTER_HEIGHT = 34
-TEXT_SIZE, FOOTER_SIZE = 20, 16
-GIF_LIMIT = 8.0  # longest time that an animation takes [s]; a longer run is played faster
-
-
-def write_time(picture: Image.Image, time: float, decimals: int) -> Image.Image:
-    """The picture with its time in a corner."""
-    drawing = ImageDraw.Draw(picture)
-    font = ImageFont.load_default(TEXT_SIZE)
-    text = f"{time:.{decimals}f} s"
-    drawing.text((MARGIN, MARGIN), text, TEXT_COLOUR, font, stroke_width=2, stroke_fill=BACKGROUND)
-    return picture
+FOOTER_HEIGHT = 72
+WEBP_QUALITY = 76
+TEXT = 16  # size of text in the footer and of times [pixels]
 
 
 def decimals_for(times: list[float]) -> int:
@@ -42,22 +34,36 @@ def columns_for(count: int, width: int, height: int) -> int:
     return min(divisors, key=lambda c: abs(math.log(c * width / (count / c * height) / SHEET_ASPECT)))
 
 
-def put_together(pictures: list[Image.Image], times: list[float], footer: str) -> Image.Image:
-    """A sheet of equal pictures with their times, row by row, over a line of text."""
-    width, height = pictures[0].size
-    columns = columns_for(len(pictures), width, height)
-    scale = min(1.0, (SHEET_WIDTH - GAP * (columns - 1)) / (columns * width))
-    width, height = int(scale * width), int(scale * height)
+def layout_of(count: int, width: int, height: int) -> tuple[int, float]:
+    """Columns of a sheet of so many pictures, and how much smaller they are on it."""
+    columns = columns_for(count, width, height)
+    return columns, min(1.0, (SHEET_WIDTH - GAP * (columns - 1)) / (columns * width))
+
+
+def width_of(columns: int, scale: float, size: tuple[int, int]) -> int:
+    """Of a whole sheet [pixels]."""
+    return columns * (int(scale * size[0]) + GAP) - GAP
+
+
+def put_together(pictures: list[Image.Image], texts: list[str], footer: Overlay, theme: Theme) -> Image.Image:
+    """A sheet of equal pictures with their times, row by row, over one line of bars."""
+    from bilayer_core.view.overlay import font_of
+
+    (width, height), mode = pictures[0].size, pictures[0].mode
+    columns, scale = layout_of(len(pictures), width, height)
+    whole, small = width_of(columns, scale, (width, height)), (int(scale * width), int(scale * height))
     rows = len(pictures) // columns
-    size = (columns * (width + GAP) - GAP, rows * (height + GAP) + FOOTER_HEIGHT)
-    decimals = decimals_for(times)
-    sheet = Image.new("RGB", size, BACKGROUND)
+    blank = (*theme.background, 0) if theme.transparent else theme.background
+    sheet = Image.new(mode, (whole, rows * (small[1] + GAP) + FOOTER_HEIGHT), blank)
+    drawing = ImageDraw.Draw(sheet)
     for index, picture in enumerate(pictures):
         row, column = divmod(index, columns)
-        small = picture.resize((width, height), Image.Resampling.LANCZOS)
-        sheet.paste(write_time(small, times[index], decimals), (column * (width + GAP), row * (height + GAP)))
-    font = ImageFont.load_default(FOOTER_SIZE)
-    ImageDraw.Draw(sheet).text((MARGIN, size[1] - FOOTER_HEIGHT + 6), footer, FOOTER_COLOUR, font)
+        corner = (column * (small[0] + GAP), row * (small[1] + GAP))
+        sheet.paste(picture.resize(small, Image.Resampling.LANCZOS), corner)
+        at = corner[0] + TEXT // 2, corner[1] + TEXT // 2
+        drawing.text(at, texts[index], theme.text, font_of(TEXT), stroke_width=2, stroke_fill=theme.halo)
+    below = footer.write(Image.new(mode, (whole, FOOTER_HEIGHT), blank))
+    sheet.paste(below, (0, sheet.height - FOOTER_HEIGHT))
     return sheet
 
 
@@ -66,17 +72,20 @@ def save_png(picture: Image.Image, path: str | Path) -> None:
     _save(picture, path, optimize=True)
 
 
-def save_gif(pictures: list[Image.Image], times: list[float], path: str | Path) -> None:
-    """Write an animation at the speed of the run, or faster if that takes long."""
-    scale = min(1.0, GIF_SIZE / max(pictures[0].size))
-    size = tuple(round(scale * side) for side in pictures[0].size)
-    decimals = decimals_for(times)
-    small = [
-        write_time(picture.resize(size, Image.Resampling.LANCZOS), time, decimals)
-        for picture, time in zip(pictures, times, strict=True)
-    ]
-    lasting = min(times[-1] - times[0], GIF_LIMIT) / max(len(times) - 1, 1)
-    _save(small[0], path, save_all=True, append_images=small[1:], duration=max(20, round(1e3 * lasting)), loop=0)
+def save_gif(pictures: list[Image.Image], rate: float, path: str | Path) -> None:
+    """Write an animation that begins anew when it ends, of so many pictures a second: at most 50, as fast as players
+    show them. The name says whether as GIF or, a third of the size and with all colours, as WebP.
+    """
+    lasting = max(20, 10 * round(100 / rate))
+    options = {"save_all": True, "append_images": pictures[1:], "duration": lasting, "loop": 0}
+    if Path(path).suffix.lower() == ".webp":
+        _save(pictures[0], path, **options, quality=WEBP_QUALITY, method=6)
+        return
+    if pictures[0].mode == "RGB":
+        colours = pictures[len(pictures) // 2].quantize(255, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+        pictures = [picture.quantize(palette=colours, dither=Image.Dither.NONE) for picture in pictures]
+    options["append_images"] = pictures[1:]
+    _save(pictures[0], path, **options, optimize=False, disposal=2 if pictures[0].mode == "RGBA" else 1)
 
 
 def _save(picture: Image.Image, path: str | Path, **options: object) -> None:

@@ -20,20 +20,29 @@ def viewer(monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "asked"),
     [
-        (["run.mcap"], [("open_viewer", "run.mcap", False)]),
-        (["run.rrd", "--web"], [("open_viewer", "run.rrd", True)]),
-        (["run.mcap", "--save", "run.rrd"], [("convert_log", "run.mcap", "run.rrd")]),
-        (["run.mcap", "--screenshot", "run.png"], [("screenshot", "run.mcap", "run.png", None)]),
-        (["run.rrd", "--screenshot", "run.png", "--time", "500 ms"], [("screenshot", "run.rrd", "run.png", 0.5)]),
+        (["run.mcap"], [("open_viewer", "run.mcap", False, "strain")]),
+        (["run.rrd", "--web"], [("open_viewer", "run.rrd", True, "strain")]),
+        (["run.mcap", "--colour", "contact"], [("open_viewer", "run.mcap", False, "contact")]),
+        (["run.mcap", "--save", "run.rrd"], [("convert_log", "run.mcap", "run.rrd", "strain")]),
+        (["run.mcap", "--screenshot", "run.png"], [("screenshot", "run.mcap", "run.png", None, "strain")]),
+        (
+            ["run.rrd", "--screenshot", "run.png", "--time", "500 ms"],
+            [("screenshot", "run.rrd", "run.png", 0.5, "strain")],
+        ),
         (
             ["run.mcap", "--save", "run.rrd", "--screenshot", "run.png"],
-            [("convert_log", "run.mcap", "run.rrd"), ("screenshot", "run.rrd", "run.png", None)],
+            [("convert_log", "run.mcap", "run.rrd", "strain"), ("screenshot", "run.rrd", "run.png", None, "strain")],
         ),
     ],
 )
 def test_the_viewer_is_asked_for_what_the_options_say(viewer, arguments, asked):
     assert main(["view", *arguments]) == 0
     assert viewer == asked
+
+
+def test_a_recording_keeps_its_colours(viewer, capsys):
+    assert main(["view", "run.rrd", "--colour", "contact"]) == 2
+    assert "--colour: run.rrd is a rerun recording, whose colours are made already" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("option", "name"), [("--save", "there.rrd"), ("--screenshot", "there.png")])

@@ -106,7 +106,9 @@ def test_the_programs_of_the_readme_run(root, tmp_path):
 
 def test_pictures_are_small_and_each_is_shown_on_a_page(root):
     text = "".join((root / page).read_text(encoding="utf-8") for page in PAGES)
-    for picture in (root / "docs/images").rglob("*.png"):
+    pictures = [path for path in (root / "docs/images").rglob("*") if path.is_file()]
+    assert {path.suffix for path in pictures} == {".png", ".webp"}
+    for picture in pictures:
         assert picture.stat().st_size < 300_000, picture
         assert picture.relative_to(root / "docs").as_posix() in text, picture
 

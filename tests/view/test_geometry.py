@@ -10,6 +10,7 @@ from bilayer_core.record.colours import strain_colours
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
+from bilayer_core.view.colouring import choose_colouring
 from bilayer_core.view.layout import summary
 from bilayer_core.view.scales import VIEW_ASPECT, VIEW_DIRECTION, choose_scales, place_eye, rounded_up
 
@@ -124,9 +125,9 @@ def test_the_text_beside_the_picture_states_its_scales():
     run = memory.run_data()
     exact = {**run.description.settings, "newton_tolerance": "2.6950000000000005e-06"}
     run = replace(run, description=replace(run.description, settings=exact))
-    text = summary(run, choose_scales(run))
+    text = summary(run, choose_scales(run), choose_colouring(run))
     assert "newton_tolerance 2.695e-06" in text
-    assert "from −6 % (blue) over 0 (grey) to +6 % (red)" in text
+    assert "axial strain [%]: -6 (blue) over 0 (grey) to +6 (red)" in text
     # Arrows of 21.5 mN become a quarter of the robot's 116 mm, up to rounding of the scale.
     assert "8 mN for 10 mm" in text
     assert "Squares on the ground:** 15 mm" in text

@@ -1,6 +1,7 @@
-"""Pictures without a screen: what is cut out, how sheets are laid out, and a look at their pixels."""
+"""Pictures and films without a screen, and a look at their pixels."""
 
 import dataclasses
+import subprocess
 
 import numpy as np
 import pytest
@@ -11,14 +12,16 @@ from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.view import sheet
+from bilayer_core.view import sheet, stage
 from bilayer_core.view.arrows import reaction_arrows
-from bilayer_core.view.layout import BACKGROUND
-from bilayer_core.view.render import Studio
-from bilayer_core.view.rrd_writer import BALL_COLOURS
+from bilayer_core.view.colouring import choose_colouring, contact_pressure
+from bilayer_core.view.overlay import round_length
+from bilayer_core.view.render import Look, Studio
 from bilayer_core.view.scales import ARROW_SHARE, choose_scales, seen_from
+from bilayer_core.view.theme import BACKGROUND, BALL_COLOURS
 
 TIMES = np.arange(0, 101) * 0.04
+SIZE = (480, 360)
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +32,19 @@ def log(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def studio(log):
-    with Studio(log) as studio:
-        yield studio
+def drawn(log, tmp_path_factory):
+    """Draws a picture with the options that are given, once each; its colours, shape (height, width, 3 or 4)."""
+    directory, known = tmp_path_factory.mktemp("pictures"), {}
+
+    def draw(time=4.0, **look):
+        key = (time, *sorted(look.items()))
+        if key not in known:
+            path = directory / f"{len(known)}.png"
+            Studio(log, Look.of(**{"size": SIZE, **look})).picture(path, time)
+            known[key] = np.asarray(Image.open(path)).astype(int)
+        return known[key]
+
+    return draw
 
 
 def pixels(path):
@@ -39,15 +52,30 @@ def pixels(path):
 
 
 def is_red(image):
-    r, g, b = np.moveaxis(image, -1, 0)
-    return (r > 150) & (r > 2 * g) & (r > 2 * b)
+    r, g, b = np.moveaxis(image[..., :3], -1, 0)
+    return (r > 110) & (r > 2 * g) & (r > 2 * b)
 
 
 def is_ball(image):
     """The stronger of the ball's colours, in any light."""
-    r, g, b = np.moveaxis(image, -1, 0)
+    r, g, b = np.moveaxis(image[..., :3], -1, 0)
     red, green, blue = BALL_COLOURS[0]
-    return (r > 120) & (np.abs(g - r * green / red) < 20) & (np.abs(b - r * blue / red) < 30)
+    return (r > 80) & (np.abs(g - r * green / red) < 25) & (np.abs(b - r * blue / red) < 40)
+
+
+def is_arrow(image):
+    r, g, b = np.moveaxis(image[..., :3], -1, 0)
+    return (g > 100) & (g > 1.5 * r) & (g > 1.2 * b)
+
+
+def box(mask):
+    """First and last row and column where something is."""
+    rows, columns = np.nonzero(mask)
+    return rows.min(), rows.max(), columns.min(), columns.max()
+
+
+ROBOT = slice(0, int(0.85 * SIZE[1]))  # rows above the bars
+BARS = slice(int(0.85 * SIZE[1]), SIZE[1])
 
 
 @pytest.mark.parametrize(
@@ -74,13 +102,26 @@ def test_what_is_looked_at_is_in_the_middle_and_slopes_are_those_of_perspective(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "say what to draw: --png OUT.png, --sheet OUT.png or --gif OUT.gif"),
+        ([], "say what to draw: --png OUT.png, --sheet OUT.png, --gif OUT.gif or --mp4 OUT.mp4"),
+        (["--mp4", "x.gif"], "x.gif: must end in .mp4"),
+        (["--mp4", "x.mp4", "--size", "321x180"], "--size: a film's width and height are even, found 321x180"),
+        (["--mp4", "x.mp4", "--background", "transparent"], "--background: a film cannot be transparent"),
+        (["--png", "x.png", "--background", "greenish"], "--background: found 'greenish'; allowed are dark, white"),
+        (["--png", "x.png", "--camera", "below"], "--camera: found 'below'; allowed are front, side, top"),
+        (["--png", "x.png", "--camera", "10,100"], "an elevation is from -90 to 90 degrees"),
+        (["--png", "x.png", "--camera", "10,20,0 mm"], "a distance is above 0 m"),
+        (["--png", "x.png", "--camera", "10,20 m"], "--camera: found '10,20 m'; allowed are"),
+        (["--png", "x.png", "--size", "10x10"], "width and height in pixels, each from 160 to 4096"),
+        (["--png", "x.png", "--fps", "10"], "--fps: is that of a film"),
+        (["--mp4", "x.mp4", "--speed", "1", "--frames", "9"], "--speed: says how many pictures a run takes"),
+        (["--png", "x.png", "--colour", "stress"], "'stress' is not one of"),
         (["--png", "x.gif"], "x.gif: must end in .png"),
         (["--gif", "x.png"], "x.png: must end in .gif"),
         (["--png", "x.png", "--sheet", "x.png"], "x.png: is named for two outputs"),
         (["--sheet", "x.png", "--at", "1", "--frames", "3"], "--frames: says how many pictures, --at of which times"),
         (["--png", "x.png", "--at", "1", "--at", "2"], "--png: is one picture"),
-        (["--gif", "x.gif", "--frames", "100000000"], "100000000 is not in the range 1<=x<=400"),
+        (["--gif", "x.gif", "--frames", "100000000"], "100000000 is not in the range 1<=x<=20000"),
+        (["--gif", "x.gif", "--frames", "401"], "--frames: 401 is not in the range 1<=x<=400; a film may have more"),
         (["--gif", "x.gif", *401 * ["--at", "1"]], "--at: is given 401 times; at most 400 are allowed"),
         (["--png", "there.png"], "there.png: exists already"),
         (["--png", "x.png", "--at", "-1"], "must be a time [s] at least 0"),
@@ -95,47 +136,145 @@ def test_what_cannot_be_drawn_is_refused_before_anything_is(arguments, message, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["there.png"]
 
 
-@pytest.mark.slow
-def test_a_sheet_shows_the_robot_large_with_times_and_without_the_viewers_notices(studio, tmp_path):
+@pytest.mark.parametrize("camera", ["auto", "follow", "iso", "front", "side", "top", "30,50", "-120 deg, 0.3 rad"])
+@pytest.mark.parametrize("time", [0.0, 4.0])
+def test_the_robot_is_whole_in_the_picture_and_large(drawn, camera, time):
+    alone = drawn(time, camera=camera, background="transparent")
+    far = {"iso", "front", "side", "30,50", "-120 deg, 0.3 rad"} & {camera}
+    robot = is_red(alone) | is_ball(alone) if time else is_ball(alone)
+    top, bottom, left, right = box(robot[ROBOT])
+    assert top > 5 and bottom < ROBOT.stop - 2 and left > 5 and right < SIZE[0] - 6
+    if time and not far:
+        assert max((bottom - top) / SIZE[1], (right - left) / SIZE[0]) > 1 / 3
+    assert robot[ROBOT].sum() > 400
+
+
+def test_one_picture_is_as_near_as_the_robot_allows(drawn):
+    top, bottom, left, right = box((is_ball(drawn()) | is_red(drawn()) | is_arrow(drawn()))[ROBOT])
+    assert bottom - top > 0.6 * SIZE[1]
+
+
+def test_strain_is_red_and_contact_forces_are_green_arrows(drawn):
+    before, after = drawn(0.0)[ROBOT], drawn(4.0)[ROBOT]
+    assert not is_red(before).any() and not is_arrow(before).any()
+    assert is_red(after).sum() > 3000 and is_arrow(after).sum() > 200
+
+
+def test_colours_of_curvature_and_of_contact_differ_from_those_of_strain(drawn):
+    curved, pressed = drawn(colour="curvature")[ROBOT], drawn(colour="contact", camera="40,-10")[ROBOT]
+    assert not is_red(curved).any() and is_blue(curved).sum() > 3000  # they curl down: negative curvature
+    tips = is_red(pressed).sum()
+    assert 5 < tips < 0.05 * is_red(drawn(camera="40,-10")[ROBOT]).sum()
+
+
+def test_the_pressure_of_contact_is_force_over_the_face_of_the_node(log):
+    run = read_log(log)
+    layer = run.description.layers[0]
+    pressure = contact_pressure(run, layer)
+    spacing = synthetic_run.LENGTH / (synthetic_run.NODES - 1)
+    force = 0.02 * np.sqrt(1 + 0.4**2)
+    assert pressure[-1, -5] == pytest.approx(force / (spacing * synthetic_run.WIDTH), rel=0.03)
+    assert pressure[-1, -1] == pytest.approx(2 * force / (spacing * synthetic_run.WIDTH), rel=0.03)
+    assert not pressure[0].any() and not pressure[-1, :-9].any()
+
+
+@pytest.mark.parametrize(
+    ("quantity", "title", "first", "last"),
+    [
+        ("strain", "axial strain [%]", "-6", "+6"),
+        ("curvature", "curvature [1/m]", "-50", "+50"),
+        ("contact", "contact pressure [kPa]", "0", "4"),
+    ],
+)
+def test_the_colour_bar_says_quantity_unit_and_limits(log, quantity, title, first, last):
+    found = choose_colouring(read_log(log), quantity)
+    assert (found.title, found.ticks[0][1], found.ticks[-1][1]) == (title, first, last)
+
+
+def test_the_colour_bar_is_there_with_all_its_colours(drawn):
+    bars = drawn(0.0)[BARS, : SIZE[0] // 2]
+    rows = np.nonzero(is_red(bars).any(axis=1) & is_blue(bars).any(axis=1))[0]
+    assert 5 <= len(rows) <= 12
+    row = bars[rows[len(rows) // 2]]
+    columns = np.nonzero(is_blue(row))[0].min(), np.nonzero(is_red(row))[0].max()
+    assert 0.2 * SIZE[0] < columns[1] - columns[0] < 0.5 * SIZE[0]
+    assert (row[sum(columns) // 2] > 200).all()  # grey in its middle
+
+
+@pytest.mark.parametrize("camera", ["front", "top", "iso"])
+def test_the_scale_bar_is_as_long_as_it_says(log, drawn, camera):
+    """The ball, of 40 mm, measured by the bar."""
+    image = drawn(4.0, camera=camera, background="white")
+    dark = (image[BARS, SIZE[0] // 2 + 40 :].max(axis=2) < 80).sum(axis=1)
+    length = dark[-25:-10].max()
+    setting = Studio(log, Look.of(camera, size=SIZE))._set([4.0], render_insets(), 0.0)
+    metres, _ = round_length(0.16 * SIZE[0] * setting.metres_per_pixel)
+    ball = is_ball(image)[ROBOT]
+    top, bottom, _, _ = box(ball)
+    if camera != "iso":  # hidden in part, so that its height is that of the sphere from the front alone
+        assert (bottom - top) * metres / length <= 2.02 * synthetic_run.RADIUS
+    assert metres / length == pytest.approx(setting.metres_per_pixel, rel=0.05)
+
+
+def render_insets():
+    from bilayer_core.view.camera import Insets
+
+    return Insets()
+
+
+@pytest.mark.parametrize(("text", "length"), [("20 mm", 0.03), ("1 m", 1.0), ("5 um", 9.9e-6), ("2 km", 4e3)])
+def test_lengths_of_scale_bars_are_round(text, length):
+    assert round_length(length)[1] == text
+
+
+def test_backgrounds_are_what_was_asked_for(drawn):
+    corner = (slice(2, 8), slice(-8, -2))
+    assert (drawn()[corner] == BACKGROUND).all()
+    assert (drawn(background="white")[corner] == 255).all()
+    assert (drawn(background="#f4f1e8")[corner] == (0xF4, 0xF1, 0xE8)).all()
+    clear = drawn(background="transparent")
+    assert clear.shape[2] == 4 and (clear[corner][..., 3] == 0).all()
+    assert (clear[..., 3][is_ball(clear)] == 255).mean() > 0.9
+    assert 0.2 < (clear[..., 3] > 0).mean() < 0.95
+
+
+def test_a_body_without_a_surface_is_not_drawn(log, drawn, monkeypatch):
+    """Nothing is between the four arms where the hub is."""
+    image = drawn(4.0, camera="top", background="transparent")
+    found = []
+    monkeypatch.setattr(stage.Stage, "_add_shape", lambda self, shape, *_: found.append(shape.kind))
+    monkeypatch.setattr(stage.Stage, "draw", lambda self, moment, shot: Image.new("RGB", SIZE))
+    Studio(log, Look.of(size=SIZE)).picture(log.with_name("nothing.png"))
+    assert sorted(found) == ["plane", "sphere"] and image.any()
+
+
+def test_a_sheet_shows_the_robot_in_each_part_with_its_time_over_one_colour_bar(log, tmp_path):
+    studio = Studio(log, Look.of())
     studio.sheet(tmp_path / "sheet.png", studio.spread(4))
     whole = pixels(tmp_path / "sheet.png")
-    assert 2 * whole.shape[0] < whole.shape[1] <= sheet.SHEET_WIDTH  # four in a row
-    width = (whole.shape[1] + sheet.GAP) // 4 - sheet.GAP
-    height = whole.shape[0] - sheet.FOOTER_HEIGHT - sheet.GAP
-    cells = [whole[:height, left : left + width] for left in range(0, whole.shape[1], width + sheet.GAP)]
-    assert len(cells) == 4
-    heights = [np.nonzero(is_ball(cell))[0].mean() for cell in cells]
-    assert heights[0] - heights[3] > 0.25 * height  # lifted
-    for cell in cells:
+    assert whole.shape[1] <= sheet.SHEET_WIDTH
+    body = whole[: -sheet.FOOTER_HEIGHT - sheet.GAP]
+    gaps = np.nonzero((body == BACKGROUND).all(axis=(0, 2)))[0]
+    columns = 1 + len([g for g in gaps if g - 1 not in gaps and 0 < g < whole.shape[1] - sheet.GAP])
+    assert columns in (2, 4)
+    width, height = (whole.shape[1] + sheet.GAP) // columns - sheet.GAP, (len(body) + sheet.GAP) * columns // 4
+    for k in range(4):
+        top, left = k // columns * height, k % columns * (width + sheet.GAP)
+        cell = body[top : top + height - sheet.GAP, left : left + width]
         assert is_ball(cell).mean() > 0.005
-        red = np.nonzero(is_red(cell) | is_ball(cell))
-        assert min(part.min() for part in red) > 5 and red[0].max() < height - 5 and red[1].max() < width - 5
-        time = cell[5:40, 5:90]
-        assert (time.min(axis=2) > 180).sum() > 40  # text, in white
-        corner = cell[:30, -60:]
-        assert (corner.min(axis=2) > 120).sum() == 0
-    footer = whole[-sheet.FOOTER_HEIGHT + 2 :]
-    assert (np.abs(footer - BACKGROUND).max(axis=2) > 60).sum() > 300
-
-
-@pytest.mark.slow
-def test_one_picture_is_cut_closer_than_a_sheet_of_the_whole_motion(studio, tmp_path):
-    studio.picture(tmp_path / "end.png")
-    image = pixels(tmp_path / "end.png")
-    assert is_ball(image).mean() > 0.05 and is_red(image).mean() > 0.05
+        assert (cell[5:30, 5:70].min(axis=2) > 180).sum() > 20  # time, in white
+    footer = whole[-sheet.FOOTER_HEIGHT :]
+    assert is_red(footer).sum() > 100 and is_blue(footer).sum() > 100
 
 
 def is_blue(image):
-    r, g, b = np.moveaxis(image, -1, 0)
-    return (b > r + 60) & (b > g + 20)
+    r, g, b = np.moveaxis(image[..., :3], -1, 0)
+    return (b > r + 40) & (b > g + 20)
 
 
-def test_reactions_are_drawn_where_they_are_asked_for(log, studio, tmp_path):
-    studio.picture(tmp_path / "without.png")
-    with Studio(log, reactions=True) as other:
-        other.picture(tmp_path / "with.png")
-    assert not is_blue(pixels(tmp_path / "without.png")).any()
-    assert is_blue(pixels(tmp_path / "with.png")).sum() > 100
+def test_reactions_are_drawn_where_they_are_asked_for(drawn):
+    assert not is_blue(drawn(background="white")[ROBOT]).any()
+    assert is_blue(drawn(background="white", reactions=True)[ROBOT]).sum() > 30
 
 
 def test_arrows_of_forces_and_moments_have_scales_of_their_own(log):
@@ -153,19 +292,57 @@ def test_arrows_of_forces_and_moments_have_scales_of_their_own(log):
     assert reaction_arrows(dataclasses.replace(run, clamp_wrenches=0.0 * wrenches), scales) == {}
 
 
-@pytest.mark.slow
-def test_an_animation_has_a_picture_for_each_time(studio, tmp_path):
-    studio.gif(tmp_path / "run.gif", studio.spread(3))
+def test_an_animation_has_a_picture_for_each_time(log, tmp_path):
+    studio = Studio(log, Look.of())
+    studio.gif(tmp_path / "run.gif", studio.spread(3), 20.0)
     animation = Image.open(tmp_path / "run.gif")
     assert animation.n_frames == 3 and max(animation.size) <= sheet.GIF_SIZE
+    assert animation.info["duration"] == 50
     shares = []
     for index in range(3):
         animation.seek(index)
-        shares.append(is_red(np.asarray(animation.convert("RGB")).astype(int)).mean())
+        shares.append(is_red(np.asarray(animation.convert("RGB")).astype(int))[: int(0.8 * animation.height)].mean())
     assert shares[0] == 0.0 and shares[2] > 0.005
 
 
-@pytest.mark.slow
-def test_a_time_that_the_log_does_not_hold_is_refused(studio, tmp_path):
+def frames_of(path, size):
+    """The pictures of a film, shape (n, height, width, 3)."""
+    import imageio_ffmpeg
+
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24"]
+    data = subprocess.run([*command, "-"], capture_output=True, check=True).stdout
+    return np.frombuffer(data, np.uint8).reshape(-1, size[1], size[0], 3)
+
+
+def test_a_film_lasts_as_long_as_the_run_at_least_five_seconds_and_moves(log, tmp_path, capsys):
+    path, size = tmp_path / "run.mp4", (320, 180)
+    assert main(["render", str(log), "--mp4", str(path), "--size", "320x180", "--fps", "5"]) == 0
+    assert capsys.readouterr().out == f"film       {path}: 25 pictures, 5 s, 1.25x slower\n"
+    frames = frames_of(path, size).astype(int)
+    assert len(frames) == 25
+    robot = [is_red(frame)[: int(0.8 * size[1])].sum() for frame in frames]
+    assert robot[0] < 30 < 300 < robot[-1]
+    changes = np.abs(np.diff(frames, axis=0)).max(axis=(1, 2, 3))
+    assert np.count_nonzero(changes > 30) >= 20
+    assert path.stat().st_size < 300_000
+
+
+def test_shapes_between_those_in_the_log_are_on_the_way_from_one_to_the_next(log):
+    studio = Studio(log, Look.of())
+    before, between, after = (studio._moments.at(time) for time in (1.0, 1.01, 1.04))
+    assert between.positions == pytest.approx(0.75 * before.positions + 0.25 * after.positions, abs=1e-12)
+    assert np.linalg.norm(between.material_frames, axis=1) == pytest.approx(np.ones(len(between.material_frames)))
+
+
+def test_a_time_that_the_log_does_not_hold_is_refused(log, tmp_path):
     with pytest.raises(InputError, match=r"holds 0 s to 4 s, and not 5 s"):
-        studio.picture(tmp_path / "late.png", 5.0)
+        Studio(log, Look.of()).picture(tmp_path / "late.png", 5.0)
+
+
+def test_what_is_missing_is_said_with_what_to_install(log, monkeypatch):
+    monkeypatch.setattr(stage.ctypes.util, "find_library", lambda name: None)
+    with pytest.raises(InputError, match="apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri"):
+        Studio(log, Look.of())
+    monkeypatch.setattr(stage.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"pip install 'bilayer_sim_ros\[film\]'"):
+        Studio(log, Look.of())

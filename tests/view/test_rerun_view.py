@@ -16,7 +16,7 @@ from PIL import Image
 from bilayer_core.errors import InputError
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.view import rerun_view, viewer_process
-from bilayer_core.view.rrd_writer import BALL_COLOURS
+from bilayer_core.view.theme import BALL_COLOURS
 
 TIMES = np.arange(0, 101) * 0.04
 ROBOT = (slice(70, 860), slice(0, 1195))  # rows and columns of the view of the robot in a picture
@@ -79,8 +79,10 @@ def test_the_robot_is_red_round_the_ball_with_arrows_and_lifts_it(viewer):
     assert len(rows_where(after, is_red)) > 5000
     assert len(rows_where(after, is_arrow)) > 1000
     balls = [rows_where(image, is_ball) for image in (before, after)]
-    assert min(len(rows) for rows in balls) > 2000
-    assert balls[0].mean() - balls[1].mean() > 200
+    assert min(len(rows) for rows in balls) > 15000
+    assert balls[0].mean() - balls[1].mean() > 80  # the camera follows, and sees the arms curl down at the same time
+    robot = np.concatenate([rows_where(after, is_red), balls[1]])
+    assert robot.max() - robot.min() > 790 / 3
     # Well framed: robot and ball away from the edges.
     for image in (before, after):
         ground = image[-40:, :40].reshape(-1, 3).mean(axis=0)
@@ -105,7 +107,8 @@ def test_the_viewer_has_nothing_to_complain_about(viewer):
     picture(viewer, None)
     assert viewer.complaints() == []
     views = {view.name: view for view in viewer.client.get_state().views}
-    assert {"Robot", "Strain", "Run", "Stimulus", "Contact force [N]", "Energy [mJ]", "Solver"} <= views.keys()
+    assert {"Robot", "axial strain [%]", "Run", "Stimulus", "Contact force [N]", "Solver"} <= views.keys()
+    assert {"Energy [mJ]", "Gravity [mJ]", "Events"} <= views.keys()
 
 
 @pytest.mark.slow
@@ -115,6 +118,7 @@ def test_the_recording_holds_every_strand_body_and_curve(viewer):
     expected |= {"/world/bodies/ball", "/world/bodies/hub", "/world/obstacles/ground", "/world/contact_forces"}
     expected |= {"/plots/stimulus/humidity", "/plots/contact_force/on_ball", "/plots/height/robot", "/summary"}
     expected |= {"/plots/energy/bend", "/plots/solver/smallest_gap"}
+    expected |= {"/plots/gravity/gravity", "/world/middle", "/events"}
     assert expected <= found
     timeline = next(item for item in viewer.client.get_state().recordings[0].timelines if item.name == "sim_time")
     assert (timeline.time_type, timeline.start, timeline.end) == ("duration", 0, 4 * 10**9)
