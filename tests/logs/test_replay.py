@@ -171,9 +171,9 @@ def test_a_log_of_before_says_what_it_lacks(tmp_path, monkeypatch):
 
 
 def mcap_log_stimuli(description):
-    from bilayer_core.record.topics import stimulus_topics
+    from bilayer_core.record.topics import EVENTS, stimulus_topics
 
-    return stimulus_topics(description)
+    return (EVENTS, *stimulus_topics(description))
 
 
 # other runs from an instant on
