@@ -19,6 +19,8 @@ from bilayer_core.view.arrows import Arrows, contact_arrows, reaction_arrows
 from bilayer_core.view.layout import CHANNEL_COLOURS, TIMELINE, blueprint, summary
 from bilayer_core.view.scales import Scales, choose_scales
 
+DRAWN = ("body_pose", "com", "nodes", "points")
+"""Topics without which there is nothing to draw."""
 CHUNK = 150  # frames in a chunk: chunks are what the viewer loads, caches and drops
 SIDE_SHADE = 0.55  # brightness of the narrow faces of ribbons
 GROUND_COLOURS = ((74, 79, 88), (62, 66, 74), (28, 30, 34))
@@ -36,6 +38,8 @@ def write_recording(run: RunData, rrd_path: str | Path, layout: Layout = bluepri
     """Write `run` to an ``.rrd`` file; InputError if it holds no frame, OSError if the file cannot be written."""
     if not len(run.times) or not len(run.shape_times):
         raise InputError(f"{run.description.scene_name}: the run holds no frame, there is nothing to show")
+    if missing := [topic for topic in run.lacks if topic.split("/")[2] in DRAWN]:
+        raise InputError(f"{run.description.scene_name}: the log does not hold {', '.join(missing)}, which is drawn")
     scales = choose_scales(run)
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
