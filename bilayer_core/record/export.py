@@ -56,6 +56,8 @@ def export(path: str | Path, out: str | Path, kind: str, names: Sequence[str] = 
     out, source = Path(out), LogSource(path)
     if kind != NPZ and importlib.util.find_spec("pyarrow") is None:
         raise InputError(f"{kind[1:]} is written by pyarrow; install it with: pip install 'bilayer_sim_ros[export]'")
+    if out.name in ("", "-"):
+        raise InputError(f"{kind[1:]}: {str(out)!r} is not allowed; it must be the name of a file or a directory")
     wanted = chosen(source, names)
     if not wanted:
         raise InputError(f"{path}: holds no quantity to export")

@@ -32,6 +32,11 @@ class LoggedRun(RunData):
         self.__dict__.update(self._source.attributes_with(name))
         return self.__dict__[name]
 
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """Topics that the log does not hold; what comes of them is NaN."""
+        return self._source.lacks
+
     def entries(self) -> dict[str, Entry]:
         """What is known of each quantity beside its values, by name."""
         return self._source.entries

@@ -70,6 +70,11 @@ class RunData(Recorded):
         """All quantities by name."""
         return {quantity.name: quantity for quantity in quantities_of(self)}
 
+    @property
+    def lacks(self) -> tuple[str, ...]:
+        """Topics that the run's log does not hold; what comes of them is NaN."""
+        return ()
+
     def entries(self) -> dict[str, Entry]:
         """What is known of each quantity beside its values, by name."""
         return {entry.name: entry for entry in entries(self.description, self.energy, self.solver)}

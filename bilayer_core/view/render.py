@@ -14,6 +14,7 @@ from bilayer_core.record.log_reader import read_log
 from bilayer_core.view.arrows import contact_arrows, reaction_arrows
 from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
 from bilayer_core.view.colouring import STRAIN, choose_colouring
+from bilayer_core.view.drawable import refuse_undrawable
 from bilayer_core.view.moments import Moment, Moments
 from bilayer_core.view.scales import choose_scales
 from bilayer_core.view.stage import FINER, FINER_OF_FILMS, Stage, require_vtk
@@ -76,8 +77,7 @@ class Studio:
         require_vtk()
         self._path, self._look = Path(path), look
         self._run = run = read_log(path)
-        if not len(run.times) or not len(run.shape_times):
-            raise InputError(f"{path}: the log holds no shape, there is nothing to draw")
+        refuse_undrawable(run, str(path))
         self._scales = choose_scales(run)
         self._colouring = choose_colouring(run, look.colour)
         self._moments = Moments(run, [self._colouring.values(run, layer) for layer in run.description.layers])

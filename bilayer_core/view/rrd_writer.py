@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
-from bilayer_core.errors import InputError
 from bilayer_core.record.events import LEVEL_NAMES
 from bilayer_core.record.node_frames import layer_rows
 from bilayer_core.record.run_data import RunData
@@ -15,6 +14,7 @@ from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import Arrows, contact_arrows, reaction_arrows
 from bilayer_core.view.colouring import STRAIN, Colouring, choose_colouring
+from bilayer_core.view.drawable import refuse_undrawable
 from bilayer_core.view.layout import (
     CHANNEL_COLOURS,
     EVENTS,
@@ -53,8 +53,7 @@ def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) ->
     colour : str
         What the colours of rods say, from `colouring.QUANTITIES`.
     """
-    if not len(run.times) or not len(run.shape_times):
-        raise InputError(f"{run.description.scene_name}: the run holds no frame, there is nothing to show")
+    refuse_undrawable(run, run.description.scene_name)
     scales, colouring = choose_scales(run), choose_colouring(run, colour)
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
