@@ -181,6 +181,8 @@ class McapRecorder:
             self._join(self._thread)
         finally:
             self._thread = None
+        if isinstance(self._failure, OSError) and not self._kept:
+            self._kept = f"; {self._what_is_kept()}"
         self._raise_failure()
 
     def _join(self, thread: threading.Thread) -> None:
@@ -212,7 +214,7 @@ class McapRecorder:
         """What `close` raises, as things stand."""
         if not isinstance(self._failure, OSError):
             return self._failure
-        reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}; {self._kept}"
+        reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}{self._kept}"
         return SimulationError(reason, self._last_time) if self._patience is None else OutputError(reason)
 
     def _what_is_kept(self) -> str:
@@ -238,7 +240,8 @@ class McapRecorder:
             except Exception as error:
                 failure = failure or error  # what fails after that, such as to close the file, follows from it
         if failure is not None:
-            self._kept = self._what_is_kept()
+            if self._patience is None:  # else at the end: to read a long log takes what a run that goes on needs
+                self._kept = f"; {self._what_is_kept()}"
             self._failure = self._failure or failure
         self._backlog.close()
 

@@ -33,8 +33,6 @@ class FrameTables:
         Free ends of strands, which have no bending element, and their neighbours, shape (n_end,).
     joint_a, joint_b, joint_node : Array
         Edges and node of each bending element, shape (n_bend,).
-    mass : float
-        Of the rods [kg].
     energies : tuple of (str, int)
         Conservative forces of the model, with their places among the energies of forces.
     has_joints, has_mechanisms : bool
@@ -56,7 +54,6 @@ class FrameTables:
         bends = slice(model.bend_count)
         self.joint_a, self.joint_b = model.joint_a[bends].astype(np.intp), model.joint_b[bends].astype(np.intp)
         self.joint_node = model.joint_node[bends].astype(np.intp)
-        self.mass = model.node_mass.sum()
         kind, place = kinds(), {name: index for index, name in enumerate(NAMES)}
         self.energies = tuple((name, place[name]) for name in model.forces if kind[name] is Kind.CONSERVATIVE)
         self.has_joints, self.has_mechanisms = engine.joints.exists, engine.mechanisms.exists

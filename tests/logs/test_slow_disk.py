@@ -123,11 +123,11 @@ def test_with_a_patience_a_disk_that_fills_up_is_told_and_the_run_goes_on(tmp_pa
     while not recorder.failure:
         observe_all(recorder, 10)
         assert time.monotonic() < deadline
-    assert "No space left on device; it can be read up to t = " in recorder.failure
+    assert recorder.failure == f"the log {path} could not be written: No space left on device"
     dropped = recorder.dropped
     observe_all(recorder, 10)
     assert recorder.dropped == dropped + 10
-    with pytest.raises(OutputError, match="No space left") as raised:
+    with pytest.raises(OutputError, match="No space left on device; it can be read up to t = ") as raised:
         recorder.close(True)
     assert raised.value.exit_code == 3 and "stopped at" not in str(raised.value)
     assert len(read_log(path).times) > 0
