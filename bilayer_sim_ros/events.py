@@ -6,10 +6,10 @@ from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.event_messages import encode_event
 from bilayer_core.record.events import Event, EventDetector
 from bilayer_core.record.topics import EVENTS
-from bilayer_core.simulation.frame import Description, Frame
 
 DEPTH = 100
 """Several things may happen in one frame, and none is to be lost."""

@@ -7,10 +7,10 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
+from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.encoders import FrameEncoder
 from bilayer_core.record.events import Event
 from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec, output_topics
-from bilayer_core.simulation.frame import Description, Frame
 from bilayer_sim_ros.conversions import to_time
 from bilayer_sim_ros.events import EventPublisher
 from bilayer_sim_ros.message_types import CLOCK_TOPIC, message_class

@@ -11,8 +11,8 @@ from concurrent.futures import Future
 from typing import Protocol
 
 from bilayer_core.errors import InputError, OutputError
+from bilayer_core.observed.frame import Frame
 from bilayer_core.record.events import Event
-from bilayer_core.simulation.frame import Frame
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
 from bilayer_core.simulation.simulator import Simulator

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.simulation.frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
+from bilayer_core.observed.frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
 
 ARMS = 4
 NODES = 41

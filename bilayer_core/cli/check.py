@@ -41,8 +41,8 @@ def _report(simulator) -> dict[str, Any]:
     from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
     from bilayer_core.model.validity import validity_figures
-    from bilayer_core.record.forecast import forecast
     from bilayer_core.record.topics import Rate, output_topics
+    from bilayer_core.runs.forecast import forecast
 
     scene, plan, model = simulator.scene, simulator.plan, simulator.model
     figures = (*validity_figures(scene), *twist_figures(scene, plan.model, plan.dimension))

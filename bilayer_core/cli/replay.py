@@ -15,7 +15,7 @@ from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
 from bilayer_core.errors import InputError
 
 if TYPE_CHECKING:
-    from bilayer_core.record.replay import Verification
+    from bilayer_core.runs.replay import Verification
 
 DIFFERS = 1
 """Exit code if a run does not come out as it is in the log."""
@@ -92,7 +92,7 @@ def replay(
 
 def _verify(log: str, tolerance: float | None, json_file: str | None, force: bool, quiet: bool) -> int:
     from bilayer_core.record.paths import check_output_path, write_text
-    from bilayer_core.record.replay import verify
+    from bilayer_core.runs.replay import verify
 
     if tolerance is not None and not tolerance > 0.0:
         raise InputError(f"--tolerance: {tolerance} is not allowed; it must be a part of the longest rod above 0")
@@ -166,7 +166,7 @@ def _go_on(
     from bilayer_core.cli.report import summary_lines
     from bilayer_core.record.log_reader import read_info
     from bilayer_core.record.mcap_log import McapRecorder
-    from bilayer_core.record.replay import branch
+    from bilayer_core.runs.replay import branch
 
     interrupt, observers = Interrupt(), []
     simulator, inputs = branch(log, moment, overrides, stimuli, loads)

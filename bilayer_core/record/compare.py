@@ -116,7 +116,8 @@ class _Rows:
         of_shape = bool(self.entries) and self.entries[0].of_shape
         self.times = run.shape_times if of_shape else run.times
         self._blocks = run.blocks(self.entries)
-        self._begin, self._held = 0, {name: [] for name in names}
+        self._begin = 0
+        self._held: dict[str, list[Array]] = {name: [] for name in names}
         self._end = 0
 
     def blocks(self) -> Iterator[tuple[slice, dict[str, Array]]]:
@@ -144,7 +145,8 @@ class _Largest:
 
     def __init__(self, entry: Entry):
         self.entry = entry
-        self.value, self.time = 0.0, None
+        self.value = 0.0
+        self.time: float | None = None
         self.least, self.most = np.inf, -np.inf
 
     def see_range(self, values: Array) -> None:

@@ -7,7 +7,7 @@ from dataclasses import asdict, fields
 
 import numpy as np
 
-from bilayer_core.simulation.frame import BodyInfo, Description, JointInfo, ObstacleInfo, ShapeInfo, Strand
+from bilayer_core.observed.frame import BodyInfo, Description, JointInfo, ObstacleInfo, ShapeInfo, Strand
 
 LATER = ("joints", "channel_units")
 """What older logs do not have."""

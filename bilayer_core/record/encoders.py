@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from bilayer_core.observed.frame import Description, Frame
+from bilayer_core.observed.inputs import Input
 from bilayer_core.record.cdr import Template, read_float64_multi_array
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.topics import FRAME_ID, Rate, output_topics
-from bilayer_core.simulation.frame import Description, Frame
-from bilayer_core.simulation.inputs import Input
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
 SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from bilayer_core.simulation.frame import Description, Frame
+from bilayer_core.observed.frame import Description, Frame
 
 DEBUG, INFO, WARN = 10, 20, 30
 """Levels of ``rcl_interfaces/msg/Log``."""

@@ -10,10 +10,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from bilayer_core.observed.frame import Frame
 from bilayer_core.record.cdr import decode, nanoseconds, stamp_of
 from bilayer_core.record.encoders import SmallMessage
 from bilayer_core.record.mcap_file import message_head, time_and_sequence
-from bilayer_core.simulation.frame import Frame
 
 
 class FrameBlock:

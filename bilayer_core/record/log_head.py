@@ -7,10 +7,10 @@ from pathlib import Path
 
 from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
+from bilayer_core.observed.frame import Description
 from bilayer_core.record.description_text import from_text
 from bilayer_core.record.log_records import ATTACHMENT, METADATA, content, parse, walk
 from bilayer_core.record.opening import open_log
-from bilayer_core.simulation.frame import Description
 
 _HEAD = ("description", "versions", "settings")
 """Metadata that every log has before its first chunk."""

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.observed.frame import Description
 from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
@@ -21,7 +22,6 @@ from bilayer_core.record.logged_run import LoggedRun
 from bilayer_core.record.opening import open_log
 from bilayer_core.record.run_data import RunData
 from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
-from bilayer_core.simulation.frame import Description
 
 __all__ = [
     "CUT_OFF",

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.observed.frame import Description
 from bilayer_core.record import encoders
 from bilayer_core.record.cdr import NANOSECONDS, Template, read_float64_multi_array
 from bilayer_core.record.event_messages import decode_event
@@ -17,7 +18,6 @@ from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.node_frames import node_order
 from bilayer_core.record.quantities import Entry, Quantity, entries
 from bilayer_core.record.topics import EVENTS, LOG_NAMESPACE, Rate, output_topics
-from bilayer_core.simulation.frame import Description
 
 Array = np.ndarray
 BLOCK = 8 << 20

@@ -22,11 +22,11 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
+from bilayer_core.observed.frame import Description, Frame, ShapeInfo
 from bilayer_core.record.cdr import Template
 from bilayer_core.record.node_frames import NodeFrames, layer_rows
 from bilayer_core.record.ribbons import Ribbons
 from bilayer_core.record.topics import FRAME_ID
-from bilayer_core.simulation.frame import Description, Frame, ShapeInfo
 
 STRAIN_LIMIT = 0.05
 PLANE_SIZE = 1.0  # edge of the square drawn for a plane [m]

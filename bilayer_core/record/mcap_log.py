@@ -14,6 +14,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from bilayer_core.errors import InputError, OutputError, SimulationError
+from bilayer_core.observed.frame import Description, Frame
+from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.description_text import to_text
@@ -26,8 +28,6 @@ from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
 from bilayer_core.record.topics import EVENTS, INPUTS, QOS, DisplayGate, Rate, TopicSpec, input_topics
-from bilayer_core.simulation.frame import Description, Frame
-from bilayer_core.simulation.inputs import STIMULUS, Input
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
 GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wakes ten times a second [s of wall time]
@@ -264,7 +264,7 @@ class _LogFile:
     def __init__(self, path: Path, force: bool, description: Description, gate: DisplayGate):
         import mcap
 
-        from bilayer_core.simulation.observation import machine, versions
+        from bilayer_core.observed.system import machine, versions
 
         self._gate = gate
         self._encoder = FrameEncoder(description)

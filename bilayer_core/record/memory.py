@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.encoders import SOLVER_LABELS
 from bilayer_core.record.events import EventDetector
 from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.run_data import RunData
-from bilayer_core.simulation.frame import Description, Frame
 
 
 class MemoryRecorder:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.kinematics.node_frames import frames_at_nodes
-from bilayer_core.simulation.frame import Description, Frame
+from bilayer_core.observed.frame import Description, Frame
 
 
 def node_order(description: Description) -> np.ndarray:

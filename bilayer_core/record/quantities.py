@@ -26,13 +26,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.observed.frame import Description
 from bilayer_core.record.node_frames import node_order
-from bilayer_core.simulation.frame import Description
 
 Array = np.ndarray
 AXES, QUATERNION, WRENCH = ("x", "y", "z"), ("x", "y", "z", "w"), ("fx", "fy", "fz", "mx", "my", "mz")
@@ -40,24 +40,22 @@ SOLVER_UNITS = {"residual": "m/s", "min_gap": "m", "cpu_time": "s"}
 
 
 class Run(Protocol):
-    """Whose quantities are told: a `RunData`."""
+    """Whose quantities are told: a `RunData`, which has the attributes that entries name."""
 
-    description: Description
-    times: Array
-    stimulus: Array
-    energy: dict[str, Array]
-    com: Array
-    body_positions: Array
-    body_quaternions: Array
-    contact_wrenches: Array
-    clamp_wrenches: Array
-    solver: dict[str, Array]
-    shape_times: Array
-    positions: Array
-    contact_forces: Array
-    material_frames: Array
-    strain: Array
-    curvature: Array
+    @property
+    def description(self) -> Description: ...
+
+    @property
+    def times(self) -> Array: ...
+
+    @property
+    def shape_times(self) -> Array: ...
+
+    @property
+    def energy(self) -> dict[str, Array]: ...
+
+    @property
+    def solver(self) -> dict[str, Array]: ...
 
 
 @dataclass(frozen=True)
@@ -112,9 +110,9 @@ class Entry:
     name: str
     unit: str
     attribute: str
-    index: str | tuple
+    index: str | tuple[Any, ...]
     topic: str
-    columns: tuple
+    columns: tuple[Any, ...]
     axes: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
 

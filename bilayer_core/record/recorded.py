@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bilayer_core.observed.frame import Description
 from bilayer_core.record.quantities import AXES, Entry, Quantity, unknown_quantity
-from bilayer_core.simulation.frame import Description
 
 if TYPE_CHECKING:
     import pandas

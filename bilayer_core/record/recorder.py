@@ -9,13 +9,13 @@ from typing import Protocol
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.observed.frame import Description, Frame
+from bilayer_core.observed.observer import Observer
 from bilayer_core.record.encoders import SOLVER_LABELS
 from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.quantities import Entry, Quantity, entries
 from bilayer_core.record.recorded import Recorded
 from bilayer_core.record.tables import chosen_names
-from bilayer_core.simulation.frame import Description, Frame
-from bilayer_core.simulation.observers import Observer
 
 Array = np.ndarray
 
@@ -115,7 +115,8 @@ class Recorder(Recorded):
         if entry.attribute == "solver":
             return np.array(float(getattr(frame, str(entry.index))))
         if _is_frame(entry) and self._node_frames is not None:
-            return self._node_frames.quaternions[entry.index].astype(np.float32)
+            frames: Array = self._node_frames.quaternions
+            return frames[entry.index].astype(np.float32)
         values: Array = getattr(frame, entry.attribute)[entry.index]
         return np.array(values, np.float32 if entry.of_shape else float)
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bilayer_core.observed.frame import Description, Frame, strain_at
 from bilayer_core.record.colours import strain_colours
 from bilayer_core.record.node_frames import NodeFrames, layer_rows
-from bilayer_core.simulation.frame import Description, Frame, strain_at
 
 Array = np.ndarray
 

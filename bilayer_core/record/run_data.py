@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from bilayer_core.observed.frame import Description, Strand
 from bilayer_core.record.events import Event
 from bilayer_core.record.quantities import Entry, Quantity, entries, quantities_of
 from bilayer_core.record.recorded import Recorded
-from bilayer_core.simulation.frame import Description, Strand
 
 
 @dataclass(frozen=True, repr=False)

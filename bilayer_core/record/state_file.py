@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.observed.frame import Description
 from bilayer_core.record.paths import draft_of
-from bilayer_core.simulation.frame import Description
 
 LOG_SUFFIX = ".mcap"
 

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from bilayer_core.simulation.frame import Description
+from bilayer_core.observed.frame import Description
 
 LOG_NAMESPACE = "/bilayer_sim"
 FRAME_ID = "world"
@@ -102,7 +102,7 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
 
 
 INPUTS = TopicSpec("inputs", MULTI_ARRAY, Rate.EVENT)
-"""What acted from outside, exactly: a message for each `simulation.inputs.Input`, at the time from which on it acted.
+"""What acted from outside, exactly: a message for each `observed.inputs.Input`, at the time from which on it acted.
 
 Labels are ``step``, ``time`` [s] and ``kind:name``, whose size is the number of its values.
 """

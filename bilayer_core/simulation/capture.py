@@ -10,10 +10,10 @@ import numpy as np
 
 from ..kinematics.rotation import quaternion_from_matrix
 from ..model.state import State
+from ..observed.frame import Frame
 from . import observation as observe
 from .contact_pairs import Pairs
 from .fluid_energy import energy_of_fluid
-from .frame import Frame
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper
 

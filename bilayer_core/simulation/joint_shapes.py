@@ -8,9 +8,9 @@ import numpy as np
 
 from ..kinematics.rotation import quaternion_from_matrix
 from ..model.model import Model
+from ..observed.frame import JointInfo, ShapeInfo
 from ..scene.body import Guided
 from ..scene.joint import Joint
-from .frame import JointInfo, ShapeInfo
 
 RADIUS = 0.2
 """Of pins and axes, over the largest width of a rod."""

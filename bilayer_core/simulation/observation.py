@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -13,42 +11,13 @@ from ..model.model import Model
 from ..model.shapes import Shape, obstacle_pose, shape_of
 from ..model.state import State
 from ..model.strand_arrays import StrandArrays
+from ..observed.frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
 from .fluid_energy import energy_of_fluid
-from .frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
 from .frame_tables import FrameTables
 from .joint_shapes import joint_shapes
 from .kinetic_energy import kinetic_energy
 
 Array = np.ndarray
-
-
-def versions() -> dict[str, str]:
-    """Versions of this package and of what its results depend on."""
-    import numba
-    import scipy
-
-    from bilayer_core import __version__
-
-    return {
-        "bilayer_sim_ros": __version__,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
-    }
-
-
-def machine() -> dict[str, str]:
-    """What results depend on to the last bit, beside versions."""
-    return {"system": platform.system(), "machine": platform.machine(), "processor": _processor()}
-
-
-@cache
-def _processor() -> str:
-    """Name of the processor's model, as far as the system tells it."""
-    from llvmlite import binding
-
-    return str(binding.get_host_cpu_name())
 
 
 def describe(model: Model, state: State, settings: dict[str, str], scene_text: str) -> Description:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from .inputs import Acted, Input
+from ..observed.inputs import Acted, Input
 from .observers import Schedule
 from .result import Termination
 

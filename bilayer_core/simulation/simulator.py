@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,15 +23,17 @@ from ..model.model import Model
 from ..model.override import acts, jump_to, ramp_to
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
+from ..observed.frame import Description, Frame
+from ..observed.inputs import LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_of_pose
+from ..observed.observer import Observer
+from ..observed.system import versions
 from ..scene.config import SceneConfig
 from ..scene.loader import scene_text
 from . import observation as observe
 from .capture import make_frame
 from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
-from .frame import Description, Frame
-from .inputs import LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_of_pose
-from .observers import Observer, Schedule, first_failure
+from .observers import Schedule, first_failure
 from .plane_watch import PlaneWatch
 from .poses import LEAST_TIME, new_goal
 from .result import RunResult, Termination
@@ -252,7 +255,7 @@ class Simulator:
             "dt": repr(self.dt),
             "tolerance": "none" if self.tolerance is None else repr(self.tolerance),
             "newton_tolerance": repr(self.steps.newton_tolerance),
-            **observe.versions(),
+            **versions(),
         }
         return observe.describe(self.model, self._state, settings, scene_text(self.scene))
 
@@ -378,7 +381,7 @@ class Simulator:
         Parameters
         ----------
         note : callable
-            Called with each `simulation.inputs.Input`, before the step from which on it acts.
+            Called with each `observed.inputs.Input`, before the step from which on it acts.
         """
         self._listeners.append(note)
         self._until = math.nan  # who begins to listen hears where steps end
@@ -482,6 +485,7 @@ class Simulator:
         *,
         until: float | None = None,
         stop: Callable[[], bool] | None = None,
+        log: str | Path | None = None,
         observers: Sequence[Observer] = (),
         inputs: Sequence[Input] = (),
         progress: Callable[[float], None] | None = None,
@@ -504,11 +508,14 @@ class Simulator:
         stop : callable, optional
             Asked after each step; true ends the run, as ``stopped``. Steps are then made one by one, which takes a
             little longer and changes none.
+        log : str or Path, optional
+            MCAP file to write, at the rates of the scene's `output`; for others, or to replace a file, put a
+            `bilayer_core.record.mcap_log.McapRecorder` among the observers.
         observers : sequence of Observer
             Each sees the first frame, the last, and at its rate between that of the first step which ends at or after
             each due time; all are closed whatever happens. For those that look at more than one run see `attach`.
         inputs : sequence of Input
-            What acts from outside (`simulation.inputs`), each from its time on: adaptive steps end there, of fixed ones
+            What acts from outside (`observed.inputs`), each from its time on: adaptive steps end there, of fixed ones
             it acts from the first that begins then or later.
         progress : callable, optional
             Called every few steps with the simulated time [s].
@@ -524,7 +531,8 @@ class Simulator:
         Raises
         ------
         InputError
-            If the duration or the time is none to which the run can advance.
+            If the duration or the time is none to which the run can advance, or the log cannot be begun: nothing is
+            changed then.
         SimulationError
             If a step cannot be made.
         OutputError
@@ -535,6 +543,11 @@ class Simulator:
         steps, fixed = int(round(left / self.dt)), not self.steps.adaptive
         if fixed and left > 0.0 and steps == 0:
             raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
+        if log is not None:
+            from ..record.mcap_log import McapRecorder
+
+            output = self.scene.output
+            observers = [McapRecorder(log, output.rate, output.marker_rate), *observers]
         self.compile()
         begin, cpu, wall, before = self.time, self.cpu_time, clock.perf_counter(), self._state.step[0]
         end = begin + steps * self.dt if fixed else self._stepper.end_near(begin + left if until is None else until)

@@ -11,7 +11,7 @@ from ..engine.energy_account import LARGEST, NUMERICAL
 from ..model.impacts import heaviest, stiffness_that_holds
 from ..model.model import Model
 from ..model.validity import LARGE_STRAIN
-from . import observation as observe
+from ..observed.system import versions
 from .plane_watch import PlaneWatch
 from .result import Termination
 from .views.body import BodyView
@@ -99,7 +99,7 @@ def summarise(simulator: Any) -> dict:
             *_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
         ],
-        "versions": observe.versions(),
+        "versions": versions(),
     }
 
 

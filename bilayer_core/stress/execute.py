@@ -8,8 +8,8 @@ import traceback
 from collections.abc import Sequence
 
 from ..errors import BilayerError, Remedy, SimulationError
+from ..observed.frame import Frame
 from ..scene.config import DEFAULT_TOLERANCE
-from ..simulation.frame import Frame
 from ..simulation.simulator import Simulator
 from .case import Decision, Outcome, Record, StressCase
 from .judge import Verdict

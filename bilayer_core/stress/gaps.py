@@ -27,7 +27,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from ..model.model import Model
-from ..simulation.frame import Frame
+from ..observed.frame import Frame
 from .surfaces import MeetingPoints, surfaces_of
 
 Array = np.ndarray

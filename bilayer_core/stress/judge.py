@@ -21,8 +21,8 @@ import numpy as np
 
 from ..engine.energy_account import FREE, LARGEST, LOWEST
 from ..errors import BilayerError
+from ..observed.frame import Frame
 from ..scene.body import Guided
-from ..simulation.frame import Frame
 from ..simulation.simulator import Simulator
 from .gaps import GapCheck
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.contact_points import Owned, owned_shapes
 from ..model.model import Model
-from ..simulation.frame import Frame
+from ..observed.frame import Frame
 
 Array = np.ndarray
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ..observed.frame import Frame
 from ..scene.loader import load_scene
-from ..simulation.frame import Frame
 from ..simulation.result import Termination
 from ..simulation.simulator import Simulator
 from .judge import Judge

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.simulation.frame import ShapeInfo, Strand
+from bilayer_core.observed.frame import ShapeInfo, Strand
 
 # Corners of a cross-section along (m1, m2), in half thicknesses and half widths. Every corner is there twice, once
 # for the wide face and once for the narrow one, so that narrow faces can be darker and edges stay sharp.

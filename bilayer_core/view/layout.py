@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import rerun.blueprint as rrb
 
+from bilayer_core.observed.system import versions
 from bilayer_core.record.run_data import RunData
-from bilayer_core.simulation.observation import versions
 from bilayer_core.view.arrows import reaction_arrows
 from bilayer_core.view.camera import is_worth_following
 from bilayer_core.view.colouring import Colouring

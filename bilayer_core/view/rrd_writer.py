@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from bilayer_core.observed.frame import ShapeInfo
 from bilayer_core.record.events import LEVEL_NAMES
 from bilayer_core.record.node_frames import layer_rows
 from bilayer_core.record.run_data import RunData
-from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import Arrows, contact_arrows, reaction_arrows
 from bilayer_core.view.colouring import STRAIN, Colouring, choose_colouring

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.observed.frame import ShapeInfo
 from bilayer_core.record.run_data import RunData
-from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import REACTIONS, Arrows
 from bilayer_core.view.camera import HALF_SLOPE, Shot

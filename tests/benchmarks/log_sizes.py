@@ -15,7 +15,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[2])]
 def main() -> None:
     from bilayer_core import Simulator, load_scene
     from bilayer_core.cli import main as bilayer
-    from bilayer_core.record.forecast import forecast
+    from bilayer_core.runs.forecast import forecast
     from bilayer_core.scene.bundled import bundled_scenes
 
     print("| scene | forecast | written | ratio |\n| --- | --- | --- | --- |")

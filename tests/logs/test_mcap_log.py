@@ -16,12 +16,12 @@ from slow_disks import Full
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, OutputError, SimulationError
+from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record import mcap_log
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.memory import MemoryRecorder
-from bilayer_core.simulation.inputs import STIMULUS, Input
 
 TIMES = np.arange(0, 51) * 0.02
 

@@ -10,11 +10,11 @@ from rosbags.highlevel import AnyReader
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
+from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_reader import read_info, read_messages
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.repair import repair
-from bilayer_core.simulation.inputs import STIMULUS, Input
 
 TIMES = np.arange(0, 76) * 0.02
 

@@ -9,12 +9,12 @@ import synthetic_run
 from slow_disks import Full, Valve
 
 from bilayer_core.errors import OutputError
+from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record import mcap_log
 from bilayer_core.record.encoders import decode_input
 from bilayer_core.record.log_reader import read_info, read_log, read_messages
 from bilayer_core.record.mcap_log import QUEUE_LENGTH, McapRecorder
 from bilayer_core.record.topics import INPUTS
-from bilayer_core.simulation.inputs import STIMULUS, Input
 
 FRAMES = 300
 PERIOD = 0.02

@@ -11,7 +11,7 @@ from acted_scenes import pushed
 from sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.simulation.frame import Frame
+from bilayer_core.observed.frame import Frame
 
 SCENES = {"gripping": "gripping", "pushed": pushed(), "everything": everything()}
 

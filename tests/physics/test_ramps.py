@@ -7,7 +7,7 @@ from sample_scenes import everything
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
 from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.replay import verify
+from bilayer_core.runs.replay import verify
 
 CORNERS = (0.0, 0.04, 0.1, 0.16, 0.2)
 VALUES = (0.0, 0.5, 0.3, 0.9, 0.9)

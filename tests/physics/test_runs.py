@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from sample_scenes import everything
 
-from bilayer_core import Simulator, load_scene
+from bilayer_core import Simulator, load_scene, read_log
 from bilayer_core.errors import InputError
+from bilayer_core.runs.replay import verify
 from bilayer_core.simulation.result import Termination
 
 
@@ -148,6 +149,21 @@ def test_what_is_attached_sees_where_a_loaded_state_is(adaptive):
     detach()
     jump = watcher.times.index(0.16)
     assert watcher.times[0] == 0.1 and watcher.times[jump + 1] == 0.1 and watcher.times[-1] == 0.12
+
+
+def test_a_run_writes_a_log_from_which_it_is_made_again(simulator, tmp_path):
+    simulator.run(0.02)
+    simulator.set_stimulus("humidity", 0.7)
+    simulator.run(0.04, log=tmp_path / "run.mcap")
+    run, found = read_log(tmp_path / "run.mcap"), verify(tmp_path / "run.mcap")
+    assert found.passed and found.states == len(run.times) > 2
+    assert run.times[-1] == simulator.time and run["com"].values[-1] == pytest.approx(simulator.com)
+    before = simulator.save_state()
+    with pytest.raises(InputError, match="exists already"):
+        simulator.run(0.04, log=tmp_path / "run.mcap")
+    with pytest.raises(InputError, match="must end in .mcap"):
+        simulator.run(0.04, log=str(tmp_path / "run.bag"))
+    np.testing.assert_array_equal(simulator.save_state(), before)
 
 
 def test_overrides_may_be_values_by_path():

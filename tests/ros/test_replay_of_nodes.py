@@ -12,10 +12,10 @@ from processes import bilayer
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 
+from bilayer_core.observed.inputs import LOAD, POSE, RESET, STIMULUS, UNTIL
 from bilayer_core.record.encoders import decode_input
 from bilayer_core.record.log_reader import read_messages
 from bilayer_core.record.topics import INPUTS
-from bilayer_core.simulation.inputs import LOAD, POSE, RESET, STIMULUS, UNTIL
 
 NAMESPACE = "/bilayer_sim"
 

@@ -13,14 +13,14 @@ from std_msgs.msg import Float64
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import OutputError
+from bilayer_core.observed.inputs import STIMULUS
 from bilayer_core.record import mcap_log
 from bilayer_core.record.encoders import decode_input
 from bilayer_core.record.log_reader import read_info, read_log, read_messages
 from bilayer_core.record.mcap_log import QUEUE_LENGTH
-from bilayer_core.record.replay import verify
 from bilayer_core.record.topics import INPUTS
+from bilayer_core.runs.replay import verify
 from bilayer_core.scene.schedule import Hold
-from bilayer_core.simulation.inputs import STIMULUS
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.lockstep import Asynchronous
 from bilayer_sim_ros.pacing import Pacer

@@ -14,7 +14,8 @@ BASE = {"errors", "jit"}
 GEOMETRY = BASE | {"kinematics", "contact"}
 MECHANICS = GEOMETRY | {"scene", "model", "forces"}
 ENGINE = MECHANICS | {"integrators", "engine"}
-NUMERICS = ENGINE | {"simulation"}
+RECORDS = BASE | {"kinematics", "observed", "record"}
+NUMERICS = ENGINE | {"observed", "record", "simulation"}
 ALLOWED = {
     "errors": set(),
     "jit": {"errors"},
@@ -25,19 +26,21 @@ ALLOWED = {
     "forces": GEOMETRY | {"scene", "model"},
     "integrators": MECHANICS,
     "engine": MECHANICS | {"integrators"},
-    "simulation": ENGINE,
-    "record": NUMERICS,
-    "view": NUMERICS | {"record"},
+    "observed": set(),
+    "record": RECORDS,
+    "simulation": ENGINE | {"observed", "record"},
+    "runs": NUMERICS,
+    "view": NUMERICS | {"runs"},
     "converge": NUMERICS,
     "beam2d": {"errors", "scene", "model"},
-    "validate": NUMERICS | {"beam2d", "record"},
-    "bench": NUMERICS | {"converge", "record", "validate"},
-    "stress": NUMERICS | {"record", "converge", "validate", "bench"},
-    "testing": NUMERICS | {"record", "stress"},
-    "cli": NUMERICS | {"record", "view", "converge", "validate", "bench", "stress"},
+    "validate": NUMERICS | {"beam2d"},
+    "bench": NUMERICS | {"converge", "validate"},
+    "stress": NUMERICS | {"converge", "validate", "bench"},
+    "testing": NUMERICS | {"stress"},
+    "cli": NUMERICS | {"runs", "view", "converge", "validate", "bench", "stress"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
-FACES = {"__init__": NUMERICS | {"converge", "record"}, "__main__": {"cli"}}
+FACES = {"__init__": NUMERICS | {"converge"}, "__main__": {"cli"}}
 TOP = "bilayer_core"
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import synthetic_run
 
+from bilayer_core.observed.frame import ShapeInfo
 from bilayer_core.record.colours import strain_colours
 from bilayer_core.record.memory import MemoryRecorder
-from bilayer_core.simulation.frame import ShapeInfo
 from bilayer_core.view import geometry
 from bilayer_core.view.colouring import choose_colouring
 from bilayer_core.view.layout import summary

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...model.model import Model
 from ...model.strand_arrays import StrandArrays
+from ...observed.frame import Strand
 from .. import observation as observe
-from ..frame import Strand
 from .present import ByName, Present
 
 Array = np.ndarray

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.mcap_log import SUFFIX, McapRecorder
-from bilayer_core.simulation.frame import Description, Frame
 from bilayer_core.simulation.simulator import Simulator
 
 Array = np.ndarray

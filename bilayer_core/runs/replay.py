@@ -1,7 +1,7 @@
 """Runs made again from their logs: the same one, to compare it bit for bit, or another one from an instant on.
 
 A log holds the scene, what the steps were to be, the state at every frame, and all that acted from outside with the
-step from which on it acted (`simulation.inputs`). That is all that a run depends on.
+step from which on it acted (`observed.inputs`). That is all that a run depends on.
 """
 
 from __future__ import annotations
@@ -10,19 +10,20 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.observed.frame import Description
+from bilayer_core.observed.inputs import LOAD, STIMULUS, UNTIL, Input
+from bilayer_core.observed.system import machine, versions
 from bilayer_core.record.cdr import read_float64_multi_array
 from bilayer_core.record.encoders import decode_input
 from bilayer_core.record.log_reader import read_head, read_messages, read_state
 from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.scene.text import read_yaml
-from bilayer_core.simulation.frame import Description
-from bilayer_core.simulation.inputs import LOAD, STIMULUS, UNTIL, Input
-from bilayer_core.simulation.observation import machine, versions
 from bilayer_core.simulation.simulator import Simulator
 
 Array = np.ndarray
@@ -160,7 +161,7 @@ def simulator_of(path: str | Path, overrides: Sequence[str] = ()) -> Simulator:
     settings, content = head.settings, read_yaml(head.description.scene_text, str(path))
     scene = load_scene(content, overrides)
     asked = {of.partition("=")[0] for of in overrides}
-    used = {
+    used: dict[str, Any] = {
         "model": settings["model"],
         "dimension": int(settings["dimension"]),
         "integrator": settings["integrator"],
@@ -289,7 +290,7 @@ class _Comparison:
             if result.first is None:
                 self._note_first(name, shape, one, other, logged, result)
 
-    def _note_first(self, name, shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
+    def _note_first(self, name: str, shape: tuple[int, ...], one: Array, other: Array, logged: Array, result: Verification) -> None:
         if self._tolerance is None:
             differs = one.view(np.uint64) != other.view(np.uint64)
         else:
@@ -297,7 +298,7 @@ class _Comparison:
         if differs.any():
             result.first = self._difference(name, shape, int(differs.argmax()), one, other, logged)
 
-    def _note_largest(self, name, shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
+    def _note_largest(self, name: str, shape: tuple[int, ...], one: Array, other: Array, logged: Array, result: Verification) -> None:
         if not one.size:
             return
         index = int(np.abs(one - other).argmax())
@@ -305,7 +306,7 @@ class _Comparison:
         if found.size > (result.largest.size if result.largest else 0.0):
             result.largest = found
 
-    def _difference(self, name, shape, index: int, one: Array, other: Array, logged: Array) -> Difference:
+    def _difference(self, name: str, shape: tuple[int, ...], index: int, one: Array, other: Array, logged: Array) -> Difference:
         row = int(np.unravel_index(index, shape)[0])
         where = self._owner(name, shape, row)
         return Difference(float(logged[0]), int(logged[1]), name, where, float(one[index]), float(other[index]))

@@ -1,0 +1,46 @@
+"""Who looks at a run, and what is looked at."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from .frame import Description, Frame
+
+
+class Observed(Protocol):
+    """What observers see of a simulator.
+
+    Attributes
+    ----------
+    time : float
+        Simulated [s].
+    description : Description
+    """
+
+    @property
+    def time(self) -> float: ...
+
+    @property
+    def description(self) -> Description: ...
+
+    def frame(self) -> Frame:
+        """A snapshot."""
+
+
+class Observer(Protocol):
+    """Something that looks at a run `rate` times in each simulated second: when the first step ends after each multiple
+    of its period, or exactly there. No step is another for it.
+
+    One that has a method ``note(input)`` is also told what acts from outside (`observed.inputs.Input`).
+    """
+
+    rate: float
+
+    def start(self, description: Description) -> None:
+        """Called once, before the first frame."""
+
+    def observe(self, frame: Frame) -> None:
+        """Called with every frame that is due, the first and the last included."""
+
+    def close(self, complete: bool, termination: str = "") -> None:
+        """Called once at the end; `complete` is false if the run was cut short, `termination` says why it ended."""

@@ -1,0 +1,37 @@
+"""What results depend on beside the scene: versions, and the machine."""
+
+from __future__ import annotations
+
+import platform
+from functools import cache
+
+import numpy as np
+
+
+def versions() -> dict[str, str]:
+    """Versions of this package and of what its results depend on."""
+    import numba
+    import scipy
+
+    from bilayer_core import __version__
+
+    return {
+        "bilayer_sim_ros": __version__,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+        "numba": numba.__version__,
+    }
+
+
+def machine() -> dict[str, str]:
+    """What results depend on to the last bit, beside versions."""
+    return {"system": platform.system(), "machine": platform.machine(), "processor": _processor()}
+
+
+@cache
+def _processor() -> str:
+    """Name of the processor's model, as far as the system tells it."""
+    from llvmlite import binding
+
+    return str(binding.get_host_cpu_name())
