@@ -27,6 +27,7 @@ from bilayer_core.scene.text import read_yaml
 from bilayer_core.simulation.simulator import Simulator
 
 Array = np.ndarray
+Shape = tuple[int, ...]
 STATE = f"{LOG_NAMESPACE}/state"
 SEAL = "seal"
 """Part of a state that sums up the others."""
@@ -290,7 +291,7 @@ class _Comparison:
             if result.first is None:
                 self._note_first(name, shape, one, other, logged, result)
 
-    def _note_first(self, name: str, shape: tuple[int, ...], one: Array, other: Array, logged: Array, result: Verification) -> None:
+    def _note_first(self, name: str, shape: Shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
         if self._tolerance is None:
             differs = one.view(np.uint64) != other.view(np.uint64)
         else:
@@ -298,7 +299,7 @@ class _Comparison:
         if differs.any():
             result.first = self._difference(name, shape, int(differs.argmax()), one, other, logged)
 
-    def _note_largest(self, name: str, shape: tuple[int, ...], one: Array, other: Array, logged: Array, result: Verification) -> None:
+    def _note_largest(self, name: str, shape: Shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
         if not one.size:
             return
         index = int(np.abs(one - other).argmax())
@@ -306,7 +307,7 @@ class _Comparison:
         if found.size > (result.largest.size if result.largest else 0.0):
             result.largest = found
 
-    def _difference(self, name: str, shape: tuple[int, ...], index: int, one: Array, other: Array, logged: Array) -> Difference:
+    def _difference(self, name: str, shape: Shape, index: int, one: Array, other: Array, logged: Array) -> Difference:
         row = int(np.unravel_index(index, shape)[0])
         where = self._owner(name, shape, row)
         return Difference(float(logged[0]), int(logged[1]), name, where, float(one[index]), float(other[index]))
