@@ -12,6 +12,7 @@ from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.record.run_data import RunData
 from bilayer_core.view import sheet, stage
 from bilayer_core.view.arrows import reaction_arrows
 from bilayer_core.view.colouring import choose_colouring, contact_pressure
@@ -278,7 +279,8 @@ def test_reactions_are_drawn_where_they_are_asked_for(drawn):
 
 
 def test_arrows_of_forces_and_moments_have_scales_of_their_own(log):
-    run = read_log(log)
+    logged = read_log(log)
+    run = RunData(**{part.name: getattr(logged, part.name) for part in dataclasses.fields(RunData)})
     wrenches = np.zeros((len(run.times), 2, 6))
     wrenches[:, 0, 2], wrenches[:, 0, 4] = 2.0, -3e-3
     run = dataclasses.replace(run, clamp_wrenches=wrenches)
