@@ -45,7 +45,7 @@ class Outlet(Protocol):
     def forget(self, channel: int) -> None:
         """Have nobody get what was published on a latched channel until now."""
 
-    def send_clock(self, time: int) -> None:
+    def send_clock(self, now: int) -> None:
         """Publish the time of the log [ns]."""
 
     def flush(self) -> None:
@@ -208,7 +208,8 @@ class Player:
             if not self._playback.paused:
                 self._clock.start()
             while not self._stopping.is_set():
-                if not self._requests.serve(self._time_to_wait()):
+                self._requests.serve(self._time_to_wait())
+                if not self._stopping.is_set():
                     self._play_what_is_due()
             self._outlet.flush()
         except Exception as error:
@@ -326,8 +327,7 @@ class Player:
         return self._state()
 
     def _do_resume(self) -> str:
-        if self.paused:
-            self._clock.start()
+        self._clock.start()
         return self._state()
 
     def _do_play_next(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 
@@ -20,8 +21,8 @@ from bilayer_sim_ros.message_types import CLOCK_TOPIC, message_class
 from bilayer_sim_ros.stored_qos import DEPTH, offered_profile
 
 CDR = "cdr"
-ACKNOWLEDGEMENT = Duration(seconds=1.0)
-"""Longest wait of each topic at the end."""
+ACKNOWLEDGEMENT = 1.0
+"""Longest wait for subscribers at the end, of all topics together [s]."""
 
 
 def replayed_name(topic: str) -> str:
@@ -90,16 +91,17 @@ class ReplayTopics:
         self._node.destroy_publisher(old)
         self._publishers[channel] = self._node.create_publisher(old.msg_type, old.topic, old.qos_profile)
 
-    def send_clock(self, time: int) -> None:
+    def send_clock(self, now: int) -> None:
         """Publish the time of the log [ns]."""
-        seconds, rest = divmod(time, NANOSECONDS)
+        seconds, rest = divmod(now, NANOSECONDS)
         self._clock.publish(Clock(clock=Time(sec=seconds, nanosec=rest)))
 
     def flush(self) -> None:
         """Wait a little until all that was sent has arrived."""
+        deadline = time.monotonic() + ACKNOWLEDGEMENT
         for publisher in self._publishers.values():
             if publisher.qos_profile.reliability == ReliabilityPolicy.RELIABLE:
-                publisher.wait_for_all_acked(ACKNOWLEDGEMENT)
+                publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
 
 
 def _class_of(channel: Channel) -> type:

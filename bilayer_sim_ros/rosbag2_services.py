@@ -8,6 +8,7 @@ from typing import Any
 
 from builtin_interfaces.msg import Time
 from rclpy.node import Node
+from rclpy.type_support import check_is_valid_srv_type
 
 from bilayer_core.errors import BilayerError, InputError
 from bilayer_core.record.cdr import NANOSECONDS
@@ -25,7 +26,9 @@ def rosbag2_services(node: Node, player: Player) -> list[Service]:
     """
     try:
         from rosbag2_interfaces import srv
-    except ImportError as error:
+
+        check_is_valid_srv_type(srv.IsPaused)  # loads the libraries of the package
+    except Exception as error:  # of several kinds: the package, or what its libraries need, is missing
         raise InputError(
             f"parameter 'services' is 'rosbag2', but its types cannot be imported ({error}): install the package "
             "rosbag2_interfaces of your ROS 2 distribution, which has no wheel, or take 'std_srvs'"

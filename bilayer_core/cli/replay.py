@@ -35,7 +35,7 @@ THENCE = "From there on; null: its schedule."
 @click.option("--load", "loads", multiple=True, metavar="NAME=FACTOR", help=THENCE)
 @click.option("--duration", type=Duration(), help="How long to go on; default: to the end of the log's run.")
 @click.option("--log", "new", metavar="NEW.mcap", help="Write a log of what comes then.")
-@click.option("--ros", "publishes", is_flag=True, help="Publish its messages as a ROS 2 node, replay_node, does.")
+@click.option("--ros", "publishes", is_flag=True, help="Publish its messages on ROS 2: the node replay_node.")
 @click.option("--rate", type=float, metavar="R", help="Seconds of the log per second, for --ros.")
 @click.option("--loop", is_flag=True, help="Begin again at the end, for --ros.")
 @click.option("--force", is_flag=True, help="Replace existing files.")

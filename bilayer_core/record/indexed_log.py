@@ -5,6 +5,7 @@ Any MCAP file with an index will do, those of rosbag2 as well: only topics, type
 
 from __future__ import annotations
 
+import bisect
 import itertools
 import shlex
 from collections.abc import Collection, Iterator
@@ -16,6 +17,9 @@ from typing import Self
 from bilayer_core.errors import InputError
 from bilayer_core.record.opening import damage_told, is_finished, open_log
 from bilayer_core.record.topics import QOS
+
+CHUNKS_AT_ONCE = 64
+"""In whose index messages are looked for at once, some seconds of a log."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +85,9 @@ class IndexedLog:
         self.path = Path(path)
         with ExitStack() as undo:
             file = undo.enter_context(open_log(self.path))
+            finished = is_finished(file)
             self._reader = SeekingReader(file, validate_crcs=True)
-            summary = self._reader.get_summary() if is_finished(file) else None
+            summary = self._reader.get_summary() if finished else None
             count = summary.statistics.message_count if summary is not None and summary.statistics else None
             if summary is None or (count != 0 and not (summary.chunk_indexes and summary.channels)):
                 raise _without_index(self.path)
@@ -93,6 +98,10 @@ class IndexedLog:
             self.end = max(chunk.message_end_time for chunk in chunks)
             self.channels = tuple(sorted(_channels(summary), key=lambda channel: (channel.topic, channel.number)))
             self._topics = {channel.number: channel.topic for channel in self.channels}
+            # Of the parts in which messages are read: the reader puts all chunks of a part in order first, which for
+            # those of ten minutes takes four times as long as to read one.
+            starts = sorted({chunk.message_start_time for chunk in chunks})
+            self._borders = starts[CHUNKS_AT_ONCE::CHUNKS_AT_ONCE]
             self._resources = undo.pop_all()
 
     def __enter__(self) -> Self:
@@ -107,7 +116,9 @@ class IndexedLog:
 
     def messages(self, channels: Collection[int], start: int) -> Iterator[Message]:
         """Messages of some channels from `start` [ns] on, by time; those of one time in the order of the file."""
-        yield from self._read(channels, starting_at=start)
+        later = self._borders[bisect.bisect_right(self._borders, start) :]
+        for begin, end in itertools.pairwise([start, *later, max(start, self.end) + 1]):
+            yield from self._read(channels, starting_at=begin, ending_before=end)
 
     def latest(self, channel: int, before: int, count: int) -> list[Message]:
         """The last messages of a channel before a time [ns], at most `count`, by time."""

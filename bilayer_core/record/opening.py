@@ -44,12 +44,14 @@ def damage_told(path: Path) -> Iterator[None]:
 
 
 def is_finished(file: BinaryIO) -> bool:
-    """Whether a file ends as it begins, which one that was cut off, or is still written, does not."""
-    if file.seek(0, 2) < 2 * len(MAGIC):
-        return False
-    file.seek(-len(MAGIC), 2)
+    """Whether a file ends as it begins, which one that was cut off, or is still written, does not.
+
+    It is at its begin afterwards.
+    """
+    size = file.seek(0, 2)
+    file.seek(max(size - len(MAGIC), 0))
     last = file.read()
     file.seek(0)
     first = file.read(len(MAGIC))
     file.seek(0)
-    return first == last
+    return size >= 2 * len(MAGIC) and first == last

@@ -1,5 +1,5 @@
 import pytest
-from mcap.writer import CompressionType
+from mcap.writer import CompressionType, Writer
 from written_logs import WITHOUT_INDEX, damage, number, value_of, write_log
 
 from bilayer_core.errors import InputError
@@ -36,10 +36,33 @@ def test_messages_that_were_written_late_come_by_time_and_equal_times_in_the_ord
     assert values(found) == [7, 1, 4, 5, 2, 3, 6, 0]
 
 
+def test_a_log_of_many_chunks_is_read_without_gap_or_repetition_from_any_time_on(tmp_path):
+    out_of_order = sorted(counted(count=1000), key=lambda message: round(message[1] * 10) % 7 + message[1] // 2)
+    with IndexedLog(write_log(tmp_path / "run.mcap", out_of_order, chunk_size=60)) as log:
+        for start in range(0, 1001, 53):
+            found = values(log.messages(numbers(log).values(), start * 100_000_000))
+            assert found == list(range(start, 1000))
+
+
 def test_only_messages_of_the_wished_channels_come(tmp_path):
     with IndexedLog(write_log(tmp_path / "run.mcap", counted("/a") + counted("/b", 3))) as log:
         assert len(list(log.messages([numbers(log)["/b"]], 0))) == 3
         assert {channel.topic: channel.count for channel in log.channels} == {"/a": 100, "/b": 3}
+
+
+def test_two_channels_of_one_topic_are_told_apart(tmp_path):
+    path = tmp_path / "run.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schemas = [writer.register_schema(f"std_msgs/msg/{name}", "ros2msg", b"") for name in ("Float64", "String")]
+        for index, schema in enumerate(schemas):
+            writer.add_message(writer.register_channel("/a", "cdr", schema), index, number(index), index)
+        writer.finish()
+    with IndexedLog(path) as log:
+        first, second = (channel.number for channel in log.channels)
+        assert values(log.messages([second], 0)) == [1]
+        assert values(log.latest(first, 9, 9)) == [0]
 
 
 def test_the_last_messages_before_a_time_leave_out_that_time(tmp_path):

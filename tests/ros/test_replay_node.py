@@ -275,13 +275,17 @@ def test_where_ros_is_missing_the_command_says_so_with_exit_code_2(counted_log, 
     assert "pip install 'bilayer_sim_ros[ros]'" in done.stderr and "Traceback" not in done.stderr
 
 
-def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it(run_log, tmp_path):
-    cut = tmp_path / "cut.mcap"
+def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it_and_then_plays(run_log, domain, monkeypatch, tmp_path):
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    cut, new = tmp_path / "cut.mcap", tmp_path / "NEW.mcap"
     cut.write_bytes(run_log.read_bytes()[:-100])
     done = bilayer("replay", cut, "--ros")
     assert done.returncode == 2
-    assert f"{cut}: has no index" in done.stderr and f"bilayer repair {cut} NEW.mcap" in done.stderr
-    assert "Traceback" not in done.stderr
+    assert f"{cut}: has no index" in done.stderr and "Traceback" not in done.stderr
+    (repair,) = re.findall(r"bilayer (repair \S+) NEW\.mcap", done.stderr)
+    assert bilayer(*repair.split(), new).returncode == 0
+    played = bilayer("replay", new, "--ros", "--rate", "10")
+    assert played.returncode == 0 and "ended at t = 0.5 s" in played.stderr, played.stderr
 
 
 @pytest.mark.parametrize(

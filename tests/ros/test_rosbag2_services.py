@@ -55,6 +55,7 @@ def call(player, warnings, monkeypatch):
         setattr(types, name, name)
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces", package)
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces.srv", types)
+    monkeypatch.setattr("bilayer_sim_ros.rosbag2_services.check_is_valid_srv_type", lambda _: None)
     logger = SimpleNamespace(warning=warnings.append)
     services = rosbag2_services(SimpleNamespace(get_logger=lambda: logger), player)
     by_name = {service.name: service for service in services}
@@ -105,4 +106,12 @@ def test_play_is_dismissed_while_the_log_is_played(call, player, warnings):
 
 def test_without_its_types_the_error_names_the_package_and_the_other_choice(player):
     with pytest.raises(InputError, match="'rosbag2'.*package rosbag2_interfaces.*or take 'std_srvs'"):
+        rosbag2_services(SimpleNamespace(), player)
+
+
+def test_types_whose_libraries_are_missing_are_told_likewise(player, monkeypatch):
+    package = ModuleType("rosbag2_interfaces")
+    package.srv = SimpleNamespace(IsPaused=object)
+    monkeypatch.setitem(sys.modules, "rosbag2_interfaces", package)
+    with pytest.raises(InputError, match="'rosbag2'.*cannot be imported .*or take 'std_srvs'"):
         rosbag2_services(SimpleNamespace(), player)
