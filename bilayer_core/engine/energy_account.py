@@ -21,9 +21,8 @@ Driving ends this. What stimuli and prescribed bodies supply has the error of it
 differs from that by trapezoids, W̃. So what steps make is summed over a while (each step forgets `FORGOTTEN` of the sum,
 so that runs of any length are judged alike), W − W̃ is summed as well, with its sign, and what the first sum has beyond
 the size of the second is made by no quadrature. (Sizes of W − W̃ step by step would excuse steps that make energy, where
-errors of the quadrature go to and fro.) Limits are then `LARGEST_DRIVEN_GAIN` and `SMALL_DRIVEN`, of the energy that
-a node has at the speed of a body where that is more. A flow, and forces that follow, may supply without end: there
-nothing is asked.
+errors of the quadrature go to and fro.) Limits are then `LARGEST_DRIVEN_GAIN` and `SMALL_DRIVEN`. A flow, and
+forces that follow, may supply without end: there nothing is asked.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -36,8 +35,6 @@ The account is part of the state, so that a run that is continued makes the same
 """
 
 from __future__ import annotations
-
-import math
 
 from ..forces.inertia import second_moment_beyond
 from ..jit import call, kernel, piece
@@ -292,28 +289,9 @@ def close_step_account(p, state, work, h, beyond, end):
     if grows or done[DRIVEN] == BY_BODIES:
         account[LOWEST] = account[FREE]
         made -= abs(account[UNSURE])
-        size = max(account[LARGEST], _taken_along(p, work.rates)) if done[DRIVEN] == BY_BODIES else account[LARGEST]
-        return _too_much(p, made, gain, LARGEST_DRIVEN_GAIN * size, SMALL_DRIVEN)
+        return _too_much(p, made, gain, LARGEST_DRIVEN_GAIN * account[LARGEST], SMALL_DRIVEN)
     account[LOWEST] = min(account[LOWEST], account[FREE])
     return _too_much(p, account[FREE] - account[LOWEST], gain, LARGEST_GAIN * account[LARGEST], SMALL)
-
-
-@kernel
-def _taken_along(p, rates):
-    """The energy of the lightest node at the speed of the fastest prescribed body [J].
-
-    Where all rests until a body meets it, the largest energy of the run says nothing of what the body brings.
-    """
-    lightest, fastest = math.inf, 0.0
-    for i in range(p.strands.node_mass.shape[0]):
-        if p.strands.node_mass[i] > 0.0:
-            lightest = min(lightest, p.strands.node_mass[i])
-    for k in range(p.bodies.prescribed.shape[0]):
-        b, square = p.bodies.prescribed[k], 0.0
-        for c in range(3):
-            square += rates[b, c] ** 2
-        fastest = max(fastest, square)
-    return 0.5 * lightest * fastest if fastest > 0.0 else 0.0
 
 
 @kernel

@@ -15,7 +15,8 @@ from .region import LARGEST_BEND, LARGEST_MACH, LARGEST_STRAIN
 from .torture import NOT_EXPRESSIBLE, TORTURES
 
 PAGE = "stability.md"
-SEEDED_BUGS = Path(__file__).resolve().parents[2] / "docs" / "data" / "mutations.jsonl"
+DATA = Path(__file__).resolve().parents[2] / "docs" / "data"
+SEEDED_BUGS, MUTATED_SCENES = DATA / "mutations.jsonl", DATA / "mutated_scenes.md"
 LEAST_ACCURATE, MOST_REFUSED, LEAST_REMEDIES = 0.70, 0.05, 0.90
 """Parts of the cases inside the region, and of the remedies tried."""
 
@@ -117,6 +118,7 @@ def _page(journal: Journal) -> Iterator[str]:
     yield from _extremes(records)
     yield from _worst_cases(records)
     yield from _torture_cases(records)
+    yield from _mutated_scenes()
     yield from _seeded_bugs()
 
 
@@ -188,6 +190,17 @@ def _torture_cases(records: Sequence[Record]) -> Iterator[str]:
     yield "What scenes cannot express, or nothing sure decides:"
     yield ""
     yield from (f"- {number} {name}: {why}" for number, name, why in NOT_EXPRESSIBLE)
+    yield ""
+
+
+def _mutated_scenes() -> Iterator[str]:
+    """What came of scenes with random mutations, as it was noted where they were tried, if this is a checkout."""
+    yield "## Mutated scenes"
+    yield ""
+    if MUTATED_SCENES.exists():
+        yield from MUTATED_SCENES.read_text(encoding="utf-8").splitlines()
+    else:
+        yield "`FUZZ_SCENES=10000 pytest -m \"\" tests/fuzz` has not been run."
     yield ""
 
 

@@ -42,13 +42,14 @@ def test_with_fixed_steps_the_remedy_is_adaptive_ones_as_well():
     assert ", and leave `solver.dt` out for adaptive steps" in str(stop.value.remedy)
 
 
-@pytest.mark.parametrize("integrator", ["implicit_midpoint", "sdirk2"])
-@pytest.mark.parametrize("turns", [40.0, -70.0])
-def test_no_step_ends_with_an_edge_that_has_no_length_left(integrator, turns):
+@pytest.mark.parametrize(
+    ("integrator", "turns", "dt"), [("implicit_midpoint", 60.0, 2e-6), ("sdirk2", 40.0, 5e-6), ("tr_bdf2", 60.0, 5e-6)]
+)
+def test_no_step_ends_with_an_edge_that_has_no_length_left(integrator, turns, dt):
     """Such an edge turns by what Newton's method leaves: faces of its rod would then be anywhere."""
-    simulator = Simulator(load_scene(coiling(turns, dt=2e-5, integrator=integrator)))
+    simulator = Simulator(load_scene(coiling(turns, dt=dt, integrator=integrator)))
     rest, least = simulator.model.rest_length, math.inf
-    with pytest.raises(SimulationError, match="which a linear material cannot hold"):
+    with pytest.raises(SimulationError, match="has less than 1 % of its length left"):
         while simulator.time < 0.05:
             simulator.step()
             edges = np.linalg.norm(np.diff(simulator.positions, axis=0), axis=1)

@@ -187,12 +187,13 @@ def test_no_step_that_a_body_drives_makes_energy_however_short(speed, dt, model,
     """A ball hits a film whose barrier is much too stiff for the steps of the midpoint rule, which ends within it."""
     parameters = Parameters(**BAT, speed=speed, dt=dt, model=model, gravity=gravity, integrator="implicit_midpoint")
     simulator = Simulator(load_scene(scene_of(parameters)))
+    free = [0.0]
     try:
-        simulator.run(40 * dt)
+        simulator.run(40 * dt, each_step=lambda time: free.append(float(simulator.energy_account[FREE])))
     except SimulationError as stop:
         assert stop.remedy.changes
-    account = simulator.energy_account
-    assert account[NUMERICAL] < 3 * LARGEST_DRIVEN_GAIN * account[LARGEST]
+    rise = (np.array(free) - np.minimum.accumulate(free)).max()
+    assert len(free) > 3 and rise < 3 * LARGEST_DRIVEN_GAIN * simulator.energy_account[LARGEST]
 
 
 @pytest.mark.parametrize("start", [1.0e-2, 1.0001e-2, 1.02e-2, 1.05e-2, 1.0999e-2])
