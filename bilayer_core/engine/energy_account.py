@@ -17,12 +17,14 @@ again, shorter, unless its own part is less than `SMALL` of that. The shortest s
 much by itself, which is what rounding and a loose tolerance of Newton's method leave, and less than `MOST` times as
 much with those before it; otherwise a run stops.
 
-Driving ends this. What stimuli and prescribed bodies supply has the error of its quadrature: W = h Σ bᵢ Pᵢ − Σ bᵢ sᵢ·Δη
-differs from that by trapezoids, W̃. So what steps make is summed over a while (each step forgets `FORGOTTEN` of the sum,
-so that runs of any length are judged alike), W − W̃ is summed as well, with its sign, and what the first sum has beyond
-the size of the second is made by no quadrature. (Sizes of W − W̃ step by step would excuse steps that make energy, where
-errors of the quadrature go to and fro.) Limits are then `LARGEST_DRIVEN_GAIN` and `SMALL_DRIVEN`. A flow, and
-forces that follow, may supply without end: there nothing is asked.
+Driving ends this. Where stimuli change, what they supply has the error of its quadrature: W = −Σ bᵢ sᵢ·Δη differs from
+that by trapezoids, W̃. So what steps make is summed over a while (each step forgets `FORGOTTEN` of the sum, so that runs
+of any length are judged alike), W − W̃ is summed as well, with its sign, and what the first sum has beyond the size of
+the second is made by no quadrature. (Sizes of W − W̃ step by step would excuse steps that make energy, where errors of
+the quadrature go to and fro.) Limits are then `LARGEST_DRIVEN_GAIN` and `SMALL_DRIVEN`. Where bodies are moved, forces
+jump with their acceleration, and such errors are of one sign: there no single step may make more than
+`LARGEST_STEP_GAIN` of the largest energy beyond |W − W̃|. A flow, and forces that follow, may supply without end: there
+nothing is asked.
 
 Contact is where most is lost: an impact that is over within a step or two. So the energy of barriers is looked at by
 itself, with that of the limits of hinges and slides. Its change beyond the work that the motion has done on them by the
@@ -50,7 +52,6 @@ from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of
 from .powers import (
-    BY_BODIES,
     BY_FLOW,
     DRIVEN,
     LOSING,
@@ -81,6 +82,7 @@ LARGEST_GAIN = 9e-4
 SMALL = 1e-3
 LARGEST_DRIVEN_GAIN = 0.02
 SMALL_DRIVEN = 5e-4
+LARGEST_STEP_GAIN = 0.1
 MOST = 2.0
 FORGOTTEN = 5e-4
 ROUNDING = 1e-11
@@ -278,15 +280,16 @@ def close_step_account(p, state, work, h, beyond, end):
     missed += DAMPING_SHARE * h * abs(damping - account[POWER_DAMPING])
     account[POWER_DAMPING] = damping
     p.outcome.figures[CONTACT_ERROR] = missed
-    if done[DRIVEN] == BY_FLOW:
+    if done[DRIVEN] != 0.0:
         account[LOWEST], account[MADE], account[UNSURE] = account[FREE], 0.0, 0.0
-        return NONE
-    if done[DRIVEN] == BY_BODIES:
-        unsure += by_powers - 0.5 * h * (power + done[SUPPLYING])
+        if done[DRIVEN] == BY_FLOW:
+            return NONE
+        gain -= abs(unsure + by_powers - 0.5 * h * (power + done[SUPPLYING]))
+        return _too_much(p, gain, gain, LARGEST_STEP_GAIN * account[LARGEST], 0.0)
     made = (1.0 - FORGOTTEN) * account[MADE] + gain
     account[MADE] = max(made, 0.0)
     account[UNSURE] = (1.0 - FORGOTTEN) * account[UNSURE] + unsure if made > 0.0 else 0.0
-    if grows or done[DRIVEN] == BY_BODIES:
+    if grows:
         account[LOWEST] = account[FREE]
         made -= abs(account[UNSURE])
         return _too_much(p, made, gain, LARGEST_DRIVEN_GAIN * account[LARGEST], SMALL_DRIVEN)

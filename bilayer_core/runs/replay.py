@@ -299,7 +299,9 @@ class _Comparison:
         if differs.any():
             result.first = self._difference(name, shape, int(differs.argmax()), one, other, logged)
 
-    def _note_largest(self, name: str, shape: Shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
+    def _note_largest(
+        self, name: str, shape: Shape, one: Array, other: Array, logged: Array, result: Verification
+    ) -> None:
         if not one.size:
             return
         index = int(np.abs(one - other).argmax())
