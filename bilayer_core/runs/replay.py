@@ -291,7 +291,9 @@ class _Comparison:
             if result.first is None:
                 self._note_first(name, shape, one, other, logged, result)
 
-    def _note_first(self, name: str, shape: Shape, one: Array, other: Array, logged: Array, result: Verification) -> None:
+    def _note_first(
+        self, name: str, shape: Shape, one: Array, other: Array, logged: Array, result: Verification
+    ) -> None:
         if self._tolerance is None:
             differs = one.view(np.uint64) != other.view(np.uint64)
         else:
