@@ -11,7 +11,7 @@ import click
 from bilayer_core.cli.nodes import become_replay_node
 from bilayer_core.cli.options import Duration, Verb, set_option
 from bilayer_core.cli.signals import Interruption
-from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
+from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar, progress_bar
 from bilayer_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,6 +22,7 @@ DIFFERS = 1
 
 
 THENCE = "From there on; null: its schedule."
+MANY = "Many runs, each with another value of stimulus.CHANNEL, load.NAME or a key of the scene, overlaid in one --rrd."
 
 
 @click.command(cls=Verb)
@@ -35,6 +36,8 @@ THENCE = "From there on; null: its schedule."
 @click.option("--load", "loads", multiple=True, metavar="NAME=FACTOR", help=THENCE)
 @click.option("--duration", type=Duration(), help="How long to go on; default: to the end of the log's run.")
 @click.option("--log", "new", metavar="NEW.mcap", help="Write a log of what comes then.")
+@click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording of what comes then.")
+@click.option("--vary", metavar="NAME=FROM:TO:COUNT", help=MANY)
 @click.option("--ros", "publishes", is_flag=True, help="Publish its messages on ROS 2: the node replay_node.")
 @click.option("--rate", type=float, metavar="R", help="Seconds of the log per second, for --ros.")
 @click.option("--loop", is_flag=True, help="Begin again at the end, for --ros.")
@@ -51,6 +54,8 @@ def replay(
     loads: tuple[str, ...],
     duration: float | None,
     new: str | None,
+    rrd: str | None,
+    vary: str | None,
     publishes: bool,
     rate: float | None,
     loop: bool,
@@ -68,6 +73,7 @@ def replay(
             "publish its messages"
         )
     changes = {"--set": overrides, "--stimulus": stimuli, "--load": loads, "--duration": duration, "--log": new}
+    changes |= {"--rrd": rrd, "--vary": vary}
     if publishes:
         others = {**changes, "--tolerance": tolerance, "--json": json_file, "--force": force, "--quiet": quiet}
         given = [option for option, value in others.items() if value is not None and value is not False and value != ()]
@@ -86,7 +92,12 @@ def replay(
         if value is not None:
             raise InputError(f"{option}: is for --verify")
     changed = _values("--stimulus", stimuli), _values("--load", loads)
-    _go_on(log, moment, overrides, *changed, duration, new, force, quiet)
+    if vary is not None:
+        if rrd is None or new is not None:
+            raise InputError("--vary: its runs go into one recording; name that by --rrd, and no --log")
+        _branch_out(log, moment, vary, overrides, *changed, duration, rrd, force, quiet)
+    else:
+        _go_on(log, moment, overrides, *changed, duration, new, rrd, force, quiet)
     return 0
 
 
@@ -160,11 +171,11 @@ def _go_on(
     loads: dict[str, float | None],
     duration: float | None,
     new: str | None,
+    rrd: str | None,
     force: bool,
     quiet: bool,
 ) -> None:
     from bilayer_core.cli.report import summary_lines
-    from bilayer_core.record.log_reader import read_info
     from bilayer_core.record.mcap_log import McapRecorder
     from bilayer_core.runs.replay import branch
 
@@ -175,10 +186,12 @@ def _go_on(
             raise InputError(f"--log: {new} is the log that is gone on from; choose another name")
         output = simulator.scene.output
         observers.append(McapRecorder(new, output.rate, output.marker_rate, force))
+    if rrd is not None:
+        from bilayer_core.view.rerun_view import RrdRecorder
+
+        observers.append(RrdRecorder(rrd, simulator.scene.output.rate, force))
     if duration is None:
-        duration = read_info(log).last_time - simulator.time
-        if duration <= 0.0:
-            raise InputError(f"--from: the log ends at t = {simulator.time:g} s; say with --duration how long to go on")
+        duration = _time_left(log, simulator.time)
     compile_kernels(quiet)
     begin = simulator.time
     with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
@@ -188,3 +201,49 @@ def _go_on(
             click.echo(line)
     if interrupt.granted:
         raise Interruption(interrupt.wished)
+
+
+def _time_left(log: str, time: float) -> float:
+    """Simulated time from an instant to the end of a log's run [s]."""
+    from bilayer_core.record.log_reader import read_info
+
+    left = read_info(log).last_time - time
+    if left <= 0.0:
+        raise InputError(f"--from: the log ends at t = {time:g} s; say with --duration how long to go on")
+    return left
+
+
+def _branch_out(
+    log: str,
+    moment: float,
+    vary: str,
+    overrides: tuple[str, ...],
+    stimuli: dict[str, float | None],
+    loads: dict[str, float | None],
+    duration: float | None,
+    rrd: str,
+    force: bool,
+    quiet: bool,
+) -> None:
+    from bilayer_core.record.log_reader import read_state
+    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.runs.branches import Varied, run_branches
+    from bilayer_core.view.rerun_view import require_rerun, write_branches
+
+    require_rerun()
+    check_output_path(rrd, force, ".rrd")
+    varied, begin = Varied.read(vary), float(read_state(log, moment)[0][0])
+    until = begin + (_time_left(log, begin) if duration is None else duration)
+    compile_kernels(quiet)
+    common = {"overrides": overrides, "stimuli": stimuli, "loads": loads}
+    branches = []
+    with count_bar(len(varied.values), quiet) as show:
+        for of in run_branches(log, moment, varied, until, **common):
+            branches.append(of)
+            show(f"{varied.name} = {of.value:g}")
+    write_branches(branches, varied.name, rrd, force)
+    if not quiet:
+        click.echo(f"{len(branches)} branches from t = {begin:g} s to {until:g} s by {varied.name}: {rrd}")
+        for of in branches:
+            if of.stopped:
+                click.echo(f"  {varied.name} = {of.value:g} stopped at t = {of.run.times[-1]:g} s: {of.stopped}")

@@ -76,7 +76,7 @@ def blueprint(run: RunData, scales: Scales, colouring: Colouring) -> rrb.Bluepri
         right,
         column_shares=[5, 3],
     )
-    return _whole(content, time_panel="collapsed")
+    return whole(content, time_panel="collapsed")
 
 
 def _curves(plot: tuple[str, str]) -> rrb.TimeSeriesView:
@@ -106,7 +106,8 @@ def _robot(run: RunData, scales: Scales) -> rrb.Spatial3DView:
     )
 
 
-def _whole(content: rrb.Container | rrb.View, time_panel: str) -> rrb.Blueprint:
+def whole(content: rrb.Container | rrb.View, time_panel: str) -> rrb.Blueprint:
+    """The layout of a window."""
     return rrb.Blueprint(
         content,
         rrb.TimePanel(timeline=TIMELINE, state=time_panel, play_state="paused"),

@@ -5,15 +5,19 @@ from __future__ import annotations
 import importlib.util
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.record.paths import check_output_path, draft_of
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.colouring import STRAIN
+
+if TYPE_CHECKING:
+    from bilayer_core.view.branches import Branch
 
 RRD_SUFFIX = ".rrd"
 
@@ -32,6 +36,15 @@ def convert_log(mcap_path: str | Path, rrd_path: str | Path, colour: str = STRAI
     from bilayer_core.record.log_reader import read_log
 
     write_rrd(read_log(mcap_path), rrd_path, colour=colour)
+
+
+def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path, force: bool) -> None:
+    """Write runs that differ by what has a name as one recording; see `view.branches`."""
+    require_rerun()
+    from bilayer_core.view.branches import write_branches as write
+
+    with draft_of(check_output_path(rrd_path, force, RRD_SUFFIX), force) as draft:
+        write(branches, name, draft)
 
 
 class RrdRecorder(MemoryRecorder):

@@ -69,9 +69,9 @@ def _send(recording: rr.RecordingStream, run: RunData, scales: Scales, colouring
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     recording.log("summary", rr.TextDocument(summary(run, scales, colouring), media_type="text/markdown"), static=True)
     _log_legend(recording, colouring)
-    _log_obstacles(recording, run, scales)
+    log_obstacles(recording, run, scales)
     _send_strands(recording, run, colouring)
-    _send_bodies(recording, run, scales)
+    send_bodies(recording, run, scales, "world/bodies")
     _send_middle(recording, run)
     _send_joints(recording, run)
     _send_arrows(recording, "world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
@@ -105,7 +105,8 @@ def _log_legend(recording: rr.RecordingStream, colouring: Colouring) -> None:
     recording.log("legend/ticks", labels, static=True)
 
 
-def _log_obstacles(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+def log_obstacles(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+    """Fixed surfaces."""
     for obstacle in run.description.obstacles:
         shape = obstacle.shape
         mesh = _plane(shape, scales) if shape.kind == "plane" else _mesh(geometry.shape_mesh(shape, OBSTACLE_COLOURS))
@@ -147,10 +148,10 @@ def _send_strands(recording: rr.RecordingStream, run: RunData, colouring: Colour
             )
 
 
-def _send_bodies(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+def send_bodies(recording: rr.RecordingStream, run: RunData, scales: Scales, under: str) -> None:
     """Bodies as they are; one without a surface has a pose alone."""
     for index, body in enumerate(run.description.bodies):
-        path = f"world/bodies/{body.name}"
+        path = f"{under}/{body.name}"
         if body.shape is not None:
             plane = body.shape.kind == "plane"
             shape = _plane(body.shape, scales) if plane else _mesh(geometry.shape_mesh(body.shape, BALL_COLOURS))

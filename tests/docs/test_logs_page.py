@@ -40,9 +40,8 @@ def test_the_programs_and_commands_of_the_page_about_logs_do_what_it_says(root, 
 @pytest.mark.slow
 def test_the_programs_of_the_page_about_python_run(root, tmp_path):
     program = "\n".join(block.text for block in blocks(root / "docs/python.md") if block.info == "python")
-    done = subprocess.run(
-        [sys.executable, "-c", program], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=TIMEOUT
-    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=TIMEOUT)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "Simulator(gripping at t = 0 s" in done.stdout and "Termination.STOPPED" in done.stdout
     assert "Recorder(gripping: t = " in done.stdout and done.stdout.rstrip().endswith("True")

@@ -1,0 +1,150 @@
+"""Many runs that go on from one instant of a log, each with another value of one thing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.observed.inputs import Input
+from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.record.run_data import RunData
+from bilayer_core.runs.replay import branch
+from bilayer_core.simulation.simulator import Simulator
+
+STIMULUS, LOAD = "stimulus.", "load."
+"""What the names of channels and of loads begin with; any other name is a key of the scene."""
+MOST = 1000
+"""Branches."""
+
+
+@dataclass(frozen=True)
+class Varied:
+    """What differs from branch to branch.
+
+    Attributes
+    ----------
+    name : str
+        ``stimulus.CHANNEL``, ``load.NAME``, or a key of the scene.
+    values : tuple of float
+    """
+
+    name: str
+    values: tuple[float, ...]
+
+    @classmethod
+    def read(cls, text: str) -> Varied:
+        """From ``NAME=FROM:TO:COUNT``, evenly from one value to another.
+
+        Raises
+        ------
+        InputError
+            If it is none.
+        """
+        name, _, span = text.partition("=")
+        parts = span.split(":")
+        try:
+            begin, end, count = float(parts[0]), float(parts[1]), int(parts[2])
+        except (ValueError, IndexError):
+            begin = end = count = 0
+        if not (name and len(parts) == 3 and 1 <= count <= MOST and np.isfinite([begin, end]).all()):
+            raise InputError(
+                f"--vary: {text!r} is not allowed; it must be NAME=FROM:TO:COUNT with 1 to {MOST} values, "
+                "such as stimulus.humidity=0.2:0.8:10"
+            )
+        return cls(name, tuple(np.linspace(begin, end, count).tolist()))
+
+
+@dataclass(frozen=True)
+class Branch:
+    """One of the runs.
+
+    Attributes
+    ----------
+    value : float
+        Of what differs.
+    run : RunData
+        From the instant on.
+    stopped : str
+        Why it could not go on to the end; empty if it did.
+    """
+
+    value: float
+    run: RunData
+    stopped: str
+
+
+def run_branches(
+    path: str | Path,
+    time: float,
+    varied: Varied,
+    until: float,
+    *,
+    overrides: tuple[str, ...] = (),
+    stimuli: Mapping[str, float | None] | None = None,
+    loads: Mapping[str, float | None] | None = None,
+    rate: float = 20.0,
+) -> Iterator[Branch]:
+    """Go on from an instant of a log with each value in turn.
+
+    Parameters
+    ----------
+    path : str or Path
+        MCAP log.
+    time : float
+        The last state at or before it [s] is gone on from.
+    varied : Varied
+    until : float
+        Simulated time to which they go [s].
+    overrides, stimuli, loads
+        What all have in common; as for `runs.replay.branch`.
+    rate : float
+        Of the frames that are kept [Hz].
+
+    Raises
+    ------
+    InputError
+        If the log or a value cannot be taken. A branch that cannot go on is none: it says why and ends there.
+    """
+    common = dict(stimuli or {}), dict(loads or {})
+    of_scene = not varied.name.startswith((STIMULUS, LOAD))
+    simulator: Simulator | None = None
+    inputs: list[Input] = []
+    for value in varied.values:
+        if of_scene:
+            simulator, inputs = branch(path, time, (*overrides, f"{varied.name}={value!r}"), *common)
+        elif simulator is None:
+            simulator, inputs = branch(path, time, overrides, *_with(*common, varied.name, value))
+            start = simulator.save_state()
+        else:
+            simulator.load_state(start)
+            _set(simulator, varied.name, value)
+        yield _run(simulator, inputs, value, until, rate)
+
+
+def _with(
+    stimuli: dict[str, float | None], loads: dict[str, float | None], name: str, value: float
+) -> tuple[dict[str, float | None], dict[str, float | None]]:
+    """Stimuli and loads with that of a name."""
+    kind, _, own = name.partition(".")
+    return (stimuli | {own: value}, loads) if f"{kind}." == STIMULUS else (stimuli, loads | {own: value})
+
+
+def _set(simulator: Simulator, name: str, value: float) -> None:
+    kind, _, own = name.partition(".")
+    if f"{kind}." == STIMULUS:
+        simulator.set_stimulus(own, value)
+    else:
+        simulator.set_load(own, value)
+
+
+def _run(simulator: Simulator, inputs: list[Input], value: float, until: float, rate: float) -> Branch:
+    recorder, stopped = MemoryRecorder(rate), ""
+    try:
+        simulator.run(until=until, observers=[recorder], inputs=inputs)
+    except SimulationError as failure:
+        stopped = failure.reason
+    return Branch(value, recorder.run_data(), stopped)
