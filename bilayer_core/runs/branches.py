@@ -10,9 +10,10 @@ import numpy as np
 
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.observed.inputs import Input
+from bilayer_core.record.log_reader import read_state
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.record.run_data import RunData
-from bilayer_core.runs.replay import branch
+from bilayer_core.runs.replay import branch, set_from_outside
 from bilayer_core.simulation.simulator import Simulator
 
 STIMULUS, LOAD = "stimulus.", "load."
@@ -115,13 +116,13 @@ def run_branches(
     inputs: list[Input] = []
     for value in varied.values:
         if of_scene:
-            simulator, inputs = branch(path, time, (*overrides, f"{varied.name}={value!r}"), *common)
+            written = int(value) if value.is_integer() else value
+            simulator, inputs = branch(path, time, (*overrides, f"{varied.name}={written!r}"), *common)
         elif simulator is None:
             simulator, inputs = branch(path, time, overrides, *_with(*common, varied.name, value))
-            start = simulator.save_state()
         else:
-            simulator.load_state(start)
-            _set(simulator, varied.name, value)
+            simulator.load_state(read_state(path, time)[0])
+            set_from_outside(simulator, *_with(*common, varied.name, value))
         yield _run(simulator, inputs, value, until, rate)
 
 
@@ -131,14 +132,6 @@ def _with(
     """Stimuli and loads with that of a name."""
     kind, _, own = name.partition(".")
     return (stimuli | {own: value}, loads) if f"{kind}." == STIMULUS else (stimuli, loads | {own: value})
-
-
-def _set(simulator: Simulator, name: str, value: float) -> None:
-    kind, _, own = name.partition(".")
-    if f"{kind}." == STIMULUS:
-        simulator.set_stimulus(own, value)
-    else:
-        simulator.set_load(own, value)
 
 
 def _run(simulator: Simulator, inputs: list[Input], value: float, until: float, rate: float) -> Branch:

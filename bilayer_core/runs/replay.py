@@ -204,12 +204,19 @@ def branch(
     refuse_without_inputs(Path(path))
     simulator, state = simulator_of(path, overrides), read_state(path, time)[0]
     simulator.load_state(state)
+    set_from_outside(simulator, stimuli, loads)
+    changed = {(STIMULUS, channel) for channel in stimuli} | {(LOAD, name) for name in loads}
+    return simulator, [told for told in inputs_after(path, state) if (told.kind, told.name) not in changed]
+
+
+def set_from_outside(
+    simulator: Simulator, stimuli: Mapping[str, float | None], loads: Mapping[str, float | None]
+) -> None:
+    """Set channels and loads, None for their schedules."""
     for channel, value in stimuli.items():
         simulator.set_stimulus(channel, value)
     for name, factor in loads.items():
         simulator.set_load(name, factor)
-    changed = {(STIMULUS, channel) for channel in stimuli} | {(LOAD, name) for name in loads}
-    return simulator, [told for told in inputs_after(path, state) if (told.kind, told.name) not in changed]
 
 
 def inputs_after(path: str | Path, state: Array) -> list[Input]:

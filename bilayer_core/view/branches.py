@@ -14,13 +14,15 @@ from bilayer_core.record.run_data import RunData
 from bilayer_core.view.drawable import refuse_undrawable
 from bilayer_core.view.layout import TIMELINE, whole
 from bilayer_core.view.rrd_writer import log_obstacles, send_bodies
-from bilayer_core.view.scales import choose_scales
+from bilayer_core.view.scales import Scales, choose_scales
 from bilayer_core.view.theme import BACKGROUND
 
 FIRST, LAST = np.array([70, 150, 255]), np.array([255, 120, 50])
 """Colours of the smallest and the largest value."""
 LINE_WIDTH = 1.5
 """[points]"""
+MOST_IN_LEGEND = 10
+"""Curves whose values are told beside them."""
 CURVES = {"height": "Height of the mass centre [mm]", "along": "Way of the mass centre along x [mm]"}
 
 
@@ -60,7 +62,7 @@ def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) 
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()
     recording.send_recording_name(f"{widest.description.scene_name}: {len(branches)} branches by {name}")
-    recording.send_blueprint(_blueprint(scales), make_active=False, make_default=True)
+    recording.send_blueprint(_blueprint(scales, len(branches) <= MOST_IN_LEGEND), make_active=False, make_default=True)
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     text = rr.TextDocument(summary(branches, name), media_type="text/markdown")
     recording.log("summary", text, static=True)
@@ -117,7 +119,7 @@ def _send_curves(recording: rr.RecordingStream, number: str, label: str, run: Ru
         )
 
 
-def _blueprint(scales) -> rrb.Blueprint:
+def _blueprint(scales: Scales, legend: bool) -> rrb.Blueprint:
     robot = rrb.Spatial3DView(
         name="Branches",
         origin="world",
@@ -127,7 +129,10 @@ def _blueprint(scales) -> rrb.Blueprint:
             kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
         ),
     )
-    curves = [rrb.TimeSeriesView(name=title, origin=f"plots/{curve}") for curve, title in CURVES.items()]
+    curves = [
+        rrb.TimeSeriesView(name=title, origin=f"plots/{curve}", plot_legend=rrb.PlotLegend(visible=legend))
+        for curve, title in CURVES.items()
+    ]
     text = rrb.TextDocumentView(name="Run", origin="summary")
     left = rrb.Vertical(robot, text, row_shares=[9, 2])
     return whole(rrb.Horizontal(left, rrb.Vertical(*curves), column_shares=[5, 3]), time_panel="collapsed")

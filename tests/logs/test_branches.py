@@ -88,6 +88,7 @@ def test_branches_are_overlaid_in_one_recording(log, tmp_path, capsys):
     with HeadlessViewer() as viewer:
         viewer.open(out)
         found = {item.entity_path for item in viewer.client.get_recording_schema(paths_only=True).entities}
+        viewer.set_time(None)
         picture = np.asarray(Image.open(io.BytesIO(viewer.picture())).convert("RGB")).astype(int)
         assert viewer.complaints() == []
     assert {f"/world/branches/{k:02}/rods" for k in range(12)} <= found
