@@ -116,6 +116,17 @@ def test_where_a_ring_closes_changes_nothing_with_any_integrator_and_adaptive_st
     assert ends[1] == pytest.approx(ends[0], abs=1e-12)
 
 
+@DIMENSIONS
+def test_where_a_ring_closes_changes_nothing_of_the_momentum_of_a_fluid(dimension):
+    """The midpoint rule ends beyond its stage, where nodes take the momentum that is extrapolated."""
+    ends = []
+    for start in (0, 7):
+        simulator = loaded_ring(start, "a stream", "laminate", dimension, dt=1e-3, integrator="implicit_midpoint")
+        simulator.run(0.04)
+        ends.append(nodes_of(simulator, start))
+    assert ends[1] == pytest.approx(ends[0], abs=1e-12)
+
+
 @MODELS
 @DIMENSIONS
 def test_a_layer_on_a_part_of_a_ring_may_be_anywhere_on_it(model, dimension):
