@@ -18,9 +18,6 @@ from rclpy.utilities import remove_ros_args
 from bilayer_core.errors import BilayerError, InputError
 from bilayer_sim_ros.parameters import NodeParameter, Value, accept_all
 
-INTERRUPTED = 130
-"""Exit code after SIGINT or SIGTERM."""
-
 Work = Callable[[Node, Mapping[str, Value], threading.Event], None]
 
 
@@ -32,7 +29,6 @@ def run(
     argv: list[str] | None,
     *,
     argument: str | None = None,
-    interrupted_code: int = INTERRUPTED,
 ) -> int:
     """Run `work` as a ROS 2 executable.
 
@@ -43,7 +39,8 @@ def run(
     Returns
     -------
     int
-        0 done, 2 bad input, 3 the simulation could not go on, `interrupted_code` after a signal.
+        0 done, also after SIGINT or SIGTERM, which are how nodes end; 2 bad input; 3 the simulation could not go on, or
+        its log is not whole.
     """
     argv = sys.argv if argv is None else [executable, *argv]
     try:
@@ -53,14 +50,9 @@ def run(
         return InputError.exit_code
     options = _parse(executable, table, arguments, argument)
     given = {argument: options.argument} if argument is not None and options.argument is not None else {}
-    stop, interrupted = threading.Event(), threading.Event()
-
-    def interrupt(*_):
-        interrupted.set()
-        stop.set()
-
+    stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, interrupt)
+        signal.signal(number, lambda *_: stop.set())
     try:
         _run_node(node_name, table, work, stop, argv, given)
     except BilayerError as error:
@@ -68,7 +60,7 @@ def run(
             raise
         print(f"{executable}: {error}", file=sys.stderr)
         return error.exit_code
-    return interrupted_code if interrupted.is_set() else 0
+    return 0
 
 
 def _parse(

@@ -18,7 +18,7 @@ def main(argv: list[str] | None = None) -> int:
         from bilayer_sim_ros.replay import play
     except ModuleNotFoundError as error:
         return explain_missing_ros("replay_node", error)
-    return run("replay_node", "bilayer_replay", REPLAY_NODE, play, argv, argument="log", interrupted_code=0)
+    return run("replay_node", "bilayer_replay", REPLAY_NODE, play, argv, argument="log")
 
 
 if __name__ == "__main__":

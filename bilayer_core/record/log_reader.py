@@ -189,6 +189,8 @@ def _lacks(head: Head, file: LogFile, metadata: dict[str, dict[str, str]]) -> tu
         lacks.append("the quality of service of its topics: rosbag2 plays them with its own")
     if not file.has_index:
         lacks.append("an index, as it was not finished: `bilayer repair` makes a log with one of it")
+    if dropped := metadata.get("run", {}).get("dropped_frames"):
+        lacks.append(f"{dropped} frames, left out while the disk was behind; no input is missing")
     if lost := metadata.get(REPAIRED, {}).get("lost"):
         lacks.append(f"what was lost before it was repaired: {lost}")
     return tuple(lacks)

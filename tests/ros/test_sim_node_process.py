@@ -127,13 +127,13 @@ def test_a_run_that_reaches_its_duration_leaves_a_complete_log(start, domain, tm
 
 
 @pytest.mark.parametrize("signals", [[signal.SIGINT], [signal.SIGINT] * 2, [signal.SIGTERM]])
-def test_an_interrupted_node_ends_with_130_and_a_log_readable_to_its_end(start, connect, domain, tmp_path, signals):
+def test_an_interrupted_node_ends_with_0_and_a_log_readable_to_its_end(start, connect, domain, tmp_path, signals):
     log = tmp_path / "run.mcap"
     node = start("sim_node", domain, FAST | {"log": log})
     clock = connect(node).listen(Clock, "/clock")
     for number in signals:
         node.send(number)
-    assert node.wait(30) == 130, node.output
+    assert node.wait(30) == 0, node.output
     assert "Traceback" not in node.output
     info = read_info(log)
     assert (info.complete, info.termination) == (False, "interrupted")
@@ -149,7 +149,7 @@ def test_a_paused_node_can_be_interrupted(start, connect, domain):
     node = start("sim_node", domain, FAST | {"start_paused": True})
     connect(node).listen(Clock, "/clock")
     node.send(signal.SIGINT)
-    assert node.wait(30) == 130
+    assert node.wait(30) == 0
 
 
 def test_a_reset_finishes_the_log_and_begins_a_numbered_one(start, connect, domain, tmp_path):
