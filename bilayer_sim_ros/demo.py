@@ -25,8 +25,9 @@ from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.rerun_view import convert_log, screenshot
 from bilayer_sim_ros.conversions import to_seconds
-from bilayer_sim_ros.executable import INTERRUPTED
 
+INTERRUPTED = 130
+"""Exit code after SIGINT."""
 SCENE, CHANNEL, BALL = "gripping", "humidity", "ball"
 RAMP_DURATION = 13.3
 """Time in which the controller takes the stimulus from nothing to all [s]."""

@@ -12,9 +12,10 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.observed.inputs import LOAD, POSE, STIMULUS, UNTIL, Input
-from bilayer_core.record import mcap_log, replay
+from bilayer_core.record import mcap_log
 from bilayer_core.record.log_reader import read_info, read_log, read_state
 from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.runs import replay
 from bilayer_core.runs.replay import branch, inputs_after, verify
 from bilayer_core.scene.bundled import bundled_scenes
 
