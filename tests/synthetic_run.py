@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.observed.frame import BodyInfo, Description, Frame, ObstacleInfo, ShapeInfo, Strand
+from bilayer_core.observed.inputs import STIMULUS, Input
 
 ARMS = 4
 NODES = 41
@@ -162,9 +163,16 @@ def random_frame(generator: np.random.Generator) -> Frame:
     )
 
 
-def run(recorder, times: np.ndarray, complete: bool = True) -> None:
-    """Show the run at `times` to an observer."""
+def run(recorder, times: np.ndarray, complete: bool = True, inputs: dict[int, Input] | None = None) -> None:
+    """Show the run at `times` to an observer, and tell it inputs before frames, by their number."""
     recorder.start(description())
-    for time in times:
+    for number, time in enumerate(times):
+        if inputs and number in inputs:
+            recorder.note(inputs[number])
         recorder.observe(frame(float(time), float(times[-1])))
     recorder.close(complete)
+
+
+def stimulus_before(number: int, times: np.ndarray) -> dict[int, Input]:
+    """A stimulus that is set before a frame, for `run`."""
+    return {number: Input(number, float(times[number]), STIMULUS, "humidity", (0.25,))}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from ..errors import InputError
 from ..observed.inputs import Acted, Input
 from .observers import Schedule
 from .result import Termination
@@ -35,6 +37,30 @@ class Callbacks:
     def steps_at_once(self) -> int:
         """Steps after which somebody is to be called."""
         return STEPS_AT_ONCE if self.stop is None and self.each_step is None else 1
+
+
+def time_left(now: float, end_of_scene: float, duration: float | None, until: float | None) -> float:
+    """Simulated time of a run that is asked for as in `Simulator.run` [s].
+
+    Raises
+    ------
+    InputError
+        If both are given, or there is no such time.
+    """
+    if duration is not None and until is not None:
+        raise InputError("run: give a duration or a time `until`, not both")
+    if until is not None:
+        if not (math.isfinite(until) and until >= now):
+            allowed = f"it must be a number of seconds from the present time, {now:g}, up"
+            raise InputError(f"until: {until} is not allowed; {allowed}")
+        return until - now
+    left = end_of_scene - now if duration is None else duration
+    if duration is None and left < 0.0:
+        at = f"the scene ends at {end_of_scene:g} s, the present time is {now:g} s"
+        raise InputError(f"duration: is missing; {at}; say how long to go on")
+    if not (math.isfinite(left) and left >= 0.0):
+        raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
+    return left
 
 
 def advance_to(

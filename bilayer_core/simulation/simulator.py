@@ -37,7 +37,7 @@ from .observers import Schedule, first_failure
 from .plane_watch import PlaneWatch
 from .poses import LEAST_TIME, new_goal
 from .result import RunResult, Termination
-from .run_loop import Callbacks, advance_to
+from .run_loop import Callbacks, advance_to, time_left
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
 from .stepper import Stepper, StepReport
@@ -539,7 +539,7 @@ class Simulator:
             If a log cannot be written. Observers have then seen the last accepted frame and are closed; what goes wrong
             with that is a note to the error.
         """
-        left = self._time_left(duration, until)
+        left = time_left(self.time, self.scene.duration, duration, until)
         steps, fixed = int(round(left / self.dt)), not self.steps.adaptive
         if fixed and left > 0.0 and steps == 0:
             raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
@@ -577,23 +577,6 @@ class Simulator:
         return RunResult(
             termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
         )
-
-    def _time_left(self, duration: float | None, until: float | None) -> float:
-        """Simulated time of a run [s]."""
-        if duration is not None and until is not None:
-            raise InputError("run: give a duration or a time `until`, not both")
-        if until is not None:
-            if not (math.isfinite(until) and until >= self.time):
-                allowed = f"it must be a number of seconds from the present time, {self.time:g}, up"
-                raise InputError(f"until: {until} is not allowed; {allowed}")
-            return until - self.time
-        left = self.scene.duration - self.time if duration is None else duration
-        if duration is None and left < 0.0:
-            at = f"the scene ends at {self.scene.duration:g} s, the present time is {self.time:g} s"
-            raise InputError(f"duration: is missing; {at}; say how long to go on")
-        if not (math.isfinite(left) and left >= 0.0):
-            raise InputError(f"duration: {left} is not allowed; it must be a number of seconds from 0 up")
-        return left
 
     def attach(self, observer: Observer) -> Callable[[], None]:
         """Show frames to an observer from now on, at its rate, whoever makes steps; returns what ends that.

@@ -29,7 +29,7 @@ def test_messages_come_from_any_time_on_whatever_the_compression(tmp_path, compr
             assert values(log.messages(numbers(log).values(), start)) == expected
 
 
-def test_messages_that_were_written_late_come_by_time_and_equal_times_in_the_order_of_the_file(tmp_path):
+def test_messages_come_by_time_and_those_of_one_time_as_in_the_file(tmp_path):
     late = [("/a", time, number(index)) for index, time in enumerate((5, 1, 4, 4, 2, 3, 4, 0))]
     with IndexedLog(write_log(tmp_path / "run.mcap", late, chunk_size=1)) as log:
         found = list(log.messages(numbers(log).values(), 0))

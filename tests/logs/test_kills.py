@@ -18,7 +18,6 @@ MOST_MISSING = 1.0
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
 def test_a_log_of_a_killed_run_or_node_lacks_at_most_a_second(tmp_path):
-    pytest.importorskip("rclpy")
     found = []
     with claimed_domain() as domain:
         for name, loss in kills(KILLS, tmp_path, SEED, domain):

@@ -16,7 +16,6 @@ from slow_disks import Full
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, OutputError, SimulationError
-from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record import mcap_log
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
@@ -30,12 +29,7 @@ TIMES = np.arange(0, 51) * 0.02
 def log(tmp_path_factory):
     path = tmp_path_factory.mktemp("log") / "run.mcap"
     recorder = McapRecorder(path, rate=50.0, marker_rate=50.0)
-    recorder.start(synthetic_run.description())
-    for step, moment in enumerate(TIMES):
-        if step == 25:
-            recorder.note(Input(step, moment, STIMULUS, "humidity", (0.25,)))
-        recorder.observe(synthetic_run.frame(float(moment), TIMES[-1]))
-    recorder.close(True)
+    synthetic_run.run(recorder, TIMES, inputs=synthetic_run.stimulus_before(25, TIMES))
     return path
 
 

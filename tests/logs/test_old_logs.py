@@ -112,7 +112,6 @@ def test_a_log_without_any_frame_is_read_as_empty(tmp_path):
 
 @pytest.mark.parametrize("topic", ["body_pose/wall", "nodes"])
 def test_a_log_without_shapes_or_poses_is_not_drawn(topic, log, tmp_path, capsys):
-    pytest.importorskip("rerun")
     old = stripped(log, tmp_path / "old.mcap", topics=[f"/bilayer_sim/{topic}"])
     assert main(["view", str(old), "--save", str(tmp_path / "old.rrd")]) == 2
     assert f"the log does not hold /bilayer_sim/{topic}, which is drawn" in capsys.readouterr().err

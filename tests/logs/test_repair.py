@@ -10,7 +10,6 @@ from rosbags.highlevel import AnyReader
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_reader import read_info, read_messages
 from bilayer_core.record.mcap_log import McapRecorder
@@ -23,12 +22,7 @@ TIMES = np.arange(0, 76) * 0.02
 def log(tmp_path_factory):
     path = tmp_path_factory.mktemp("log") / "run.mcap"
     recorder = McapRecorder(path, rate=50.0, marker_rate=25.0)
-    recorder.start(synthetic_run.description())
-    for step, moment in enumerate(TIMES):
-        if step == 25:
-            recorder.note(Input(step, moment, STIMULUS, "humidity", (0.25,)))
-        recorder.observe(synthetic_run.frame(float(moment), TIMES[-1]))
-    recorder.close(True)
+    synthetic_run.run(recorder, TIMES, inputs=synthetic_run.stimulus_before(25, TIMES))
     return path
 
 

@@ -51,7 +51,7 @@ def inputs_in(path):
     return [decode_input(data) for data in found if data is not None]
 
 
-def test_frames_are_left_out_and_counted_while_the_disk_hangs_but_no_input_and_not_the_last(tmp_path, valve):
+def test_a_disk_that_hangs_costs_counted_frames_but_no_input_and_not_the_last(tmp_path, valve):
     path = tmp_path / "run.mcap"
     recorder = McapRecorder(path, patience=0.0)
     recorder.start(synthetic_run.description())

@@ -163,7 +163,7 @@ def test_a_paused_player_sends_one_message_when_it_is_asked_for_the_next(play):
     assert player.paused and player.position == 0.1
 
 
-def test_after_a_seek_a_paused_player_is_paused_and_the_next_message_is_that_of_the_new_time(play):
+def test_a_paused_player_stays_paused_after_a_seek_and_plays_on_from_there(play):
     player = play(counted(), paused=True)
     for position, expected in ((0.55, 6), (0.9, 9), (0.0, 0), (0.3, 3)):
         ask(player.seek(round(position * SECOND)))
