@@ -194,6 +194,7 @@ def surfaces_of(model: Model, sizes: dict[str, int]) -> Surfaces:
         position=surfaces.position,
         rotation=surfaces.rotation,
         can_collide=surfaces.can_collide,
+        edge_can_cross=surfaces.edge_can_cross,
         margin=np.full(1, -1.0),  # no list yet
     )
 

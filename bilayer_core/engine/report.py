@@ -9,6 +9,7 @@ from ..model.records.status import (
     BLOCKED,
     COLLAPSED,
     CONVERGED,
+    CROSSED,
     GAINS_ENERGY,
     INDEFINITE,
     LINE_SEARCH,
@@ -26,6 +27,7 @@ FAILURES = {
     BLOCKED: "prescribed motion would push a surface through another one",
     BEYOND: "the end of the step, beyond its last stage, lies behind a surface",
     COLLAPSED: "an edge has hardly any of its length left",
+    CROSSED: "an edge goes through a surface between its nodes",
     UNSETTLED: "normal forces and friction do not settle on each other",
     GAINS_ENERGY: "steps make energy however short they are",
     TOO_INACCURATE: "the error of the step stays above the tolerance",
@@ -44,7 +46,8 @@ class IntegrationReport:
     status : int
         Why it ended, from `model.records.status`.
     pair : int
-        Near pair that blocks prescribed motion, or edge that has collapsed, −1 if none.
+        Near pair that blocks prescribed motion, edge that has collapsed, or edge that crosses a surface
+        (`contact.crossing`), −1 if none.
     iterations, factorisations, settlings : int
         Exact Hessians factorised and further corrections taken with a kept one; the former alone; how often friction
         was frozen anew. Failed attempts are included.

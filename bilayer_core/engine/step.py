@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ..contact.crossing import crossing, note_start
 from ..jit import call, kernel, piece, record_at
 from ..kinematics.copying import copy
 from ..model.records.outcome import (
@@ -20,7 +21,7 @@ from ..model.records.outcome import (
     SWAPPED,
 )
 from ..model.records.problem import Problem
-from ..model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, MAX_ITERATIONS, READY
+from ..model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, CROSSED, MAX_ITERATIONS, READY
 from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of, lagged
 from .ends import write_twist
@@ -139,14 +140,17 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     Returns
     -------
     status : int
-        In `Outcome`: the blocking pair or collapsed edge, −1 if none, the number in `work.configurations` of
-        the last configuration, numbers of iterations, factorisations and settlings, the largest residual and the gap.
+        In `Outcome`: the blocking pair, the collapsed edge or the edge that crosses a surface, −1 if none, the number
+        in `work.configurations` of the last configuration, numbers of iterations, factorisations and settlings, the
+        largest residual and the gap.
     """
     stage, previous, figures = work.stage, work.first, p.outcome.figures
     s, e, t = 0, 1, 2
     ends, stages = method.couplings.shape
     _clear(p.outcome)
     call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
+    if p.surfaces.exists:
+        note_start(p.surfaces, configuration_at(work.configurations[s]))
     call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), work.first))
     call(p.calls.begin_step_account, (p, state, inputs, work, method.works[0] * h))
     if p.light.exists:
@@ -199,6 +203,12 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         copy(start_state.values, state.values)
         figures[RESIDUAL] = math.inf
         return _leave(p, COLLAPSED, edge, e)
+    if p.surfaces.exists:
+        crossed = crossing(p.strands, p.surfaces, configuration_at(work.configurations[e]))
+        if crossed >= 0:
+            copy(start_state.values, state.values)
+            figures[RESIDUAL] = math.inf
+            return _leave(p, CROSSED, crossed, e)
     status = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
     copy(p.memory, state.memory)
     if status != READY:
@@ -302,6 +312,8 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
         stage.lengths[:] = length
         status, e = _evaluate_at_rest(p, state, work, s, t, mode == COUNT)
         return _leave(p, status, -1, e)
+    if p.surfaces.exists:
+        note_start(p.surfaces, start)
     stage.lengths[:] = length
     call(p.calls.stand_still_stage, (p, state, start, True, stage))
     status = call(p.calls.start_stage, (p, start, stage))
@@ -314,6 +326,10 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
     status, e, t = _solve(p, work, e, t, tolerance, max_iterations, MINIMUM)
     if status == CONVERGED or status == MAX_ITERATIONS:
         end = configuration_at(work.configurations[e])
+        crossed = crossing(p.strands, p.surfaces, end) if p.surfaces.exists else -1
+        if crossed >= 0:
+            p.outcome.figures[RESIDUAL] = math.inf
+            return _leave(p, CROSSED, crossed, e)
         work.moved[0] = call(p.calls.distance, (p, start, end))
         call(p.calls.write_shape, (p, end, state))
     return _leave(p, status, -1, e)

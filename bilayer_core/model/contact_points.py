@@ -106,6 +106,7 @@ def build_contact(
         rotation=np.array([s.rotation @ s.shape.rotation for s in surfaces]).reshape(-1, 3, 3),
         grain=np.array([s.grain for s in surfaces]).reshape(-1, 3),
         can_collide=np.ascontiguousarray(groups.T),
+        edge_can_cross=_edges_can_cross(found, of_nodes[:, used], surfaces),
     )
 
 
@@ -170,6 +171,14 @@ def _nodes_can_collide(
             strand = next(s for s in found.strands if s.first_node <= node < s.first_node + s.node_count)
             rows[_from_clamp(node, strand, gap, clear), column] = False
     return rows
+
+
+def _edges_can_cross(found: Collected, nodes_can_collide: np.ndarray, surfaces: list[Owned]) -> np.ndarray:
+    """Edges of which both nodes meet a surface that is no plane, shape (n_surface, n_edge)."""
+    first = found.column("edge_node", np.int64)
+    curved = np.array([surface.shape.kind != "plane" for surface in surfaces], dtype=bool)
+    both = nodes_can_collide[first] & nodes_can_collide[first + 1] & curved
+    return np.ascontiguousarray(both.T)
 
 
 def _from_clamp(node: int, strand: StrandArrays, gap: np.ndarray, clear: float) -> list[int]:

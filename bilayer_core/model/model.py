@@ -83,6 +83,7 @@ class Surfaces(ReadOnlyArrays):
     rotation: Array  # its own axes in the body's frame, shape (n_surface, 3, 3)
     grain: Array  # forward direction of friction on it in the body's frame, 0 without one, shape (n_surface, 3)
     can_collide: Array  # whether contact points of a group can meet it, shape (n_surface, n_group)
+    edge_can_cross: Array  # whether it could come between the nodes of an edge, shape (n_surface, n_edge)
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
         thinnest[rod.name] = at_edges.thickness.min()
         yield from _of_section(rod, at_edges)
         if scene.contact is not None:
-            yield _of_edges(rod, thinnest[rod.name], scene.contact.barrier_distance)
+            yield _of_edges(rod, longest_edge(scene, rod))
     if scene.contact is not None:
         yield _of_barrier(*min(thinnest.items(), key=lambda item: item[1]), scene.contact.barrier_distance)
 
@@ -143,9 +143,13 @@ def _of_barrier(name: str, thin: float, distance: float) -> Figure:
     )
 
 
-def _of_edges(rod: Rod, thin: float, distance: float) -> Figure:
-    """Of a rod whose least thickness is `thin` [m]."""
-    longest = COARSE * (thin + distance)
+def longest_edge(scene: SceneConfig, rod: Rod) -> float:
+    """Length of edges between whose nodes nothing comes that is not small beside the rod [m]."""
+    return COARSE * float(EdgeFigures(scene, rod).thickness.min() + scene.contact.barrier_distance)
+
+
+def _of_edges(rod: Rod, longest: float) -> Figure:
+    """Of a rod whose edges should not be longer than that [m]."""
     return Figure(
         f"rods.{rod.name}",
         "edge length",

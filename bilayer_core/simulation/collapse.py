@@ -14,6 +14,7 @@ import numpy as np
 from ..engine.step import LEAST_LENGTH
 from ..errors import Remedy
 from ..model.model import Model
+from .crossed import edge_of_strand
 
 Array = np.ndarray
 SHARPEST = math.radians(175.0)
@@ -48,12 +49,6 @@ def collapsed(model: Model, position: Array) -> str:
         bend, turn = int(cosine.argmin()), math.degrees(math.acos(max(cosine.min(), -1.0)))
         return f"the joint behind edge {edge_of_strand(model, int(first[bend]))} is folded by {turn:.1f}°"
     return ""
-
-
-def edge_of_strand(model: Model, edge: int) -> str:
-    """An edge's number within its strand, and the strand."""
-    strand = next(s for s in reversed(model.strands) if s.first_edge <= edge)
-    return f"{edge - strand.first_edge} of {strand.name}"
 
 
 def damp_materials(model: Model) -> Remedy:

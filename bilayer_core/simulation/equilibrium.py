@@ -18,11 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..engine.modes import COUNT, SETTLE
-from ..engine.report import FAILURES
+from ..engine.report import FAILURES, IntegrationReport
 from ..errors import InputError, SimulationError
 from ..model.lit import light_of, part_seen
-from ..model.records.status import MAX_ITERATIONS
+from ..model.records.status import CROSSED, MAX_ITERATIONS
 from ..model.state import NOT_KNOWN, State
+from .crossed import crossed, edge_of_strand
 from .stepper import Stepper
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
@@ -151,7 +152,7 @@ class _Search:
                 state.take(start)
                 length *= SHRINKAGE
                 if length < SHORTEST:
-                    raise self._failure(FAILURES[attempt.status], moved)
+                    raise self._failure(self._why(attempt), moved)
                 continue
             moved = engine.moved
             if np.abs(state.position - first_position).max() > OUT_OF_SIGHT * self.size:
@@ -165,6 +166,13 @@ class _Search:
                 return self._report(attempt.residual * length)
             length = min(GROWTH * length, LONGEST)
         raise self._failure("the shape does not come to rest", moved)
+
+    def _why(self, attempt: IntegrationReport) -> str:
+        """Why a round failed."""
+        if attempt.status != CROSSED:
+            return FAILURES[attempt.status]
+        edge, surface = crossed(self.stepper.model, attempt.pair)
+        return f"edge {edge_of_strand(self.stepper.model, edge)} goes through {surface} between its nodes"
 
     def _report(self, residual: float) -> StaticReport:
         unstable, out_of_plane = self._unstable(self.stepper), 0

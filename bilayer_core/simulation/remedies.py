@@ -13,9 +13,19 @@ from ..errors import Remedy
 from ..integrators.method import Method
 from ..model.impacts import HELD, heaviest, stiffness_that_holds
 from ..model.model import Model
-from ..model.records.status import BEYOND, BLOCKED, GAINS_ENERGY, LINE_SEARCH, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
+from ..model.records.status import (
+    BEYOND,
+    BLOCKED,
+    CROSSED,
+    GAINS_ENERGY,
+    LINE_SEARCH,
+    MAX_ITERATIONS,
+    TOO_INACCURATE,
+    UNSETTLED,
+)
 from ..scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
 from .collapse import damp_materials
+from .crossed import more_stations
 from .step_choice import Steps
 
 NEARLY = 1e3
@@ -52,6 +62,8 @@ def remedy(
         if not _holds(model, speed):
             return _stiffer(model, speed)
         return Remedy("a prescribed body must stop before nothing can give way: change its `motion`")
+    if found.status == CROSSED:
+        return more_stations(model, found.pair)
     farthest, length = float(np.abs(model.start_position).max()), max(rod.path.length for rod in scene.rods)
     if LAST_DIGITS * farthest > (steps.tolerance or DEFAULT_TOLERANCE) * length:
         known = f"{farthest:.1g} m from it positions are known to {LAST_DIGITS * farthest:.1g} m"

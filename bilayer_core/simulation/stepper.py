@@ -18,11 +18,12 @@ from ..engine.step import LEAST_LENGTH
 from ..errors import InputError, SimulationError
 from ..integrators.method import Method
 from ..model.model import Model
-from ..model.records.status import COLLAPSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
+from ..model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
 from ..model.records.step import Configuration
 from ..model.state import NOT_KNOWN, State
-from .collapse import collapsed, edge_of_strand
+from .collapse import collapsed
 from .contact_pairs import ContactOwners
+from .crossed import crossed, edge_of_strand
 from .energy_budget import EnergyLedger
 from .frame_tables import FrameTables
 from .remedies import remedy
@@ -230,6 +231,9 @@ class Stepper:
         if found.status == COLLAPSED:
             edge = f"edge {edge_of_strand(self.model, found.pair)}"
             return f"{edge} has less than {100 * LEAST_LENGTH:g} % of its length left in {end}"
+        if found.status == CROSSED:
+            edge, surface = crossed(self.model, found.pair)
+            return f"edge {edge_of_strand(self.model, edge)} goes through {surface} between its nodes in {end}"
         text = f"{FAILURES[found.status]} in {end}"
         if found.status == GAINS_ENERGY:
             return f"{text} ({found.error:.3g} times what the account of energy allows)"

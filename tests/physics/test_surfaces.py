@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from evaluations import at_rest
+from records_by_hand import record_of
 from sample_scenes import HALF_SIZES, contact, layer, rod, scene
 
 from bilayer_core import load_scene
@@ -20,12 +21,6 @@ from bilayer_core.model.state import initial_state
 
 surfaces_at, strands_at, bodies_at = record_at(Surfaces), record_at(Strands), record_at(Bodies)
 configuration_at, system_at = record_at(Configuration), record_at(System)
-
-
-def record_of(declared, **values):
-    """A record with these values; its other arrays are empty, its other numbers zero."""
-    absent = declared.absent()
-    return declared(**{name: getattr(absent, name) for name in declared.names} | values)
 
 
 @kernel

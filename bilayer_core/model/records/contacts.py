@@ -42,6 +42,7 @@ class Surfaces:
     position: Matrix
     rotation: Stack
     can_collide: FlagTable
+    edge_can_cross: FlagTable  # see `contact.crossing`
     near_contact_point: Indices = ("near",)
     near_surface: Indices = ("near",)
     near_gap: Vector = ("near",)
@@ -51,6 +52,9 @@ class Surfaces:
     listed_contact_point: Matrix = ("contact_point", 3)
     listed_surface_position: Matrix = ("surface", 3)
     listed_surface_rotation: Stack = ("surface", 3, 3)
+    first_position: Matrix = ("node", 3)  # of nodes at the start of the step [m]
+    first_surface_position: Matrix = ("surface", 3)
+    first_surface_rotation: Stack = ("surface", 3, 3)
 
 
 @record

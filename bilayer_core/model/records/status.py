@@ -11,7 +11,7 @@ BORDER_CAPACITY_EXCEEDED = 3
 """Contacts of rods have more columns than the border has capacity for."""
 INPUTS_END = 4
 """What acts from outside is not known as far as the step reaches."""
-CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND, UNSETTLED, COLLAPSED = (
+CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND, UNSETTLED, COLLAPSED, CROSSED = (
     5,
     10,
     11,
@@ -21,6 +21,7 @@ CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND,
     15,
     16,
     17,
+    18,
 )
 """How a step ended; from `MAX_ITERATIONS` on it failed."""
 TOO_INACCURATE = 20
