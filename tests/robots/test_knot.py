@@ -6,6 +6,8 @@ the contact forces between the two strands of the braid, which slide on each oth
 for h ≪ R P tends to 0.492 (B/R²) √(R/h) (Audoly, Clauvelin, Neukirch 2007; `loose_braid` finds the constant anew).
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.optimize import nnls
@@ -134,6 +136,12 @@ def knot(*changes, seconds=None, **options):
     return simulator
 
 
+@cache
+def usual():
+    """The bundled scene after nine seconds, for tests that do not go on from there."""
+    return knot(seconds=9.0)
+
+
 def test_it_is_an_overhand_knot_all_the_time_and_the_thread_never_meets_itself():
     simulator = knot(seconds=0.02)
     determinants, radii = [], []
@@ -160,7 +168,7 @@ def test_with_one_crossing_the_other_way_it_is_no_knot_and_comes_undone():
 
 
 def test_both_hands_pull_as_hard():
-    simulator = knot(seconds=9.0)
+    simulator = usual()
     left, right = (simulator.clamps[f"thread.{end}"].wrench[0] for end in ("start", "end"))
     assert left == pytest.approx(-right, rel=0.02)
 
@@ -204,6 +212,6 @@ def test_tension_and_contact_forces_tend_to_those_of_a_loose_knot():
     ids=str,
 )
 def test_no_model_tolerance_or_integrator_changes_loop_or_tension(method):
-    simulator, other = knot(seconds=9.0), knot(seconds=9.0, **method)
+    simulator, other = usual(), knot(seconds=9.0, **method)
     assert loop_radius(other) == pytest.approx(loop_radius(simulator), rel=0.02)
     assert tension(other) == pytest.approx(tension(simulator), rel=0.05)

@@ -12,6 +12,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 
+from bilayer_core.jit.compile_all import compile_all, is_complete
 from bilayer_core.record.log_reader import read_info
 from bilayer_sim_ros.conversions import to_seconds
 
@@ -27,11 +28,10 @@ def control_law(now):
 
 
 @pytest.fixture(scope="module")
-def kernels(tmp_path_factory):
-    """A cache of kernels for nodes of this module alone: what two processes compile may differ in rounding."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("NUMBA_CACHE_DIR", str(tmp_path_factory.mktemp("kernels")))
-        yield
+def kernels():
+    """All kernels, before nodes start: what two processes compile may differ in rounding."""
+    if not is_complete():
+        compile_all()
 
 
 def run_with_a_late_controller(start, connect, domain, log, seed, **parameters):

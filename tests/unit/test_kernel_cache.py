@@ -13,45 +13,45 @@ import pytest
 from bilayer_core.jit import cache, compile_all
 
 PROGRAM = """
-import numpy as np
+import math
+
 from bilayer_core import load_scene
-from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.engine.engine import error_norm_of
+from bilayer_core.engine.error_norm import step_defect
 from bilayer_core.model.build import build_model
+from bilayer_core.model.records.step import StateArrays
 from bilayer_core.model.state import initial_state
 
-model = build_model(load_scene("cantilever"), "laminate", 2)
-evaluator, state = Evaluator(model), initial_state(model)
-at = evaluator.new()
-evaluator.take_state(state, at)
-evaluator.transport_frames(at, np.zeros(model.edge_count), at)
-nothing = np.zeros((len(model.joint_a), 3))
-evaluator.stand_still(state, at, 1.0, np.full(model.edge_count, 0.01), nothing, np.zeros(0))
-evaluator.start_stage(at)
-print(repr(evaluator.evaluate(at, ["stretching"])["stretching"]))
+model = build_model(load_scene("gripping"), "laminate", 3)
+before, after = initial_state(model), initial_state(model)
+ball = model.bodies.body_of_free[0]
+turn = [[math.cos(0.1), -math.sin(0.1), 0], [math.sin(0.1), math.cos(0.1), 0], [0, 0, 1]]
+after.body_rotation[ball] = turn @ after.body_rotation[ball]
+ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.names}) for state in (before, after))
+print(repr(step_defect(error_norm_of(model), *ends, 0.0)))
 """
-CALLED, LENGTH = "bilayer_core/kinematics/frames.py", "math.sqrt(x * x + y * y + z * z)"
-"""A file of functions that kernels call, and what it takes for the length of an edge."""
+CALLED, TURN = "bilayer_core/kinematics/rotating.py", "return factor * x, factor * y, factor * z"
+"""A file of functions that kernels call, and what one of them says of the turn of a body."""
 
 
-def _energy(tree, folder):
+def _defect(tree, folder):
     environment = os.environ | {"PYTHONPATH": str(tree), "NUMBA_CACHE_DIR": str(folder), "BILAYER_JIT_AHEAD": "0"}
     run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, cwd=tree)
     assert run.returncode == 0, run.stderr
     return float(run.stdout)
 
 
-@pytest.mark.slow
 def test_an_edit_of_a_function_that_kernels_call_changes_the_result_at_once(root, tmp_path):
     tree, folder = tmp_path / "tree", tmp_path / "cache"
     for part in ("bilayer_core", "config"):
         shutil.copytree(root / part, tree / part, ignore=shutil.ignore_patterns("__pycache__"))
     path = tree / CALLED
     source = path.read_text(encoding="utf-8")
-    assert LENGTH in source
-    first = _energy(tree, folder)
-    assert _energy(tree, folder) == first > 0.0  # ½ EA η² L
-    path.write_text(source.replace(LENGTH, f"1.03 * {LENGTH}"), encoding="utf-8")
-    assert _energy(tree, folder) == pytest.approx(4.0 * first, rel=1e-9)
+    assert source.count(TURN) == 1
+    first = _defect(tree, folder)
+    assert _defect(tree, folder) == first > 0.0
+    path.write_text(source.replace(TURN, "return 3.0 * factor * x, 3.0 * factor * y, 3.0 * factor * z"), encoding="utf-8")
+    assert _defect(tree, folder) == pytest.approx(3.0 * first, rel=1e-12)
     assert len(list(folder.iterdir())) == 2
 
 
