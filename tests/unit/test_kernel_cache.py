@@ -31,6 +31,7 @@ ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.names}
 print(repr(step_defect(error_norm_of(model), *ends, 0.0)))
 """
 CALLED, TURN = "bilayer_core/kinematics/rotating.py", "return factor * x, factor * y, factor * z"
+TRIPLED = "return 3.0 * factor * x, 3.0 * factor * y, 3.0 * factor * z"
 """A file of functions that kernels call, and what one of them says of the turn of a body."""
 
 
@@ -50,7 +51,7 @@ def test_an_edit_of_a_function_that_kernels_call_changes_the_result_at_once(root
     assert source.count(TURN) == 1
     first = _defect(tree, folder)
     assert _defect(tree, folder) == first > 0.0
-    path.write_text(source.replace(TURN, "return 3.0 * factor * x, 3.0 * factor * y, 3.0 * factor * z"), encoding="utf-8")
+    path.write_text(source.replace(TURN, TRIPLED), encoding="utf-8")
     assert _defect(tree, folder) == pytest.approx(3.0 * first, rel=1e-12)
     assert len(list(folder.iterdir())) == 2
 
