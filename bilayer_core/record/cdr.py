@@ -81,6 +81,17 @@ class Template:
         """Writable arrays into the message, one for each field. Nothing can be appended afterwards."""
         return {name: decode(self._buffer, field) for name, field in self.fields.items()}
 
+    def numbers(self, dtype: str) -> np.ndarray:
+        """View of all that it has as numbers of one type, which is to be complete; see `place`."""
+        size = np.dtype(dtype).itemsize
+        count = (len(self._buffer) - len(HEADER)) // size
+        return np.frombuffer(self._buffer, dtype, count, len(HEADER))
+
+    def place(self, name: str) -> int:
+        """Where an array that changes begins among the numbers of its type."""
+        offset, dtype, _ = self.fields[name]
+        return (offset - len(HEADER)) // dtype.itemsize
+
     def set_time(self, time: float) -> None:
         """Write simulation time [s] into every stamp."""
         stamp = stamp_of(nanoseconds(time))

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bilayer_core.kinematics.marker_lines import place_arrows
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
 from bilayer_core.observed.frame import Description, Frame, ShapeInfo
 from bilayer_core.record.cdr import Template
@@ -71,26 +72,9 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarr
     ndarray
         Pairs of points [m], shape (6 arrows, 3).
     """
-    x, y, z = forces.T
-    size = np.sqrt(x * x + y * y + z * z)
-    direction = np.zeros(forces.shape)
-    direction[:, 2] = 1.0
-    np.divide(forces, size[:, None], out=direction, where=size[:, None] > 0.0)
-    length = ARROW_DECADE * np.log10(1 + size / unit)
-    # Across the arrow: direction × z, or direction × x if it is upright.
-    x, y, z = direction.T
-    upright, sideways = np.abs(z) > 0.9, np.empty(forces.shape)
-    sideways[:, 0], sideways[:, 1], sideways[:, 2] = across = (
-        np.where(upright, 0.0, y),
-        np.where(upright, z, -x),
-        np.where(upright, -y, 0.0),
-    )
-    sideways *= (HEAD_HALF_WIDTH * length / np.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2))[:, None]
-    tip = origins + length[:, None] * direction
-    base = tip - (HEAD_SHARE * length)[:, None] * direction
-    points = np.empty((len(forces), 6, 3))
-    points[:, 0], points[:, 1], points[:, 2], points[:, 4] = origins, tip, tip, tip
-    points[:, 3], points[:, 5] = base + sideways, base - sideways
+    points, units = np.empty((len(forces), 6, 3)), np.empty(len(forces))
+    units[:] = unit
+    place_arrows(origins, forces, units, ARROW_DECADE, HEAD_SHARE, HEAD_HALF_WIDTH, points)
     return points.reshape(-1, 3)
 
 
@@ -169,15 +153,8 @@ class MarkerEncoder:
 
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
-        layers = range(len(description.layers))
-        self._ribbons = Ribbons(
-            description,
-            node_frames,
-            STRAIN_LIMIT,
-            points=[views[f"points{i}"].reshape(-1, 2, 3) for i in layers],
-            colours=[views[f"colours{i}"].reshape(-1, 2, 4) for i in layers],
-            spacings=[views[f"spacing{i}"] for i in layers],
-        )
+        self._ribbons = Ribbons(description, node_frames, STRAIN_LIMIT, template)
+        force_arrows(np.empty((0, 3)), np.empty((0, 3)))  # compiled now, and not where a log's first frame waits for it
         self._clamp_arrows = [(views[name], part, unit) for name, _, part, unit in arrows]
         self._joint_poses = [views[f"joint{i}"] for i in range(len(description.joints))]
         self._body_poses = [views[f"pose{i}"] for i in range(len(description.bodies))]
