@@ -2,7 +2,7 @@
 
 Its `Writer` makes a dozen Python objects for each message, half of what a log cost: a log has a thousand messages of a
 hundred bytes in a simulated second. Here a message is two appends to the chunk in hand.
-Records, their layout and the order in which they stand in the file are the library's.
+Records, their layout and the order in which they stand in the file are the library's; blocks of lz4 are not linked.
 """
 
 from __future__ import annotations
@@ -200,7 +200,8 @@ class McapFile:
         times = [time for index in indexes.values() for time in index[::2]]
         start, end = min(times), max(times)
         self._span = [min(start, self._span[0]) if self._chunks else start, max(end, self._span[1])]
-        data = lz4.frame.compress(chunk)
+        # Blocks that are not linked take four fifths of the time, for a hundredth more bytes.
+        data = lz4.frame.compress(chunk, block_linked=False)
         common = {
             "compression": "lz4",
             "message_start_time": start,
