@@ -2,7 +2,7 @@
 
 Its `Writer` makes a dozen Python objects for each message, half of what a log cost: a log has a thousand messages of a
 hundred bytes in a simulated second. Here a message is two appends to the chunk in hand.
-Records, their layout and the order in which they stand in the file are the library's; blocks of lz4 are not linked.
+Records, their layout and the order in which they stand in the file are the library's.
 """
 
 from __future__ import annotations
@@ -113,6 +113,13 @@ class McapFile:
         self._chunk += self._bytes_of(channel)
         return channel.id
 
+    def describe_outside(self) -> None:
+        """Write the types and topics announced so far outside of chunks, too: if the first chunk is lost, what follows
+        can be read.
+        """
+        for record in (*self._schemas, *self._channels):
+            self._write(record)
+
     def add_message(self, channel: int, time: int, sequence: int, data: bytes) -> None:
         """Put a message of a time [ns] into the chunk in hand, and write that if it is full."""
         head = _MESSAGE.pack(MESSAGE, _MESSAGE_HEAD + len(data), channel)
@@ -200,8 +207,7 @@ class McapFile:
         times = [time for index in indexes.values() for time in index[::2]]
         start, end = min(times), max(times)
         self._span = [min(start, self._span[0]) if self._chunks else start, max(end, self._span[1])]
-        # Blocks that are not linked take four fifths of the time, for a hundredth more bytes.
-        data = lz4.frame.compress(chunk, block_linked=False)
+        data = lz4.frame.compress(chunk)
         common = {
             "compression": "lz4",
             "message_start_time": start,
