@@ -42,7 +42,6 @@ from ..forces.inertia import second_moment_beyond
 from ..jit import call, kernel, piece
 from ..jit.stack import stack_matrix
 from ..kinematics.copying import copy
-from ..kinematics.rotating import inertia_tensor
 from ..kinematics.vector import row
 from ..model.force_list import Kind, kinds
 from ..model.force_slots import NAMES, slot_of
@@ -51,6 +50,7 @@ from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of
+from .kinetic import kinetic_energy
 from .powers import (
     BY_FLOW,
     DRIVEN,
@@ -98,21 +98,7 @@ DAMPING_SHARE = 0.01
 @kernel
 def _kinetic(p, state, at):
     """Kinetic energy of nodes, edges, free bodies and the fluid [J]."""
-    strands, bodies, fluid, energy = p.strands, p.bodies, p.fluid, 0.0
-    for i in range(strands.node_mass.shape[0]):
-        v0, v1, v2 = row(state.velocity, i)
-        energy += 0.5 * strands.node_mass[i] * (v0 * v0 + v1 * v1 + v2 * v2)
-    for e in range(strands.spin_inertia.shape[0]):
-        energy += 0.5 * strands.spin_inertia[e] * state.spin[e] ** 2
-    tensor = stack_matrix(3, 3)
-    for f in range(bodies.mass.shape[0]):
-        b = bodies.body_of_free[f]
-        inertia_tensor(bodies.second_moment, f, state.body_rotation, b, tensor)
-        for c in range(3):
-            energy += 0.5 * bodies.mass[f] * state.body_velocity[b, c] ** 2
-            for k in range(3):
-                w = state.body_angular_velocity
-                energy += 0.5 * tensor[c, k] * w[b, c] * w[b, k]
+    fluid, energy = p.fluid, kinetic_energy(p, state)
     if fluid.exists:
         copy(state.velocity, fluid.node_velocity)
         copy(state.spin, fluid.spin)

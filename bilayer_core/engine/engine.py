@@ -23,6 +23,7 @@ from .actuation import Actuation
 from .energy_account import open_account
 from .error_norm import ErrorNorm
 from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
+from .look import Look, look_at
 from .potential import add_forces, expand_to_unknowns
 from .report import FAILURES, IntegrationReport
 from .run_extrema import count_shape
@@ -77,6 +78,7 @@ class Engine:
         self._error_norm, self._counts = error_norm_of(model), empty_counts()
         self._state: State | None = None
         self._integration: Integration | None = None
+        self._no_joints = Joints.absent()
         self._evaluated = True  # whether forces are those of `end`
         self.extrema = RunExtrema.zeros(
             sizes_of(model),
@@ -182,7 +184,7 @@ class Engine:
     @property
     def joints(self) -> Joints:
         """Joints between bodies, with what they exerted there; without any, absent."""
-        return next((own for own in self._storage.problem.forces.holds if isinstance(own, Joints)), Joints.absent())
+        return next((own for own in self._storage.problem.forces.holds if isinstance(own, Joints)), self._no_joints)
 
     @property
     def mechanisms(self) -> Mechanisms:
@@ -229,6 +231,12 @@ class Engine:
             expand_to_unknowns(problem, self.end)
             problem.sums.energy[:] = energy
             self._evaluated = True
+
+    def look_at(self, state: State, seen: Look) -> None:
+        """Have seen what there is to see of a state that is `end`, with forces as they are there."""
+        self.evaluate_end()
+        run = self._parts_for(state)
+        look_at(run.problem, self.joints, run.state, self.end, seen)
 
     def open_account(self, state: State) -> None:
         """Begin with the energy of a state that was evaluated, unless its account is its own."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..jit import entry, kernel
+from .rotating import quaternion_of
 from .vector import combine, cross, dot, row, scaled
 
 
@@ -22,20 +23,12 @@ def frames_at_nodes(
         m1 = combine(1.0, row(directors, before), 1.0, row(directors, after))
         m1 = _unit(combine(1.0, m1, -dot(m1, m3), m3))
         m2 = cross(m3, m1)
-        trace = m1[0] + m2[1] + m3[2]
-        if trace >= max(m1[0], m2[1], m3[2]):
-            x, y, z, w = m2[2] - m3[1], m3[0] - m1[2], m1[1] - m2[0], 1.0 + trace
-        elif m1[0] >= max(m2[1], m3[2]):
-            x, y, z, w = 1.0 + m1[0] - m2[1] - m3[2], m2[0] + m1[1], m3[0] + m1[2], m2[2] - m3[1]
-        elif m2[1] >= m3[2]:
-            x, y, z, w = m2[0] + m1[1], 1.0 + m2[1] - m3[2] - m1[0], m3[1] + m2[2], m3[0] - m1[2]
-        else:
-            x, y, z, w = m3[0] + m1[2], m3[1] + m2[2], 1.0 + m3[2] - m1[0] - m2[1], m1[1] - m2[0]
-        scale = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)
-        quaternions_out[node, 0] = scale * x
-        quaternions_out[node, 1] = scale * y
-        quaternions_out[node, 2] = scale * z
-        quaternions_out[node, 3] = scale * w
+        (
+            quaternions_out[node, 0],
+            quaternions_out[node, 1],
+            quaternions_out[node, 2],
+            quaternions_out[node, 3],
+        ) = quaternion_of(m1[0], m2[0], m3[0], m1[1], m2[1], m3[1], m1[2], m2[2], m3[2])
         normals_out[node, 0], normals_out[node, 1], normals_out[node, 2] = m1
         widths_out[node, 0], widths_out[node, 1], widths_out[node, 2] = m2
 

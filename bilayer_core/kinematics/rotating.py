@@ -134,6 +134,22 @@ def inertia_tensor(second_moment, f, rotation, b, out):
 
 
 @kernel
+def quaternion_of(m00, m01, m02, m10, m11, m12, m20, m21, m22):
+    """Unit quaternion x y z w of a rotation matrix by its largest component (Shepperd 1978), as a tuple."""
+    trace = m00 + m11 + m22
+    if trace >= max(m00, m11, m22):
+        x, y, z, w = m21 - m12, m02 - m20, m10 - m01, 1.0 + trace
+    elif m00 >= max(m11, m22):
+        x, y, z, w = 1.0 + m00 - m11 - m22, m10 + m01, m20 + m02, m21 - m12
+    elif m11 >= m22:
+        x, y, z, w = m10 + m01, 1.0 + m11 - m22 - m00, m21 + m12, m02 - m20
+    else:
+        x, y, z, w = m20 + m02, m21 + m12, 1.0 + m22 - m00 - m11, m10 - m01
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    return scale * x, scale * y, scale * z, scale * w
+
+
+@kernel
 def solve_three(matrix, x, y, z):
     """Solution of a regular 3 × 3 system by Cramer's rule, as a tuple."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
+
+from .rotating import quaternion_of
 
 
 def skew(vector: np.ndarray) -> np.ndarray:
@@ -49,22 +49,8 @@ def matrix_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
 
 
 def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Unit quaternion x y z w (w ≥ 0) of a rotation matrix, by its largest component (Shepperd 1978), shape (4,)."""
-    m = matrix.tolist()  # a tenth of the time of indexing an array
-    trace = m[0][0] + m[1][1] + m[2][2]
-    candidates = [m[0][0], m[1][1], m[2][2], trace]
-    largest = candidates.index(max(candidates))
-    parts = [0.0, 0.0, 0.0, 0.0]
-    if largest == 3:
-        parts = [m[2][1] - m[1][2], m[0][2] - m[2][0], m[1][0] - m[0][1], 1.0 + trace]
-    else:
-        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
-        parts[i] = 1.0 + m[i][i] - m[j][j] - m[k][k]
-        parts[j] = m[j][i] + m[i][j]
-        parts[k] = m[k][i] + m[i][k]
-        parts[3] = m[k][j] - m[j][k]
-    quaternion = np.array(parts)
-    quaternion /= math.sqrt(quaternion @ quaternion)
+    """Unit quaternion x y z w (w ≥ 0) of a rotation matrix, shape (4,); see `rotating.quaternion_of`."""
+    quaternion = np.array(quaternion_of.py_func(*(entry for row in matrix.tolist() for entry in row)))
     return quaternion if quaternion[3] >= 0.0 else -quaternion
 
 

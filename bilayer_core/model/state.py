@@ -83,7 +83,7 @@ class State:
             setattr(self, name, self.values[start : start + part.size].reshape(part.shape))
             start += part.size
             if name == "seal":
-                self._place_of_seal = start - 1
+                self.place_of_seal = start - 1
 
     def copy(self) -> State:
         """A state of its own with the same values."""
@@ -95,9 +95,7 @@ class State:
 
     def flat(self) -> Array:
         """All parts in order, as one array of float64, with a seal: what has one is as a run left it."""
-        flat = self.values.copy()
-        flat[self._place_of_seal] = zlib.crc32(flat)
-        return flat
+        return sealed(self.values, self.place_of_seal)
 
     def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
         """Name and shape of each part of `flat`."""
@@ -127,12 +125,19 @@ class State:
         bad = np.flatnonzero(~finite)
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
-        seal, conditions = flat[self._place_of_seal], self.conditions.copy()
-        flat[self._place_of_seal] = 0.0
+        seal, conditions = flat[self.place_of_seal], self.conditions.copy()
+        flat[self.place_of_seal] = 0.0
         self.values[:] = flat
         untouched = seal == zlib.crc32(flat) and np.array_equal(self.conditions, conditions)
         self.conditions[:] = conditions
         return untouched
+
+
+def sealed(values: Array, place: int) -> Array:
+    """A flat state of the values of one, with a seal at its place."""
+    flat = values.copy()
+    flat[place] = zlib.crc32(values)
+    return flat
 
 
 PARTS = tuple(part.name for part in fields(State))

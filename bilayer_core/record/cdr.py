@@ -39,6 +39,7 @@ class Template:
     def __init__(self) -> None:
         self._buffer = bytearray(HEADER)
         self.stamps: list[int] = []
+        self._of_stamps: tuple[np.ndarray, np.ndarray] | None = None
         self.fields: dict[str, tuple[int, np.dtype, tuple[int, ...]]] = {}
 
     def align(self, size: int) -> None:
@@ -81,11 +82,24 @@ class Template:
         """Writable arrays into the message, one for each field. Nothing can be appended afterwards."""
         return {name: decode(self._buffer, field) for name, field in self.fields.items()}
 
+    def numbers(self, dtype: str) -> np.ndarray:
+        """View of all that it has as numbers of one type, which is to be complete; see `place`."""
+        size = np.dtype(dtype).itemsize
+        count = (len(self._buffer) - len(HEADER)) // size
+        return np.frombuffer(self._buffer, dtype, count, len(HEADER))
+
+    def place(self, name: str) -> int:
+        """Where an array that changes begins among the numbers of its type."""
+        offset, dtype, _ = self.fields[name]
+        return (offset - len(HEADER)) // dtype.itemsize
+
     def set_time(self, time: float) -> None:
         """Write simulation time [s] into every stamp."""
-        stamp = stamp_of(nanoseconds(time))
-        for offset in self.stamps:
-            self._buffer[offset : offset + _STAMP.size] = stamp
+        if self._of_stamps is None:
+            places = np.array(self.stamps, dtype=np.intp)[:, None] + np.arange(_STAMP.size)
+            self._of_stamps = np.frombuffer(self._buffer, np.uint8), places
+        buffer, places = self._of_stamps
+        buffer[places] = np.frombuffer(stamp_of(nanoseconds(time)), np.uint8)
 
     def __len__(self) -> int:
         return len(self._buffer)

@@ -49,7 +49,7 @@ PRESSURE_MAP = _build_map(PRESSURE_ANCHORS)
 def map_colours(values: np.ndarray, low: float, high: float, colours: np.ndarray) -> np.ndarray:
     """Colours of `values` from a map whose ends are those of `low` and `high`: sRGBA from 0 to 1, shape + (4,)."""
     index = np.rint((values - low) * ((STEPS - 1) / (high - low)))
-    return colours[np.clip(index, 0, STEPS - 1).astype(np.intp)]
+    return colours.take(np.minimum(np.maximum(index, 0.0), STEPS - 1.0).astype(np.intp), axis=0)
 
 
 def strain_colours(strain: np.ndarray, limit: float) -> np.ndarray:

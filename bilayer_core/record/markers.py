@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bilayer_core.kinematics.marker_lines import place_arrows
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
 from bilayer_core.observed.frame import Description, Frame, ShapeInfo
 from bilayer_core.record.cdr import Template
@@ -71,26 +72,9 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarr
     ndarray
         Pairs of points [m], shape (6 arrows, 3).
     """
-    x, y, z = forces.T
-    size = np.sqrt(x * x + y * y + z * z)
-    direction = np.zeros(forces.shape)
-    direction[:, 2] = 1.0
-    np.divide(forces, size[:, None], out=direction, where=size[:, None] > 0.0)
-    length = ARROW_DECADE * np.log10(1 + size / unit)
-    # Across the arrow: direction × z, or direction × x if it is upright.
-    x, y, z = direction.T
-    upright, sideways = np.abs(z) > 0.9, np.empty(forces.shape)
-    sideways[:, 0], sideways[:, 1], sideways[:, 2] = across = (
-        np.where(upright, 0.0, y),
-        np.where(upright, z, -x),
-        np.where(upright, -y, 0.0),
-    )
-    sideways *= (HEAD_HALF_WIDTH * length / np.sqrt(across[0] ** 2 + across[1] ** 2 + across[2] ** 2))[:, None]
-    tip = origins + length[:, None] * direction
-    base = tip - (HEAD_SHARE * length)[:, None] * direction
-    points = np.empty((len(forces), 6, 3))
-    points[:, 0], points[:, 1], points[:, 2], points[:, 4] = origins, tip, tip, tip
-    points[:, 3], points[:, 5] = base + sideways, base - sideways
+    points, units = np.empty((len(forces), 6, 3)), np.empty(len(forces))
+    units[:] = unit
+    place_arrows(origins, forces, units, ARROW_DECADE, HEAD_SHARE, HEAD_HALF_WIDTH, points)
     return points.reshape(-1, 3)
 
 
@@ -129,13 +113,13 @@ class MarkerEncoder:
             template.put("<u4", count)
             template.array(f"colours{index}", "<f4", (count, 4))
             _tail(template)
-        self._own_poses: list[np.ndarray] = []
+        carried: list[tuple[int, np.ndarray, str]] = []
         hub = max(strand.width.max() for strand in description.strands)
         for index, body in enumerate(description.bodies):
             shape, size, pose = CUBE, (hub,) * 3, np.array(_IDENTITY)
             if body.shape:
                 shape, size, pose = shape_marker(body.shape)
-            self._own_poses.append(pose)
+            carried.append((index, pose, f"pose{index}"))
             _head(template, f"bodies/{body.name}", shape, BODY_COLOUR, size, pose_field=f"pose{index}")
             template.put("<u4", 0, 0)
             _tail(template)
@@ -144,11 +128,12 @@ class MarkerEncoder:
             _head(template, f"obstacles/{obstacle.name}", shape, OBSTACLE_COLOUR, size, pose)
             template.put("<u4", 0, 0)
             _tail(template)
-        self._joints: list[tuple[int, np.ndarray]] = []
         for index, joint in enumerate(description.joints):
             shape, size, pose = shape_marker(joint.shape)
-            self._joints.append((joint.body, pose))
-            _head(template, joint.name, shape, JOINT_COLOUR, size, pose, pose_field=f"joint{index}")
+            if joint.body >= 0:
+                carried.append((joint.body, pose, f"joint{index}"))
+            moving = f"joint{index}" if joint.body >= 0 else ""
+            _head(template, joint.name, shape, JOINT_COLOUR, size, pose, pose_field=moving)
             template.put("<u4", 0, 0)
             _tail(template)
         for name, colour, _, _ in arrows:
@@ -169,31 +154,19 @@ class MarkerEncoder:
 
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
-        layers = range(len(description.layers))
-        self._ribbons = Ribbons(
-            description,
-            node_frames,
-            STRAIN_LIMIT,
-            points=[views[f"points{i}"].reshape(-1, 2, 3) for i in layers],
-            colours=[views[f"colours{i}"].reshape(-1, 2, 4) for i in layers],
-            spacings=[views[f"spacing{i}"] for i in layers],
-        )
+        self._ribbons = Ribbons(description, node_frames, STRAIN_LIMIT, template)
+        force_arrows(np.empty((0, 3)), np.empty((0, 3)))  # compiled now, and not where a log's first frame waits for it
         self._clamp_arrows = [(views[name], part, unit) for name, _, part, unit in arrows]
-        self._joint_poses = [views[f"joint{i}"] for i in range(len(description.joints))]
-        self._body_poses = [views[f"pose{i}"] for i in range(len(description.bodies))]
+        self._carried = [(body, _Carried(own), views[field]) for body, own, field in carried]
 
     def encode(self, frame: Frame) -> bytes:
         """The message for `frame`."""
         nodes = self._nodes
         nodes.update(frame)
         self._ribbons.show(frame)
-        for index, pose in enumerate(self._body_poses):
-            _place(pose, frame.body_positions[index], frame.body_quaternions[index], self._own_poses[index])
-        for (body, own), pose in zip(self._joints, self._joint_poses, strict=True):
-            if body < 0:
-                pose[:] = own
-            else:
-                _place(pose, frame.body_positions[body], frame.body_quaternions[body], own)
+        positions, quaternions = frame.body_positions, frame.body_quaternions
+        for body, carried, pose in self._carried:
+            carried.place(positions[body], quaternions[body], pose)
         self._template.set_time(frame.time)
 
         forces = frame.contact_forces
@@ -220,12 +193,19 @@ class MarkerEncoder:
         return arrows[begin:]
 
 
-def _place(pose_out: np.ndarray, position: np.ndarray, quaternion: np.ndarray, own: np.ndarray) -> None:
-    """Pose in the world of what has a pose of its own in the frame of a body."""
-    pose_out[:3] = position
-    if own[:3].any():
-        pose_out[:3] += matrix_from_quaternion(quaternion) @ own[:3]
-    pose_out[3:] = quaternion if own[6] == 1.0 else quaternion_product(quaternion, own[3:])
+class _Carried:
+    """What has a pose of its own in the frame of a body, or of the world."""
+
+    def __init__(self, own: np.ndarray):
+        self._own, self._is_away, self._is_turned = own, bool(own[:3].any()), bool(own[6] != 1.0)
+
+    def place(self, position: np.ndarray, quaternion: np.ndarray, pose_out: np.ndarray) -> None:
+        """Write its pose in the world."""
+        pose_out[:3], pose_out[3:] = position, quaternion
+        if self._is_away:
+            pose_out[:3] += matrix_from_quaternion(quaternion) @ self._own[:3]
+        if self._is_turned:
+            pose_out[3:] = quaternion_product(quaternion, self._own[3:])
 
 
 def _head(

@@ -113,6 +113,13 @@ class McapFile:
         self._chunk += self._bytes_of(channel)
         return channel.id
 
+    def describe_outside(self) -> None:
+        """Write the types and topics announced so far outside of chunks, too: if the first chunk is lost, what follows
+        can be read.
+        """
+        for record in (*self._schemas, *self._channels):
+            self._write(record)
+
     def add_message(self, channel: int, time: int, sequence: int, data: bytes) -> None:
         """Put a message of a time [ns] into the chunk in hand, and write that if it is full."""
         head = _MESSAGE.pack(MESSAGE, _MESSAGE_HEAD + len(data), channel)

@@ -293,6 +293,7 @@ class _LogFile:
                     schemas[spec.type] = self._log.add_schema(spec.type, schema_text(spec.type))
                 channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: _profile(spec)})
                 self._topics[spec.name] = channel
+            self._log.describe_outside()
             self._log.flush()
             self._sync()
             undo.pop_all()

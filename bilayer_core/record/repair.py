@@ -155,6 +155,8 @@ class _Repair:
             self._take(place)
             chunk = place if place.opcode == CHUNK else chunk
         self._start("", "")
+        for number in self._channels:
+            self._register(number)
         if self._unknown:
             self._lose(f"{_count(self._unknown, 'message')} of channels that nothing describes")
         found = self._found
@@ -325,9 +327,9 @@ class _Repair:
                 schema = parse(Schema, inside[start:end])
                 self._schemas[schema.id] = schema
             elif opcode == CHANNEL:
+                # Registered when a message comes: those in chunks, which have checksums, before those outside.
                 channel = parse(Channel, inside[start:end])
                 self._channels[channel.id] = channel
-                self._register(channel.id)
 
     def _register(self, number: int) -> int | None:
         """The number of a channel in the new file."""

@@ -1,140 +1,47 @@
-"""Frames that cost the stepping thread copies alone: what is derived is computed by who asks for it, in its thread."""
+"""Frames, which cost the thread of the steps a look and two copies: what else is derived, who asks for it computes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from ..kinematics.rotation import quaternion_from_matrix
-from ..model.state import State
+from ..model.state import State, sealed
 from ..observed.frame import Frame
-from . import observation as observe
-from .contact_pairs import Pairs
-from .fluid_energy import energy_of_fluid
+from .observation import energies, positions_with_points, velocities_with_points
+from .parts import Parts
 from .statistics import RunStatistics, center_of_mass
 from .stepper import Stepper
 
-Array = np.ndarray
-
-
-class _End(NamedTuple):
-    """Of a `Configuration`, what is looked at."""
-
-    length: Array
-    tangent: Array
-    director1: Array
-    arm: Array
-
-
-class _Sums(NamedTuple):
-    """Of `Sums`, likewise."""
-
-    contact_point: Array
-    contact: Array
-    attached: Array
-    edge: Array
-    energy: Array
-
-
-class _Between(NamedTuple):
-    """Of joints or mechanisms between bodies, likewise."""
-
-    body: Array
-    gradient: Array
-
-
-class _State:
-    """Parts of a flat state, as views of it, each when it is asked for."""
-
-    def __init__(self, flat: Array, places: dict[str, tuple[int, int, tuple[int, ...]]]):
-        self._flat, self._places = flat, places
-
-    def __getattr__(self, name: str) -> Array:
-        try:
-            begin, end, shape = self._places[name]
-        except KeyError:
-            raise AttributeError(name) from None
-        part = self.__dict__[name] = self._flat[begin:end].reshape(shape)
-        return part
-
 
 class Capture:
-    """Copies of what derived quantities depend on, which stands for the stepper in functions of `observation`."""
+    """What attributes of a frame are made of: a copy of the state, and of what was seen of it."""
 
     def __init__(self, stepper: Stepper, state: State):
-        self.model, self.tables = stepper.model, stepper.tables
-        engine, at = stepper.engine, stepper.end
-        engine.evaluate_end()
-        sums = engine.sums
-        self.flat = state.flat()
-        self.flat.flags.writeable = False  # parts of it are handed out as they are
-        self.state = _State(self.flat, self.tables.places_in(state))
-        self.end = _End(at.length.copy(), at.tangent.copy(), at.director1.copy(), at.arm.copy())
-        self.sums = _Sums(
-            sums.contact_point[: self.model.node_count + self.model.point_count].copy(),
-            sums.contact.copy(),
-            sums.attached.copy(),
-            sums.edge.copy(),
-            sums.energy.copy(),
-        )
-        between = [_Between(of.body, of.gradient.copy()) for of in observe.between_bodies(stepper)]
-        self.joints = between[0] if self.tables.has_joints else None
-        self.mechanisms = between[-1] if self.tables.has_mechanisms else None
-        self.owners = stepper.contact_owners
-        self.touching = self.owners.touching(engine)
-        of_fluid = len(self.model.fluid_mass) > 0
-        self.fluid_energy = energy_of_fluid(self.model, at, state.velocity, state.spin) if of_fluid else None
-
-    @property
-    def engine(self) -> Capture:
-        """Itself: it has what is asked of an engine, too."""
-        return self
-
-    def positions(self) -> Array:
-        """As in `Frame`, like all that follow."""
-        return observe.positions_with_points(self.model, self.state)
-
-    def velocities(self) -> Array:
-        return observe.velocities_with_points(self.model, self.state)
-
-    def strain(self) -> Array:
-        return observe.node_strain(self.model, self)
-
-    def curvature(self) -> Array:
-        return observe.node_curvature(self.model, self)
-
-    def body_quaternions(self) -> Array:
-        return np.array([quaternion_from_matrix(of) for of in self.state.body_rotation]).reshape(-1, 4)
-
-    def contacts(self) -> Pairs:
-        return self.owners.names_of(self.touching)
-
-    def com(self) -> Array:
-        return center_of_mass(self.model, self.state)
-
-    def energy(self) -> dict[str, float]:
-        return observe.energies(self, self.state, self.fluid_energy)
+        self.model, self.owners = stepper.model, stepper.contact_owners
+        self.seen, self.touching = stepper.look_at(state)
+        self.values, self.place_of_seal = state.values.copy(), state.place_of_seal
+        self.values.flags.writeable = False  # parts of it are handed out as they are
+        self.state = Parts(self.values, stepper.places_in(state))
 
 
 _DERIVED: dict[str, Callable[[Capture], Any]] = {
-    "positions": Capture.positions,
-    "velocities": Capture.velocities,
+    "positions": lambda of: positions_with_points(of.model, of.state),
+    "velocities": lambda of: velocities_with_points(of.model, of.state),
     "directors": lambda of: of.state.director1,
-    "strain": Capture.strain,
-    "curvature": Capture.curvature,
-    "contact_forces": observe.contact_forces,
+    "strain": lambda of: of.seen.strain,
+    "curvature": lambda of: of.seen.curvature,
+    "contact_forces": lambda of: of.seen.contact_force,
     "body_positions": lambda of: of.state.body_position,
-    "body_quaternions": Capture.body_quaternions,
+    "body_quaternions": lambda of: of.seen.quaternion,
     "body_velocities": lambda of: of.state.body_velocity,
     "body_angular_velocities": lambda of: of.state.body_angular_velocity,
-    "contact_wrenches": observe.contact_wrenches,
-    "clamp_wrenches": observe.clamp_wrenches,
-    "com": Capture.com,
-    "contacts": Capture.contacts,
-    "energy": Capture.energy,
+    "contact_wrenches": lambda of: of.seen.contact_wrench,
+    "clamp_wrenches": lambda of: of.seen.clamp_wrench,
+    "com": lambda of: center_of_mass(of.model, of.state),
+    "contacts": lambda of: of.owners.names_of(of.touching),
+    "energy": lambda of: energies(of.model, of.seen),
+    "state": lambda of: sealed(of.values, of.place_of_seal),
 }
 """How attributes of a `Frame` are computed."""
 
@@ -174,6 +81,5 @@ def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStati
         residual=statistics.last_residual,
         substeps=statistics.substeps,
         cpu_time=cpu_time,
-        state=capture.flat,
         rejected=(statistics.rejected, statistics.inaccurate, statistics.gaining),
     )

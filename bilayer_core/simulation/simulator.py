@@ -34,6 +34,7 @@ from .capture import make_frame
 from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
 from .observers import Schedule, first_failure
+from .parts import Parts
 from .plane_watch import PlaneWatch
 from .poses import LEAST_TIME, new_goal
 from .result import RunResult, Termination
@@ -170,7 +171,7 @@ class Simulator:
     @property
     def contact_forces(self) -> Array:
         """Barrier and friction force on each of them [N], shape (nodes, 3)."""
-        return observe.contact_forces(self._evaluated())
+        return self._seen().contact_force
 
     @property
     def com(self) -> Array:
@@ -208,7 +209,7 @@ class Simulator:
 
     @property
     def _present(self) -> Present:
-        return Present(self.model, self._state, self._evaluated)
+        return Present(self.model, self._state, self._evaluated, self._seen)
 
     def _evaluated(self) -> Stepper:
         """The stepper, with forces of the present state."""
@@ -216,16 +217,19 @@ class Simulator:
         self._stepper.engine.evaluate_end()
         return self._stepper
 
+    def _seen(self) -> Parts:
+        """What there is to see of the present state."""
+        self.compile()
+        return self._stepper.look_at(self._state)[0]
+
     @property
     def curvatures(self) -> Array:
         """Curvature χ through the thickness at every node [1/m], shape (nodes,)."""
-        self.compile()
-        return observe.node_curvature(self.model, self._stepper)
+        return self._seen().curvature
 
     def energy(self) -> dict[str, float]:
         """Energy of each term [J]."""
-        self.compile()
-        return observe.energies(self._stepper, self._state)
+        return observe.energies(self.model, self._seen())
 
     @property
     def energy_account(self) -> Array:

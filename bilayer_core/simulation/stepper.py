@@ -11,6 +11,7 @@ import numpy as np
 from ..engine.energy_account import LARGEST
 from ..engine.engine import Engine
 from ..engine.integrate import TIME_ROUNDING, StepControl
+from ..engine.look import Look, look_of
 from ..engine.modes import EVALUATE_STATE
 from ..engine.newton import LAST_DIGITS
 from ..engine.report import FAILURES, IntegrationReport
@@ -25,7 +26,7 @@ from .collapse import collapsed
 from .contact_pairs import ContactOwners
 from .crossed import crossed, edge_of_strand
 from .energy_budget import EnergyLedger
-from .frame_tables import FrameTables
+from .parts import Parts, Places, places_in
 from .remedies import remedy
 from .step_choice import Steps
 from .surroundings import Surroundings
@@ -120,6 +121,7 @@ class Stepper:
         self.engine = Engine(model, method, control, steps.newton_tolerance, max_iterations)
         self.engine.actuation = self.surroundings.actuation
         self.ledger: EnergyLedger | None = None
+        self._places: tuple[int, Places] = (-1, {})
 
     @property
     def same_time(self) -> float:
@@ -132,9 +134,23 @@ class Stepper:
         return self.engine.end
 
     @cached_property
-    def tables(self) -> FrameTables:
-        """What frames of this model are made with."""
-        return FrameTables(self.model, self.engine)
+    def _look(self) -> tuple[Look, Places]:
+        owners = self.contact_owners
+        return look_of(self.model, owners.of_point, owners.of_surface, owners.count)
+
+    def look_at(self, state: State) -> tuple[Parts, np.ndarray]:
+        """What there is to see of a state that was reached or evaluated last, by its names in `engine.look.Look`, and
+        the numbers of the pairs that touch: copies.
+        """
+        seen, places = self._look
+        self.engine.look_at(state, seen)
+        return Parts(seen.values.copy(), places), seen.touching[: seen.touching_count[0]].copy()
+
+    def places_in(self, state: State) -> Places:
+        """Of the parts of a state in its values."""
+        if state.values.size != self._places[0]:
+            self._places = state.values.size, places_in(state)
+        return self._places[1]
 
     @cached_property
     def contact_owners(self) -> ContactOwners:
@@ -161,6 +177,7 @@ class Stepper:
     def compile(self, state: State) -> None:
         """Make a step, for its kernels; `state` stays as it is."""
         self._integrate(state.copy(), math.inf, math.inf, 1)
+        self.look_at(state)
 
     def restart(self, state: State) -> None:
         """Begin again with the first step's length: something has jumped."""

@@ -1,5 +1,7 @@
 """Logs that were cut off or are damaged become ones that strict readers open, with all that is whole."""
 
+import io
+
 import numpy as np
 import pytest
 import synthetic_run
@@ -12,6 +14,7 @@ from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_reader import read_info, read_messages
+from bilayer_core.record.log_records import CHANNEL, SCHEMA, walk
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.repair import repair
 
@@ -146,10 +149,33 @@ def test_random_damage_is_never_kept_silently_and_never_breaks_the_repair(log, t
         assert len(kept) == found.messages and set(kept) <= written
 
 
-def test_messages_without_a_description_of_their_channel_are_told(log, damaged):
+def test_what_follows_a_first_chunk_that_is_lost_is_kept_without_an_index(log, damaged):
+    data, places = bytearray(log.read_bytes()), chunks_of(log)
+    data[places[0].offset + 300] ^= 0xFF
+    found, new = damaged(bytes(data[: places[3].begin]))  # neither the first chunk nor the index describes channels
+    assert (found.whole, found.chunks, len(found.lost)) == (False, 2, 1)
+    kept = messages_of(new)
+    assert kept == [of for of in messages_of(log) if of in set(kept)] and found.messages == len(kept) > 100
+    assert_strict_readers_open(new, found.messages)
+    assert len(read_log(new).times) > 10
+
+
+def test_a_description_outside_of_chunks_that_is_damaged_yields_to_that_inside(log, damaged):
     data = bytearray(log.read_bytes())
-    data[chunks_of(log)[0].offset + 300] ^= 0xFF
-    found, new = damaged(bytes(data[:-3000]))  # neither the first chunk nor the index describes channels
+    at = data.index(b"/bilayer_sim/com")
+    assert at < chunks_of(log)[0].begin
+    data[at + 1] ^= 0x01
+    found, new = damaged(bytes(data[:-3000]))
+    assert messages_of(new) == messages_of(log)[: found.messages] and found.messages > 100
+
+
+def test_messages_without_a_description_of_their_channel_are_told(log, damaged):
+    data, places = bytearray(log.read_bytes()), chunks_of(log)
+    data[places[0].offset + 300] ^= 0xFF
+    outside = [place for place in walk(io.BytesIO(data[: places[0].begin])) if place.opcode in (SCHEMA, CHANNEL)]
+    assert len(outside) > 10 and outside[-1].end == places[0].begin
+    data[outside[0].begin : outside[-1].end] = b""
+    found, new = damaged(bytes(data[:-3000]))  # nothing describes channels
     assert found.messages == 0 and "messages of channels that nothing describes" in found.lost[-1]
     assert len(read_log(new).times) == 0
 

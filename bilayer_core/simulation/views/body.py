@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...kinematics.rotation import quaternion_from_matrix
-from .. import observation as observe
 from .motion import Motion, motion_of
 from .present import ByName, Present
 
@@ -26,7 +25,7 @@ class BodyView:
     contact_wrench : Array
         Contact force [N] and moment about its position [N m], in the world's axes, shape (6,).
     clamp_wrench : Array
-        Likewise, what the rods that it holds exert on it; see `observation.clamp_wrenches`. At the end of the last
+        Likewise, what the rods that it holds exert on it; see `engine.look`. At the end of the last
         step: with the inertia of the held nodes, which `implicit_midpoint` does not give at the ends of its steps.
     turning, sliding : Motion or None
         About the hinge and along the rail of a guided body, where the scene has `turning` or `sliding`.
@@ -56,11 +55,11 @@ class BodyView:
 
     @property
     def contact_wrench(self) -> Array:
-        return observe.contact_wrenches(self._present.evaluated())[self._index].copy()
+        return self._present.seen().contact_wrench[self._index]
 
     @property
     def clamp_wrench(self) -> Array:
-        return observe.clamp_wrenches(self._present.evaluated())[self._index]
+        return self._present.seen().clamp_wrench[self._index]
 
     @property
     def turning(self) -> Motion | None:

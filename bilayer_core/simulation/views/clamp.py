@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import observation as observe
 from .present import ByName, Present
 
 Array = np.ndarray
@@ -37,7 +36,7 @@ class ClampView:
     @property
     def wrench(self) -> Array:
         present = self._present
-        wrench = observe.each_clamp(present.evaluated())[self._held].sum(axis=0)
+        wrench = present.seen().clamp[self._held].sum(axis=0)
         body = present.model.attached_body[self._held[0]]
         wrench[3:] -= np.cross(self.position - present.state.body_position[body], wrench[:3])
         return wrench

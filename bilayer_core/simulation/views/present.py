@@ -10,6 +10,7 @@ from typing import TypeVar
 from ...errors import UnknownName
 from ...model.model import Model
 from ...model.state import State
+from ..parts import Parts
 from ..stepper import Stepper
 
 View = TypeVar("View")
@@ -19,11 +20,12 @@ MOST_TOLD = 12
 
 @dataclass(frozen=True)
 class Present:
-    """What views look at: a model, its state, and what evaluates the forces there."""
+    """What views look at: a model, its state, what evaluates the forces there, and what there is to see."""
 
     model: Model
     state: State
     evaluated: Callable[[], Stepper]
+    seen: Callable[[], Parts]
 
 
 class ByName(Mapping[str, View]):

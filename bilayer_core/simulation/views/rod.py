@@ -75,15 +75,15 @@ class RodView:
 
     @property
     def strain(self) -> Array:
-        return observe.node_strain(self._present.model, self._present.evaluated())[self.nodes]
+        return self._present.seen().strain[self.nodes]
 
     @property
     def curvature(self) -> Array:
-        return observe.node_curvature(self._present.model, self._present.evaluated())[self.nodes]
+        return self._present.seen().curvature[self.nodes]
 
     @property
     def contact_forces(self) -> Array:
-        return observe.contact_forces(self._present.evaluated())[self.nodes]
+        return self._present.seen().contact_force[self.nodes]
 
     @property
     def layers(self) -> ByName[LayerView]:
@@ -116,13 +116,12 @@ class LayerView:
 
     @property
     def strain(self) -> Array:
-        nodes, stepper = self._layer.nodes, self._present.evaluated()
-        strain = observe.node_strain(self._present.model, stepper)[nodes]
-        return self._layer.strain_of(strain, observe.node_curvature(self._present.model, stepper)[nodes])
+        nodes, seen = self._layer.nodes, self._present.seen()
+        return self._layer.strain_of(seen.strain[nodes], seen.curvature[nodes])
 
     @property
     def curvature(self) -> Array:
-        return observe.node_curvature(self._present.model, self._present.evaluated())[self._layer.nodes].copy()
+        return self._present.seen().curvature[self._layer.nodes]
 
     @property
     def width(self) -> Array:

@@ -1,0 +1,227 @@
+"""What an observer sees at the end of a step that a state does not say: strains, contact, clamps, kinetic energy.
+
+All of it is computed at once by the thread that makes steps, into one piece of memory: that costs less than to copy
+for another thread what it is computed of.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..forces.joints import Joints
+from ..jit import call, kernel, piece, record, shapes_of, zeros_in_one
+from ..jit.record import Flags, IndexTable, Indices, Matrix, Vector
+from ..kinematics.copying import copy
+from ..kinematics.rotating import quaternion_of
+from ..kinematics.vector import combine3, cross, dot, row, scaled
+from ..model.model import Model
+from ..model.records.parts import Fluid
+from ..model.records.problem import Problem
+from ..model.records.status import READY
+from ..model.records.step import Configuration, StateArrays
+from ..model.sizes import sizes_of
+from .build import fluid_of
+from .kinetic import kinetic_energy
+
+Array = np.ndarray
+
+
+@record
+class Look:
+    """Where it looks, and what it saw; the latter is in `values`, in one piece."""
+
+    voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
+    joint_node: Indices  # the node of each, shape (n_bend,)
+    node: Indices  # of strands, shape (n,)
+    edges: IndexTable  # before and after each; at an end both are its one edge, shape (n, 2)
+    neighbour: IndexTable  # free ends of strands, which have no bending element, and the nodes beside, shape (n_end, 2)
+    twin: IndexTable  # nodes in memory that stand for others of a closed strand, and these, shape (n_shut, 2)
+    holder: Indices  # body of each attached node, shape (n_attached,)
+    fluid: Fluid  # one of its own, since that of a step is scratch
+    owner_of_point: Indices  # whose each contact point is, nodes first, shape (n_contact_point,)
+    owner_of_surface: Indices
+    touching: Indices = ("pair of owners",)  # numbers a n + b of those that touch, a ≤ b, of n owners
+    touching_count: Indices = (1,)
+    touched: Flags = ("owner squared",)  # scratch
+    owners: int  # n of the pairs
+    values: Vector
+    strain: Vector = ("seen point",)  # of nodes, the mean of their edges', with eigenstrain; 0 at points of bodies
+    curvature: Vector = ("seen point",)  # χ of nodes [1/m]
+    contact_force: Matrix = ("seen point", 3)  # barrier and friction force on nodes and points of bodies [N]
+    quaternion: Matrix = ("body", 4)  # x y z w, w ≥ 0
+    contact_wrench: Matrix = ("body", 6)  # contact force [N] and moment about its position [N m] on every body
+    clamp: Matrix = ("attached", 6)  # the part of each held node with its direction in the next
+    clamp_wrench: Matrix = ("body", 6)  # of the rods that each body holds [N, N m], see `_see_clamps`
+    energy: Vector = ("force",)  # of each force, in the order of `model.force_slots` [J]
+    kinetic: Vector = (2,)  # of rods and bodies, and of the fluid [J]
+
+
+@piece(int, Problem, Joints, StateArrays, Configuration, Look)
+def look_at(p, joints, state, at, seen):
+    """Write what is seen of a state, which is `at`, with forces as they were evaluated last."""
+    _see_strains(p, at, seen)
+    _see_contact(p, joints, seen)
+    _see_clamps(p, at, seen)
+    _see_touching(p, seen)
+    for b in range(seen.quaternion.shape[0]):
+        r = state.body_rotation
+        x, y, z, w = quaternion_of(
+            *(r[b, 0, 0], r[b, 0, 1], r[b, 0, 2]),
+            *(r[b, 1, 0], r[b, 1, 1], r[b, 1, 2]),
+            *(r[b, 2, 0], r[b, 2, 1], r[b, 2, 2]),
+        )
+        sign = 1.0 if w >= 0.0 else -1.0
+        seen.quaternion[b, 0], seen.quaternion[b, 1] = sign * x, sign * y
+        seen.quaternion[b, 2], seen.quaternion[b, 3] = sign * z, sign * w
+    copy(p.sums.energy, seen.energy)
+    seen.kinetic[0] = kinetic_energy(p, state)
+    if seen.fluid.exists:
+        copy(state.velocity, seen.fluid.node_velocity)
+        copy(state.spin, seen.fluid.spin)
+        seen.kinetic[1] = call(seen.fluid.fluid_momentum, (seen.fluid, at))
+    return READY
+
+
+@kernel
+def _see_strains(p, at, seen):
+    """Of nodes. (Strains of joints were last evaluated before Newton's last correction.)"""
+    strands, strain, curvature = p.strands, seen.strain, seen.curvature
+    for k in range(seen.node.shape[0]):
+        a, b = seen.edges[k, 0], seen.edges[k, 1]
+        before, after = at.length[a] / strands.rest_length[a] - 1.0, at.length[b] / strands.rest_length[b] - 1.0
+        strain[seen.node[k]] = 0.5 * (before + after)
+    for j in range(seen.voronoi_length.shape[0]):
+        a, b = strands.joint_a[j], strands.joint_b[j]
+        tangent_a, tangent_b = row(at.tangent, a), row(at.tangent, b)
+        bend = dot(tangent_b, row(at.director1, a)) - dot(tangent_a, row(at.director1, b))
+        bend /= 1.0 + dot(tangent_a, tangent_b)  # κ₁ of `forces.bend_twist`
+        curvature[seen.joint_node[j]] = bend / seen.voronoi_length[j]
+    for k in range(seen.neighbour.shape[0]):
+        curvature[seen.neighbour[k, 0]] = curvature[seen.neighbour[k, 1]]
+    for k in range(seen.twin.shape[0]):
+        strain[seen.twin[k, 0]] = strain[seen.twin[k, 1]]
+        curvature[seen.twin[k, 0]] = curvature[seen.twin[k, 1]]
+
+
+@kernel
+def _see_contact(p, joints, seen):
+    """Of nodes, points and bodies; joints and mechanisms are in the sums of bodies too."""
+    for i in range(seen.contact_force.shape[0]):
+        for c in range(3):
+            seen.contact_force[i, c] = -p.sums.contact_point[i, c]
+    for b in range(seen.contact_wrench.shape[0]):
+        for c in range(6):
+            seen.contact_wrench[b, c] = -p.sums.contact[b, c]
+    if joints.exists:
+        _leave_out(joints.body, joints.gradient, seen.contact_wrench)
+    if p.mechanisms.exists:
+        _leave_out(p.mechanisms.body, p.mechanisms.gradient, seen.contact_wrench)
+
+
+@kernel
+def _leave_out(body, gradient, wrench):
+    """Take from wrenches on bodies what something else than contact exerts."""
+    for k in range(body.shape[0]):
+        if body[k] < wrench.shape[0]:  # not the world
+            for c in range(6):
+                wrench[body[k], c] += gradient[k, c]
+
+
+@kernel
+def _see_clamps(p, at, seen):
+    """Force [N] and moment about its position [N m] that the rods which a body holds exert on it.
+
+    They are −∂Φ/∂X and −∂Φ/∂φ of the potential Φ of the step through the nodes x = X + ρ and the fixed directions t
+    that bodies hold (`engine.linear.attachments`): with the gradients g of a node and (g, g_θ) of a clamp edge
+
+        F = −Σ g,    M = −Σ ρ × g − Σ (t × g + g_θ t)
+
+    Φ has all that acts on what is held: elasticity, weight and inertia of half an edge, contact, drag, damping.
+    """
+    seen.clamp_wrench[:] = 0.0
+    edges = p.strands.edge_count
+    for k in range(seen.clamp.shape[0]):
+        force, tangent = row(p.sums.attached, k), row(at.tangent, edges + k)
+        of_arm, of_edge = cross(row(at.arm, k), force), cross(tangent, row(p.sums.edge, edges + k))
+        moment = combine3(1.0, of_arm, 1.0, of_edge, p.sums.edge[edges + k, 3], tangent)
+        seen.clamp[k, 0], seen.clamp[k, 1], seen.clamp[k, 2] = scaled(-1.0, force)
+        seen.clamp[k, 3], seen.clamp[k, 4], seen.clamp[k, 5] = scaled(-1.0, moment)
+        for c in range(6):
+            seen.clamp_wrench[seen.holder[k], c] += seen.clamp[k, c]
+
+
+@kernel
+def _see_touching(p, seen):
+    """What is nearer to something else than the barrier distance; each pair of owners once."""
+    surfaces, rods, of_point, count = p.surfaces, p.rod_contact, seen.owner_of_point, 0
+    if surfaces.exists:
+        for k in range(surfaces.near_count[0]):
+            if surfaces.near_gap[k] < surfaces.d_hat:
+                surface = seen.owner_of_surface[surfaces.near_surface[k]]
+                count = _note(of_point[surfaces.near_contact_point[k]], surface, count, seen)
+    if rods.exists:
+        for k in range(rods.contacts.count[0]):
+            count = _note(of_point[rods.contacts.node[k, 0]], of_point[rods.contacts.node[k, 1]], count, seen)
+    for k in range(count):
+        seen.touched[seen.touching[k]] = False
+    seen.touching_count[0] = count
+
+
+@kernel
+def _note(a, b, count, seen):
+    """Add a pair unless it is known; how many there are."""
+    number = min(a, b) * seen.owners + max(a, b)
+    if seen.touched[number]:
+        return count
+    seen.touched[number], seen.touching[count] = True, number
+    return count + 1
+
+
+SEEN = tuple(name for name in Look.shapes if name not in ("touching", "touching_count", "touched"))
+"""Names of what it saw, in order."""
+
+
+def look_of(
+    model: Model, owner_of_point: Array, owner_of_surface: Array, owners: int
+) -> tuple[Look, dict[str, tuple[int, int, tuple[int, ...]]]]:
+    """The record of a model, and of each part of its values by name where it begins and ends, and its shape; who owns
+    contact points and surfaces are numbers below `owners`.
+    """
+    sizes = sizes_of(model) | {"seen point": model.node_count + model.point_count}
+    sizes |= {"pair of owners": owners * (owners + 1) // 2, "owner squared": owners**2}
+    values, parts = zeros_in_one(shapes_of(Look, sizes, SEEN))
+    ends = np.cumsum([0, *(parts[name].size for name in SEEN)]).tolist()
+    places = {name: (*ends[k : k + 2], parts[name].shape) for k, name in enumerate(SEEN)}
+    bends = slice(model.bend_count)
+    look = Look.zeros(
+        sizes,
+        voronoi_length=model.voronoi_length,
+        joint_node=model.joint_node[bends].astype(np.int64),
+        **_tables_of(model),
+        holder=model.attached_body.astype(np.int64),
+        fluid=fluid_of(model, sizes) if len(model.fluid_mass) else Fluid.absent(),
+        owner_of_point=owner_of_point,
+        owner_of_surface=owner_of_surface,
+        owners=owners,
+        values=values,
+        **parts,
+    )
+    return look, places
+
+
+def _tables_of(model: Model) -> dict[str, Array]:
+    """Nodes of strands with their edges, free ends with their neighbours, and nodes that stand for others."""
+    nodes, edges, ends, shut = [], [], [], []
+    for s in model.strands:
+        first, last = s.first_node, s.first_node + s.node_count - 1
+        own = s.first_edge + np.arange(s.node_count - 1)
+        nodes.append(np.arange(first, last + 1))
+        edges.append(np.stack([np.concatenate([own[:1], own]), np.concatenate([own, own[-1:]])], axis=1))
+        shut += [(first, last - 1), (last, first + 1)] if s.closed else []
+        ends += [pair for pair in ((first, first + 1), (last, last - 1)) if pair[0] not in model.attached_node]
+    return {
+        "node": np.concatenate(nodes).astype(np.int64),
+        "edges": np.concatenate(edges).astype(np.int64),
+        "neighbour": np.array(ends, dtype=np.int64).reshape(-1, 2),
+        "twin": np.array(shut, dtype=np.int64).reshape(-1, 2),
+    }

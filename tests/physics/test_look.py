@@ -1,0 +1,109 @@
+"""What observers see of a step's forces, against formulas of whole arrays."""
+
+import numpy as np
+import pytest
+from sample_scenes import everything
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.kinematics.rotation import quaternion_from_matrix
+from bilayer_core.simulation.fluid_energy import energy_of_fluid
+from bilayer_core.simulation.kinetic_energy import kinetic_energy
+
+SCENES = {
+    "every force, two rods": (everything, "two_rod"),
+    "every force, laminate": (everything, "laminate"),
+    "closed": (lambda: "ring", "laminate"),
+    "planar": (lambda: "crawling_inchworm", "laminate"),
+    "rods that meet": (lambda: "knot", "laminate"),
+}
+
+
+@pytest.fixture(params=SCENES)
+def simulator(request):
+    content, model = SCENES[request.param]
+    simulator = Simulator(load_scene(content()), model=model)
+    simulator.run(0.01)
+    return simulator
+
+
+def strain_of(strand, edges):
+    """Means of the strains of the edges before and after each node, where a strand has ends."""
+    own = edges[strand.first_edge : strand.first_edge + strand.node_count - 1]
+    return 0.5 * (np.concatenate([own[:1], own]) + np.concatenate([own, own[-1:]]))
+
+
+def test_strains_of_nodes_are_those_of_their_edges(simulator):
+    model, at, frame = simulator.model, simulator._stepper.end, simulator.frame()
+    edges = at.length[: model.edge_count] / model.rest_length - 1.0
+    cosine = np.sum(at.tangent[model.joint_a] * at.tangent[model.joint_b], axis=1)
+    bend = np.sum(at.tangent[model.joint_b] * at.director1[model.joint_a], axis=1)
+    bend -= np.sum(at.tangent[model.joint_a] * at.director1[model.joint_b], axis=1)
+    bends = slice(model.bend_count)
+    expected = np.zeros(len(frame.curvature))
+    expected[model.joint_node[bends]] = bend[bends] / (1.0 + cosine[bends]) / model.voronoi_length
+    for strand in model.strands:
+        nodes = np.arange(strand.first_node, strand.first_node + strand.node_count)
+        strain = strain_of(strand, edges)
+        if strand.closed:  # its first two nodes are its last
+            strain[0], strain[-1] = strain[-2], strain[1]
+            expected[nodes[[0, -1]]] = expected[nodes[[-2, 1]]]
+        else:
+            free = [end for end in (0, -1) if nodes[end] not in model.attached_node]
+            expected[nodes[free]] = [expected[nodes[1 if end == 0 else -2]] for end in free]
+        np.testing.assert_allclose(frame.strain[nodes], strain, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(frame.curvature[nodes], expected[nodes], rtol=1e-12, atol=1e-12)
+    assert np.abs(expected).max() > 1e-3
+    assert not frame.strain[model.node_count :].any() and not frame.curvature[model.node_count :].any()
+
+
+def test_wrenches_on_bodies_are_sums_over_what_touches_and_what_is_held(simulator):
+    model, engine, frame = simulator.model, simulator._stepper.engine, simulator.frame()
+    sums, at = engine.sums, engine.end
+    contact = -sums.contact
+    for own in (engine.joints, engine.mechanisms):
+        np.add.at(contact, own.body, own.gradient.reshape(-1, 6))
+    np.testing.assert_allclose(frame.contact_wrenches, contact[:-1], rtol=1e-12, atol=1e-18)
+    points = model.node_count + model.point_count
+    np.testing.assert_array_equal(frame.contact_forces, -sums.contact_point[:points])
+    held, tangent, of_edge = -sums.attached, at.tangent[model.edge_count :], -sums.edge[model.edge_count :]
+    moment = np.cross(at.arm, held) + np.cross(tangent, of_edge[:, :3]) + of_edge[:, 3:] * tangent
+    clamps = np.zeros((len(model.bodies.names), 6))
+    np.add.at(clamps, model.attached_body, np.concatenate([held, moment], axis=1))
+    np.testing.assert_allclose(frame.clamp_wrenches, clamps, rtol=1e-12, atol=1e-12 * np.abs(clamps).max(initial=1e-9))
+
+
+def test_energies_and_rotations_seen_are_those_of_the_state(simulator):
+    model, state, frame = simulator.model, simulator._state, simulator.frame()
+    assert frame.energy["kinetic"] == pytest.approx(kinetic_energy(model, state), rel=1e-12)
+    if len(model.fluid_mass):
+        of_fluid = energy_of_fluid(model, simulator._stepper.end, state.velocity, state.spin)
+        assert frame.energy["fluid"] == pytest.approx(of_fluid, rel=1e-12)
+    assert ("fluid" in frame.energy) == bool(len(model.fluid_mass))
+    expected = [quaternion_from_matrix(of) for of in state.body_rotation]
+    np.testing.assert_allclose(frame.body_quaternions, np.reshape(expected, (-1, 4)), rtol=0, atol=1e-15)
+
+
+def test_each_pair_that_touches_is_seen_once(simulator):
+    surfaces, rods = simulator._stepper.engine.surfaces, simulator._stepper.engine.rod_contact
+    owners, expected = simulator._stepper.contact_owners, set()
+    if surfaces.exists:
+        near = np.arange(surfaces.near_count[0])[surfaces.near_gap[: surfaces.near_count[0]] < surfaces.d_hat]
+        points, own = owners.of_point[surfaces.near_contact_point[near]], owners.of_surface[surfaces.near_surface[near]]
+        expected |= {tuple(sorted(pair)) for pair in zip(points.tolist(), own.tolist(), strict=True)}
+    if rods.exists:
+        nodes = owners.of_point[rods.contacts.node[: rods.contacts.count[0]]]
+        expected |= {tuple(sorted(pair)) for pair in nodes.tolist()}
+    for _ in range(2):
+        _, seen = simulator._stepper.look_at(simulator._state)
+        assert sorted(divmod(number, owners.count) for number in seen.tolist()) == sorted(expected)
+    assert len(simulator.frame().contacts) == len(expected)
+
+
+def test_a_frame_keeps_what_was_seen_while_the_run_goes_on(simulator):
+    frame, again = simulator.frame(), simulator.frame()
+    names = ("strain", "clamp_wrenches", "contact_wrenches", "state")
+    before = {name: np.array(getattr(again, name)) for name in names}
+    simulator.run(0.002)
+    simulator.frame()
+    for name, values in before.items():
+        np.testing.assert_array_equal(getattr(frame, name), values)
