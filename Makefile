@@ -50,6 +50,13 @@ verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scen
 	$(BIN)/bilayer stress --out runs/stress
 	$(BIN)/bilayer stress --mutations --out runs/mutations
 
+# The commands are those of the page.
+gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.
+	mkdir -p runs/gallery
+	sed -n 's/^bilayer \(run\|render\) .*/& --force/p' docs/gallery.md > runs/gallery/commands.sh
+	cd runs/gallery && PATH="$(CURDIR)/$(BIN):$$PATH" sh -e commands.sh
+	cp runs/gallery/*.png docs/images/gallery/
+
 clean:  ## Remove .venv and what runs and tests left.
 	rm -rf $(VENV) build install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
 
@@ -91,4 +98,4 @@ system:
 	printf '\nSystem packages are missing. Install them with this line, then run make again:\n\n' >&2; \
 	printf '    sudo apt-get update && sudo apt-get install %s\n\n' "$$(echo $$missing)" >&2; exit 1
 
-.PHONY: help demo test bounds stress verify lint install kernels clean system
+.PHONY: help demo test bounds stress verify gallery lint install kernels clean system
