@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 AREA = 1280 * 720  # of a picture whose size is not given [pixels]
 ASPECTS = (0.7, 2.6)  # least and largest width over height of one
 FILM_SIZE = (1280, 720)
+MISSED = 0.1  # part of a run without shapes at its end that is warned of
 SHEET_INSETS = Insets(top=0.10, bottom=0.06, side=0.05)
 DEEPEST = 40.0  # radius of the ground, in sizes of the robot: squares of a run that goes far are still seen
 
@@ -96,6 +97,17 @@ class Studio:
     def last(self) -> float:
         """Time of the last one [s]."""
         return float(min(self._run.times[-1], self._run.shape_times[-1]))
+
+    @property
+    def warning(self) -> str | None:
+        """That shapes end long before the run, where they were logged too seldom."""
+        end = float(self._run.times[-1])
+        if end - self.last <= MISSED * (end - float(self._run.times[0])):
+            return None
+        return (
+            f"{self._path}: the run ends at t = {end:.9g} s, but its last shape is of t = {self.last:.9g} s, and "
+            "nothing later can be drawn; run it with a larger output.marker_rate"
+        )
 
     def spread(self, count: int) -> list[float]:
         """Times evenly over the run, from its start to its end [s]."""

@@ -377,6 +377,14 @@ def test_shapes_between_those_in_the_log_are_on_the_way_from_one_to_the_next(log
     assert np.linalg.norm(between.material_frames, axis=1) == pytest.approx(np.ones(len(between.material_frames)))
 
 
+def test_a_run_whose_shapes_end_long_before_it_is_warned_of(tmp_path, capsys):
+    path = tmp_path / "short.mcap"
+    synthetic_run.run(McapRecorder(path, rate=25.0, marker_rate=1.0), TIMES[:21])
+    assert main(["render", str(path), "--png", str(tmp_path / "x.png"), "--size", "160x160"]) == 0
+    told = capsys.readouterr().err
+    assert "the run ends at t = 0.8 s, but its last shape is of t = 0 s" in told and "output.marker_rate" in told
+
+
 def test_a_time_that_the_log_does_not_hold_is_refused(log, tmp_path):
     with pytest.raises(InputError, match=r"holds 0 s to 4 s, and not 5 s"):
         Studio(log, Look.of()).picture(tmp_path / "late.png", 5.0)
