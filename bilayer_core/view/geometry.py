@@ -57,11 +57,23 @@ def ribbon_normals(material_frames: np.ndarray) -> np.ndarray:
 
 def ribbon_triangles(nodes: int) -> np.ndarray:
     """Vertex indices of the surface of a ribbon with its ends closed, for vertices as above, shape (triangles, 3)."""
+    last = CORNERS * (nodes - 1)
+    ends = np.array([FIRST_END, [last + corner for corner in LAST_END]])
+    return np.concatenate([ribbon_faces(nodes), two_triangles(ends)])
+
+
+FIRST_END, LAST_END = (4, 5, 7, 6), (4, 6, 7, 5)  # corners of the first and last section, seen from outside
+
+
+def ribbon_faces(nodes: int) -> np.ndarray:
+    """The same without the ends."""
     first = CORNERS * np.arange(nodes - 1)[:, None, None]
     quads = np.array([[a, b, b + CORNERS, a + CORNERS] for a, b in _FACES])
-    last = CORNERS * (nodes - 1)
-    ends = np.array([[4, 5, 7, 6], [last + 4, last + 6, last + 7, last + 5]])
-    corners = np.concatenate([(first + quads).reshape(-1, 4), ends])
+    return two_triangles((first + quads).reshape(-1, 4))
+
+
+def two_triangles(corners: np.ndarray) -> np.ndarray:
+    """Of each of some quadrilaterals, shape (quadrilaterals, 4): shape (triangles, 3)."""
     return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.uint32)
 
 

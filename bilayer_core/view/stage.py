@@ -208,13 +208,19 @@ class Stage:
         return replace(layers[0], **{name: np.concatenate(part) for name, part in parts.items()}), rows, nodes
 
     def _add_ribbons(self) -> Any:
-        triangles, first = [], 0
+        triangles, first, ends = [], 0, []
         for layer in self._run.description.layers:
             nodes = layer.nodes.stop - layer.nodes.start
-            triangles.append(first + geometry.ribbon_triangles(nodes))
+            triangles.append(first + geometry.ribbon_faces(nodes))
+            ends.append(first + np.array(geometry.FIRST_END))
             first += nodes * geometry.CORNERS
-        blank = np.zeros((first, 3), np.float32)
-        shades = np.zeros((first, 3), np.uint8)
+            ends.append(first - geometry.CORNERS + np.array(geometry.LAST_END))
+        triangles.append(first + geometry.two_triangles(np.arange(4 * len(ends)).reshape(-1, 4)))
+        self._ends = np.concatenate(ends)
+        self._outwards = np.tile(np.repeat([[-1.0], [1.0]], 4, axis=0), (len(ends) // 2, 1))
+        count = first + len(self._ends)  # corners of ends are there once more, with normals of their own
+        blank = np.zeros((count, 3), np.float32)
+        shades = np.zeros((count, 3), np.uint8)
         data = _poly_data(blank, blank.copy(), shades, np.concatenate(triangles))
         self._add(data, 0.62, 0.42, 0.06)
         return data
@@ -226,9 +232,12 @@ class Stage:
         vertices = geometry.ribbon_vertices(self._all_layers, moment.positions[None, self._nodes], frames)[0]
         own = self._colouring.colours(np.concatenate(moment.values))[:, None, :3] * shade
         colours = np.rint(own).astype(np.uint8)
-        parts = (vertices, geometry.ribbon_normals(frames)[0], colours)
-        _replace(self._ribbons, *(part.reshape(-1, 3) for part in parts))
-        return vertices.reshape(-1, 3)
+        vertices, colours = vertices.reshape(-1, 3), colours.reshape(-1, 3)
+        along = self._outwards * geometry.rotated(frames[0], 2)[self._ends // geometry.CORNERS]
+        normals = [geometry.ribbon_normals(frames).reshape(-1, 3), along.astype(np.float32)]
+        joined = [vertices, vertices[self._ends]], normals, [colours, colours[self._ends]]
+        _replace(self._ribbons, *map(np.concatenate, joined))
+        return vertices
 
     def _add_arrows(self) -> Any:
         blank = np.zeros((1, 3), np.float32)
