@@ -44,11 +44,19 @@ stress: $(STAMP)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
 # What is found is committed: docs/stability.md with its figures, and docs/data/mutations.jsonl.
-verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scenes, 200 kills, seeded bugs.
+verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scenes, 200 kills, films, seeded bugs.
 	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz
 	KILLS=200 KILLS_SEED=7 $(BIN)/python -m pytest -m "" -s tests/logs/test_kills.py
+	$(BIN)/python tests/benchmarks/films.py
 	$(BIN)/bilayer stress --out runs/stress
 	$(BIN)/bilayer stress --mutations --out runs/mutations
+
+# The commands are those of the page.
+gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.
+	mkdir -p runs/gallery
+	sed -n 's/^bilayer \(run\|render\) .*/& --force/p' docs/gallery.md > runs/gallery/commands.sh
+	cd runs/gallery && PATH="$(CURDIR)/$(BIN):$$PATH" sh -e commands.sh
+	cp runs/gallery/*.png docs/images/gallery/
 
 clean:  ## Remove .venv and what runs and tests left.
 	rm -rf $(VENV) build install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
@@ -91,4 +99,4 @@ system:
 	printf '\nSystem packages are missing. Install them with this line, then run make again:\n\n' >&2; \
 	printf '    sudo apt-get update && sudo apt-get install %s\n\n' "$$(echo $$missing)" >&2; exit 1
 
-.PHONY: help demo test bounds stress verify lint install kernels clean system
+.PHONY: help demo test bounds stress verify gallery lint install kernels clean system

@@ -153,9 +153,15 @@ REPLAY_NODE = (
     NodeParameter("play.start_offset", 0.0, "part of the log's beginning that is left out [s]", 0.0),
     NodeParameter("play.playback_duration", -1.0, "how much of the log is played [s]; negative = to its end"),
     NodeParameter(
+        "play.playback_until_timestamp",
+        -1.0,
+        "time of the log at which playing ends [s]; negative = at its end; with a duration as well, the later of both",
+    ),
+    NodeParameter(
         "play.clock_publish_frequency",
         0.0,
         "messages on /clock per second [Hz]; 0 = none. A /clock in the log is not published",
         0.0,
     ),
+    NodeParameter("play.clock_publish_on_topic_publish", False, "a message on /clock right before each that is played"),
 )

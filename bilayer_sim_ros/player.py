@@ -70,6 +70,8 @@ class Playback:
         Whether to wait for `Player.resume` at the start.
     clock_rate : float
         Clock messages per second of real time [Hz]; 0 = none.
+    clock_on_publish : bool
+        Whether a clock message with its time goes out right before each message.
     """
 
     begin: int
@@ -79,6 +81,7 @@ class Playback:
     loop: bool = False
     paused: bool = False
     clock_rate: float = 0.0
+    clock_on_publish: bool = False
 
 
 class Player:
@@ -261,6 +264,8 @@ class Player:
     def _send_next(self) -> Message:
         """Send the message whose turn it is, and read the following one, so that it is there when it is due."""
         sent = self._next
+        if self._playback.clock_on_publish:
+            self._outlet.send_clock(sent.time)
         self._send(sent)
         self._next = self._following(self._messages)
         return sent

@@ -35,7 +35,9 @@ def play(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> 
 def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: threading.Event) -> None:
     playback = playback_of(log, parameters)
     logger = node.get_logger()
-    topics = ReplayTopics(node, log.channels, playback.clock_rate > 0.0, logger.warning)
+    topics = ReplayTopics(
+        node, log.channels, playback.clock_rate > 0.0 or playback.clock_on_publish, logger.warning
+    )
     if not topics.channels:
         raise InputError(f"{log.path}: holds no topic that can be published")
 
@@ -77,14 +79,23 @@ def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: th
 
 def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
     """What parameters ask for of a log, or InputError."""
-    offset, duration, position = (
-        parameters[f"play.{name}"] for name in ("start_offset", "playback_duration", "position")
+    offset, duration, until, position = (
+        parameters[f"play.{name}"]
+        for name in ("start_offset", "playback_duration", "playback_until_timestamp", "position")
     )
     length = (log.end - log.start) / NANOSECONDS
     if offset > length:
         raise InputError(f"parameter 'play.start_offset' is {offset:g}; {log.path} takes {length:.9g} s")
     begin = log.start + nanoseconds(offset)
-    end = log.end if duration < 0.0 else min(log.end, begin + nanoseconds(min(duration, length)))
+    ends = [log.end] if duration < 0.0 and until < 0.0 else []
+    if duration >= 0.0:
+        ends.append(begin + nanoseconds(min(duration, length)))
+    if until >= 0.0:
+        ends.append(nanoseconds(min(until, log.end / NANOSECONDS)))
+    end = min(max(ends), log.end)
+    if end < begin:
+        span = f"{begin / NANOSECONDS:.9g} to {log.end / NANOSECONDS:.9g} s"
+        raise InputError(f"parameter 'play.playback_until_timestamp' is {until:.9g}; {log.path} is played from {span}")
     first = nanoseconds(position) if position else begin
     if not log.start <= first <= end:
         span = f"{log.start / NANOSECONDS:.9g} to {end / NANOSECONDS:.9g} s"
@@ -97,6 +108,7 @@ def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
         loop=parameters["play.loop"],
         paused=parameters["play.start_paused"],
         clock_rate=parameters["play.clock_publish_frequency"],
+        clock_on_publish=parameters["play.clock_publish_on_topic_publish"],
     )
 
 

@@ -129,6 +129,8 @@ def render(
     if mp4:
         require_ffmpeg()
     studio = Studio(file, look)
+    if studio.warning is not None:
+        click.echo(f"warning: {studio.warning}", err=True)
     if png:
         studio.picture(png, times[0] if times else None)
         click.echo(f"picture    {png}")

@@ -67,6 +67,8 @@ def replay(
 
     Exit code 1 if --verify finds a difference.
     """
+    from bilayer_core.record.log_head import read_head
+
     if verifies + (moment is not None) + publishes != 1:
         raise InputError(
             "replay: say either --verify, to compare the run with its log, or --from T, to go on from T, or --ros, to "
@@ -83,6 +85,7 @@ def replay(
     for option, value in (("--rate", rate), ("--loop", loop)):
         if value is not None and value is not False:
             raise InputError(f"{option}: is for --ros")
+    read_head(Path(log))  # what is no log is told before kernels are compiled
     if verifies:
         given = [option for option, value in changes.items() if value]
         if given:

@@ -51,9 +51,15 @@ class Interruption(BaseException):
 
 def interruption_behind(error: BaseException | None) -> Interruption | None:
     """The interruption of which an exception was made: Python makes a RuntimeError where a class is being made."""
-    while error is not None and not isinstance(error, Interruption):
-        error = error.__cause__ or error.__context__
-    return error
+    behind, seen = [error], set()
+    while behind:
+        found = behind.pop()
+        if isinstance(found, Interruption):
+            return found
+        if found is not None and id(found) not in seen:  # one may be behind itself
+            seen.add(id(found))
+            behind += [found.__context__, found.__cause__]
+    return None
 
 
 class Signals:

@@ -121,10 +121,17 @@ def scene_from_log(path: str | Path) -> str:
 
 
 def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray, float]:
-    """Flat state and its time [s]: the last one logged, or the last one at or before `time`."""
+    """Flat state and its time [s]: the last one logged, or the last one at or before `time`.
+
+    An InputError if there is none, or if `time` is later than the last one by more than states are apart.
+    """
     file = LogFile(path)
     stamps = file.times(STATE)
     if time is not None:
+        latest = np.sort(stamps)[-2:].tolist()
+        if latest and nanoseconds(time) > 2 * latest[-1] - latest[0]:
+            last = latest[-1] / NANOSECONDS
+            raise InputError(f"{path}: its last state is of t = {last:.9g} s, and t = {time:g} s is after its end")
         stamps = stamps[stamps <= max(0, nanoseconds(time))] if time >= 0.0 else stamps[:0]
     if not len(stamps):
         before = "" if time is None else f" at or before t = {time:g} s"

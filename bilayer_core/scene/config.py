@@ -36,15 +36,18 @@ from bilayer_core.scene.units import (
 LARGEST_TOLERANCE = 0.1
 DEFAULT_TOLERANCE, DEFAULT_DT = 1e-4, 1e-3
 """Of `Solver`: where neither is given, steps are adaptive with this tolerance and begin with this length [s]."""
-ErrorTolerance = real(
-    "a part of the longest rod (the speed at which Newton ends is `newton_tolerance`)",
-    "1",
-    "1e-4",
-    above=0.0,
-    at_most=LARGEST_TOLERANCE,
-)
-Restitution = real("a coefficient of restitution", "1", "0.5", at_least=0.0, at_most=1.0)
-PoissonRatio = real("Poisson's ratio", "1", "0.5", above=-1.0, at_most=0.5)
+ErrorTolerance = Annotated[
+    float,
+    *real(
+        "a part of the longest rod (the speed at which Newton ends is `newton_tolerance`)",
+        "1",
+        "1e-4",
+        above=0.0,
+        at_most=LARGEST_TOLERANCE,
+    ),
+]
+Restitution = Annotated[float, *real("a coefficient of restitution", "1", "0.5", at_least=0.0, at_most=1.0)]
+PoissonRatio = Annotated[float, *real("Poisson's ratio", "1", "0.5", above=-1.0, at_most=0.5)]
 
 
 class Material(Part):
@@ -220,9 +223,9 @@ class Solver(Part):
     newton_tolerance: PositiveSpeed | None = None
     """Newton ends with a correction of velocities, which it still takes, no larger than this; by default the speed that
     makes 1/100 of `tolerance` (1e-4 with fixed steps) in the longest adaptive step (`max_step`)."""
-    max_newton_iterations: whole(1, 10_000) = 50
+    max_newton_iterations: Annotated[int, *whole(1, 10_000)] = 50
     """After which a step counts as failed and is shortened."""
-    max_halvings: whole(0, 1000) | None = None
+    max_halvings: Annotated[int, *whole(0, 1000)] | None = None
     """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why. By default 10;
     adaptive steps may then be as short as a thousandth of the time in which sound passes an edge, or in which the
     fastest point covers what `tolerance` allows."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from bilayer_core.scene.part import Part
 from bilayer_core.scene.units import PositiveLength, whole
@@ -20,5 +20,5 @@ class Imperfection(Part):
     """Largest distance from the path; a hundredth of the thickness is small."""
     direction: Literal["normal", "across", "both"] = "normal"
     """Along the normal of the rod, across path and normal, or both by the same law; the last two need dimension 3."""
-    seed: whole(0) = 0
+    seed: Annotated[int, *whole(0)] = 0
     """Of the random numbers. Rods of a pattern have the same shape."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -12,8 +12,8 @@ from bilayer_core.scene.mechanism import Sliding, Turning
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.units import real
 
-PositiveRate = real("a stiffness", "N/m", "1e6 N/m", above=0.0)
-PositiveTorsionRate = real("a torsional stiffness", "N*m/rad", "100 N*m/rad", above=0.0)
+PositiveRate = Annotated[float, *real("a stiffness", "N/m", "1e6 N/m", above=0.0)]
+PositiveTorsionRate = Annotated[float, *real("a torsional stiffness", "N*m/rad", "100 N*m/rad", above=0.0)]
 TURNS, SLIDES = ("hinge", "cylinder"), ("slide", "cylinder")
 """Types that turn about their axis, and that slide along it."""
 WITH_AXIS = ("hinge", "slide", "cylinder", "universal")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Annotated
 
 from pydantic import model_validator
 
@@ -10,15 +11,17 @@ from bilayer_core.scene.faults import Fault, refuse_all
 from bilayer_core.scene.part import Part
 from bilayer_core.scene.units import Angle, Length, PositiveSpeed, real
 
-NonNegativeStiffness = real("a stiffness", "N/m", "20 N/m", at_least=0.0)
-NonNegativeTorsion = real("a torsional stiffness", "N*m/rad", "2e-4 N*m/rad", at_least=0.0)
-PositiveStiffness = real("a stiffness", "N/m", "1e6 N/m", above=0.0)
-PositiveTorsion = real("a torsional stiffness", "N*m/rad", "10 N*m/rad", above=0.0)
-Damping = real("a damping coefficient", "N*s/m", "0.01 N*s/m", at_least=0.0)
-TorsionalDamping = real("a torsional damping coefficient", "N*m*s/rad", "1e-6 N*m*s/rad", at_least=0.0)
-NonNegativeForce = real("a force", "N", "10 mN", at_least=0.0)
-NonNegativeMoment = real("a moment", "N*m", "0.1 N*mm", at_least=0.0)
-PositiveAngularSpeed = real("an angular speed", "rad/s", "0.01 rad/s", above=0.0)
+NonNegativeStiffness = Annotated[float, *real("a stiffness", "N/m", "20 N/m", at_least=0.0)]
+NonNegativeTorsion = Annotated[float, *real("a torsional stiffness", "N*m/rad", "2e-4 N*m/rad", at_least=0.0)]
+PositiveStiffness = Annotated[float, *real("a stiffness", "N/m", "1e6 N/m", above=0.0)]
+PositiveTorsion = Annotated[float, *real("a torsional stiffness", "N*m/rad", "10 N*m/rad", above=0.0)]
+Damping = Annotated[float, *real("a damping coefficient", "N*s/m", "0.01 N*s/m", at_least=0.0)]
+TorsionalDamping = Annotated[
+    float, *real("a torsional damping coefficient", "N*m*s/rad", "1e-6 N*m*s/rad", at_least=0.0)
+]
+NonNegativeForce = Annotated[float, *real("a force", "N", "10 mN", at_least=0.0)]
+NonNegativeMoment = Annotated[float, *real("a moment", "N*m", "0.1 N*mm", at_least=0.0)]
+PositiveAngularSpeed = Annotated[float, *real("an angular speed", "rad/s", "0.01 rad/s", above=0.0)]
 
 
 class Turning(Part):

@@ -123,7 +123,7 @@ class Rotation(Pattern):
     """About which copies are turned."""
     center: Point = (0.0, 0.0, 0.0)
     """A point of the axis."""
-    count: whole(1, MOST_COPIES)
+    count: Annotated[int, *whole(1, MOST_COPIES)]
     """Rods in all; they are called `NAME_0`, `NAME_1` and so on."""
     angle: Angle | None = None
     """Between a copy and the next; by default they are even over a full turn."""
@@ -146,7 +146,7 @@ class Translation(Pattern):
     type: Literal["translation"]
     step: Step
     """From a copy to the next."""
-    count: whole(1, MOST_COPIES)
+    count: Annotated[int, *whole(1, MOST_COPIES)]
     """Rods in all; they are called `NAME_0`, `NAME_1` and so on."""
 
     def places(self) -> list[Placement]:
@@ -160,7 +160,7 @@ class Grid(Pattern):
     type: Literal["grid"]
     steps: list[Step] = Field(min_length=2, max_length=3)
     """From a copy to the next in its row, from a row to the next, and from a layer to the next."""
-    counts: list[whole(1, MOST_COPIES)] = Field(min_length=2, max_length=3)
+    counts: list[Annotated[int, *whole(1, MOST_COPIES)]] = Field(min_length=2, max_length=3)
     """Along each step. Copies are called `NAME_0`, `NAME_1` and so on along the first row, then along the next."""
 
     @property

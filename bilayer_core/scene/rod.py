@@ -87,7 +87,7 @@ class Rod(Part):
     """Through the thickness, from the first layer (bottom) to the last (top); at the start of a curved path. Of a
     path through points only its part across the path counts.
     """
-    stations: whole(3, MOST_NODES)
+    stations: Annotated[int, *whole(3, MOST_NODES)]
     """Cross-sections along the path, both ends included; the last one of a closed path is the first again."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
     """Bottom first."""

@@ -184,47 +184,45 @@ class Count:
         return int(value)
 
 
-def real(*arguments: Any, **limits: float) -> Any:
-    """Annotation of a real number; the arguments are those of `Quantity`."""
+def real(*arguments: Any, **limits: float) -> tuple[Any, ...]:
+    """What makes ``Annotated[float, *real(...)]`` a real number with a unit; the arguments are those of `Quantity`."""
     quantity = Quantity(*arguments, **limits)
     written = float | str if quantity.unit else float
-    return Annotated[
-        float, BeforeValidator(quantity, json_schema_input_type=written), Field(description=quantity.describe())
-    ]
+    return BeforeValidator(quantity, json_schema_input_type=written), Field(description=quantity.describe())
 
 
-def whole(at_least: int, at_most: int = LARGEST_COUNT) -> Any:
-    """Annotation of a whole number."""
+def whole(at_least: int, at_most: int = LARGEST_COUNT) -> tuple[Any, ...]:
+    """What makes ``Annotated[int, *whole(...)]`` a whole number from `at_least` to `at_most`."""
     count = Count(at_least, at_most)
-    return Annotated[int, BeforeValidator(count, json_schema_input_type=int), Field(description=count.describe())]
+    return BeforeValidator(count, json_schema_input_type=int), Field(description=count.describe())
 
 
-PlainNumber = real("a plain number", "")
-Number = real("a number", "1", "0.5")
-NonNegativeNumber = real("a number", "1", "0.5", at_least=0.0)
-PositiveNumber = real("a number", "1", "10", above=0.0)
-Length = real("a length", "m", "1 mm")
-NonNegativeLength = real("a length", "m", "1 mm", at_least=0.0)
-PositiveLength = real("a length", "m", "1 mm", above=0.0)
-Time = real("a time", "s", "0.5 s")
-NonNegativeTime = real("a time", "s", "0.5 s", at_least=0.0)
-PositiveTime = real("a time", "s", "1 ms", above=0.0)
-Angle = real("an angle", "rad", "90 deg")
-DutyCycle = real("a part of the period", "1", "50 %", above=0.0, at_most=1.0)
-PositiveMass = real("a mass", "kg", "2.7 g", above=0.0)
-NonNegativeMass = real("a mass", "kg", "2.7 g", at_least=0.0)
-Force = real("a force", "N", "50 mN")
-Moment = real("a moment", "N*m", "2 N*mm")
-PositiveInertia = real("a moment of inertia", "kg*m^2", "7.2e-7", above=0.0)
-PositiveDensity = real("a density", "kg/m^3", "1000", above=0.0)
-PositivePressure = real("a pressure", "Pa", "100 MPa", above=0.0)
-PositiveSpeed = real("a speed", "m/s", "0.1 mm/s", above=0.0)
-Speed = real("a speed", "m/s", "1 m/s")
-PositiveAngularSpeed = real("an angular speed", "rad/s", "90 deg/s", above=0.0)
-AngularSpeed = real("an angular speed", "rad/s", "60 rpm")
-Acceleration = real("an acceleration", "m/s^2", "-9.81")
-PositiveRate = real("a rate", "Hz", "50", above=0.0)
-NonNegativeRate = real("a rate", "1/s", "2", at_least=0.0)
-Curvature = real("a curvature", "1/m", "20 1/m")
-Twist = real("a twist", "rad/m", "20 rad/m")
-PositiveAngle = real("an angle", "rad", "90 deg", above=0.0)
+PlainNumber = Annotated[float, *real("a plain number", "")]
+Number = Annotated[float, *real("a number", "1", "0.5")]
+NonNegativeNumber = Annotated[float, *real("a number", "1", "0.5", at_least=0.0)]
+PositiveNumber = Annotated[float, *real("a number", "1", "10", above=0.0)]
+Length = Annotated[float, *real("a length", "m", "1 mm")]
+NonNegativeLength = Annotated[float, *real("a length", "m", "1 mm", at_least=0.0)]
+PositiveLength = Annotated[float, *real("a length", "m", "1 mm", above=0.0)]
+Time = Annotated[float, *real("a time", "s", "0.5 s")]
+NonNegativeTime = Annotated[float, *real("a time", "s", "0.5 s", at_least=0.0)]
+PositiveTime = Annotated[float, *real("a time", "s", "1 ms", above=0.0)]
+Angle = Annotated[float, *real("an angle", "rad", "90 deg")]
+DutyCycle = Annotated[float, *real("a part of the period", "1", "50 %", above=0.0, at_most=1.0)]
+PositiveMass = Annotated[float, *real("a mass", "kg", "2.7 g", above=0.0)]
+NonNegativeMass = Annotated[float, *real("a mass", "kg", "2.7 g", at_least=0.0)]
+Force = Annotated[float, *real("a force", "N", "50 mN")]
+Moment = Annotated[float, *real("a moment", "N*m", "2 N*mm")]
+PositiveInertia = Annotated[float, *real("a moment of inertia", "kg*m^2", "7.2e-7", above=0.0)]
+PositiveDensity = Annotated[float, *real("a density", "kg/m^3", "1000", above=0.0)]
+PositivePressure = Annotated[float, *real("a pressure", "Pa", "100 MPa", above=0.0)]
+PositiveSpeed = Annotated[float, *real("a speed", "m/s", "0.1 mm/s", above=0.0)]
+Speed = Annotated[float, *real("a speed", "m/s", "1 m/s")]
+PositiveAngularSpeed = Annotated[float, *real("an angular speed", "rad/s", "90 deg/s", above=0.0)]
+AngularSpeed = Annotated[float, *real("an angular speed", "rad/s", "60 rpm")]
+Acceleration = Annotated[float, *real("an acceleration", "m/s^2", "-9.81")]
+PositiveRate = Annotated[float, *real("a rate", "Hz", "50", above=0.0)]
+NonNegativeRate = Annotated[float, *real("a rate", "1/s", "2", at_least=0.0)]
+Curvature = Annotated[float, *real("a curvature", "1/m", "20 1/m")]
+Twist = Annotated[float, *real("a twist", "rad/m", "20 rad/m")]
+PositiveAngle = Annotated[float, *real("an angle", "rad", "90 deg", above=0.0)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import model_validator
 
@@ -112,7 +112,7 @@ class PulseTrain(_Pulses):
     type: Literal["pulse_train"]
     width: PositiveTime
     """From the beginning of the rise to the beginning of the fall."""
-    count: whole(1)
+    count: Annotated[int, *whole(1)]
     """Of pulses."""
 
     @model_validator(mode="after")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from PIL import Image
 
 MISSING = "films need ffmpeg; install it with: pip install 'bilayer_sim_ros[film]'"
-ENCODING = ["-preset", "veryfast", "-crf", "20", "-movflags", "+faststart", "-f", "mp4"]
+ENCODING = ["-preset", "superfast", "-crf", "21", "-movflags", "+faststart", "-f", "mp4"]
 """Of x264: small enough to send, no blocks to be seen; a film begins before all of it is loaded."""
 
 

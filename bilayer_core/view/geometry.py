@@ -57,11 +57,23 @@ def ribbon_normals(material_frames: np.ndarray) -> np.ndarray:
 
 def ribbon_triangles(nodes: int) -> np.ndarray:
     """Vertex indices of the surface of a ribbon with its ends closed, for vertices as above, shape (triangles, 3)."""
+    last = CORNERS * (nodes - 1)
+    ends = np.array([FIRST_END, [last + corner for corner in LAST_END]])
+    return np.concatenate([ribbon_faces(nodes), two_triangles(ends)])
+
+
+FIRST_END, LAST_END = (4, 5, 7, 6), (4, 6, 7, 5)  # corners of the first and last section, seen from outside
+
+
+def ribbon_faces(nodes: int) -> np.ndarray:
+    """The same without the ends."""
     first = CORNERS * np.arange(nodes - 1)[:, None, None]
     quads = np.array([[a, b, b + CORNERS, a + CORNERS] for a, b in _FACES])
-    last = CORNERS * (nodes - 1)
-    ends = np.array([[4, 5, 7, 6], [last + 4, last + 6, last + 7, last + 5]])
-    corners = np.concatenate([(first + quads).reshape(-1, 4), ends])
+    return two_triangles((first + quads).reshape(-1, 4))
+
+
+def two_triangles(corners: np.ndarray) -> np.ndarray:
+    """Of each of some quadrilaterals, shape (quadrilaterals, 4): shape (triangles, 3)."""
     return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.uint32)
 
 
@@ -193,6 +205,14 @@ def shape_extent(shape: ShapeInfo) -> np.ndarray:
     return np.array(shape.position) + (signs * np.array(shape.size)) @ rotation
 
 
+def plane_axes(plane: ShapeInfo) -> np.ndarray:
+    """Unit vectors along the sides of the squares of a plane, and its normal, as rows."""
+    normal = rotated(np.array(plane.quaternion), 2)
+    across = np.cross([0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0], normal)
+    across /= np.linalg.norm(across)
+    return np.stack([across, np.cross(normal, across), normal])
+
+
 def plane_mesh(
     plane: ShapeInfo, center: np.ndarray, half_size: float, cell: float, colours: tuple[tuple[int, ...], ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -204,18 +224,16 @@ def plane_mesh(
         [m], shape (3,).
     half_size, cell : float
         Radius of the disc and edge of a square [m]. The squares keep their places when the centre changes.
-    colours : two or three of (red, green, blue)
-        Of the two squares, and of the rim into which they fade; without that they become transparent.
+    colours : three of (red, green, blue)
+        Of the two squares, and of the rim into which they fade.
 
     Returns
     -------
     vertices, colours, triangles : ndarray
-        Shapes (v, 3), (v, 3) or with an opacity (v, 4) uint8, (t, 3).
+        Shapes (v, 3), (v, 3) uint8, (t, 3).
     """
-    normal, point = rotated(np.array(plane.quaternion), 2), np.array(plane.position)
-    across = np.cross([0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0], normal)
-    across /= np.linalg.norm(across)
-    along = np.cross(normal, across)
+    across, along, _ = plane_axes(plane)
+    point = np.array(plane.position)
     relative = center - point
     middle = np.array([relative @ across, relative @ along])
     first = np.floor((middle - half_size) / cell).astype(int)
@@ -228,16 +246,12 @@ def plane_mesh(
     vertices = point + at[..., :1] * across + at[..., 1:] * along
     distance = np.linalg.norm(at - middle, axis=-1, keepdims=True) / half_size
     fade = np.clip((distance - 0.35) / 0.65, 0.0, 1.0) ** 1.5
-    light, dark, *rim = (np.array(colour, float) for colour in colours)
-    own = np.where(((i + j) % 2 == 0)[:, None, None], light, dark)
-    if rim:
-        shades = (1 - fade) * own + fade * rim[0]
-    else:
-        shades = np.concatenate([np.broadcast_to(own, (*fade.shape[:2], 3)), 255 * (1 - fade)], axis=-1)
+    light, dark, rim = (np.array(colour, float) for colour in colours)
+    shades = (1 - fade) * np.where(((i + j) % 2 == 0)[:, None, None], light, dark) + fade * rim
     quads = 4 * np.arange(len(i))[:, None] + np.arange(4)
     triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     return (
         vertices.reshape(-1, 3).astype(np.float32),
-        np.rint(shades).astype(np.uint8).reshape(-1, shades.shape[-1]),
+        np.rint(shades).astype(np.uint8).reshape(-1, 3),
         triangles.astype(np.uint32),
     )

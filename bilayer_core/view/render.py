@@ -15,10 +15,12 @@ from bilayer_core.view.arrows import contact_arrows, reaction_arrows
 from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
 from bilayer_core.view.colouring import STRAIN, choose_colouring
 from bilayer_core.view.drawable import refuse_undrawable
+from bilayer_core.view.ground import Ground
 from bilayer_core.view.moments import Moment, Moments
 from bilayer_core.view.scales import choose_scales
-from bilayer_core.view.stage import FINER, FINER_OF_FILMS, Stage, require_vtk
+from bilayer_core.view.stage import Stage
 from bilayer_core.view.theme import Theme, theme_of
+from bilayer_core.view.window import require_vtk
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 AREA = 1280 * 720  # of a picture whose size is not given [pixels]
 ASPECTS = (0.7, 2.6)  # least and largest width over height of one
 FILM_SIZE = (1280, 720)
+MISSED = 0.1  # part of a run without shapes at its end that is warned of
 SHEET_INSETS = Insets(top=0.10, bottom=0.06, side=0.05)
 DEEPEST = 40.0  # radius of the ground, in sizes of the robot: squares of a run that goes far are still seen
 
@@ -95,6 +98,17 @@ class Studio:
         """Time of the last one [s]."""
         return float(min(self._run.times[-1], self._run.shape_times[-1]))
 
+    @property
+    def warning(self) -> str | None:
+        """That shapes end long before the run, where they were logged too seldom."""
+        end = float(self._run.times[-1])
+        if end - self.last <= MISSED * (end - float(self._run.times[0])):
+            return None
+        return (
+            f"{self._path}: the run ends at t = {end:.9g} s, but its last shape is of t = {self.last:.9g} s, and "
+            "nothing later can be drawn; run it with a larger output.marker_rate"
+        )
+
     def spread(self, count: int) -> list[float]:
         """Times evenly over the run, from its start to its end [s]."""
         return np.linspace(self.first, self.last, count).tolist() if count > 1 else [self.last]
@@ -131,7 +145,7 @@ class Studio:
 
         require_ffmpeg()
         setting = self._set(times, Insets(), rate, FILM_SIZE)
-        save_mp4(self._written(setting, time_text(times, note), FINER_OF_FILMS), setting.size, rate, path)
+        save_mp4(self._written(setting, time_text(times, note)), setting.size, rate, path)
 
     def pictures(
         self, times: Sequence[float], insets: Insets, rate: float, texts: list[str], longest: int | None = None
@@ -151,9 +165,9 @@ class Studio:
         """
         return self._written(self._set(times, insets, rate, longest=longest), texts)
 
-    def _written(self, setting: _Setting, texts: list[str], finer: float = FINER) -> Iterator[Image.Image]:
+    def _written(self, setting: _Setting, texts: list[str]) -> Iterator[Image.Image]:
         overlay = self._overlay(setting.size, setting.metres_per_pixel)
-        for picture, text in zip(self._draw(setting, finer), texts, strict=True):
+        for picture, text in zip(self._draw(setting), texts, strict=True):
             yield overlay.write(picture, text)
 
     def _set(
@@ -181,7 +195,7 @@ class Studio:
         found = shots(camera, every, robot, size[0] / size[1], insets, rate)
         return _Setting(moments, found, size, found[0].metres_per_height / size[1])
 
-    def _draw(self, setting: _Setting, finer: float = FINER) -> Iterator[Image.Image]:
+    def _draw(self, setting: _Setting) -> Iterator[Image.Image]:
         scales, targets = self._scales, np.array([shot.target for shot in setting.shots])
         middle = 0.5 * (targets.min(axis=0) + targets.max(axis=0))
         way = 0.5 * float(np.linalg.norm(np.ptp(targets, axis=0)))
@@ -193,10 +207,9 @@ class Studio:
             self._colouring,
             self._look.theme,
             setting.size,
-            (middle, radius, scales.cell),
+            Ground(middle, radius, scales.cell),
             scales.size,
             self._arrows,
-            finer,
         )
         try:
             for moment, shot in zip(setting.moments, setting.shots, strict=True):

@@ -1,26 +1,21 @@
-"""A run drawn by VTK without a screen or a graphics card. VTK is imported when a stage is made, not before.
-
-Every picture is drawn with more pixels than it has, and made smaller, which smooths edges in a third of the time that
-the driver's own way takes.
+"""A run drawn by VTK. The ground is smooth by itself and drawn as it is; the part of the picture where anything else is
+seen is drawn with twice as many pixels along each side, and made smaller, which smooths its edges.
 """
 
 from __future__ import annotations
 
-import ctypes.util
-import importlib.util
-import math
-import sys
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bilayer_core.errors import InputError
-from bilayer_core.observed.frame import ShapeInfo
+from bilayer_core.observed.frame import ShapeInfo, Strand
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import REACTIONS, Arrows
-from bilayer_core.view.camera import HALF_SLOPE, Shot
+from bilayer_core.view.camera import Shot
 from bilayer_core.view.colouring import Colouring
+from bilayer_core.view.ground import Ground, add_plane
 from bilayer_core.view.moments import Moment, Moments
 from bilayer_core.view.theme import (
     ARROW_COLOUR,
@@ -31,50 +26,25 @@ from bilayer_core.view.theme import (
     SIDE_SHADE,
     Theme,
 )
+from bilayer_core.view.window import Part, Window, part_around
 
 if TYPE_CHECKING:
     from PIL import Image
 
-FINER, FINER_OF_FILMS = 2.0, 1.5  # times as many pixels along each side are drawn as a picture has
+FINER = 2  # times as many pixels along each side are drawn of what has edges
+_MARK, _LIGHT = "//VTK::Light::Impl", """
+float near = max(normalVCVSOutput.z, 0.0), over = max(dot(normalVCVSOutput, vec3(-0.4657, 0.6985, 0.5433)), 0.0);
+float first = near * near, second = max(dot(normalVCVSOutput, vec3(-0.2651, 0.3976, 0.8784)), 0.0);
+second *= second;
+first *= first; first *= first; first *= first; first *= first;
+second *= second; second *= second; second *= second; second *= second;
+vec3 shine = (0.55 * first + 0.6 * second) * specularIntensity * specularColorUniform;
+fragOutput0 = vec4(ambientColor + (0.55 * near + 0.6 * over) * diffuseColor + shine, opacity);
+"""
+"""Light from the eye and from over its left shoulder: diffuse, and the 32nd power of the cosine between the normal and
+what halves the angle to the eye. VTK's own loop over lights takes one and a half times as long."""
+WORTH_KEEPING = 0.7  # of the size of the part that was drawn last: other sizes cost new buffers
 ARROW_RADIUS = 0.006  # of the shaft of an arrow, in sizes of the robot
-MISSING = "pictures and films need VTK; install it with: pip install 'bilayer_sim_ros[film]'"
-MISSING_DRIVER = (
-    "there is no OpenGL driver to draw with; on Debian and Ubuntu install Mesa's software driver with: "
-    "sudo apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri"
-)
-
-
-def require_vtk() -> None:
-    """Raise InputError, with what to install, where nothing can be drawn."""
-    for module in ("vtkmodules", "PIL"):
-        if importlib.util.find_spec(module) is None:
-            raise InputError(MISSING)
-    if sys.platform == "linux" and not any(map(ctypes.util.find_library, ("EGL", "OSMesa"))):
-        raise InputError(MISSING_DRIVER)
-
-
-def _window() -> Any:
-    """A window without a screen; InputError where none can be."""
-    from vtkmodules import vtkRenderingOpenGL2 as rendering
-    from vtkmodules.vtkCommonCore import vtkObject
-    from vtkmodules.vtkRenderingCore import vtkRenderWindow
-
-    if sys.platform != "linux":
-        window = vtkRenderWindow()
-    elif ctypes.util.find_library("EGL"):
-        window = rendering.vtkEGLRenderWindow()
-    else:
-        window = rendering.vtkOSOpenGLRenderWindow()
-    window.SetOffScreenRendering(1)
-    told = vtkObject.GetGlobalWarningDisplay()
-    vtkObject.SetGlobalWarningDisplay(0)  # what it would print is said below
-    try:
-        works = window.SupportsOpenGL()
-    finally:
-        vtkObject.SetGlobalWarningDisplay(told)
-    if not works:
-        raise InputError(MISSING_DRIVER)
-    return window
 
 
 class Stage:
@@ -89,14 +59,12 @@ class Stage:
     theme : Theme
     size : tuple of int
         Width and height of pictures.
-    ground : tuple of (ndarray, float, float)
-        Middle, radius and edge of squares of planes [m].
+    ground : Ground
+        Where planes are seen.
     arrow_size : float
         Size of the robot, for the thickness of arrows [m].
     arrows : dict of str to Arrows
         Scales of the arrows that are drawn: ``contact_forces``, ``clamp_forces``, ``clamp_moments``.
-    finer : float
-        How many times as many pixels are drawn along each side.
 
     Raises
     ------
@@ -111,63 +79,68 @@ class Stage:
         colouring: Colouring,
         theme: Theme,
         size: tuple[int, int],
-        ground: tuple[np.ndarray, float, float],
+        ground: Ground,
         arrow_size: float,
         arrows: dict[str, Arrows],
-        finer: float = FINER,
     ):
-        require_vtk()
-        import vtkmodules.vtkRenderingOpenGL2  # noqa: F401, the classes below are then its own
-        from vtkmodules.vtkRenderingCore import vtkRenderer
-
         self._run, self._moments, self._colouring, self._theme = run, moments, colouring, theme
-        self._size, self._arrows = size, arrows
+        self._size, self._ground, self._arrows = size, ground, arrows
         self._arrow_radius = ARROW_RADIUS * arrow_size
-        self._renderer = vtkRenderer()
-        self._renderer.SetBackground(*(c / 255 for c in theme.background))
-        self._renderer.SetBackgroundAlpha(0.0 if theme.transparent else 1.0)
-        if theme.transparent:
-            self._renderer.SetBackground(0.0, 0.0, 0.0)
-        self._window = _window()
-        self._window.SetMultiSamples(0)
-        self._window.SetAlphaBitPlanes(1)
-        self._window.SetSize(*(round(finer * side) for side in size))
-        self._window.AddRenderer(self._renderer)
-        self._add_lights()
-        self._add_fixed(ground)
+        self._window = Window(theme, size)
+        self._renderer = self._window.renderer
+        self._all_layers, self._rows, self._nodes = self._chain_layers()
         self._ribbons = self._add_ribbons()
-        self._moving = self._add_moving(ground)
-        self._arrow_data = {name: self._add_arrows(name) for name in arrows}
+        self._moving = self._add_moving()
+        self._arrow_data = {name: self._add_arrows() for name in arrows}
+        self._fixed = self._add_fixed()  # last: the ground is then drawn where it is seen only
+        self._background: Window | None = None
+        self._behind: tuple[Shot, Image.Image] | None = None
+        planes = [o.shape for o in run.description.obstacles if o.shape.kind == "plane"]
+        if planes:
+            self._background = Window(theme, size)
+            for plane in planes:
+                add_plane(self._background.renderer, plane, ground, theme)
+        self._background_finer = 1 if len(planes) < 2 else FINER  # where two planes meet is an edge
+        self._drawn = (1, 1)  # size of the part that was drawn last
 
     def close(self) -> None:
-        """Give the window back."""
-        self._window.Finalize()
+        """Give the windows back."""
+        self._window.close()
+        if self._background is not None:
+            self._background.close()
 
     def draw(self, moment: Moment, shot: Shot) -> Image.Image:
         """The run at a time, from an eye: RGB, or RGBA with a transparent background."""
-        self._place_ribbons(moment)
-        for actor, body in self._moving:
-            actor.SetUserMatrix(_matrix(moment.body_positions[body], moment.body_quaternions[body]))
-        for name, data in self._arrow_data.items():
-            self._place_arrows(name, data, moment)
-        self._look(shot)
-        self._window.Render()
-        return self._pixels()
+        points = [self._fixed, self._place_ribbons(moment)]
+        points += [self._place_moving(moment, *moving) for moving in self._moving]
+        points += [self._place_arrows(name, data, moment) for name, data in self._arrow_data.items()]
+        part = self._part(shot, np.concatenate(points))
+        whole = part == (0, 0, *self._size)
+        picture = self._window.nothing() if whole else self._picture_behind(shot)
+        if part is not None:
+            picture.paste(self._window.draw(shot, part, FINER), part[:2])
+        return picture.convert("RGBA") if self._theme.transparent else picture
+
+    def _part(self, shot: Shot, points: np.ndarray) -> Part | None:
+        """The part of the picture that shows points, as large as the last one unless that is much too large."""
+        part = part_around(shot, points, self._size)
+        if part is not None:
+            width, height = part[2] - part[0], part[3] - part[1]
+            larger = max(width, self._drawn[0]), max(height, self._drawn[1])
+            if width * height > WORTH_KEEPING * larger[0] * larger[1]:
+                part = part_around(shot, points, self._size, larger)
+            self._drawn = (part[2] - part[0], part[3] - part[1])
+        return part
+
+    def _picture_behind(self, shot: Shot) -> Image.Image:
+        """Of the ground alone: the last one as long as the eye stays where it is."""
+        if self._background is None:
+            return self._window.nothing()
+        if self._behind is None or not _equal(shot, self._behind[0]):
+            self._behind = shot, self._background.draw(shot, (0, 0, *self._size), self._background_finer)
+        return self._behind[1].copy()
 
     # what is there
-
-    def _add_lights(self) -> None:
-        """One from the eye, and one from over its left shoulder."""
-        from vtkmodules.vtkRenderingCore import vtkLight
-
-        self._renderer.SetAutomaticLightCreation(False)
-        for place, strength in (((0.0, 0.0, 1.0), 0.55), ((-0.6, 0.9, 0.7), 0.6)):
-            light = vtkLight()
-            light.SetLightTypeToCameraLight()
-            light.SetPosition(*place)
-            light.SetFocalPoint(0.0, 0.0, 0.0)
-            light.SetIntensity(strength)
-            self._renderer.AddLight(light)
 
     def _add(self, data: Any, ambient: float, diffuse: float, specular: float = 0.0) -> Any:
         """An actor that draws points with colours."""
@@ -179,77 +152,101 @@ class Stage:
         actor = vtkActor()
         actor.SetMapper(mapper)
         of = actor.GetProperty()
+        of.BackfaceCullingOn()  # all surfaces are closed
         of.SetInterpolationToPhong()
         of.SetAmbient(ambient)
         of.SetDiffuse(diffuse)
         of.SetSpecular(specular)
-        of.SetSpecularPower(30.0)
+        actor.GetShaderProperty().AddFragmentShaderReplacement(_MARK, True, f"{_MARK}\n{_LIGHT}", False)
         self._renderer.AddActor(actor)
         return actor
 
-    def _add_shape(self, shape: ShapeInfo, colours: geometry.Colours, ground: tuple) -> Any:
+    def _add_shape(self, shape: ShapeInfo, colours: geometry.Colours) -> tuple[Any, np.ndarray]:
+        """An actor, and corners of a box that holds it in the frame of its owner [m]."""
         if shape.kind == "plane":
-            middle, radius, cell = ground
-            clear = self._theme.transparent
-            rim = () if clear else (self._theme.background,)  # opaque is drawn in a third of the time
-            colours = (*self._theme.ground, *rim)
-            vertices, shades, triangles = geometry.plane_mesh(shape, middle, radius, cell, colours)
-            actor = self._add(_poly_data(vertices, None, shades, triangles), 1.0, 0.0)
-            actor.GetProperty().LightingOff()
-            if clear:
-                actor.ForceTranslucentOn()
-            return actor
+            return add_plane(self._renderer, shape, self._ground, self._theme), self._ground.corners(shape)
         vertices, normals, shades, triangles = geometry.shape_mesh(shape, colours)
-        return self._add(_poly_data(vertices, normals, shades, triangles), 0.35, 0.65, 0.15)
+        actor = self._add(_poly_data(vertices, normals, shades, triangles), 0.35, 0.65, 0.15)
+        return actor, geometry.shape_extent(shape)
 
-    def _add_fixed(self, ground: tuple) -> None:
+    def _add_fixed(self) -> np.ndarray:
+        """Corners of boxes round all that has edges and does not move [m], shape (points, 3)."""
+        found = [np.zeros((0, 3))]
         for obstacle in self._run.description.obstacles:
-            self._add_shape(obstacle.shape, OBSTACLE_COLOURS, ground)
+            _, corners = self._add_shape(obstacle.shape, OBSTACLE_COLOURS)
+            if obstacle.shape.kind != "plane":
+                found.append(corners)
         for joint in self._run.description.joints:
             if joint.body < 0:
-                self._add_shape(joint.shape, JOINT_COLOURS, ground)
+                found.append(self._add_shape(joint.shape, JOINT_COLOURS)[1])
+        return np.concatenate(found)
 
-    def _add_moving(self, ground: tuple) -> list[tuple[Any, int]]:
+    def _add_moving(self) -> list[tuple[Any, np.ndarray, int]]:
         """Bodies as they are, and joints on them; a body without a surface has nothing to draw."""
         of = self._run.description
         bodies = [
-            (self._add_shape(body.shape, BALL_COLOURS, ground), index)
+            (*self._add_shape(body.shape, BALL_COLOURS), index)
             for index, body in enumerate(of.bodies)
             if body.shape is not None
         ]
-        joints = [(self._add_shape(j.shape, JOINT_COLOURS, ground), j.body) for j in of.joints if j.body >= 0]
+        joints = [(*self._add_shape(j.shape, JOINT_COLOURS), j.body) for j in of.joints if j.body >= 0]
         return bodies + joints
 
+    def _place_moving(self, moment: Moment, actor: Any, corners: np.ndarray, body: int) -> np.ndarray:
+        """Move a body; its corners."""
+        position, quaternion = moment.body_positions[body], moment.body_quaternions[body]
+        axes = np.stack([geometry.rotated(quaternion, axis) for axis in range(3)])
+        actor.SetUserMatrix(_matrix(position, axes))
+        return position + corners @ axes
+
+    def _chain_layers(self) -> tuple[Strand, np.ndarray, np.ndarray]:
+        """All layers as if they were one, and the rows and nodes that their cross-sections have in a moment."""
+        layers = self._run.description.layers
+        parts = {name: [getattr(of, name) for of in layers] for name in ("width", "thickness", "offset")}
+        rows = np.concatenate([np.arange(part.start, part.stop) for part in self._moments.rows])
+        nodes = np.concatenate([np.arange(of.nodes.start, of.nodes.stop) for of in layers])
+        return replace(layers[0], **{name: np.concatenate(part) for name, part in parts.items()}), rows, nodes
+
     def _add_ribbons(self) -> Any:
-        triangles, first = [], 0
+        triangles, first, ends = [], 0, []
         for layer in self._run.description.layers:
             nodes = layer.nodes.stop - layer.nodes.start
-            triangles.append(first + geometry.ribbon_triangles(nodes))
+            triangles.append(first + geometry.ribbon_faces(nodes))
+            ends.append(first + np.array(geometry.FIRST_END))
             first += nodes * geometry.CORNERS
-        blank = np.zeros((first, 3), np.float32)
-        shades = np.zeros((first, 3), np.uint8)
+            ends.append(first - geometry.CORNERS + np.array(geometry.LAST_END))
+        triangles.append(first + geometry.two_triangles(np.arange(4 * len(ends)).reshape(-1, 4)))
+        self._ends = np.concatenate(ends)
+        self._outwards = np.tile(np.repeat([[-1.0], [1.0]], 4, axis=0), (len(ends) // 2, 1))
+        count = first + len(self._ends)  # corners of ends are there once more, with normals of their own
+        blank = np.zeros((count, 3), np.float32)
+        shades = np.zeros((count, 3), np.uint8)
         data = _poly_data(blank, blank.copy(), shades, np.concatenate(triangles))
         self._add(data, 0.62, 0.42, 0.06)
         return data
 
-    def _place_ribbons(self, moment: Moment) -> None:
-        shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
-        vertices, normals, colours = [], [], []
-        for layer, rows, values in zip(self._run.description.layers, self._moments.rows, moment.values, strict=True):
-            frames = moment.material_frames[None, rows]
-            vertices.append(geometry.ribbon_vertices(layer, moment.positions[None, layer.nodes], frames)[0])
-            normals.append(geometry.ribbon_normals(frames)[0])
-            own = self._colouring.colours(values)[:, None, :3] * shade
-            colours.append(np.rint(255.0 * own).astype(np.uint8))
-        _replace(self._ribbons, *(np.concatenate(part).reshape(-1, 3) for part in (vertices, normals, colours)))
+    def _place_ribbons(self, moment: Moment) -> np.ndarray:
+        """Move the ribbons; their corners [m], shape (corners, 3)."""
+        shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 255.0, 255.0 * SIDE_SHADE)[:, None]
+        frames = moment.material_frames[None, self._rows]
+        vertices = geometry.ribbon_vertices(self._all_layers, moment.positions[None, self._nodes], frames)[0]
+        own = self._colouring.colours(np.concatenate(moment.values))[:, None, :3] * shade
+        colours = np.rint(own).astype(np.uint8)
+        vertices, colours = vertices.reshape(-1, 3), colours.reshape(-1, 3)
+        along = self._outwards * geometry.rotated(frames[0], 2)[self._ends // geometry.CORNERS]
+        normals = [geometry.ribbon_normals(frames).reshape(-1, 3), along.astype(np.float32)]
+        joined = [vertices, vertices[self._ends]], normals, [colours, colours[self._ends]]
+        _replace(self._ribbons, *map(np.concatenate, joined))
+        return vertices
 
-    def _add_arrows(self, name: str) -> Any:
+    def _add_arrows(self) -> Any:
         blank = np.zeros((1, 3), np.float32)
         data = _poly_data(blank, blank.copy(), np.zeros((1, 3), np.uint8), np.zeros((0, 3), np.uint32))
         self._add(data, 0.5, 0.5)
         return data
 
-    def _place_arrows(self, name: str, data: Any, moment: Moment) -> None:
+    def _place_arrows(self, name: str, data: Any, moment: Moment) -> np.ndarray:
+        """Move arrows of one kind; their corners [m], shape (corners, 3)."""
         scale = self._arrows[name]
         if name in REACTIONS:
             origins, forces = moment.body_positions, moment.clamp_wrenches[:, REACTIONS[name]]
@@ -260,41 +257,17 @@ class Stage:
         vertices, normals, triangles = geometry.arrow_mesh(
             origins[shown], forces[shown] * scale.metres_per_unit, self._arrow_radius
         )
-        if not len(vertices):
-            vertices = normals = np.zeros((1, 3), np.float32)
-        shades = np.tile(np.array(colour, np.uint8), (len(vertices), 1))
-        data.ShallowCopy(_poly_data(vertices, normals, shades, triangles))
+        blank = vertices if len(vertices) else np.zeros((1, 3), np.float32)
+        shades = np.tile(np.array(colour, np.uint8), (len(blank), 1))
+        data.ShallowCopy(_poly_data(blank, normals if len(vertices) else blank, shades, triangles))
+        return vertices
 
-    # how it is seen
 
-    def _look(self, shot: Shot) -> None:
-        camera = self._renderer.GetActiveCamera()
-        camera.SetPosition(*shot.eye)
-        camera.SetFocalPoint(*shot.target)
-        camera.SetViewUp(*shot.up)
-        camera.SetParallelProjection(shot.half_height is not None)
-        if shot.half_height is not None:
-            camera.SetParallelScale(shot.half_height)
-        else:
-            camera.SetViewAngle(2.0 * math.degrees(math.atan(HALF_SLOPE)))
-        self._renderer.ResetCameraClippingRange()
-
-    def _pixels(self) -> Image.Image:
-        from PIL import Image
-        from vtkmodules.util.numpy_support import vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
-
-        width, height = self._window.GetSize()
-        found = vtkUnsignedCharArray()
-        self._window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, found)
-        whole = Image.frombuffer("RGBX", (width, height), vtk_to_numpy(found), "raw", "RGBX", 0, 1)
-        halved = (width, height) == (2 * self._size[0], 2 * self._size[1])
-        small = whole.reduce(2) if halved else whole.resize(self._size, Image.Resampling.BOX)
-        small = small.transpose(Image.Transpose.FLIP_TOP_BOTTOM)
-        if not self._theme.transparent:
-            return small.convert("RGB")
-        # Colours are multiplied by the opacity: nothing was behind them.
-        return Image.frombytes("RGBa", small.size, small.tobytes()).convert("RGBA")
+def _equal(first: Shot, second: Shot) -> bool:
+    """Whether two shots show the same."""
+    return first.half_height == second.half_height and all(
+        np.array_equal(getattr(first, name), getattr(second, name)) for name in ("eye", "target", "up")
+    )
 
 
 def _poly_data(vertices: np.ndarray, normals: np.ndarray | None, colours: np.ndarray, triangles: np.ndarray) -> Any:
@@ -326,11 +299,11 @@ def _replace(data: Any, vertices: np.ndarray, normals: np.ndarray | None, colour
     data.Modified()
 
 
-def _matrix(position: np.ndarray, quaternion: np.ndarray) -> Any:
+def _matrix(position: np.ndarray, axes: np.ndarray) -> Any:
     from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
     matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([geometry.rotated(quaternion, axis) for axis in range(3)], axis=1)
+    matrix[:3, :3] = axes.T
     matrix[:3, 3] = position
     found = vtkMatrix4x4()
     found.DeepCopy(matrix.ravel().tolist())

@@ -11,7 +11,7 @@ import pytest
 from processes import TIMEOUT, bilayer, command, environment
 
 from bilayer_core.cli import main, program
-from bilayer_core.cli.signals import Signals
+from bilayer_core.cli.signals import Interruption, Signals, interruption_behind
 from bilayer_core.record.log_reader import read_info
 
 LINES = {signal.SIGINT: "bilayer: interrupted\n", signal.SIGTERM: "bilayer: ended by SIGTERM\n"}
@@ -195,6 +195,16 @@ def test_the_command_line_called_from_python_leaves_the_handlers_as_they_were():
     assert signal.getsignal(signal.SIGTERM) not in before[0]
     signals.close()
     assert ([signal.getsignal(number) for number in LINES], sys.unraisablehook) == before
+
+
+def test_an_interruption_is_found_behind_exceptions_that_go_in_circles():
+    first, second, interruption = ValueError("1"), ValueError("2"), Interruption(signal.SIGINT)
+    first.__cause__ = first
+    assert interruption_behind(first) is None
+    first.__cause__, second.__context__ = second, first
+    assert interruption_behind(first) is None and interruption_behind(None) is None
+    first.__context__ = interruption  # beside the cause, which leads nowhere
+    assert interruption_behind(second) is interruption
 
 
 def test_a_signal_at_the_end_of_the_process_changes_nothing():

@@ -94,6 +94,10 @@ def test_a_state_is_read_back_exactly(log):
     np.testing.assert_array_equal(earlier, synthetic_run.frame(0.5, 1.0).state)
     with pytest.raises(InputError, match="holds no state at or before t = -1 s"):
         read_state(log, -1.0)
+    period = last_time - read_state(log, 0.999)[1]
+    assert read_state(log, 1.0 + 0.9 * period)[1] == 1.0
+    with pytest.raises(InputError, match="its last state is of t = 1 s, and t = 1.5 s is after its end"):
+        read_state(log, 1.5)
 
 
 def test_a_run_goes_on_from_its_log_bit_for_bit(tmp_path):

@@ -218,7 +218,8 @@ def test_branches_do_not_touch_the_log(tmp_path, capsys):
         (["--from", "0.1", "--stimulus", "light=1"], "stimulus 'light': no such channel"),
         (["--from", "0.1", "--load", "pull=1"], "load 'pull': no such load"),
         (["--from", "0.1", "--set", "rods.rod.stations=5"], "saved state: "),
-        (["--from", "9"], "say with --duration how long to go on"),
+        (["--from", "9"], "its last state is of t = 0.12 s, and t = 9 s is after its end"),
+        (["--from", "0.12"], "say with --duration how long to go on"),
         (["--verify", "--tolerance", "-1"], "--tolerance: -1.0 is not allowed"),
     ],
 )

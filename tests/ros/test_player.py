@@ -280,6 +280,14 @@ def test_the_clock_goes_at_its_own_rate_while_playing_and_paused(play):
     assert max(values(player, "/clock")) <= 100 * SECOND
 
 
+def test_a_clock_with_the_time_of_each_message_goes_out_right_before_it(play):
+    player = play(counted(3, 0.5) + [("/b", 0.5, number(7))], rate=FAST, clock_on_publish=True)
+    played(player)
+    half = SECOND // 2
+    expected = [("/clock", 0), ("/a", 0), ("/clock", half), ("/a", 1), ("/clock", half), ("/b", 7)]
+    assert player.outlet.sent == [*expected, ("/clock", SECOND), ("/a", 2)]
+
+
 LATCHES = [("/map", 1.0, number(1)), ("/map", 3.0, number(3)), ("/map", 5.0, number(5))]
 
 

@@ -15,12 +15,16 @@ from processes import bilayer, command, environment
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from written_logs import LATCHED, number, value_of, write_log
 
+from bilayer_core.record.indexed_log import IndexedLog
 from bilayer_core.record.log_reader import read_messages
 from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_sim_ros.parameters import REPLAY_NODE
+from bilayer_sim_ros.replay import playback_of
 
 NODE = "/bilayer_replay"
 PAUSED = {"play.start_paused": True}
@@ -174,6 +178,40 @@ def test_offset_duration_and_rate_bound_what_is_sent_and_the_clock_follows(start
     assert times == sorted(times) and times[0] == 1.0 and times[-1] <= 1.5 and len(set(times)) > 20
 
 
+def test_playing_ends_at_a_time_of_the_log_and_a_clock_comes_before_each_message(start, connect, domain, counted_log):
+    parameters = {"play.start_offset": 1.0, "play.playback_until_timestamp": 1.5}
+    clocked = parameters | {"play.clock_publish_on_topic_publish": True}
+    node = start("replay_node", domain, PAUSED | clocked | {"log": counted_log()})
+    client = connect(node)
+    heard, clock = listen(client, f"{NODE}/number"), listen(client, "/clock", Clock)
+    assert client.call("resume", NODE).success
+    client.spin_to_the_end()
+    assert node.wait() == 0
+    assert numbers(heard) == [10, 11, 12, 13, 14, 15]
+    stamps = [deserialize_message(data, Clock).clock for data in clock]
+    times = [stamp.sec + stamp.nanosec * 1e-9 for stamp in stamps]
+    assert times == pytest.approx([1.0, 1.1, 1.2, 1.3, 1.4, 1.5])
+
+
+@pytest.mark.parametrize(
+    ("offset", "duration", "until", "end"),
+    [
+        (0.0, -1.0, -1.0, 9.9),
+        (1.0, -1.0, 2.5, 2.5),
+        (1.0, 0.5, 2.5, 2.5),
+        (1.0, 4.0, 2.5, 5.0),
+        (1.0, -1.0, 1e300, 9.9),
+        (1.0, -1.0, 1.0, 1.0),
+        (1.0, 2.0, 0.5, 3.0),
+    ],
+)
+def test_of_duration_and_time_the_later_one_ends_playing(counted_log, offset, duration, until, end):
+    given = {"play.start_offset": offset, "play.playback_duration": duration, "play.playback_until_timestamp": until}
+    with IndexedLog(counted_log()) as log:
+        found = playback_of(log, {parameter.name: parameter.default for parameter in REPLAY_NODE} | given)
+    assert (found.begin, found.end) == pytest.approx((offset * 1e9, end * 1e9))
+
+
 @pytest.mark.parametrize("number_of_signal", [signal.SIGINT, signal.SIGTERM])
 def test_a_loop_goes_on_until_a_signal_ends_the_node_with_0(start, connect, domain, counted_log, number_of_signal):
     log = counted_log(count=5, period=0.02)
@@ -298,6 +336,10 @@ def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it_and_then_plays(r
         ({"play.loop": 1}, "'play.loop' is 1; allowed is true or false"),
         ({"services": "rosbag"}, "one of std_srvs, rosbag2"),
         ({"play.start_offset": 99.0}, "'play.start_offset' is 99; "),
+        (
+            {"play.start_offset": 0.1, "play.playback_until_timestamp": 0.05},
+            "'play.playback_until_timestamp' is 0.05; ",
+        ),
         ({"play.position": 99.0}, "'play.position' is 99; "),
         ({"services": "rosbag2"}, "rosbag2_interfaces"),
     ],

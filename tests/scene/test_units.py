@@ -1,3 +1,5 @@
+from typing import Annotated
+
 import numpy as np
 import pytest
 from processes import python
@@ -71,7 +73,7 @@ def test_a_length_that_is_not_a_finite_number_of_its_range_is_refused_with_its_u
     [
         (units.PositiveLength, 0.0, units.SMALLEST),
         (units.NonNegativeLength, -units.SMALLEST, 0.0),
-        (units.whole(3), 2, 3),
+        (Annotated[int, *units.whole(3)], 2, 3),
     ],
 )
 def test_the_ends_of_a_range_belong_to_it_as_its_words_say(annotation, limit, beside):
@@ -90,7 +92,7 @@ def test_a_plain_number_takes_no_unit(value):
 @pytest.mark.parametrize("value", [3.0, 3.5, "3", True])
 def test_a_count_must_be_a_whole_number(value):
     with pytest.raises(ValidationError, match="must be a whole number of at least 1"):
-        TypeAdapter(units.whole(1)).validate_python(value)
+        TypeAdapter(Annotated[int, *units.whole(1)]).validate_python(value)
 
 
 @pytest.mark.parametrize(

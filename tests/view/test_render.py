@@ -13,8 +13,9 @@ from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.run_data import RunData
-from bilayer_core.view import sheet, stage
+from bilayer_core.view import sheet, stage, window
 from bilayer_core.view.arrows import reaction_arrows
+from bilayer_core.view.camera import HALF_SLOPE, Shot
 from bilayer_core.view.colouring import choose_colouring, contact_pressure
 from bilayer_core.view.overlay import round_length
 from bilayer_core.view.render import Look, Studio
@@ -243,10 +244,50 @@ def test_a_body_without_a_surface_is_not_drawn(log, drawn, monkeypatch):
     """Nothing is between the four arms where the hub is."""
     image = drawn(4.0, camera="top", background="transparent")
     found = []
-    monkeypatch.setattr(stage.Stage, "_add_shape", lambda self, shape, *_: found.append(shape.kind))
-    monkeypatch.setattr(stage.Stage, "draw", lambda self, moment, shot: Image.new("RGB", SIZE))
+    add = stage.Stage._add_shape
+    noted = lambda self, shape, *of: found.append(shape.kind) or add(self, shape, *of)  # noqa: E731
+    monkeypatch.setattr(stage.Stage, "_add_shape", noted)
     Studio(log, Look.of(size=SIZE)).picture(log.with_name("nothing.png"))
     assert sorted(found) == ["plane", "sphere"] and image.any()
+
+
+@pytest.mark.parametrize("look", [{}, {"camera": "top"}, {"background": "transparent"}, {"camera": "20,5,0.12 m"}])
+def test_drawing_the_part_where_the_robot_is_gives_the_whole_picture(log, look, tmp_path, monkeypatch):
+    """The same colours as if all of it had been drawn with twice as many pixels: no seam, nothing cut off."""
+    studio, parts = Studio(log, Look.of(size=SIZE, **look)), []
+    around = window.part_around
+    monkeypatch.setattr(stage, "part_around", lambda *of: parts.append(around(*of)) or parts[-1])
+    studio.picture(tmp_path / "part.png", 3.0)
+    monkeypatch.setattr(stage, "part_around", lambda *of: (0, 0, *SIZE))
+    studio.picture(tmp_path / "whole.png", 3.0)
+    part, whole = (np.asarray(Image.open(tmp_path / f"{name}.png")).astype(float) for name in ("part", "whole"))
+    for image in (part, whole):
+        image[..., :3] *= image[..., 3:] / 255 if image.shape[2] == 4 else 1.0  # what is hardly there has any colour
+    left, upper, right, lower = parts[0]
+    assert ((right - left) * (lower - upper) < 0.9 * SIZE[0] * SIZE[1]) == ("0.12" not in look.get("camera", ""))
+    apart = np.abs(part - whole).max(axis=-1)
+    inside = apart[upper:lower, left:right].copy()
+    assert inside.max() <= 64 and (inside > 2).mean() < 2e-3  # rounding may move an edge over one sample in four
+    apart[upper:lower, left:right] = 0
+    assert apart.max() <= 6  # the ground, drawn without more pixels
+
+
+@pytest.mark.parametrize("half_height", [None, 0.1])
+def test_the_part_of_a_picture_round_points_holds_them_all(half_height):
+    eye, target = np.array([0.3, -1.0, 0.4]), np.array([0.0, 0.0, 0.05])
+    up = np.array([0.0, 0.0, 1.0])
+    back = (eye - target) / np.linalg.norm(eye - target)
+    right = np.cross(up, back) / np.linalg.norm(np.cross(up, back))
+    shot = Shot(eye, target, np.cross(back, right), half_height, 0.5)
+    around = [target + a * right + b * shot.up for a in (-0.03, 0.05) for b in (0.0, 0.02)]
+    left, upper, last, lower = window.part_around(shot, np.array(around), (400, 200))
+    assert left < 200 < last and upper < 100 <= lower - window.ROOM
+    pixels_per_metre = 200 / (2 * (half_height or HALF_SLOPE * np.linalg.norm(eye - target)))
+    assert last - left == pytest.approx(0.08 * pixels_per_metre + 2 * window.ROOM, abs=2)
+    assert window.part_around(shot, np.array(around), (400, 200), (90, 70))[2:] != (last, lower)
+    assert window.part_around(shot, np.array([target - 50 * right]), (400, 200)) is None
+    behind = window.part_around(shot, np.array([target, eye + back]), (400, 200))
+    assert (behind == (0, 0, 400, 200)) == (half_height is None)
 
 
 def test_a_sheet_shows_the_robot_in_each_part_with_its_time_over_one_colour_bar(log, tmp_path):
@@ -336,15 +377,23 @@ def test_shapes_between_those_in_the_log_are_on_the_way_from_one_to_the_next(log
     assert np.linalg.norm(between.material_frames, axis=1) == pytest.approx(np.ones(len(between.material_frames)))
 
 
+def test_a_run_whose_shapes_end_long_before_it_is_warned_of(tmp_path, capsys):
+    path = tmp_path / "short.mcap"
+    synthetic_run.run(McapRecorder(path, rate=25.0, marker_rate=1.0), TIMES[:21])
+    assert main(["render", str(path), "--png", str(tmp_path / "x.png"), "--size", "160x160"]) == 0
+    told = capsys.readouterr().err
+    assert "the run ends at t = 0.8 s, but its last shape is of t = 0 s" in told and "output.marker_rate" in told
+
+
 def test_a_time_that_the_log_does_not_hold_is_refused(log, tmp_path):
     with pytest.raises(InputError, match=r"holds 0 s to 4 s, and not 5 s"):
         Studio(log, Look.of()).picture(tmp_path / "late.png", 5.0)
 
 
 def test_what_is_missing_is_said_with_what_to_install(log, monkeypatch):
-    monkeypatch.setattr(stage.ctypes.util, "find_library", lambda name: None)
+    monkeypatch.setattr(window.ctypes.util, "find_library", lambda name: None)
     with pytest.raises(InputError, match="apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri"):
         Studio(log, Look.of())
-    monkeypatch.setattr(stage.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(window.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install 'bilayer_sim_ros\[film\]'"):
         Studio(log, Look.of())
