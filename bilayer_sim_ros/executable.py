@@ -98,7 +98,12 @@ def _run_node(
     executor = SingleThreadedExecutor()
     thread = threading.Thread(target=_spin, args=(executor,), name="executor", daemon=True)
     try:
-        node = Node(name, automatically_declare_parameters_from_overrides=True)
+        try:
+            node = Node(name, automatically_declare_parameters_from_overrides=True)
+        except ValueError as error:  # "Cannot declare a statically typed parameter ... of type PARAMETER_NOT_SET"
+            raise InputError(
+                'a parameter has no value: allowed is one of its type, and [""] for a list of nothing'
+            ) from error
         values = declare(node, table, given)
         executor.add_node(node)
         thread.start()

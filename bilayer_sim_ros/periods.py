@@ -32,3 +32,7 @@ class Periods:
     def next_end(self, time: float) -> float:
         """When the one that has not ended at `time` [s] does [s]."""
         return self._start + (self.complete(time) + 1) / self._rate
+
+    def time_to_nearest_end(self, time: float) -> float:
+        """Time from `time` [s] to the end of a period that is nearest to one period later [s]."""
+        return self.next_end(time + 0.5 / self._rate) - time

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 from bilayer_core.simulation.stepper import StepReport
+from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.recording import LogStatus, Recording
 
 # Real time between two reports [s].
@@ -15,7 +17,7 @@ STATUS_PERIOD = 1.0
 
 @dataclass
 class Status:
-    """How the run is doing: since the status before, except for `time`, `paused`, `waited` and `log`.
+    """How the run is doing: since the status before, except for `time`, `paused`, `asked_factor`, `waited` and `log`.
 
     Attributes
     ----------
@@ -24,8 +26,16 @@ class Status:
     paused : bool
     real_time_factor : float
         Simulated seconds per second.
-    steps, substeps, iterations : int
-        Steps, the parts in which they were taken, and Newton iterations.
+    asked_factor : float
+        The same as it was asked for; 0 for as fast as possible.
+    lost : float
+        Lag behind it that is not made up for [s].
+    real : float
+        Real time [s].
+    spent : dict
+        What that went to, in part: cause (`pacing`) to seconds.
+    steps, substeps, rejected, iterations : int
+        Steps, the parts in which they were taken, attempts that were not accepted, and Newton iterations.
     residual : float
         Largest of the last velocity corrections of steps [m/s].
     waited : float
@@ -38,8 +48,13 @@ class Status:
     time: float
     paused: bool
     real_time_factor: float = 0.0
+    asked_factor: float = 0.0
+    lost: float = 0.0
+    real: float = 0.0
+    spent: dict[str, float] = field(default_factory=dict)
     steps: int = 0
     substeps: int = 0
+    rejected: int = 0
     iterations: int = 0
     residual: float = 0.0
     waited: float = 0.0
@@ -54,10 +69,13 @@ class StatusReporter:
     ----------
     report : callable
         Called with a `Status`.
+    pacer : Pacer
     """
 
-    def __init__(self, report: Callable[[Status], None]):
+    def __init__(self, report: Callable[[Status], None], pacer: Pacer):
         self._report = report
+        self._pacer = pacer
+        self._lost = 0.0
 
     def start(self, simulated: float, waited: float = 0.0, log: LogStatus | None = None) -> None:
         """Count from simulated time `simulated` [s] and now on."""
@@ -69,8 +87,23 @@ class StatusReporter:
         status = self._status
         status.steps += 1
         status.substeps += step.substeps
+        status.rejected += step.rejected
         status.iterations += step.iterations
         status.residual = max(status.residual, step.residual)
+
+    def spend(self, cause: str, seconds: float) -> None:
+        """Count real time that something took [s]."""
+        self._status.spent[cause] = self._status.spent.get(cause, 0.0) + seconds
+
+    @contextmanager
+    def spending(self, cause: str) -> Iterator[None]:
+        """Count the real time that a block takes, if there is a cause."""
+        begin = time.monotonic()
+        try:
+            yield
+        finally:
+            if cause:
+                self.spend(cause, time.monotonic() - begin)
 
     @property
     def due_at(self) -> float:
@@ -84,7 +117,9 @@ class StatusReporter:
             return
         status = self._status
         status.real_time_factor = (simulated - status.time) / real
-        status.time, status.paused = simulated, paused
+        status.time, status.paused, status.real = simulated, paused, real
+        status.asked_factor = self._pacer.factor
+        status.lost, self._lost = self._pacer.lost - self._lost, self._pacer.lost
         status.waited = status.waited + real if waiting and status.steps == 0 else 0.0
         log, before = recording.log_status, status.log.dropped
         status.log, status.dropped = log, log.dropped - before

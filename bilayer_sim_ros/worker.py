@@ -16,9 +16,8 @@ from bilayer_core.record.events import Event
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.lockstep import Control
-from bilayer_sim_ros.pacing import Pacer
+from bilayer_sim_ros.control import Control
+from bilayer_sim_ros.pacing import CONTROLLERS, LOG, OTHERS, PHYSICS, SUBSCRIBERS, Pacer
 from bilayer_sim_ros.periods import Periods
 from bilayer_sim_ros.recording import LogStatus, Recording
 from bilayer_sim_ros.requests import Requests
@@ -52,9 +51,7 @@ class SimulationWorker:
     simulator : Simulator
         Compiled, at its start.
     control : Control
-        Stimuli from outside; asked before each step.
-    commands : Commands
-        Poses and loads from outside.
+        What acts from outside; asked before each step.
     publisher : Publisher
     recording : Recording
         Files of the first run.
@@ -81,7 +78,6 @@ class SimulationWorker:
         simulator: Simulator,
         *,
         control: Control,
-        commands: Commands,
         publisher: Publisher,
         recording: Recording,
         rate: float,
@@ -93,7 +89,6 @@ class SimulationWorker:
     ):
         self._simulator = simulator
         self._control = control
-        self._commands = commands
         self._publisher = publisher
         self._recording = recording
         self._frames = Periods(rate)
@@ -101,7 +96,7 @@ class SimulationWorker:
         self._duration = duration
         self._stop_listening: Callable[[], None] = lambda: None
         self._paused = paused
-        self._reporter = StatusReporter(report)
+        self._reporter = StatusReporter(report, pacer)
         self._finished = finished
         self._stopping = threading.Event()
         self._requests = Requests()
@@ -215,12 +210,15 @@ class SimulationWorker:
 
     def _serve_requests(self) -> None:
         """Do what is asked until the next step is due, or, where time stands still, the next status."""
-        while not self._stopping.is_set() and self._requests.serve(self._time_to_wait()):
-            pass
+        cause = CONTROLLERS if self._wants_to_advance and self._control.waiting else ""
+        with self._reporter.spending(cause):
+            while not self._stopping.is_set() and self._requests.serve(self._time_to_wait()):
+                pass
 
     def _time_to_wait(self) -> float:
         if not self._may_advance:
-            return max(min(self._reporter.due_at, self._shown_at + SHOWING_PERIOD) - time.monotonic(), 0.0)
+            look = min(self._reporter.due_at, self._shown_at + SHOWING_PERIOD, self._control.wait_ends_at)
+            return max(look - time.monotonic(), 0.0)
         if self._paused:
             return 0.0
         delay = self._pacer.delay(self._simulator.time)
@@ -228,11 +226,12 @@ class SimulationWorker:
 
     def _advance(self) -> None:
         """Take one step, and show what is due at its end."""
-        start = self._simulator.time
-        for channel, value in self._control.changes(start).items():
-            self._simulator.set_stimulus(channel, value)
-        self._commands.apply(self._simulator)
+        start, cpu, wall = self._simulator.time, self._simulator.cpu_time, self._simulator.wall_time
+        self._control.act(self._simulator)
         self._reporter.add(self._simulator.step(until=self._next_stop()))
+        cpu, wall = self._simulator.cpu_time - cpu, self._simulator.wall_time - wall
+        self._reporter.spend(PHYSICS, cpu)
+        self._reporter.spend(OTHERS, max(wall - cpu, 0.0))
         self._frame_is_out = False
         now = self._simulator.time
         frame_is_due = self._frames.complete(now) > self._frames.complete(start)
@@ -257,8 +256,10 @@ class SimulationWorker:
         if publish or self._recording.wanted:
             frame = self._simulator.frame()
             if publish:
-                self._publisher.publish(frame, everything=self._paused)
-            self._recording.observe(frame)
+                with self._reporter.spending(SUBSCRIBERS):
+                    self._publisher.publish(frame, everything=self._paused)
+            with self._reporter.spending(LOG):
+                self._recording.observe(frame)
 
     def _show_again_when_due(self) -> None:
         """Show what stands still to those who came late."""
@@ -278,12 +279,15 @@ class SimulationWorker:
         self._drop_single_steps("the simulation was resumed before the next frame")
         if self._paused:
             self._paused = False
+            self._control.wait_anew()
             self._pacer.restart(self._simulator.time)
         answer.set_result(f"running from t = {self._simulator.time:.6g} s")
 
     def _do_step(self, answer: Future) -> None:
         if not self._paused:
             raise InputError("the simulation is running: call pause first")
+        if not self._single_steps:
+            self._control.wait_anew()
         self._single_steps.append(answer)
 
     def _do_reset(self, answer: Future) -> None:
@@ -295,7 +299,6 @@ class SimulationWorker:
             self.error = self.error or error  # told when the node ends
         self._recording = following
         self._control.reset()
-        self._commands.reset()
         self._begin()
         answer.set_result("reset to t = 0 s")
 
