@@ -61,9 +61,9 @@ class Commands:
             return False
         with self._lock:
             waiting, self._waiting = self._waiting, {}
-        for action in waiting.values():
+        for key in sorted(waiting):  # whichever came first
             try:
-                action(simulator, over)
+                waiting[key](simulator, over)
             except InputError as error:
                 self._refuse(str(error))
         return True

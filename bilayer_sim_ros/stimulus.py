@@ -155,7 +155,8 @@ class StimulusInputs:
         return fault
 
     def changes(self, time: float) -> dict[str, float | None]:
-        """What to set for the step that begins at `time` [s], a tick: channels that a message or the fallback changes.
+        """What to set for the step that begins at `time` [s], a tick: channels that a message or the fallback changes,
+        in the scene's order, whichever message came first.
 
         None gives a channel back to the scene's schedule.
         """
@@ -165,8 +166,10 @@ class StimulusInputs:
         if not self._begun:
             self._begun, self._first = True, received
         self._heard.update(dict.fromkeys(received, time))
-        changes: dict[str, float | None] = dict(received)
+        changes: dict[str, float | None] = {}
         for name, channel in self._channels.items():
+            if name in received:
+                changes[name] = received[name]
             silent = self._is_silent(name, time)
             if silent or name in missing - received.keys():
                 value = self._fallback_value(channel, self._acting.get(name))

@@ -22,7 +22,9 @@ CHANNEL = "swelling"
 class Driven:
     """A simulator with messages that come between its steps, as the node has it."""
 
-    def __init__(self, scene="bending", interpolation="linear", period=PERIOD, fallback="hold", timeout=0.0, log=None, **settings):
+    def __init__(
+        self, scene="bending", interpolation="linear", period=PERIOD, fallback="hold", timeout=0.0, log=None, **settings
+    ):
         self.simulator = Simulator(load_scene(scene), **settings)
         self.simulator.compile()
         stimuli = self.simulator.scene.stimuli.items()

@@ -47,8 +47,9 @@ def test_in_lockstep_the_ramp_acts_exactly_at_each_time_and_holds_until_interrup
         "ramp_controller", domain, {"channel": "swelling", "duration": 0.2, "hold": True, "resume": True}
     )
     assert simulation.wait() == 0, simulation.output
-    # A frame shows the stimulus of the step that ends with it.
-    assert read_log(path).stimulus[1:, 0].tolist() == [ramp(k / 50, 0.2, 0.0, 1.0) for k in range(20)]
+    # A frame shows the stimulus of the step that ends with it, and that of a tick is reached at the next one.
+    expected = [ramp(k / 50, 0.2, 0.0, 1.0) for k in range(20)]
+    assert read_log(path).stimulus[1:, 0].tolist() == pytest.approx(expected, abs=1e-15)
     assert controller.running
     controller.send(signal.SIGINT)
     assert controller.wait(10) == 0, controller.output
