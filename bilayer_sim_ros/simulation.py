@@ -22,7 +22,7 @@ from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
 from bilayer_sim_ros.services import Services, trigger
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
-from bilayer_sim_ros.subscriptions import subscribe_commands, subscribe_stimuli, warn_of_refusal
+from bilayer_sim_ros.subscriptions import Rest, subscribe_commands, subscribe_stimuli, warn_of_refusal
 from bilayer_sim_ros.worker import SimulationWorker
 
 COMPILATION_PERIOD = 5.0
@@ -69,19 +69,22 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         gate = Lockstep(inputs, ClockPublisher(node, description).publish, parameters["lockstep_timeout"])
         inputs.notify = lambda: worker.wake()
     announcer = Announcer(node, inputs, parameters, lambda event: worker.tell(event))
+    pacer = Pacer(parameters["real_time_factor"])
     worker = SimulationWorker(
         simulator,
         control=Control(inputs, commands, ticks, parameters["stimulus_interpolation"], gate),
         publisher=FramePublisher(node, description, rate, scene.output.marker_rate, clock and not lockstep),
         recording=recording,
         rate=rate,
-        pacer=Pacer(parameters["real_time_factor"]),
+        pacer=pacer,
         duration=parameters["duration"] or math.inf,
         paused=parameters["start_paused"],
         report=announcer.report,
         finished=stop.set,
     )
-    subscribe_stimuli(node, inputs, description.channels)
+    # A quarter of a control period in real time: so late a command may be taken.
+    rest = Rest(lambda: 0.25 / (ticks * pacer.factor) if pacer.factor else 0.0)
+    subscribe_stimuli(node, inputs, description.channels, None if lockstep else rest)
     subscribe_commands(node, commands, simulator.model)
     services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
     state = "paused" if parameters["start_paused"] else "running"

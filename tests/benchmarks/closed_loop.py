@@ -42,8 +42,8 @@ def square(now: float, _: random.Random) -> float:
 
 
 def noise(part: float) -> Callable[[float, random.Random], float]:
-    """About the middle of the range, by a part of it."""
-    return lambda _, chance: 0.5 + part * (2.0 * chance.random() - 1.0)
+    """By a part of the range, about a value that rises from there to the middle in 2 s: no blow at the start."""
+    return lambda now, chance: part + (0.5 - part) * min(0.5 * now, 1.0) + part * (2.0 * chance.random() - 1.0)
 
 
 SIGNALS = {
@@ -124,20 +124,21 @@ def measure(name: str, scene: str, duration: float, interpolation: str, log: Pat
     return {"cpu": float(steps[1]), "process": cpu, "real": ended - begin, "warnings": len(behind)}
 
 
-def error_of(log: Path) -> tuple[float, float]:
-    """Largest, and last, distance of a node from the run at a tenth of the tolerance, over the longest rod."""
+def error_of(log: Path, part: float) -> tuple[float, float]:
+    """Largest, and last, distance of a node from the run at a part of the tolerance, over the longest rod."""
     from bilayer_core import read_log
+    from bilayer_core.record.log_reader import read_info
     from bilayer_core.runs.replay import branch, simulator_of
 
-    tolerance = simulator_of(log).tolerance
-    run = read_log(log)
-    finer, inputs = branch(log, 0.0, [f"solver.tolerance={tolerance / 10.0}"])
-    found = []
-    for instant, positions in zip(run.shape_times[1:], run.positions[1:], strict=True):
-        finer.run(until=float(instant), inputs=[told for told in inputs if finer.time <= told.time < instant])
-        found.append(float(np.linalg.norm(finer.positions - positions, axis=1).max()))
+    finer, inputs = branch(log, 0.0, [f"solver.tolerance={part * simulator_of(log).tolerance}"])
+    end = read_info(log).last_time
+    finer.run(until=end, inputs=inputs, log=log.with_suffix(".finer.mcap"))
+    run, other = read_log(log), read_log(log.with_suffix(".finer.mcap"))
+    if not np.array_equal(run.shape_times, other.shape_times):
+        raise SystemExit("the two logs have shapes of different times")
+    found = np.linalg.norm(run.positions - other.positions, axis=2).max(axis=1)
     longest = max(rod.path.length for rod in finer.scene.rods)
-    return max(found) / longest, found[-1] / longest
+    return float(found.max() / longest), float(found[-1] / longest)
 
 
 def main() -> None:
@@ -147,6 +148,8 @@ def main() -> None:
     parser.add_argument("--duration", type=float, default=10.0, help="simulated time [s]")
     parser.add_argument("--interpolation", default="linear", choices=["linear", "hold"])
     parser.add_argument("--no-error", action="store_true")
+    parser.add_argument("--part", type=float, default=0.1, help="of the tolerance, for the error")
+    parser.add_argument("--keep", type=Path, help="directory for the logs")
     parser.add_argument("--json", type=Path, help="file to write the figures to")
     parser.add_argument("--control", choices=SIGNALS, help=argparse.SUPPRESS)
     parser.add_argument("--channel", help=argparse.SUPPRESS)
@@ -161,9 +164,9 @@ def main() -> None:
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as directory:
         for name in [options.only] if options.only else SIGNALS:
-            log = Path(directory) / f"{name.split()[0]}{len(figures)}.mcap"
+            log = (options.keep or Path(directory)) / f"{name.split()[0]}{len(figures)}.mcap"
             found = measure(name, options.scene, options.duration, options.interpolation, log)
-            worst, last = (math.nan, math.nan) if options.no_error else error_of(log)
+            worst, last = (math.nan, math.nan) if options.no_error else error_of(log, options.part)
             figures[name] = found | {"largest_error": worst, "last_error": last}
             _, rate, asked = SIGNALS[name]
             factors = " | ".join(f"{options.duration / found[time]:.2f}" for time in ("real", "cpu", "process"))

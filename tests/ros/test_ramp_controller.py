@@ -39,6 +39,15 @@ def test_each_time_is_answered_once_until_the_end_value_has_been_sent_often_enou
     assert ended == ([] if hold else [len(sent)])
 
 
+def test_when_time_goes_back_the_ramp_begins_again():
+    sent = []
+    parameters = {"duration": 1.0, "start_value": 0.0, "end_value": 1.0, "hold": True}
+    sender = RampSender(sent.append, lambda: None, parameters)
+    for now in (0, 500_000_000, 2_000_000_000, 0, 250_000_000, 250_000_000):
+        sender.hear(now)
+    assert sent == [0.0, 0.5, 1.0, 0.0, 0.25]
+
+
 def test_in_lockstep_the_ramp_acts_exactly_at_each_time_and_holds_until_interrupted(start, domain, tmp_path):
     path = tmp_path / "run.mcap"
     parameters = {"scene": "bending", "log": path, "duration": 0.4, "lockstep": True, "real_time_factor": 0.0}
