@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -144,9 +145,18 @@ def declare(node: Node, table: Sequence[NodeParameter], given: Mapping[str, str]
             additional_constraints=parameter.allowed,
             read_only=not parameter.live,
             dynamic_typing=True,
+            floating_point_range=_range_of(parameter),
         )
         if node.has_parameter(parameter.name):
             node.set_descriptor(parameter.name, descriptor)
         else:
             node.declare_parameter(parameter.name, values[parameter.name], descriptor)
     return values
+
+
+def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
+    """The range of a number that has one; tools show it."""
+    if not isinstance(parameter.default, float) or math.isinf(parameter.minimum):
+        return []
+    least = math.nextafter(parameter.minimum, math.inf) if parameter.above_minimum else parameter.minimum
+    return [FloatingPointRange(from_value=least, to_value=sys.float_info.max)]

@@ -96,8 +96,19 @@ def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) 
 
 SIM_NODE = (
     NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
-    NodeParameter("rate", 0.0, "frames published and logged per simulated second [Hz]; 0 = as the scene says", 0.0),
-    NodeParameter("real_time_factor", 1.0, "simulated seconds per second, at most; 0 = as fast as possible", 0.0),
+    NodeParameter(
+        "rate", 0.0, "frames published and logged per simulated second [Hz]; 0 = as the scene says", 0.0, live=True
+    ),
+    NodeParameter(
+        "marker_rate",
+        0.0,
+        "frames per simulated second that carry nodes, points and markers [Hz]; 0 = as the scene says",
+        0.0,
+        live=True,
+    ),
+    NodeParameter(
+        "real_time_factor", 1.0, "simulated seconds per second, at most; 0 = as fast as possible", 0.0, live=True
+    ),
     NodeParameter("duration", 0.0, "simulated time after which the node ends [s]; 0 = until it is stopped", 0.0),
     NodeParameter("publish_clock", True, "publish simulated time on /clock"),
     NodeParameter("start_paused", False, "wait for the service ~/resume at the start"),

@@ -77,6 +77,13 @@ class Recording:
             raise InputError(f"{path}: exists already; remove it, or choose another name")
         return path
 
+    def set_rates(self, rate: float, marker_rate: float) -> None:
+        """Go on with other rates [Hz], also in the next run."""
+        log_path, rrd_path, _, _, patience = self._settings
+        self._settings = (log_path, rrd_path, rate, marker_rate, patience)
+        if self._log:
+            self._log.set_rates(rate, marker_rate)
+
     def of_next_run(self) -> Recording:
         """The files of the run that begins with a reset."""
         return Recording(*self._settings, run=self._run + 1)

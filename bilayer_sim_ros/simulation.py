@@ -14,9 +14,10 @@ from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_sim_ros.answers import Answers
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import SHORTEST_PERIOD, Control, tick_rate
+from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.parameters import Value
+from bilayer_sim_ros.parameters import SIM_NODE, Value
 from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
@@ -34,10 +35,10 @@ UNPACED_PATIENCE = 0.25
 def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
     """Simulate until the duration is reached or `stop` is set; raises what the simulation stopped with."""
     scene = load_scene(parameters["scene"])
-    rate = parameters["rate"] or scene.output.rate
+    rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
     rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
-    recording = Recording(parameters["log"], rerun_path, rate, scene.output.marker_rate, patience)
+    recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience)
     simulator = Simulator(
         scene,
         model=parameters["model"],
@@ -73,9 +74,10 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     worker = SimulationWorker(
         simulator,
         control=Control(inputs, commands, ticks, parameters["stimulus_interpolation"], gate),
-        publisher=FramePublisher(node, description, rate, scene.output.marker_rate, clock and not lockstep),
+        publisher=FramePublisher(node, description, rate, marker_rate, clock and not lockstep),
         recording=recording,
         rate=rate,
+        marker_rate=marker_rate,
         pacer=pacer,
         duration=parameters["duration"] or math.inf,
         paused=parameters["start_paused"],
@@ -86,6 +88,12 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     rest = Rest(lambda: 0.25 / (ticks * pacer.factor) if pacer.factor else 0.0)
     subscribe_stimuli(node, inputs, description.channels, None if lockstep else rest)
     subscribe_commands(node, commands, simulator.model)
+    changes = {
+        "real_time_factor": worker.set_real_time_factor,
+        "rate": lambda value: worker.set_rate(value or scene.output.rate),
+        "marker_rate": lambda value: worker.set_marker_rate(value or scene.output.marker_rate),
+    }
+    LiveParameters(node, SIM_NODE, changes)
     services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
     state = "paused" if parameters["start_paused"] else "running"
     node.get_logger().info(f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}")

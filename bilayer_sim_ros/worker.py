@@ -8,11 +8,12 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Protocol
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.observed.frame import Frame
-from bilayer_core.record.events import Event
+from bilayer_core.record.events import Event, changed_setting
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
 from bilayer_core.simulation.simulator import Simulator
@@ -39,6 +40,9 @@ class Publisher(Protocol):
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send what somebody listens to: what is due, or everything."""
 
+    def set_rates(self, rate: float, marker_rate: float) -> None:
+        """Go on with other rates of frames, and of topics made to be looked at [Hz]."""
+
     def tell(self, event: Event) -> None:
         """Send an event that frames do not show."""
 
@@ -55,8 +59,8 @@ class SimulationWorker:
     publisher : Publisher
     recording : Recording
         Files of the first run.
-    rate : float
-        Frames per simulated second [Hz].
+    rate, marker_rate : float
+        Frames per simulated second, and those of them that carry topics made to be looked at [Hz].
     pacer : Pacer
     duration : float
         Simulated time at which the worker ends [s]; infinity means not by itself.
@@ -81,6 +85,7 @@ class SimulationWorker:
         publisher: Publisher,
         recording: Recording,
         rate: float,
+        marker_rate: float = math.inf,
         pacer: Pacer,
         duration: float = math.inf,
         paused: bool = False,
@@ -92,6 +97,7 @@ class SimulationWorker:
         self._publisher = publisher
         self._recording = recording
         self._frames = Periods(rate)
+        self._marker_rate = marker_rate
         self._pacer = pacer
         self._duration = duration
         self._stop_listening: Callable[[], None] = lambda: None
@@ -145,6 +151,18 @@ class SimulationWorker:
     def reset(self) -> Future:
         """Ask to go back to the start of the scene; paused stays paused."""
         return self._requests.ask(self._do_reset)
+
+    def set_real_time_factor(self, factor: float) -> Future:
+        """Ask to go on at another factor; 0 = as fast as possible."""
+        return self._requests.ask(partial(self._do_set_factor, factor))
+
+    def set_rate(self, rate: float) -> Future:
+        """Ask for frames at another rate [Hz]."""
+        return self._requests.ask(lambda answer: self._do_set_rates(rate, self._marker_rate, answer))
+
+    def set_marker_rate(self, rate: float) -> Future:
+        """Ask for topics made to be looked at, at another rate [Hz]."""
+        return self._requests.ask(lambda answer: self._do_set_rates(self._frames.rate, rate, answer))
 
     # The rest runs in the worker's thread.
 
@@ -289,6 +307,20 @@ class SimulationWorker:
         if not self._single_steps:
             self._control.wait_anew()
         self._single_steps.append(answer)
+
+    def _do_set_factor(self, factor: float, answer: Future) -> None:
+        self._pacer.factor = factor
+        self._pacer.restart(self._simulator.time)
+        self.tell(changed_setting(self._simulator.time, f"real_time_factor is {factor:g}"))
+        answer.set_result("")
+
+    def _do_set_rates(self, rate: float, marker_rate: float, answer: Future) -> None:
+        self._frames.rate, self._marker_rate = rate, marker_rate
+        self._publisher.set_rates(rate, marker_rate)
+        self._recording.set_rates(rate, marker_rate)
+        text = f"rate is {rate:g} Hz, marker_rate is {marker_rate:g} Hz"
+        self.tell(changed_setting(self._simulator.time, text))
+        answer.set_result("")
 
     def _do_reset(self, answer: Future) -> None:
         following = self._recording.of_next_run()
