@@ -73,9 +73,11 @@ def to_diagnostics(status: Status, name: str, ignored: Mapping[str, int]) -> Dia
         "rejected steps": str(status.rejected),
         "Newton iterations per step": f"{per_step:.3g}",
         "largest residual [m/s]": f"{status.residual:.3g}",
+        "numerical energy, of the largest": f"{status.numerical_energy:.3g}",
         "waited for a stimulus [s]": f"{status.waited:.3g}",
         **{f"answers ignored that were {why}": str(count) for why, count in ignored.items()},
         "frames left out of the log": str(status.log.dropped),
+        "in the queue of the log": str(status.log.waiting),
         "log": status.log.failure or "OK",
     }
     level = DiagnosticStatus.WARN if late or status.dropped or status.waited >= PATIENCE else DiagnosticStatus.OK

@@ -24,12 +24,15 @@ class LogStatus:
     ----------
     dropped : int
         Frames left out of it, as the disk was too slow.
+    waiting : int
+        Frames, inputs and events in its queue.
     failure : str
         Why it is not written further; empty as long as it is.
     """
 
     dropped: int = 0
     failure: str = ""
+    waiting: int = 0
 
 
 class Recording:
@@ -97,7 +100,7 @@ class Recording:
     def log_status(self) -> LogStatus:
         """How the log is doing; one that is not written is well."""
         failure = str(self._lost or (self._log and self._log.failure) or "")
-        return LogStatus(self._log.dropped if self._log else 0, failure)
+        return LogStatus(self._log.dropped, failure, self._log.waiting) if self._log else LogStatus(0, failure)
 
     def start(self, description: Description) -> None:
         """Begin the files. One that cannot be written is an error in the first run; in a later one `close` tells."""

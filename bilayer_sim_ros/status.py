@@ -7,7 +7,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.simulation.stepper import StepReport
+from bilayer_core.simulation.summary import numerical_energy
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.recording import LogStatus, Recording
 
@@ -38,6 +40,8 @@ class Status:
         Steps, the parts in which they were taken, attempts that were not accepted, and Newton iterations.
     residual : float
         Largest of the last velocity corrections of steps [m/s].
+    numerical_energy : float
+        What steps have made or, below zero, lost of energy since the start, over the largest energy of the run.
     waited : float
         Real time for which there has been no step because no controller answers [s].
     log : LogStatus
@@ -57,6 +61,7 @@ class Status:
     rejected: int = 0
     iterations: int = 0
     residual: float = 0.0
+    numerical_energy: float = 0.0
     waited: float = 0.0
     log: LogStatus = LogStatus()
     dropped: int = 0
@@ -110,12 +115,14 @@ class StatusReporter:
         """When the next report is due, on the monotonic clock [s]."""
         return self._since + STATUS_PERIOD
 
-    def report_when_due(self, simulated: float, paused: bool, waiting: bool, recording: Recording) -> None:
-        """Report at simulated time `simulated` [s], if it is time to."""
+    def report_when_due(self, simulator: Simulator, paused: bool, waiting: bool, recording: Recording) -> None:
+        """Report how a simulator is doing, if it is time to."""
         real = time.monotonic() - self._since
         if real < STATUS_PERIOD:
             return
-        status = self._status
+        status, simulated = self._status, simulator.time
+        made, largest = numerical_energy(simulator)
+        status.numerical_energy = made / largest if largest > 0.0 else 0.0
         status.real_time_factor = (simulated - status.time) / real
         status.time, status.paused, status.real = simulated, paused, real
         status.asked_factor = self._pacer.factor

@@ -175,7 +175,7 @@ class SimulationWorker:
                 if self._may_advance:
                     self._advance()
                 waiting = self._wants_to_advance and self._control.waiting
-                self._reporter.report_when_due(self._simulator.time, self._paused, waiting, self._recording)
+                self._reporter.report_when_due(self._simulator, self._paused, waiting, self._recording)
                 self._show_again_when_due()
             if not self._stopping.is_set():
                 complete, termination = True, Termination.COMPLETED.value

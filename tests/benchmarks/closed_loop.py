@@ -95,13 +95,14 @@ def cpu_time(pid: int) -> float:
     return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
-def measure(name: str, scene: str, duration: float, interpolation: str, log: Path) -> dict[str, float]:
-    """Run a node with a controller: its factors, and how many messages acted."""
+def measure(name: str, log: Path, options: argparse.Namespace) -> dict[str, float]:
+    """Run a node with a controller: CPU time of its steps and of all of it, real time [s], and how often it warned."""
     from bilayer_core import load_scene
 
-    channel = next(iter(load_scene(scene).stimuli))
-    parameters = {"scene": scene, "log": log, "duration": duration, "start_paused": "true"}
-    parameters |= {"real_time_factor": SIGNALS[name][2], "stimulus_interpolation": interpolation}
+    channel = next(iter(load_scene(options.scene).stimuli))
+    parameters = {"scene": options.scene, "log": log, "duration": options.duration, "start_paused": "true"}
+    parameters |= {"real_time_factor": SIGNALS[name][2], "stimulus_interpolation": options.interpolation}
+    parameters |= {"tolerance": options.tolerance}
     command = ["taskset", "-c", str(NODE_CORE), sys.executable, "-m", "bilayer_sim_ros.sim_node", "--ros-args"]
     for key, value in parameters.items():
         command += ["-p", f"{key}:={value}"]
@@ -147,6 +148,7 @@ def main() -> None:
     parser.add_argument("--scene", default="gripping")
     parser.add_argument("--duration", type=float, default=10.0, help="simulated time [s]")
     parser.add_argument("--interpolation", default="linear", choices=["linear", "hold"])
+    parser.add_argument("--tolerance", type=float, default=0.0, help="of steps; 0 = as the scene says")
     parser.add_argument("--no-error", action="store_true")
     parser.add_argument("--part", type=float, default=0.1, help="of the tolerance, for the error")
     parser.add_argument("--keep", type=Path, help="directory for the logs")
@@ -165,7 +167,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as directory:
         for name in [options.only] if options.only else SIGNALS:
             log = (options.keep or Path(directory)) / f"{name.split()[0]}{len(figures)}.mcap"
-            found = measure(name, options.scene, options.duration, options.interpolation, log)
+            found = measure(name, log, options)
             worst, last = (math.nan, math.nan) if options.no_error else error_of(log, options.part)
             figures[name] = found | {"largest_error": worst, "last_error": last}
             _, rate, asked = SIGNALS[name]
