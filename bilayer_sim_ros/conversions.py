@@ -39,6 +39,11 @@ def to_seconds(stamp: Time) -> float:
     return stamp.sec + stamp.nanosec / NANOSECONDS
 
 
+def status_without_run(message: str, name: str) -> DiagnosticArray:
+    """What the node of that full name does before there is a run."""
+    return DiagnosticArray(status=[_report(DiagnosticStatus.OK, message, name, {})])
+
+
 def to_diagnostics(status: Status, name: str, ignored: Mapping[str, int]) -> DiagnosticArray:
     """How the run is doing.
 
@@ -81,11 +86,10 @@ def to_diagnostics(status: Status, name: str, ignored: Mapping[str, int]) -> Dia
         "log": status.log.failure or "OK",
     }
     level = DiagnosticStatus.WARN if late or status.dropped or status.waited >= PATIENCE else DiagnosticStatus.OK
-    report = DiagnosticStatus(
-        level=DiagnosticStatus.ERROR if status.log.failure else level,
-        name=f"{name}: simulation",
-        message=message,
-        hardware_id=name,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
+    report = _report(DiagnosticStatus.ERROR if status.log.failure else level, message, name, values)
     return DiagnosticArray(header=Header(stamp=to_time(status.time)), status=[report])
+
+
+def _report(level: bytes, message: str, name: str, values: Mapping[str, str]) -> DiagnosticStatus:
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticStatus(level=level, name=f"{name}: simulation", message=message, hardware_id=name, values=pairs)

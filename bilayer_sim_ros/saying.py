@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from bilayer_core.record.events import Event, late_stimulus
-from bilayer_sim_ros.conversions import PATIENCE, to_diagnostics
+from bilayer_sim_ros.conversions import PATIENCE, status_without_run, to_diagnostics
 from bilayer_sim_ros.pacing import cause_of_delay
 from bilayer_sim_ros.parameters import Value
 from bilayer_sim_ros.status import Status
@@ -16,6 +16,8 @@ from bilayer_sim_ros.stimulus import StimulusInputs
 
 FALLBACKS = {"hold": "the last value stays", "zero": "zero acts", "schedule": "the scene's schedule acts"}
 """What is said of each `stimulus_fallback`."""
+COMPILATION_PERIOD = 5.0
+"""Real time between two messages about compilation [s]."""
 WARNING_PERIOD = 10.0
 """Real time between two warnings about the same thing [s]."""
 
@@ -56,6 +58,12 @@ class Announcer:
         self._say_waiting(status)
         if self._publisher.get_subscription_count() > 0:
             self._publisher.publish(to_diagnostics(status, self._name, self._inputs.ignored))
+
+    def say_compiling(self, done: int, total: int) -> None:
+        """Say how many pieces of the engine are compiled; called before the run, in the main thread."""
+        text = f"compiling kernels, once for this version on this machine: {done} of {total} pieces"
+        self._node.get_logger().info(text, throttle_duration_sec=COMPILATION_PERIOD)
+        self._publisher.publish(status_without_run(text, self._name))
 
     def _say_log(self, status: Status) -> None:
         if status.log.failure and status.log.failure != self._failure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 
 from rclpy.node import Node
@@ -26,8 +26,6 @@ from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 from bilayer_sim_ros.subscriptions import Rest, subscribe_commands, subscribe_stimuli, warn_of_refusal
 from bilayer_sim_ros.worker import SimulationWorker
 
-COMPILATION_PERIOD = 5.0
-"""Between two messages about compilation [s]."""
 UNPACED_PATIENCE = 0.25
 """Longest wait for the disk of a simulation that goes as fast as it can, and has no rhythm to keep [s]."""
 
@@ -52,8 +50,6 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         refuse_without_clock(clock)
     shortest = simulator.dt if lockstep and simulator.tolerance is None else SHORTEST_PERIOD
     ticks = tick_rate(parameters["control_period"], rate, shortest)
-    ensure_compiled(_progress_of_compilation(node))
-    seconds = simulator.compile()
     description = simulator.description
     inputs = StimulusInputs(
         [
@@ -96,9 +92,14 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     LiveParameters(node, SIM_NODE, changes)
     services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
     state = "paused" if parameters["start_paused"] else "running"
-    node.get_logger().info(f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}")
-    worker.start()
     try:
+        # What is asked for and sent meanwhile waits.
+        ensure_compiled(announcer.say_compiling)
+        seconds = simulator.compile()
+        node.get_logger().info(
+            f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}"
+        )
+        worker.start()
         stop.wait()
     finally:
         worker.stop()
@@ -108,15 +109,3 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     if worker.error is not None:
         raise worker.error
     node.get_logger().info(f"ended at t = {simulator.time:.6g} s; CPU time of the steps: {simulator.cpu_time:.3f} s")
-
-
-def _progress_of_compilation(node: Node) -> Callable[[int, int], None]:
-    """Says now and then how many pieces of the engine are compiled."""
-
-    def report(done: int, total: int) -> None:
-        node.get_logger().info(
-            f"compiling kernels, once for this version on this machine: {done} of {total} pieces",
-            throttle_duration_sec=COMPILATION_PERIOD,
-        )
-
-    return report

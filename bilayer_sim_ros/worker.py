@@ -122,10 +122,13 @@ class SimulationWorker:
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the present step, finish the files, and return when that is done."""
+        """End after the present step, finish the files, and return when that is done; also where it never began."""
         self._stopping.set()
         self._requests.wake()
-        self._thread.join()
+        if self._thread.ident is None:
+            self._requests.close()
+        else:
+            self._thread.join()
 
     def wake(self) -> None:
         """Look at once whether what was waited for has come."""
