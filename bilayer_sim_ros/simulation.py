@@ -80,9 +80,8 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         report=announcer.report,
         finished=stop.set,
     )
-    # A quarter of a control period in real time: so late a command may be taken.
-    rest = Rest(lambda: 0.25 / (ticks * pacer.factor) if pacer.factor else 0.0)
-    subscribe_stimuli(node, inputs, description.channels, None if lockstep else rest)
+    rest = None if lockstep else Rest(ticks, lambda: pacer.factor)
+    subscribe_stimuli(node, inputs, description.channels, rest)
     subscribe_commands(node, commands, simulator.model)
     changes = {
         "real_time_factor": worker.set_real_time_factor,

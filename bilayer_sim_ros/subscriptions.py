@@ -22,6 +22,8 @@ from bilayer_sim_ros.stimulus import StimulusInputs
 DEPTH = 10
 STAMPED_DEPTH = 100
 """All controllers may send on one topic, and no answer is to be lost."""
+LONGEST_REST = 0.005
+"""So long services may wait for the end of a rest [s]."""
 ROUND = 0.5e-3
 """Messages that are looked for at once are taken within about that time of each other [s]."""
 REFUSAL_PERIOD = 1.0
@@ -38,17 +40,20 @@ class Rest:
 
     Parameters
     ----------
-    length : callable
-        How long, at the present [s].
+    rate : float
+        Ticks per simulated second [Hz]: the rest takes a quarter of their period, and at most `LONGEST_REST`.
+    factor : callable
+        Simulated seconds per second at the present; 0 means as many as can be, and no rest.
     """
 
-    def __init__(self, length: Callable[[], float]):
-        self._length = length
+    def __init__(self, rate: float, factor: Callable[[], float]):
+        self._rate, self._factor = rate, factor
         self._ended = -math.inf
 
     def __call__(self) -> None:
         """Rest, unless it has just been done."""
-        length = self._length()
+        factor = self._factor()
+        length = min(0.25 / (self._rate * factor), LONGEST_REST) if factor else 0.0
         if length > 0.0 and time.monotonic() - self._ended > ROUND:
             time.sleep(length)
             self._ended = time.monotonic()

@@ -3,15 +3,18 @@
 import re
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from bilayer_core import Simulator, load_scene
+from bilayer_sim_ros import subscriptions
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import Control
 from bilayer_sim_ros.pacing import CONTROLLERS, LOG, PHYSICS, SUBSCRIBERS, Pacer
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.stimulus import StimulusInputs
+from bilayer_sim_ros.subscriptions import LONGEST_REST, ROUND, Rest
 from bilayer_sim_ros.worker import SimulationWorker
 
 NAP = 0.05
@@ -124,3 +127,21 @@ def test_a_node_that_is_behind_says_so_within_a_second_and_then_every_ten(start,
     assert said and said[1] in ("physics", "other threads and programs")
     time.sleep(2.5)
     assert node.output.count("behind:") == 1
+
+
+@pytest.mark.parametrize(("factor", "rest"), [(1.0, 0.005), (5.0, 0.001), (0.01, LONGEST_REST), (0.0, 0.0)])
+def test_the_executor_rests_once_in_a_round_of_messages(monkeypatch, factor, rest):
+    now, slept = [0.0], []
+
+    def sleep(seconds):
+        slept.append(seconds)
+        now[0] += seconds
+
+    monkeypatch.setattr(subscriptions, "time", SimpleNamespace(monotonic=lambda: now[0], sleep=sleep))
+    after = Rest(50.0, lambda: factor)
+    for _ in range(3):
+        for _ in range(4):  # messages of one round
+            now[0] += 0.1 * ROUND
+            after()
+        now[0] += 10 * ROUND
+    assert slept == ([pytest.approx(rest)] * 3 if rest else [])
