@@ -155,8 +155,7 @@ def declare(node: Node, table: Sequence[NodeParameter], given: Mapping[str, str]
 
 
 def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
-    """The range of a number that has one; tools show it."""
-    if not isinstance(parameter.default, float) or math.isinf(parameter.minimum):
+    """The range of a number that has one with a first value; tools show it."""
+    if not isinstance(parameter.default, float) or math.isinf(parameter.minimum) or parameter.above_minimum:
         return []
-    least = math.nextafter(parameter.minimum, math.inf) if parameter.above_minimum else parameter.minimum
-    return [FloatingPointRange(from_value=least, to_value=sys.float_info.max)]
+    return [FloatingPointRange(from_value=parameter.minimum, to_value=sys.float_info.max)]
