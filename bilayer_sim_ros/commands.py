@@ -1,4 +1,4 @@
-"""Poses of bodies and factors of loads from topics: the latest of each waits for the next step."""
+"""Poses of bodies and factors of loads from topics: the latest of each waits for the next tick."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FRAMES = ("", "world")
 
 
 class Commands:
-    """Collects what messages ask for (any thread) until the next step begins (the stepping thread).
+    """Collects what messages ask for (any thread) until a tick begins (the stepping thread).
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Commands:
     def __init__(self, refuse: Callable[[str], None]):
         self._refuse = refuse
         self._lock = threading.Lock()
-        self._waiting: dict[tuple[str, str], Callable[[Simulator], None]] = {}
+        self._waiting: dict[tuple[str, str], Callable[[Simulator, float], None]] = {}
 
     def reset(self) -> None:
         """Forget what waits, as at the start of a run."""
@@ -39,27 +39,34 @@ class Commands:
             frame = message.header.frame_id
             raise InputError(f"pose of body {body!r}: frame {frame!r} is not allowed; it must be 'world'")
         position, quaternion = position_and_quaternion(message.pose)
-        self._keep(("pose", body), lambda simulator: simulator.set_pose(body, position, quaternion))
+        self._keep(("pose", body), lambda simulator, _: simulator.set_pose(body, position, quaternion))
 
     def ask_load(self, name: str, factor: float) -> None:
         """Have a load act with a factor."""
-        self._keep(("load", name), lambda simulator: simulator.set_load(name, factor))
+        self._keep(("load", name), lambda simulator, over: simulator.set_load(name, factor, over=over))
 
-    def _keep(self, key: tuple[str, str], action: Callable[[Simulator], None]) -> None:
+    def _keep(self, key: tuple[str, str], action: Callable[[Simulator, float], None]) -> None:
         with self._lock:
             self._waiting[key] = action
 
-    def apply(self, simulator: Simulator) -> None:
-        """Have what waits act from the next step on."""
+    def apply(self, simulator: Simulator, over: float) -> bool:
+        """Have what waits act from now on, loads within a time [s]; poses have limits of their own.
+
+        Returns
+        -------
+        bool
+            Whether anything did.
+        """
         if not self._waiting:
-            return
+            return False
         with self._lock:
             waiting, self._waiting = self._waiting, {}
-        for action in waiting.values():
+        for key in sorted(waiting):  # whichever came first
             try:
-                action(simulator)
+                waiting[key](simulator, over)
             except InputError as error:
                 self._refuse(str(error))
+        return True
 
 
 def position_and_quaternion(pose: Pose) -> tuple[Sequence[float], Sequence[float]]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import math
 import signal
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -98,7 +99,12 @@ def _run_node(
     executor = SingleThreadedExecutor()
     thread = threading.Thread(target=_spin, args=(executor,), name="executor", daemon=True)
     try:
-        node = Node(name, automatically_declare_parameters_from_overrides=True)
+        try:
+            node = Node(name, automatically_declare_parameters_from_overrides=True)
+        except ValueError as error:  # "Cannot declare a statically typed parameter ... of type PARAMETER_NOT_SET"
+            raise InputError(
+                'a parameter has no value: allowed is one of its type, and [""] for a list of nothing'
+            ) from error
         values = declare(node, table, given)
         executor.add_node(node)
         thread.start()
@@ -139,9 +145,17 @@ def declare(node: Node, table: Sequence[NodeParameter], given: Mapping[str, str]
             additional_constraints=parameter.allowed,
             read_only=not parameter.live,
             dynamic_typing=True,
+            floating_point_range=_range_of(parameter),
         )
         if node.has_parameter(parameter.name):
             node.set_descriptor(parameter.name, descriptor)
         else:
             node.declare_parameter(parameter.name, values[parameter.name], descriptor)
     return values
+
+
+def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
+    """The range of a number that has one with a first value; tools show it."""
+    if not isinstance(parameter.default, float) or math.isinf(parameter.minimum) or parameter.above_minimum:
+        return []
+    return [FloatingPointRange(from_value=parameter.minimum, to_value=sys.float_info.max)]

@@ -1,12 +1,15 @@
-"""Keeping simulated time in step with a steady clock."""
+"""Keeping simulated time in step with a steady clock, and knowing what kept it from that."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
 
-# A simulation that is later than this does not race to catch up: it goes on from where it is [s].
 LARGEST_LAG = 0.1
+"""A simulation that is later than this does not race to catch up: it goes on from where it is [s]."""
+PHYSICS, LOG, SUBSCRIBERS, CONTROLLERS = "physics", "log", "subscribers", "controllers that have not answered"
+OTHERS = "other threads and programs"
+"""What a run spends real time on; `OTHERS` is time in which a step could not go on as the processor was taken."""
 
 
 class Pacer:
@@ -18,10 +21,16 @@ class Pacer:
         Simulated seconds per second; 0 means without waiting.
     clock : callable
         Steady clock [s].
+
+    Attributes
+    ----------
+    lost : float
+        Lag that was not made up for, in all [s].
     """
 
     def __init__(self, factor: float, clock: Callable[[], float] = time.monotonic):
         self.factor = factor
+        self.lost = 0.0
         self._clock = clock
         self.restart(0.0)
 
@@ -36,5 +45,15 @@ class Pacer:
             return 0.0
         delay = self._real + (simulated - self._simulated) / self.factor - self._clock()
         if delay < -LARGEST_LAG:
+            self.lost -= delay
             self.restart(simulated)
         return max(delay, 0.0)
+
+
+def cause_of_delay(spent: dict[str, float], real: float) -> str:
+    """What most of some real time [s] went to, in words, with what the rest went to."""
+    shares = sorted(((seconds / real, cause) for cause, seconds in spent.items()), reverse=True)
+    if not shares:
+        return "not known"
+    (share, cause), rest = shares[0], [f"{cause} {part:.0%}" for part, cause in shares[1:] if part >= 0.01]
+    return f"{cause}, {share:.0%} of the time" + (f" ({', '.join(rest)})" if rest else "")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from bilayer_core.errors import InputError
 
-Value = bool | float | int | str
+Value = bool | float | int | str | list[str]
 
 # Parameters that every rclpy node has of itself.
 BUILT_IN = ("use_sim_time", "start_type_description_service")
@@ -24,7 +24,8 @@ class NodeParameter:
     ----------
     name, description : str
         The description states the unit.
-    default : bool, float or str
+    default : bool, float, str or list of str
+        A list is ``[""]`` for none: the parameter files of ROS have no empty lists.
     minimum : float
         Smallest value of a number.
     above_minimum : bool
@@ -36,7 +37,7 @@ class NodeParameter:
     """
 
     name: str
-    default: bool | float | str
+    default: bool | float | str | list[str]
     description: str
     minimum: float = -math.inf
     above_minimum: bool = False
@@ -48,6 +49,8 @@ class NodeParameter:
         """What may be given, in words."""
         if isinstance(self.default, bool):
             return "true or false"
+        if isinstance(self.default, list):
+            return "a list of texts"
         if isinstance(self.default, str):
             return "one of " + ", ".join(self.choices) if self.choices else "a text"
         if math.isinf(self.minimum):
@@ -56,6 +59,8 @@ class NodeParameter:
 
     def accept(self, value: object) -> Value:
         """`value` as the parameter's type (an integer will do for a number), or InputError."""
+        if isinstance(self.default, list) and isinstance(value, str):
+            value = [value]
         if self._is_allowed(value):
             return float(value) if isinstance(self.default, float) else value
         raise InputError(f"parameter '{self.name}' is {value!r}; allowed is {self.allowed} ({self.description})")
@@ -63,6 +68,8 @@ class NodeParameter:
     def _is_allowed(self, value: object) -> bool:
         if isinstance(self.default, bool) or isinstance(value, bool):
             return isinstance(value, type(self.default))
+        if isinstance(self.default, list):
+            return isinstance(value, list) and all(isinstance(part, str) for part in value)
         if isinstance(self.default, str):
             return isinstance(value, str) and (not self.choices or value in self.choices)
         if not isinstance(value, (int, float)) or not math.isfinite(value):
@@ -89,8 +96,19 @@ def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) 
 
 SIM_NODE = (
     NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
-    NodeParameter("rate", 0.0, "frames published and logged per simulated second [Hz]; 0 = as the scene says", 0.0),
-    NodeParameter("real_time_factor", 1.0, "simulated seconds per second, at most; 0 = as fast as possible", 0.0),
+    NodeParameter(
+        "rate", 0.0, "frames published and logged per simulated second [Hz]; 0 = as the scene says", 0.0, live=True
+    ),
+    NodeParameter(
+        "marker_rate",
+        0.0,
+        "frames per simulated second that carry nodes, points and markers [Hz]; 0 = as the scene says",
+        0.0,
+        live=True,
+    ),
+    NodeParameter(
+        "real_time_factor", 1.0, "simulated seconds per second, at most; 0 = as fast as possible", 0.0, live=True
+    ),
     NodeParameter("duration", 0.0, "simulated time after which the node ends [s]; 0 = until it is stopped", 0.0),
     NodeParameter("publish_clock", True, "publish simulated time on /clock"),
     NodeParameter("start_paused", False, "wait for the service ~/resume at the start"),
@@ -103,9 +121,29 @@ SIM_NODE = (
         "what acts before the first message and after the timeout: the value there is, zero, or the scene's schedule",
         choices=("hold", "zero", "schedule"),
     ),
-    NodeParameter("lockstep", False, "simulated time goes on only when a controller has answered the time on /clock"),
     NodeParameter(
-        "control_period", 0.0, "simulated time between two answers in lockstep [s]; 0 = that between two frames", 0.0
+        "stimulus_interpolation",
+        "linear",
+        "how a stimulus or a load gets to its new value: linear (at the end of the control period), or hold (it jumps)",
+        choices=("linear", "hold"),
+    ),
+    NodeParameter(
+        "control_period",
+        0.02,
+        "simulated time between two ticks, at which stimuli are taken [s]; 0 = that between two frames",
+        0.0,
+    ),
+    NodeParameter("lockstep", False, "simulated time goes on only when controllers have answered the tick on /clock"),
+    NodeParameter(
+        "lockstep_answers",
+        [""],
+        "channels whose answers complete a tick; none = any message does",
+    ),
+    NodeParameter(
+        "lockstep_timeout",
+        0.0,
+        "real time after which the fallback acts on channels that have not answered a tick [s]; 0 = never",
+        0.0,
     ),
     NodeParameter("log", "", "MCAP file to write; empty = none"),
     NodeParameter("rerun", "off", "rerun recording: off, or an .rrd file to write when the run ends"),

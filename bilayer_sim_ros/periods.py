@@ -14,11 +14,11 @@ class Periods:
     Parameters
     ----------
     rate : float
-        Periods per simulated second [Hz].
+        Periods per simulated second [Hz]; may be set at any time, and counts from the start then too.
     """
 
     def __init__(self, rate: float):
-        self._rate = rate
+        self.rate = rate
         self._start = 0.0
 
     def start(self, time: float) -> None:
@@ -27,8 +27,12 @@ class Periods:
 
     def complete(self, time: float) -> int:
         """How many have ended at `time` [s], to rounding."""
-        return math.floor((time - self._start) * self._rate + ROUNDING)
+        return math.floor((time - self._start) * self.rate + ROUNDING)
 
     def next_end(self, time: float) -> float:
         """When the one that has not ended at `time` [s] does [s]."""
-        return self._start + (self.complete(time) + 1) / self._rate
+        return self._start + (self.complete(time) + 1) / self.rate
+
+    def time_to_nearest_end(self, time: float) -> float:
+        """Time from `time` [s] to the end of a period that is nearest to one period later [s]."""
+        return self.next_end(time + 0.5 / self.rate) - time

@@ -44,6 +44,10 @@ class FramePublisher:
         ]
         self._events = EventPublisher(node, description)
 
+    def set_rates(self, rate: float, marker_rate: float) -> None:
+        """Go on with other rates [Hz]."""
+        self._gate.set_rates(rate, marker_rate)
+
     @property
     def wanted(self) -> bool:
         """Whether anybody subscribes to anything."""

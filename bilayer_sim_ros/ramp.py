@@ -13,7 +13,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.conversions import NANOSECONDS
+from bilayer_sim_ros.conversions import NANOSECONDS, nanoseconds_of
 from bilayer_sim_ros.parameters import Value
 
 CLOCK_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
@@ -30,7 +30,8 @@ def ramp(elapsed: float, duration: float, start_value: float, end_value: float) 
 
 
 class RampSender:
-    """Sends the value of each new time; the ramp begins at the first one.
+    """Sends the value of each new time; the ramp begins at the first one, and again when time goes back, as it does
+    with a reset of the simulation, or where a log that is played begins again or is sought in.
 
     Parameters
     ----------
@@ -60,6 +61,8 @@ class RampSender:
         """It is `now` [ns]; nothing is sent for the same time again."""
         if now == self._last:
             return
+        if self._last is not None and now < self._last:
+            self._start, self._final = None, 0
         self._last = now
         if self._start is None:
             self._start = now
@@ -86,7 +89,7 @@ def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) 
         return
     sender = RampSender(lambda value: publisher.publish(Float64(data=value)), stop.set, parameters)
     if parameters["simulated_time"]:
-        node.create_subscription(Clock, "/clock", lambda message: sender.hear(_nanoseconds(message)), CLOCK_QOS)
+        node.create_subscription(Clock, "/clock", lambda message: sender.hear(nanoseconds_of(message.clock)), CLOCK_QOS)
         # Where time stands still it is repeated once a second.
         if not _wait(lambda: sender.begun, stop, limit, "/clock is silent, and simulated_time is true"):
             return
@@ -98,10 +101,6 @@ def control(node: Node, parameters: Mapping[str, Value], stop: threading.Event) 
         return
     stop.wait()
     node.get_logger().info("done")
-
-
-def _nanoseconds(message: Clock) -> int:
-    return message.clock.sec * NANOSECONDS + message.clock.nanosec
 
 
 def _wait(condition: Callable[[], bool], stop: threading.Event, limit: float, failure: str) -> bool:

@@ -24,12 +24,15 @@ class LogStatus:
     ----------
     dropped : int
         Frames left out of it, as the disk was too slow.
+    waiting : int
+        Frames, inputs and events in its queue.
     failure : str
         Why it is not written further; empty as long as it is.
     """
 
     dropped: int = 0
     failure: str = ""
+    waiting: int = 0
 
 
 class Recording:
@@ -77,6 +80,13 @@ class Recording:
             raise InputError(f"{path}: exists already; remove it, or choose another name")
         return path
 
+    def set_rates(self, rate: float, marker_rate: float) -> None:
+        """Go on with other rates [Hz], also in the next run."""
+        log_path, rrd_path, _, _, patience = self._settings
+        self._settings = (log_path, rrd_path, rate, marker_rate, patience)
+        if self._log:
+            self._log.set_rates(rate, marker_rate)
+
     def of_next_run(self) -> Recording:
         """The files of the run that begins with a reset."""
         return Recording(*self._settings, run=self._run + 1)
@@ -90,7 +100,7 @@ class Recording:
     def log_status(self) -> LogStatus:
         """How the log is doing; one that is not written is well."""
         failure = str(self._lost or (self._log and self._log.failure) or "")
-        return LogStatus(self._log.dropped if self._log else 0, failure)
+        return LogStatus(self._log.dropped, failure, self._log.waiting) if self._log else LogStatus(0, failure)
 
     def start(self, description: Description) -> None:
         """Begin the files. One that cannot be written is an error in the first run; in a later one `close` tells."""

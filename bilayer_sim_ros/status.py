@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 
+from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.simulation.stepper import StepReport
+from bilayer_core.simulation.summary import numerical_energy
+from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.recording import LogStatus, Recording
 
 # Real time between two reports [s].
@@ -15,7 +19,7 @@ STATUS_PERIOD = 1.0
 
 @dataclass
 class Status:
-    """How the run is doing: since the status before, except for `time`, `paused`, `waited` and `log`.
+    """How the run is doing: since the status before, except for `time`, `paused`, `asked_factor`, `waited` and `log`.
 
     Attributes
     ----------
@@ -24,10 +28,20 @@ class Status:
     paused : bool
     real_time_factor : float
         Simulated seconds per second.
-    steps, substeps, iterations : int
-        Steps, the parts in which they were taken, and Newton iterations.
+    asked_factor : float
+        The same as it was asked for; 0 for as fast as possible.
+    lost : float
+        Lag behind it that is not made up for [s].
+    real : float
+        Real time [s].
+    spent : dict
+        What that went to, in part: cause (`pacing`) to seconds.
+    steps, substeps, rejected, iterations : int
+        Steps, the parts in which they were taken, attempts that were not accepted, and Newton iterations.
     residual : float
         Largest of the last velocity corrections of steps [m/s].
+    numerical_energy : float
+        What steps have made or, below zero, lost of energy since the start, over the largest energy of the run.
     waited : float
         Real time for which there has been no step because no controller answers [s].
     log : LogStatus
@@ -38,10 +52,16 @@ class Status:
     time: float
     paused: bool
     real_time_factor: float = 0.0
+    asked_factor: float = 0.0
+    lost: float = 0.0
+    real: float = 0.0
+    spent: dict[str, float] = field(default_factory=dict)
     steps: int = 0
     substeps: int = 0
+    rejected: int = 0
     iterations: int = 0
     residual: float = 0.0
+    numerical_energy: float = 0.0
     waited: float = 0.0
     log: LogStatus = LogStatus()
     dropped: int = 0
@@ -54,10 +74,13 @@ class StatusReporter:
     ----------
     report : callable
         Called with a `Status`.
+    pacer : Pacer
     """
 
-    def __init__(self, report: Callable[[Status], None]):
+    def __init__(self, report: Callable[[Status], None], pacer: Pacer):
         self._report = report
+        self._pacer = pacer
+        self._lost = 0.0
 
     def start(self, simulated: float, waited: float = 0.0, log: LogStatus | None = None) -> None:
         """Count from simulated time `simulated` [s] and now on."""
@@ -69,22 +92,41 @@ class StatusReporter:
         status = self._status
         status.steps += 1
         status.substeps += step.substeps
+        status.rejected += step.rejected
         status.iterations += step.iterations
         status.residual = max(status.residual, step.residual)
+
+    def spend(self, cause: str, seconds: float) -> None:
+        """Count real time that something took [s]."""
+        self._status.spent[cause] = self._status.spent.get(cause, 0.0) + seconds
+
+    @contextmanager
+    def spending(self, cause: str) -> Iterator[None]:
+        """Count the real time that a block takes, if there is a cause."""
+        begin = time.monotonic()
+        try:
+            yield
+        finally:
+            if cause:
+                self.spend(cause, time.monotonic() - begin)
 
     @property
     def due_at(self) -> float:
         """When the next report is due, on the monotonic clock [s]."""
         return self._since + STATUS_PERIOD
 
-    def report_when_due(self, simulated: float, paused: bool, waiting: bool, recording: Recording) -> None:
-        """Report at simulated time `simulated` [s], if it is time to."""
+    def report_when_due(self, simulator: Simulator, paused: bool, waiting: bool, recording: Recording) -> None:
+        """Report how a simulator is doing, if it is time to."""
         real = time.monotonic() - self._since
         if real < STATUS_PERIOD:
             return
-        status = self._status
+        status, simulated = self._status, simulator.time
+        made, largest = numerical_energy(simulator)
+        status.numerical_energy = made / largest if largest > 0.0 else 0.0
         status.real_time_factor = (simulated - status.time) / real
-        status.time, status.paused = simulated, paused
+        status.time, status.paused, status.real = simulated, paused, real
+        status.asked_factor = self._pacer.factor
+        status.lost, self._lost = self._pacer.lost - self._lost, self._pacer.lost
         status.waited = status.waited + real if waiting and status.steps == 0 else 0.0
         log, before = recording.log_status, status.log.dropped
         status.log, status.dropped = log, log.dropped - before

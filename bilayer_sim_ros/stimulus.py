@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from bilayer_core.errors import InputError
+from bilayer_sim_ros.answers import Answers
 
 # Simulated times are multiples of the step, up to rounding [s].
 TIME_ROUNDING = 1e-9
@@ -38,7 +39,7 @@ class Channel:
 
 
 class StimulusInputs:
-    """Collects what messages ask for (any thread) until the next step begins (the stepping thread).
+    """Collects what messages ask for (any thread) until a tick begins (the stepping thread).
 
     Parameters
     ----------
@@ -49,39 +50,63 @@ class StimulusInputs:
     fallback : str
         What acts before a channel's first message and after the timeout: ``hold`` (the last value, at first that of
         the schedule's start), ``zero`` (or the value of the range nearest to it), ``schedule``.
+    answers : Answers, optional
+        In lockstep: what judges them. Without it ticks that messages say they answer are not looked at.
 
     Attributes
     ----------
-    answered : bool
-        Whether a message has come since `ask`.
     notify : callable
         Called after each message, in the thread that received it.
     late : callable
         Called in the stepping thread with the simulated time [s] and a channel whose messages stay away for longer than
         the timeout; once until the next message.
+    missed : callable
+        Called in the stepping thread with the simulated time [s] and the channels, newly so, that did not answer a tick
+        for which nobody waits any longer.
     """
 
-    def __init__(self, channels: Sequence[Channel], timeout: float, fallback: str):
+    def __init__(self, channels: Sequence[Channel], timeout: float, fallback: str, answers: Answers | None = None):
         self._channels = {channel.name: channel for channel in channels}
         self._timeout = timeout
         self._fallback = fallback
         self._lock = threading.Lock()
-        self.answered = False
+        self._answers = answers
         self.notify: Callable[[], None] = lambda: None
         self.late: Callable[[float, str], None] = lambda time, name: None
+        self.missed: Callable[[float, Sequence[str]], None] = lambda time, names: None
+        self._first: dict[str, float] = {}
         self.reset()
 
-    def reset(self) -> None:
-        """Forget all messages, as at the start of a run."""
+    def reset(self, keep_first: bool = False) -> None:
+        """Forget all messages, as at the start of a run, but those that acted at its start if they are to again."""
         with self._lock:
-            self._received: dict[str, float] = {}
+            self._received: dict[str, float] = self._first | self._received if keep_first else {}
+        self._first = {}
+        self._begun = False
         self._heard: dict[str, float] = {}
         self._acting: dict[str, float | None] = {}
         self._late: set[str] = set()
+        self._missing: frozenset[str] = frozenset()
 
-    def ask(self) -> None:
-        """Let `answered` say from now on whether a message has come."""
-        self.answered = False
+    @property
+    def heard(self) -> Collection[str]:
+        """Channels that a message has set."""
+        return self._heard.keys()
+
+    @property
+    def answered(self) -> bool:
+        """Whether the open tick is complete."""
+        return self._answers is None or self._answers.complete
+
+    @property
+    def ignored(self) -> Mapping[str, int]:
+        """How many stamped answers were ignored, by the reason."""
+        return {} if self._answers is None else self._answers.ignored
+
+    def ask(self, tick: int, stand: bool = False) -> None:
+        """In lockstep: wait for answers to a tick, a time [ns]; those to it that were given before may `stand`."""
+        with self._lock:
+            self._answers.open(tick, stand)
 
     def receive(self, name: str, value: float) -> None:
         """Take the value of one channel; InputError leaves the last good one in force."""
@@ -97,31 +122,67 @@ class StimulusInputs:
         pairs = zip(self._channels.values(), values, strict=True)
         self._keep({channel.name: channel.accept(value) for channel, value in pairs})
 
-    def _keep(self, values: Mapping[str, float]) -> None:
+    def receive_stamped(self, tick: int, names: Sequence[str], values: Sequence[float]) -> str:
+        """Take values of channels as an answer to a tick [ns].
+
+        Returns
+        -------
+        str
+            Why it is ignored (see `Answers.take`); empty if it counts, as it always does outside lockstep.
+
+        Raises
+        ------
+        InputError
+            If names and values are not one each, or one of them is refused; all last good values stay in force.
+        """
+        if not names or len(names) != len(values) or len(set(names)) != len(names):
+            raise InputError(
+                f"a stamped stimulus has {len(names)} names ({', '.join(names)}) and {len(values)} positions; "
+                "expected is one position for each name, and each name once"
+            )
+        for name in names:
+            if name not in self._channels:
+                raise InputError(f"there is no stimulus '{name}'; allowed is {', '.join(self._channels) or 'none'}")
+        pairs = zip(names, values, strict=True)
+        return self._keep({name: self._channels[name].accept(value) for name, value in pairs}, tick)
+
+    def _keep(self, values: Mapping[str, float], tick: int | None = None) -> str:
         with self._lock:
-            self._received.update(values)
-            self.answered = True
+            fault = self._answers.take(values.keys(), tick) if self._answers is not None else ""
+            if not fault:
+                self._received.update(values)
         self.notify()
+        return fault
 
     def changes(self, time: float) -> dict[str, float | None]:
-        """What to set for the step that begins at `time` [s]: channels that a message or the fallback changes.
+        """What to set for the step that begins at `time` [s], a tick: channels that a message or the fallback changes,
+        in the scene's order, whichever message came first.
 
         None gives a channel back to the scene's schedule.
         """
         with self._lock:
             received, self._received = self._received, {}
+            missing = frozenset() if self._answers is None else self._answers.close()
+        if not self._begun:
+            self._begun, self._first = True, received
         self._heard.update(dict.fromkeys(received, time))
-        changes: dict[str, float | None] = dict(received)
+        changes: dict[str, float | None] = {}
         for name, channel in self._channels.items():
-            if self._is_silent(name, time):
+            if name in received:
+                changes[name] = received[name]
+            silent = self._is_silent(name, time)
+            if silent or name in missing - received.keys():
                 value = self._fallback_value(channel, self._acting.get(name))
                 if value != self._acting.get(name):
                     changes[name] = value
-                if name in self._heard and name not in self._late:
-                    self._late.add(name)
-                    self.late(time, name)
-            else:
+            if not silent:
                 self._late.discard(name)
+            elif name in self._heard and name not in self._late:
+                self._late.add(name)
+                self.late(time, name)
+        if missing - self._missing:
+            self.missed(time, sorted(missing - self._missing))
+        self._missing = missing
         self._acting.update(changes)
         return changes
 

@@ -8,17 +8,17 @@ import time
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Protocol
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.observed.frame import Frame
-from bilayer_core.record.events import Event
+from bilayer_core.record.events import Event, changed_setting
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.lockstep import Control
-from bilayer_sim_ros.pacing import Pacer
+from bilayer_sim_ros.control import Control
+from bilayer_sim_ros.pacing import CONTROLLERS, LOG, OTHERS, PHYSICS, SUBSCRIBERS, Pacer
 from bilayer_sim_ros.periods import Periods
 from bilayer_sim_ros.recording import LogStatus, Recording
 from bilayer_sim_ros.requests import Requests
@@ -40,6 +40,9 @@ class Publisher(Protocol):
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send what somebody listens to: what is due, or everything."""
 
+    def set_rates(self, rate: float, marker_rate: float) -> None:
+        """Go on with other rates of frames, and of topics made to be looked at [Hz]."""
+
     def tell(self, event: Event) -> None:
         """Send an event that frames do not show."""
 
@@ -52,14 +55,12 @@ class SimulationWorker:
     simulator : Simulator
         Compiled, at its start.
     control : Control
-        Stimuli from outside; asked before each step.
-    commands : Commands
-        Poses and loads from outside.
+        What acts from outside; asked before each step.
     publisher : Publisher
     recording : Recording
         Files of the first run.
-    rate : float
-        Frames per simulated second [Hz].
+    rate, marker_rate : float
+        Frames per simulated second, and those of them that carry topics made to be looked at [Hz].
     pacer : Pacer
     duration : float
         Simulated time at which the worker ends [s]; infinity means not by itself.
@@ -81,10 +82,10 @@ class SimulationWorker:
         simulator: Simulator,
         *,
         control: Control,
-        commands: Commands,
         publisher: Publisher,
         recording: Recording,
         rate: float,
+        marker_rate: float = math.inf,
         pacer: Pacer,
         duration: float = math.inf,
         paused: bool = False,
@@ -93,15 +94,15 @@ class SimulationWorker:
     ):
         self._simulator = simulator
         self._control = control
-        self._commands = commands
         self._publisher = publisher
         self._recording = recording
         self._frames = Periods(rate)
+        self._marker_rate = marker_rate
         self._pacer = pacer
         self._duration = duration
         self._stop_listening: Callable[[], None] = lambda: None
         self._paused = paused
-        self._reporter = StatusReporter(report)
+        self._reporter = StatusReporter(report, pacer)
         self._finished = finished
         self._stopping = threading.Event()
         self._requests = Requests()
@@ -121,10 +122,13 @@ class SimulationWorker:
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the present step, finish the files, and return when that is done."""
+        """End after the present step, finish the files, and return when that is done; also where it never began."""
         self._stopping.set()
         self._requests.wake()
-        self._thread.join()
+        if self._thread.ident is None:
+            self._requests.close()
+        else:
+            self._thread.join()
 
     def wake(self) -> None:
         """Look at once whether what was waited for has come."""
@@ -151,6 +155,18 @@ class SimulationWorker:
         """Ask to go back to the start of the scene; paused stays paused."""
         return self._requests.ask(self._do_reset)
 
+    def set_real_time_factor(self, factor: float) -> Future:
+        """Ask to go on at another factor; 0 = as fast as possible."""
+        return self._requests.ask(partial(self._do_set_factor, factor))
+
+    def set_rate(self, rate: float) -> Future:
+        """Ask for frames at another rate [Hz]."""
+        return self._requests.ask(lambda answer: self._do_set_rates(rate, self._marker_rate, answer))
+
+    def set_marker_rate(self, rate: float) -> Future:
+        """Ask for topics made to be looked at, at another rate [Hz]."""
+        return self._requests.ask(lambda answer: self._do_set_rates(self._frames.rate, rate, answer))
+
     # The rest runs in the worker's thread.
 
     def _work(self) -> None:
@@ -162,7 +178,7 @@ class SimulationWorker:
                 if self._may_advance:
                     self._advance()
                 waiting = self._wants_to_advance and self._control.waiting
-                self._reporter.report_when_due(self._simulator.time, self._paused, waiting, self._recording)
+                self._reporter.report_when_due(self._simulator, self._paused, waiting, self._recording)
                 self._show_again_when_due()
             if not self._stopping.is_set():
                 complete, termination = True, Termination.COMPLETED.value
@@ -215,12 +231,15 @@ class SimulationWorker:
 
     def _serve_requests(self) -> None:
         """Do what is asked until the next step is due, or, where time stands still, the next status."""
-        while not self._stopping.is_set() and self._requests.serve(self._time_to_wait()):
-            pass
+        cause = CONTROLLERS if self._wants_to_advance and self._control.waiting else ""
+        with self._reporter.spending(cause):
+            while not self._stopping.is_set() and self._requests.serve(self._time_to_wait()):
+                pass
 
     def _time_to_wait(self) -> float:
         if not self._may_advance:
-            return max(min(self._reporter.due_at, self._shown_at + SHOWING_PERIOD) - time.monotonic(), 0.0)
+            look = min(self._reporter.due_at, self._shown_at + SHOWING_PERIOD, self._control.wait_ends_at)
+            return max(look - time.monotonic(), 0.0)
         if self._paused:
             return 0.0
         delay = self._pacer.delay(self._simulator.time)
@@ -228,11 +247,12 @@ class SimulationWorker:
 
     def _advance(self) -> None:
         """Take one step, and show what is due at its end."""
-        start = self._simulator.time
-        for channel, value in self._control.changes(start).items():
-            self._simulator.set_stimulus(channel, value)
-        self._commands.apply(self._simulator)
+        start, cpu, wall = self._simulator.time, self._simulator.cpu_time, self._simulator.wall_time
+        self._control.act(self._simulator)
         self._reporter.add(self._simulator.step(until=self._next_stop()))
+        cpu, wall = self._simulator.cpu_time - cpu, self._simulator.wall_time - wall
+        self._reporter.spend(PHYSICS, cpu)
+        self._reporter.spend(OTHERS, max(wall - cpu, 0.0))
         self._frame_is_out = False
         now = self._simulator.time
         frame_is_due = self._frames.complete(now) > self._frames.complete(start)
@@ -257,8 +277,10 @@ class SimulationWorker:
         if publish or self._recording.wanted:
             frame = self._simulator.frame()
             if publish:
-                self._publisher.publish(frame, everything=self._paused)
-            self._recording.observe(frame)
+                with self._reporter.spending(SUBSCRIBERS):
+                    self._publisher.publish(frame, everything=self._paused)
+            with self._reporter.spending(LOG):
+                self._recording.observe(frame)
 
     def _show_again_when_due(self) -> None:
         """Show what stands still to those who came late."""
@@ -278,13 +300,30 @@ class SimulationWorker:
         self._drop_single_steps("the simulation was resumed before the next frame")
         if self._paused:
             self._paused = False
+            self._control.wait_anew()
             self._pacer.restart(self._simulator.time)
         answer.set_result(f"running from t = {self._simulator.time:.6g} s")
 
     def _do_step(self, answer: Future) -> None:
         if not self._paused:
             raise InputError("the simulation is running: call pause first")
+        if not self._single_steps:
+            self._control.wait_anew()
         self._single_steps.append(answer)
+
+    def _do_set_factor(self, factor: float, answer: Future) -> None:
+        self._pacer.factor = factor
+        self._pacer.restart(self._simulator.time)
+        self.tell(changed_setting(self._simulator.time, f"real_time_factor is {factor:g}"))
+        answer.set_result("")
+
+    def _do_set_rates(self, rate: float, marker_rate: float, answer: Future) -> None:
+        self._frames.rate, self._marker_rate = rate, marker_rate
+        self._publisher.set_rates(rate, marker_rate)
+        self._recording.set_rates(rate, marker_rate)
+        text = f"rate is {rate:g} Hz, marker_rate is {marker_rate:g} Hz"
+        self.tell(changed_setting(self._simulator.time, text))
+        answer.set_result("")
 
     def _do_reset(self, answer: Future) -> None:
         following = self._recording.of_next_run()
@@ -295,7 +334,6 @@ class SimulationWorker:
             self.error = self.error or error  # told when the node ends
         self._recording = following
         self._control.reset()
-        self._commands.reset()
         self._begin()
         answer.set_result("reset to t = 0 s")
 

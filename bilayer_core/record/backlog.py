@@ -30,6 +30,10 @@ class Backlog(Generic[Item]):
         self._changed = threading.Condition(threading.Lock())
         self._urgent = self._closed = False
 
+    def __len__(self) -> int:
+        """Items that wait."""
+        return len(self._items)
+
     def put(self, item: Item, patience: float | None = None) -> bool:
         """Hand an item over when there is room for it.
 

@@ -15,7 +15,7 @@ from bilayer_core.observed.frame import Description, Frame
 DEBUG, INFO, WARN = 10, 20, 30
 """Levels of ``rcl_interfaces/msg/Log``."""
 LEVEL_NAMES = {DEBUG: "DEBUG", INFO: "INFO", WARN: "WARN"}
-CONTACT, STEPS, FLIGHT, STIMULUS = "contact", "steps", "flight", "stimulus"
+CONTACT, STEPS, FLIGHT, STIMULUS, SETTING = "contact", "steps", "flight", "stimulus", "setting"
 """Names of events."""
 REJECTED_FRAMES = 50
 """Frames between two messages about rejected steps, which sum up those between; the first comes at once."""
@@ -32,7 +32,7 @@ class Event:
     level : int
         `DEBUG`, `INFO` or `WARN`.
     name : str
-        Its kind: ``contact``, ``steps``, ``flight`` or ``stimulus``.
+        Its kind: ``contact``, ``steps``, ``flight``, ``stimulus`` or ``setting``.
     text : str
     """
 
@@ -112,6 +112,11 @@ class EventDetector:
 def late_stimulus(time: float, missing: str, acting: str) -> Event:
     """A controller is late: what is missing, and what acts instead."""
     return Event(time, WARN, STIMULUS, f"stimulus late: {missing}; {acting}")
+
+
+def changed_setting(time: float, text: str) -> Event:
+    """A node goes on with another setting, which changes nothing of the robot."""
+    return Event(time, INFO, SETTING, text)
 
 
 def _contacts(time: float, pairs: Iterable[tuple[str, str]], what: str) -> list[Event]:

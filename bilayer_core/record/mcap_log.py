@@ -129,6 +129,16 @@ class McapRecorder:
             return
         self._left_out, self._last_time = None, frame.time
 
+    @property
+    def waiting(self) -> int:
+        """Frames, inputs and events that are not written yet."""
+        return len(self._backlog)
+
+    def set_rates(self, rate: float, marker_rate: float) -> None:
+        """Go on with frames at another rate, and the large messages at another one [Hz]."""
+        self.rate = rate
+        self._gate.set_rates(rate, marker_rate)
+
     def note(self, told: Input) -> None:
         """Log something that acts from outside; likewise, but it is never left out."""
         self._refuse_unstarted()

@@ -137,6 +137,10 @@ class DisplayGate:
     _ROUNDING = 1e-6
 
     def __init__(self, rate: float, display_rate: float):
+        self.set_rates(rate, display_rate)
+
+    def set_rates(self, rate: float, display_rate: float) -> None:
+        """Go on with other rates [Hz]; the next frame carries them."""
         self._rate = min(rate, display_rate)
         self._period = -1
 

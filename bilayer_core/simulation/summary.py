@@ -39,8 +39,7 @@ def summarise(simulator: Any) -> dict:
     simulated = simulator.time - simulator.start_time
     cpu = simulator.cpu_time
     min_gap = statistics.min_gap
-    account = simulator.energy_account
-    largest, numerical = float(account[LARGEST]), float(account[NUMERICAL]) - statistics.numerical_before
+    numerical, largest = numerical_energy(simulator)
     return {
         "scene": simulator.scene.name,
         "model": plan.model,
@@ -101,6 +100,12 @@ def summarise(simulator: Any) -> dict:
         ],
         "versions": versions(),
     }
+
+
+def numerical_energy(simulator: Any) -> tuple[float, float]:
+    """What steps have made or, below zero, lost of energy beyond all forces, and the largest energy of the run [J]."""
+    account = simulator.energy_account
+    return float(account[NUMERICAL]) - simulator.statistics.numerical_before, float(account[LARGEST])
 
 
 def _warnings(strain: float, numerical: float, largest: float, plane_watch: PlaneWatch | None) -> Iterator[str]:

@@ -70,7 +70,7 @@ def run(scene: str, log: Path | None) -> tuple[list[float], float]:
 def node(scene: str, log: Path | None) -> tuple[list[float], float]:
     """The same of the thread of the node, from `SETTLED` on; what start and end cost is not measured."""
     from bilayer_sim_ros.commands import Commands
-    from bilayer_sim_ros.lockstep import Asynchronous
+    from bilayer_sim_ros.control import Control
     from bilayer_sim_ros.pacing import Pacer
     from bilayer_sim_ros.recording import Recording
     from bilayer_sim_ros.stimulus import Channel, StimulusInputs
@@ -90,8 +90,7 @@ def node(scene: str, log: Path | None) -> tuple[list[float], float]:
     finished = threading.Event()
     worker = SimulationWorker(
         simulator,
-        control=Asynchronous(StimulusInputs(channels, 0.0, "schedule")),
-        commands=Commands(print),
+        control=Control(StimulusInputs(channels, 0.0, "schedule"), Commands(print), 50.0),
         publisher=Nobody(),
         recording=Recording(str(log or ""), "", rate, config.output.marker_rate, patience=0.0),
         rate=rate,

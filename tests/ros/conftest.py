@@ -121,7 +121,7 @@ class Client:
 
     def spin_to_the_end(self):
         """Serve callbacks until the process has ended, and then what is on its way."""
-        deadline = time.monotonic() + LIMIT
+        deadline = time.monotonic() + 2 * LIMIT  # topics are there before kernels are compiled
         while self._process.running:
             assert time.monotonic() < deadline, f"the node does not end:\n{self._process.output}"
             self._executor.spin_once(timeout_sec=0.05)

@@ -1,129 +1,288 @@
-"""Ticks and answers, without ROS."""
+"""Ticks and answers, without ROS topics."""
+
+import time
 
 import pytest
 
 from bilayer_core.errors import InputError
 from bilayer_core.scene.schedule import Hold
-from bilayer_sim_ros.lockstep import Lockstep, tick_rate
+from bilayer_sim_ros.answers import Answers
+from bilayer_sim_ros.commands import Commands
+from bilayer_sim_ros.control import Control, tick_rate
+from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.periods import Periods
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 
+PERIOD = 0.1
+TICK = 100_000_000
+"""The same in nanoseconds."""
+
+
+class Simulated:
+    """A simulator's time, and what is set on it."""
+
+    def __init__(self, time):
+        self.time = time
+        self.set = []
+
+    def set_stimulus(self, channel, value, *, over):
+        self.set.append((channel, value, pytest.approx(over)))
+
+
+class Run:
+    """A run with controllers in lockstep, ten ticks a second."""
+
+    def __init__(self, channels=("heat",), needed=(), start=2.0, fallback="schedule", patience=0.0):
+        schedule = Hold(**{"type": "hold", "value": 0.25})
+        self.published, self.missed = [], []
+        answers = Answers(channels, needed)
+        of_scene = [Channel(name, 0.0, 1.0, schedule) for name in channels]
+        self.inputs = StimulusInputs(of_scene, 0.0, fallback, answers)
+        self.inputs.missed = lambda time, names: self.missed.append((time, names))
+        self.lockstep = Lockstep(self.inputs, self.published.append, patience)
+        commands = Commands(lambda reason: None)
+        self.control = Control(self.inputs, commands, 1.0 / PERIOD, "hold", self.lockstep)
+        self.simulated = Simulated(start)
+        self.control.start(start)
+
+    @property
+    def waiting(self):
+        return self.control.waiting
+
+    def act(self):
+        """What is set at the present time: channel to value."""
+        self.simulated.set = []
+        self.control.act(self.simulated)
+        return {name: value for name, value, _ in self.simulated.set}
+
+    def advance(self, time):
+        self.simulated.time = time
+        self.control.advance_to(time)
+
+    def reset(self, time=0.0):
+        self.control.reset()
+        self.simulated.time = time
+        self.control.start(time)
+
 
 @pytest.fixture
-def inputs():
-    schedule = Hold(**{"type": "hold", "value": 0.25})
-    return StimulusInputs([Channel("humidity", 0.0, 1.0, schedule)], timeout=0.0, fallback="schedule")
+def run():
+    return Run()
 
 
-@pytest.fixture
-def published():
-    return []
+def answer(run, value=0.5):
+    run.inputs.receive("heat", value)
+    assert not run.waiting
+    assert run.act() == {"heat": value}
 
 
-@pytest.fixture
-def lockstep(inputs, published):
-    """Ten ticks a second; the run has started at 2 s."""
-    lockstep = Lockstep(inputs, 10.0, published.append)
-    lockstep.start(2.0)
-    return lockstep
+def test_the_start_is_a_tick(run):
+    assert (run.waiting, run.published) == (True, [2.0])
+    answer(run)
 
 
-def answer(inputs, lockstep, time, value=0.5):
-    inputs.receive("humidity", value)
-    assert not lockstep.waiting
-    assert lockstep.changes(time) == {"humidity": value}
+def test_what_came_before_the_tick_acts_but_is_no_answer(run):
+    answer(run)
+    run.inputs.receive("heat", 0.75)
+    run.advance(2.1)
+    assert run.waiting
+    run.inputs.receive_all([1.0])
+    assert not run.waiting
+    assert run.act() == {"heat": 1.0}
 
 
-def test_the_start_is_a_tick(lockstep, inputs, published):
-    assert (lockstep.waiting, published) == (True, [2.0])
-    answer(inputs, lockstep, 2.0)
-
-
-def test_what_came_before_the_tick_acts_but_is_no_answer(inputs):
-    inputs.receive("humidity", 0.75)
-    lockstep = Lockstep(inputs, 10.0, lambda time: None)
-    lockstep.start(0.0)
-    assert lockstep.waiting
-    inputs.receive_all([0.5])
-    assert lockstep.changes(0.0) == {"humidity": 0.5}
-    inputs.receive("humidity", 0.75)
-    lockstep.advance_to(0.1)
-    assert lockstep.waiting
-    inputs.receive("humidity", 1.0)
-    assert not lockstep.waiting
-
-
-def test_a_refused_message_is_no_answer(lockstep, inputs):
+def test_a_refused_message_is_no_answer(run):
     with pytest.raises(InputError):
-        inputs.receive("humidity", 2.0)
-    assert lockstep.waiting
+        run.inputs.receive("heat", 2.0)
+    assert run.waiting
 
 
-def test_between_ticks_nothing_is_awaited_published_or_taken(lockstep, inputs, published):
-    answer(inputs, lockstep, 2.0)
-    lockstep.advance_to(2.05)
-    inputs.receive("humidity", 0.75)
-    lockstep.repeat(2.05)
-    assert (lockstep.waiting, lockstep.changes(2.05), published) == (False, {}, [2.0])
-    assert lockstep.next_stop(2.05) == pytest.approx(2.1)
+def test_between_ticks_nothing_is_awaited_published_or_taken(run):
+    answer(run)
+    run.advance(2.05)
+    run.inputs.receive("heat", 0.75)
+    run.control.repeat(2.05)
+    assert (run.waiting, run.act(), run.published) == (False, {}, [2.0])
+    assert run.control.next_stop(2.05) == pytest.approx(2.1)
 
 
 @pytest.mark.parametrize("time", [2.1 - 1e-12, 2.1, 2.13])
-def test_a_tick_is_reached_when_it_is_crossed_to_rounding(lockstep, inputs, published, time):
-    answer(inputs, lockstep, 2.0)
-    lockstep.advance_to(time)
-    assert (lockstep.waiting, published) == (True, [2.0, time])
-    assert lockstep.next_stop(time) == pytest.approx(2.2)
+def test_a_tick_is_reached_when_it_is_crossed_to_rounding(run, time):
+    answer(run)
+    run.advance(time)
+    assert (run.waiting, run.published) == (True, [2.0, time])
+    assert run.control.next_stop(time) == pytest.approx(2.2)
 
 
-def test_a_time_that_stands_still_is_repeated_until_it_is_left(lockstep, inputs, published):
-    lockstep.repeat(2.0)
-    inputs.receive("humidity", 0.5)
-    lockstep.repeat(2.0)
-    assert published == [2.0] * 3
-    lockstep.changes(2.0)
-    lockstep.repeat(2.0)
-    assert published == [2.0] * 3
+def test_a_time_that_stands_still_is_repeated_until_it_is_left(run):
+    run.control.repeat(2.0)
+    run.inputs.receive("heat", 0.5)
+    run.control.repeat(2.0)
+    assert run.published == [2.0] * 3
+    run.act()
+    run.control.repeat(2.0)
+    assert run.published == [2.0] * 3
 
 
-def test_a_reset_asks_anew(lockstep, inputs, published):
-    answer(inputs, lockstep, 2.0)
-    lockstep.advance_to(2.1)
-    inputs.receive("humidity", 0.75)
-    lockstep.reset()
-    lockstep.start(0.0)
-    assert (lockstep.waiting, published) == (True, [2.0, 2.1, 0.0])
-    answer(inputs, lockstep, 0.0)
+def test_a_reset_asks_anew(run):
+    answer(run)
+    run.advance(2.1)
+    run.inputs.receive("heat", 0.75)
+    run.reset()
+    assert (run.waiting, run.published) == (True, [2.0, 2.1, 0.0])
+    answer(run)
 
 
-def test_an_answer_to_the_start_outlives_a_reset_at_the_start(lockstep, inputs):
-    inputs.receive("humidity", 0.5)
-    lockstep.reset()
-    lockstep.start(2.0)
-    assert not lockstep.waiting
-    assert lockstep.changes(2.0) == {"humidity": 0.5}
+@pytest.mark.parametrize("taken", [False, True])
+def test_an_answer_to_the_start_stands_while_no_later_time_was_heard(taken):
+    run = Run(start=0.0)
+    run.inputs.receive("heat", 0.5)
+    if taken:
+        run.act()
+        run.advance(0.05)
+    for _ in range(2):
+        run.reset()
+        assert not run.waiting
+        assert run.act() == {"heat": 0.5}
+    run.advance(0.1)
+    assert run.waiting
 
 
-def test_a_message_wakes_who_waits(inputs):
+def test_a_message_wakes_who_waits(run):
     woken = []
-    inputs.notify = lambda: woken.append(inputs.answered)
-    inputs.receive("humidity", 0.5)
+    run.inputs.notify = lambda: woken.append(run.inputs.answered)
+    run.inputs.receive("heat", 0.5)
     assert woken == [True]
+
+
+def test_a_tick_is_complete_when_every_channel_that_is_needed_has_answered():
+    run = Run(("a", "b", "c"), needed=("a", "b"))
+    run.inputs.receive("c", 0.1)
+    run.inputs.receive("a", 0.2)
+    assert run.waiting
+    assert run.inputs.receive_stamped(20 * TICK, ["b"], [0.3]) == ""
+    assert not run.waiting
+    assert run.act() == {"a": 0.2, "b": 0.3, "c": 0.1}
+    run.advance(2.1)
+    run.inputs.receive_all([0.5, 0.6, 0.7])
+    assert not run.waiting
+
+
+@pytest.mark.parametrize(
+    ("stamp", "why"), [(20, "late"), (20.5, "late"), (21, "duplicate"), (22, "foreign"), (300, "foreign")]
+)
+def test_answers_to_other_ticks_are_counted_and_ignored(stamp, why):
+    run = Run(("a", "b"), needed=("a", "b"))
+    run.inputs.receive_all([0.1, 0.2])
+    run.act()
+    run.advance(2.1)
+    run.inputs.receive_stamped(21 * TICK, ["a"], [0.5])
+    assert run.inputs.receive_stamped(int(stamp * TICK), ["a"], [0.9]) == why
+    assert dict(run.inputs.ignored) == {"late": 0, "duplicate": 0, "foreign": 0} | {why: 1}
+    assert run.waiting
+    run.inputs.receive_stamped(21 * TICK, ["b"], [0.6])
+    assert run.act() == {"a": 0.5, "b": 0.6}
+
+
+def test_an_answer_to_a_tick_that_has_just_been_left_does_not_act_at_the_next():
+    run = Run(("a", "b"))
+    run.inputs.receive_stamped(20 * TICK, ["a"], [0.5])
+    run.act()
+    assert run.inputs.receive_stamped(20 * TICK, ["b"], [0.9]) == "late"
+    run.advance(2.1)
+    assert run.waiting
+    run.inputs.receive("a", 0.6)
+    assert run.act() == {"a": 0.6}
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "reason"),
+    [
+        (["a"], [], "1 names .a. and 0 positions"),
+        ([], [], "0 names"),
+        (["a", "a"], [0.1, 0.2], "each name once"),
+        (["a", "z"], [0.1, 0.2], "no stimulus 'z'; allowed is a, b"),
+        (["a", "b"], [0.1, 7.0], "stimulus 'b' is 7; allowed is 0 to 1"),
+    ],
+)
+def test_a_stamped_message_that_cannot_be_is_refused_as_a_whole(names, values, reason):
+    run = Run(("a", "b"))
+    with pytest.raises(InputError, match=reason):
+        run.inputs.receive_stamped(20 * TICK, names, values)
+    assert run.waiting
+
+
+def test_outside_lockstep_a_stamp_is_not_looked_at():
+    schedule = Hold(**{"type": "hold", "value": 0.25})
+    inputs = StimulusInputs([Channel("a", 0.0, 1.0, schedule)], 0.0, "schedule")
+    assert inputs.receive_stamped(77, ["a"], [0.5]) == ""
+    assert inputs.changes(0.0) == {"a": 0.5}
+
+
+def test_a_scene_without_channels_does_not_wait():
+    run = Run(())
+    assert not run.waiting
+    run.advance(2.1)
+    assert (run.waiting, run.published) == (False, [2.0, 2.1])
+
+
+@pytest.mark.parametrize(("fallback", "expected"), [("zero", 0.0), ("schedule", None), ("hold", 0.3)])
+def test_after_the_timeout_the_fallback_acts_on_channels_that_are_missing(fallback, expected):
+    run = Run(("a", "b"), needed=("a", "b"), fallback=fallback, patience=0.02)
+    run.inputs.receive_all([0.2, 0.3])
+    run.act()
+    for tick, value in ((2.1, 0.6), (2.2, 0.7)):
+        run.advance(tick)
+        run.inputs.receive("a", value)
+        begin = time.monotonic()
+        assert run.waiting
+        while run.waiting:
+            time.sleep(0.001)
+        assert 0.02 <= time.monotonic() - begin < 5.0
+        changes = run.act()
+        assert changes.pop("a") == value
+        assert changes == ({"b": expected} if tick == 2.1 and fallback != "hold" else {})
+    assert run.missed == [(2.1, ["b"])]
+    run.advance(2.3)
+    run.inputs.receive_all([0.4, 0.5])
+    assert run.act() == {"a": 0.4, "b": 0.5}
+
+
+def test_the_wait_begins_when_time_is_to_go_on_and_anew_after_a_pause():
+    run = Run(patience=1000.0)
+    assert run.control.wait_ends_at == float("inf")
+    assert run.waiting
+    first = run.control.wait_ends_at
+    assert run.waiting and run.control.wait_ends_at == first < time.monotonic() + 1000.1
+    run.control.wait_anew()
+    assert run.waiting and run.control.wait_ends_at > first
 
 
 @pytest.mark.parametrize(("control_period", "expected"), [(0.0, 50.0), (0.1, 10.0), (0.001, 1000.0)])
 def test_ticks_come_with_frames_or_at_the_control_period(control_period, expected):
-    assert tick_rate(control_period, 50.0, clock=True, shortest=0.001) == pytest.approx(expected, rel=1e-12)
+    assert tick_rate(control_period, 50.0, shortest=0.001) == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_control_period_shorter_than_a_step_is_refused():
     with pytest.raises(InputError, match="'control_period' is 0.0009; allowed is a finite number >= 0.001"):
-        tick_rate(0.0009, 50.0, clock=True, shortest=0.001)
+        tick_rate(0.0009, 50.0, shortest=0.001)
 
 
 def test_lockstep_without_a_clock_is_refused():
+    refuse_without_clock(True)
     with pytest.raises(InputError, match="'publish_clock' is False; with 'lockstep' allowed is True"):
-        tick_rate(0.0, 50.0, clock=False, shortest=0.001)
+        refuse_without_clock(False)
+
+
+def test_channels_that_answer_are_channels_each_once():
+    assert channels_that_answer([""], ["a", "b"]) == []
+    assert channels_that_answer(["b", "a"], ["a", "b"]) == ["b", "a"]
+    with pytest.raises(InputError, match="'c' is no channel of the scene; allowed are, each once, a, b"):
+        channels_that_answer(["c"], ["a", "b"])
+    with pytest.raises(InputError, match="'a' is there twice"):
+        channels_that_answer(["a", "a"], ["a", "b"])
+    with pytest.raises(InputError, match="none, as the scene has no channel"):
+        channels_that_answer(["a"], [])
 
 
 def test_periods_end_one_after_the_other_from_the_start_on():
@@ -134,3 +293,10 @@ def test_periods_end_one_after_the_other_from_the_start_on():
         assert periods.complete(ends[-1]) == count
         ends.append(periods.next_end(ends[-1]))
     assert ends == pytest.approx([1.0 + k / 30.0 for k in range(101)], abs=1e-12)
+
+
+@pytest.mark.parametrize(("late", "end"), [(0.0, 1), (1e-12, 1), (-1e-12, 1), (0.049, 1), (0.051, 2), (0.099, 2)])
+def test_a_ramp_that_begins_late_ends_at_the_tick_nearest_to_a_period_later(late, end):
+    periods = Periods(1.0 / PERIOD)
+    periods.start(2.0)
+    assert late + periods.time_to_nearest_end(2.0 + late) == pytest.approx(end * PERIOD)

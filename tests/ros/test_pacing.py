@@ -1,6 +1,6 @@
 import pytest
 
-from bilayer_sim_ros.pacing import LARGEST_LAG, Pacer
+from bilayer_sim_ros.pacing import LARGEST_LAG, LOG, OTHERS, PHYSICS, Pacer, cause_of_delay
 
 
 class SetClock:
@@ -38,6 +38,11 @@ def test_a_long_lag_is_forgotten_instead_of_raced_after(clock):
     clock.now += 10.0
     assert pacer.delay(0.0) == 0.0
     assert pacer.delay(0.02) == pytest.approx(0.02)
+    assert pacer.lost == pytest.approx(10.0)
+    for _ in range(100):
+        clock.now += 1.0
+        assert pacer.delay(0.02) == 0.0
+        assert pacer.delay(0.04) <= 0.02 + 1e-9  # however long it lasts, the lag does not grow
 
 
 def test_after_a_restart_only_time_since_then_counts(clock):
@@ -45,3 +50,10 @@ def test_after_a_restart_only_time_since_then_counts(clock):
     clock.now += 10.0
     pacer.restart(5.0)
     assert pacer.delay(5.02) == pytest.approx(0.02)
+
+
+def test_the_cause_of_a_delay_is_what_most_time_went_to_and_the_rest_is_told():
+    spent = {LOG: 0.3, PHYSICS: 0.5, OTHERS: 0.001}
+    assert cause_of_delay(spent, 1.0) == "physics, 50% of the time (log 30%)"
+    assert cause_of_delay({PHYSICS: 0.9}, 1.0) == "physics, 90% of the time"
+    assert cause_of_delay({}, 1.0) == "not known"

@@ -39,6 +39,15 @@ def test_each_time_is_answered_once_until_the_end_value_has_been_sent_often_enou
     assert ended == ([] if hold else [len(sent)])
 
 
+def test_when_time_goes_back_the_ramp_begins_again():
+    sent = []
+    parameters = {"duration": 1.0, "start_value": 0.0, "end_value": 1.0, "hold": True}
+    sender = RampSender(sent.append, lambda: None, parameters)
+    for now in (0, 500_000_000, 2_000_000_000, 0, 250_000_000, 250_000_000):
+        sender.hear(now)
+    assert sent == [0.0, 0.5, 1.0, 0.0, 0.25]
+
+
 def test_in_lockstep_the_ramp_acts_exactly_at_each_time_and_holds_until_interrupted(start, domain, tmp_path):
     path = tmp_path / "run.mcap"
     parameters = {"scene": "bending", "log": path, "duration": 0.4, "lockstep": True, "real_time_factor": 0.0}
@@ -47,8 +56,9 @@ def test_in_lockstep_the_ramp_acts_exactly_at_each_time_and_holds_until_interrup
         "ramp_controller", domain, {"channel": "swelling", "duration": 0.2, "hold": True, "resume": True}
     )
     assert simulation.wait() == 0, simulation.output
-    # A frame shows the stimulus of the step that ends with it.
-    assert read_log(path).stimulus[1:, 0].tolist() == [ramp(k / 50, 0.2, 0.0, 1.0) for k in range(20)]
+    # A frame shows the stimulus of the step that ends with it, and that of a tick is reached at the next one.
+    expected = [ramp(k / 50, 0.2, 0.0, 1.0) for k in range(20)]
+    assert read_log(path).stimulus[1:, 0].tolist() == pytest.approx(expected, abs=1e-15)
     assert controller.running
     controller.send(signal.SIGINT)
     assert controller.wait(10) == 0, controller.output

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PointStamped, PoseArray
+from rcl_interfaces.msg import Log, ParameterDescriptor
+from rcl_interfaces.srv import DescribeParameters, SetParameters
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, Float64MultiArray
@@ -212,3 +215,61 @@ def test_diagnostics_come_about_once_a_second(client, heard):
     status = diagnostics[-1].status[0]
     assert (status.level, status.message) == (DiagnosticStatus.OK, "paused")
     assert "real-time factor" in {value.key for value in status.values}
+
+
+def ask(client, kind, service, request):
+    """The answer of one of the services that every node has."""
+    caller = client.node.create_client(kind, f"/bilayer_sim/{service}")
+    client.spin_until(caller.service_is_ready, service)
+    future = caller.call_async(request)
+    client.spin_until(future.done, f"an answer of {service}")
+    return future.result()
+
+
+def set_parameter(client, name, value):
+    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+    return ask(client, SetParameters, "set_parameters", request).results[0]
+
+
+def test_rates_may_be_set_at_any_time_and_are_told_as_events(client, heard):
+    clock, nodes = heard(Clock, "/clock"), heard(PoseArray, "nodes")
+    before, events = len(nodes), []
+    client.node.create_subscription(Log, "/bilayer_sim/events", events.append, 100)
+    try:
+        client.spin_until(lambda: set_parameter(client, "rate", 25.0).successful and events, "an event")
+        assert [to_seconds(step(client, clock).clock) for _ in range(2)] == pytest.approx([0.04, 0.08], abs=1e-9)
+        assert set_parameter(client, "marker_rate", 12.5).successful
+        assert set_parameter(client, "real_time_factor", 0.4).successful
+        assert client.call("resume").success
+        client.spin_until(lambda: to_seconds(clock[-1].clock) > 0.25, "some time")
+        assert client.call("pause").success
+        client.drain()
+        shown = sorted({round(to_seconds(message.header.stamp), 6) for message in nodes[before:]})
+        assert {0.16, 0.24} <= set(shown) and 0.2 not in shown  # from 0.08 s on, at 12.5 Hz
+        said = [event.msg for event in events if event.name == "setting"]
+        assert said[0] == "rate is 25 Hz, marker_rate is 20 Hz" and "real_time_factor is 0.4" in said
+    finally:
+        for name, value in (("rate", 50.0), ("marker_rate", 0.0), ("real_time_factor", 0.0)):
+            assert set_parameter(client, name, value).successful
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("rate", -1.0, "-1"),
+        ("real_time_factor", "fast", "parameter 'real_time_factor' is 'fast'; allowed is a finite number >= 0"),
+        ("scene", "gripping", "read-only"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_refused_with_the_reason(client, name, value, reason):
+    answer = set_parameter(client, name, value)
+    assert not answer.successful
+    assert reason in answer.reason
+
+
+def test_parameters_say_what_they_mean_and_what_is_allowed(client):
+    request = DescribeParameters.Request(names=["rate", "lockstep_timeout", "scene", "control_period"])
+    rate, timeout, scene, _ = ask(client, DescribeParameters, "describe_parameters", request).descriptors
+    assert (rate.read_only, timeout.read_only) == (False, True)
+    assert "frames published and logged" in rate.description and scene.additional_constraints == "a text"
+    assert isinstance(rate, ParameterDescriptor) and rate.floating_point_range[0].from_value == 0.0

@@ -22,7 +22,7 @@ from bilayer_core.record.topics import INPUTS
 from bilayer_core.runs.replay import verify
 from bilayer_core.scene.schedule import Hold
 from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.lockstep import Asynchronous
+from bilayer_sim_ros.control import Control
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
@@ -55,8 +55,7 @@ def worker_of(simulator, inputs, recording, duration, report=lambda status: None
     finished = threading.Event()
     worker = SimulationWorker(
         simulator,
-        control=Asynchronous(inputs),
-        commands=Commands(lambda reason: None),
+        control=Control(inputs, Commands(lambda reason: None), 50.0),
         publisher=Nobody(),
         recording=recording,
         rate=RATE,

@@ -1,0 +1,125 @@
+"""Topics on which controllers send; what is refused is said in a warning and changes nothing."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray
+
+from bilayer_core.errors import InputError
+from bilayer_core.model.model import Model
+from bilayer_sim_ros.commands import Commands
+from bilayer_sim_ros.conversions import nanoseconds_of
+from bilayer_sim_ros.stimulus import StimulusInputs
+
+DEPTH = 10
+STAMPED_DEPTH = 100
+"""All controllers may send on one topic, and no answer is to be lost."""
+LONGEST_REST = 0.005
+"""So long services may wait for the end of a rest [s]."""
+ROUND = 0.5e-3
+"""Messages that are looked for at once are taken within about that time of each other [s]."""
+REFUSAL_PERIOD = 1.0
+"""Real time between two warnings about refused messages [s]."""
+IGNORED_PERIOD = 10.0
+"""Real time between two warnings about answers that are ignored [s]."""
+
+
+class Rest:
+    """Lets the thread of the executor rest after a round of messages of which the last alone acts.
+
+    To look for messages costs the executor 0.3 to 1 ms whatever comes, so that a controller of 1 kHz would take half of
+    a processor from the physics.
+
+    Parameters
+    ----------
+    rate : float
+        Ticks per simulated second [Hz]: the rest takes a quarter of their period, and at most `LONGEST_REST`.
+    factor : callable
+        Simulated seconds per second at the present; 0 means as many as can be, and no rest.
+    """
+
+    def __init__(self, rate: float, factor: Callable[[], float]):
+        self._rate, self._factor = rate, factor
+        self._ended = -math.inf
+
+    def __call__(self) -> None:
+        """Rest, unless it has just been done."""
+        factor = self._factor()
+        length = min(0.25 / (self._rate * factor), LONGEST_REST) if factor else 0.0
+        if length > 0.0 and time.monotonic() - self._ended > ROUND:
+            time.sleep(length)
+            self._ended = time.monotonic()
+
+
+def subscribe_stimuli(
+    node: Node, inputs: StimulusInputs, channels: Sequence[str], rest: Callable[[], None] | None
+) -> None:
+    """Take stimuli: all channels, one, or those that a message names beside the tick that it answers.
+
+    With a `rest`, which is taken after each message, only the last message of a topic counts; without one, in lockstep,
+    each does.
+    """
+    depth = DEPTH if rest is None else 1
+
+    def all_channels(message: Float64MultiArray) -> None:
+        take(lambda: inputs.receive_all(message.data))
+
+    def one(channel: str, message: Float64) -> None:
+        take(lambda: inputs.receive(channel, message.data))
+
+    def take(receive: Callable[[], None]) -> None:
+        try:
+            receive()
+        finally:
+            if rest is not None:
+                rest()
+
+    def stamped(message: JointState) -> None:
+        tick = nanoseconds_of(message.header.stamp)
+        fault = inputs.receive_stamped(tick, message.name, message.position)
+        if fault:
+            counts = ", ".join(f"{count} {why}" for why, count in inputs.ignored.items() if count)
+            node.get_logger().warning(
+                f"lockstep: an answer of {', '.join(message.name)} to t = {tick * 1e-9:.9g} s is {fault} and is "
+                f"ignored (so far: {counts})",
+                throttle_duration_sec=IGNORED_PERIOD,
+            )
+
+    _subscribe(node, Float64MultiArray, "~/stimulus", all_channels, depth)
+    for channel in channels:
+        _subscribe(node, Float64, f"~/stimulus/{channel}", partial(one, channel), depth)
+    _subscribe(node, JointState, "~/stimulus_stamped", stamped, STAMPED_DEPTH)
+
+
+def subscribe_commands(node: Node, commands: Commands, model: Model) -> None:
+    """Take the poses of bodies that controllers may move, and factors of loads."""
+    for index in model.bodies.controlled:
+        body = model.bodies.names[index]
+        _subscribe(node, PoseStamped, f"~/mount_pose/{body}", partial(commands.ask_pose, body))
+    for load in model.scene.loads:
+        _subscribe(
+            node, Float64, f"~/load/{load.name}", lambda message, name=load.name: commands.ask_load(name, message.data)
+        )
+
+
+def warn_of_refusal(node: Node, reason: str) -> None:
+    """Say why something is refused, if that has not been said just now."""
+    node.get_logger().warning(f"refused: {reason}; the last good value stays", throttle_duration_sec=REFUSAL_PERIOD)
+
+
+def _subscribe(node: Node, kind: type, topic: str, take: Callable[[Any], None], depth: int = DEPTH) -> None:
+    def callback(message: Any) -> None:
+        try:
+            take(message)
+        except InputError as error:
+            warn_of_refusal(node, str(error))
+
+    node.create_subscription(kind, topic, callback, depth)

@@ -1,0 +1,181 @@
+"""How fast the node goes while a controller drives it, and how far off it is (Linux, two processors).
+
+    python tests/benchmarks/closed_loop.py [--only sine] [--scene NAME] [--duration S] [--interpolation hold]
+
+The node, with its log, has processor 0, the controller processor 1. The controller follows /clock and sends a signal at
+a rate in simulated time, so that the same acts on a slow machine. The node is asked for the real-time factor that is
+its goal; what it can is simulated time over the CPU time of the stepping thread and of the whole process, which hold on
+a busy machine too; what it reached is simulated over real time. The error is the largest distance of a node from the
+same run at a tenth of the tolerance, with the same commands at the same times, over the longest rod.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import random
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+NODE_CORE, CONTROLLER_CORE = 0, 1
+COMPILATION = 600.0
+"""Longest wait for a node that compiles [s]."""
+
+
+def sine(now: float, _: random.Random) -> float:
+    """0.5 Hz, all of the range."""
+    return 0.5 - 0.5 * math.cos(math.pi * now)
+
+
+def square(now: float, _: random.Random) -> float:
+    """0.2 and 0.6, a new one each half second."""
+    return 0.2 if now % 1.0 < 0.5 else 0.6
+
+
+def noise(part: float) -> Callable[[float, random.Random], float]:
+    """By a part of the range, about a value that rises from there to the middle in 2 s: no blow at the start."""
+    return lambda now, chance: part + (0.5 - part) * min(0.5 * now, 1.0) + part * (2.0 * chance.random() - 1.0)
+
+
+SIGNALS = {
+    "sine": (sine, 100.0, 5.0),
+    "square": (square, 2.0, 1.0),
+    "noise 5 %": (noise(0.05), 1000.0, 1.0),
+    "noise 20 %": (noise(0.2), 1000.0, 1.0),
+}
+"""Name to law, messages per simulated second, and the real-time factor that is asked for."""
+
+
+def control(name: str, channel: str) -> None:
+    """Send a signal as simulated time goes on, until nobody listens any more; runs in a process of its own."""
+    import rclpy
+    from rclpy.node import Node
+    from rclpy.qos import QoSProfile, ReliabilityPolicy
+    from rosgraph_msgs.msg import Clock
+    from std_msgs.msg import Float64
+    from std_srvs.srv import Trigger
+
+    law, rate, _ = SIGNALS[name]
+    chance, sent = random.Random(1), 0
+    rclpy.init()
+    node = Node("signal")
+    publisher = node.create_publisher(Float64, f"/bilayer_sim/stimulus/{channel}", 10)
+    resume = node.create_client(Trigger, "/bilayer_sim/resume")
+
+    def hear(message: Clock) -> None:
+        nonlocal sent
+        now = message.clock.sec + 1e-9 * message.clock.nanosec
+        while sent / rate <= now:
+            publisher.publish(Float64(data=law(sent / rate, chance)))
+            sent += 1
+
+    node.create_subscription(Clock, "/clock", hear, QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE))
+    deadline = time.monotonic() + COMPILATION
+    while publisher.get_subscription_count() == 0 or not resume.service_is_ready():
+        rclpy.spin_once(node, timeout_sec=0.05)
+        if time.monotonic() > deadline:
+            raise SystemExit("there is no node")
+    resume.call_async(Trigger.Request())
+    while publisher.get_subscription_count() > 0:
+        rclpy.spin_once(node, timeout_sec=0.5)
+
+
+def cpu_time(pid: int) -> float:
+    """CPU time of a running process [s]."""
+    user, system = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+
+
+def measure(name: str, log: Path, options: argparse.Namespace) -> dict[str, float]:
+    """Run a node with a controller: CPU time of its steps and of all of it, real time [s], and how often it warned."""
+    from bilayer_core import load_scene
+
+    channel = next(iter(load_scene(options.scene).stimuli))
+    parameters = {"scene": options.scene, "log": log, "duration": options.duration, "start_paused": "true"}
+    parameters |= {"real_time_factor": SIGNALS[name][2], "stimulus_interpolation": options.interpolation}
+    parameters |= {"tolerance": options.tolerance}
+    command = ["taskset", "-c", str(NODE_CORE), sys.executable, "-m", "bilayer_sim_ros.sim_node", "--ros-args"]
+    for key, value in parameters.items():
+        command += ["-p", f"{key}:={value}"]
+    driver = ["taskset", "-c", str(CONTROLLER_CORE), sys.executable, __file__, "--control", name, "--channel", channel]
+    output, begin, begun, ended, cpu = "", 0.0, 0.0, 0.0, 0.0  # it resumes the node about a second after "ready"
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as node, subprocess.Popen(driver) as controller:
+        for line in node.stderr:
+            output += line
+            if "is ready" in line:
+                begin, begun = time.monotonic(), cpu_time(node.pid)
+            elif "ended at" in line:
+                ended, cpu = time.monotonic(), cpu_time(node.pid) - begun
+        controller.terminate()
+    steps = re.search(r"CPU time of the steps: ([\d.]+) s", output)
+    if steps is None:
+        raise SystemExit(f"the node did not reach its end:\n{output}")
+    behind = re.findall(r"behind: .*", output)
+    if behind:
+        print(f"    {name}: {behind[-1]}")
+    return {"cpu": float(steps[1]), "process": cpu, "real": ended - begin, "warnings": len(behind)}
+
+
+def error_of(log: Path, part: float) -> tuple[float, float]:
+    """Largest, and last, distance of a node from the run at a part of the tolerance, over the longest rod."""
+    from bilayer_core import read_log
+    from bilayer_core.record.log_reader import read_info
+    from bilayer_core.runs.replay import branch, simulator_of
+
+    finer, inputs = branch(log, 0.0, [f"solver.tolerance={part * simulator_of(log).tolerance}"])
+    end = read_info(log).last_time
+    finer.run(until=end, inputs=inputs, log=log.with_suffix(".finer.mcap"))
+    run, other = read_log(log), read_log(log.with_suffix(".finer.mcap"))
+    if not np.array_equal(run.shape_times, other.shape_times):
+        raise SystemExit("the two logs have shapes of different times")
+    found = np.linalg.norm(run.positions - other.positions, axis=2).max(axis=1)
+    longest = max(rod.path.length for rod in finer.scene.rods)
+    return float(found.max() / longest), float(found[-1] / longest)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", choices=SIGNALS)
+    parser.add_argument("--scene", default="gripping")
+    parser.add_argument("--duration", type=float, default=10.0, help="simulated time [s]")
+    parser.add_argument("--interpolation", default="linear", choices=["linear", "hold"])
+    parser.add_argument("--tolerance", type=float, default=0.0, help="of steps; 0 = as the scene says")
+    parser.add_argument("--no-error", action="store_true")
+    parser.add_argument("--part", type=float, default=0.1, help="of the tolerance, for the error")
+    parser.add_argument("--keep", type=Path, help="directory for the logs")
+    parser.add_argument("--json", type=Path, help="file to write the figures to")
+    parser.add_argument("--control", choices=SIGNALS, help=argparse.SUPPRESS)
+    parser.add_argument("--channel", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.control:
+        control(options.control, options.channel)
+        return
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    figures = {}
+    print(f"{options.scene}, {options.interpolation}, {options.duration:g} s; load average {os.getloadavg()[0]:.1f}")
+    print("| signal | messages/s | asked | reached | by CPU of steps | by CPU of node | largest error | last error |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as directory:
+        for name in [options.only] if options.only else SIGNALS:
+            log = (options.keep or Path(directory)) / f"{name.split()[0]}{len(figures)}.mcap"
+            found = measure(name, log, options)
+            worst, last = (math.nan, math.nan) if options.no_error else error_of(log, options.part)
+            figures[name] = found | {"largest_error": worst, "last_error": last}
+            _, rate, asked = SIGNALS[name]
+            factors = " | ".join(f"{options.duration / found[time]:.2f}" for time in ("real", "cpu", "process"))
+            print(f"| {name} | {rate:g} | {asked:g} | {factors} | {worst:.2%} | {last:.2%} |", flush=True)
+    if options.json:
+        options.json.write_text(json.dumps(figures, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""A node that has to compile first: its topics and services are there, and what is asked for waits."""
+
+import threading
+
+import pytest
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from bilayer_core.record.log_reader import read_log
+from bilayer_sim_ros import simulation
+from bilayer_sim_ros.executable import declare
+from bilayer_sim_ros.parameters import SIM_NODE
+
+LIMIT = 60.0
+
+
+def spin(executor):
+    try:
+        executor.spin()
+    except ExternalShutdownException:
+        return
+
+
+@pytest.fixture
+def nodes(domain):
+    """Two nodes in this process, with an executor each in a thread: of the simulation, and of its client."""
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+
+    def node(name, **values):
+        overrides = [Parameter(key, value=value) for key, value in values.items()]
+        node = Node(
+            name, context=context, parameter_overrides=overrides, automatically_declare_parameters_from_overrides=True
+        )
+        executor = SingleThreadedExecutor(context=context)
+        executor.add_node(node)
+        threads.append(threading.Thread(target=spin, args=[executor]))
+        threads[-1].start()
+        return node
+
+    threads = []
+    yield node
+    rclpy.shutdown(context=context)
+    for thread in threads:
+        thread.join()
+
+
+def test_what_is_sent_and_asked_for_while_it_compiles_acts_when_it_is_ready(nodes, monkeypatch, tmp_path):
+    compiled, told, ended, stop = threading.Event(), threading.Event(), threading.Event(), threading.Event()
+    said = []
+
+    def compile_slowly(report):
+        while not compiled.wait(0.1):
+            report(3, 60)
+
+    monkeypatch.setattr(simulation, "ensure_compiled", compile_slowly)
+    log = tmp_path / "run.mcap"
+    node = nodes("bilayer_sim", scene="bending", log=str(log), start_paused=True, real_time_factor=0.0, duration=0.2)
+
+    def simulate():
+        simulation.simulate(node, declare(node, SIM_NODE), stop)
+        ended.set()
+
+    runs = threading.Thread(target=simulate)
+    runs.start()
+    client = nodes("client")
+
+    def hear(message):
+        said.append(message.status[0].message)
+        told.set()
+
+    client.create_subscription(DiagnosticArray, "/diagnostics", hear, 10)
+    publisher = client.create_publisher(Float64, "/bilayer_sim/stimulus/swelling", 10)
+    resume = client.create_client(Trigger, "/bilayer_sim/resume")
+    try:
+        assert resume.wait_for_service(LIMIT) and told.wait(LIMIT)
+        assert said[0] == "compiling kernels, once for this version on this machine: 3 of 60 pieces"
+        assert publisher.get_subscription_count() == 1
+        publisher.publish(Float64(data=0.75))
+        answered = threading.Event()
+        answer = resume.call_async(Trigger.Request())
+        answer.add_done_callback(lambda _: answered.set())
+        assert not answered.wait(0.5)
+        compiled.set()
+        assert answered.wait(LIMIT) and answer.result().success
+        assert ended.wait(LIMIT)
+    finally:
+        compiled.set()
+        stop.set()
+        runs.join()
+    assert read_log(log).stimulus[-1, 0] == pytest.approx(0.75, abs=1e-12)
