@@ -42,7 +42,7 @@ ROS_PLATFORM = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 data_files = [
     ("share/ament_index/resource_index/packages", ["resource/bilayer_sim_ros"]),
     (f"share/{NAME}", ["package.xml"]),
-    (f"share/{NAME}/config", glob("config/*.yaml")),
+    (f"share/{NAME}/config", glob("config/*.yaml") + glob("config/*.rviz")),
     (f"share/{NAME}/config/scenes", glob("config/scenes/*.yaml")),
     (f"share/{NAME}/config/templates", glob("config/templates/*.yaml")),
     (f"share/{NAME}/config/torture", glob("config/torture/*.yaml")),
@@ -51,7 +51,8 @@ data_files = [
 if {"bdist_wheel", "editable_wheel"} & set(sys.argv):
     # `ros2 run` looks for executables in lib/<package>. colcon puts the console scripts there (`options` below);
     # pip puts them into bin, so a wheel carries launchers that call them.
-    data_files.append((f"lib/{NAME}", ["resource/sim_node", "resource/replay_node", "resource/ramp_controller"]))
+    executables = ("sim_node", "replay_node", "ramp_controller", "gait_controller", "goal_controller")
+    data_files.append((f"lib/{NAME}", [f"resource/{name}" for name in executables]))
 
 setup(
     name=NAME,
@@ -118,6 +119,8 @@ setup(
             "sim_node = bilayer_sim_ros.sim_node:main",
             "replay_node = bilayer_sim_ros.replay_node:main",
             "ramp_controller = bilayer_sim_ros.ramp_controller:main",
+            "gait_controller = bilayer_sim_ros.controllers.gait_controller:main",
+            "goal_controller = bilayer_sim_ros.controllers.goal_controller:main",
         ],
     },
     options={

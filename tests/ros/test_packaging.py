@@ -51,7 +51,7 @@ def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
         assert (prefix / "share/bilayer_sim_ros" / name).is_file()
 
 
-@pytest.mark.parametrize("name", ["sim_node", "replay_node", "ramp_controller"])
+@pytest.mark.parametrize("name", ["sim_node", "replay_node", "ramp_controller", "gait_controller", "goal_controller"])
 def test_executables_are_where_ros2_run_looks_for_them(prefix, run, name):
     shown = run(prefix / "lib/bilayer_sim_ros" / name, "--help")
     assert shown.returncode == 0, shown.stderr

@@ -1,0 +1,135 @@
+"""The controllers to copy: one file each, and each works in lockstep, running freely, paused, and after a reset."""
+
+import ast
+import math
+import signal
+
+import numpy as np
+import pytest
+import yaml
+from geometry_msgs.msg import PointStamped
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.record.log_reader import read_log
+from bilayer_core.record.topics import output_topics
+from bilayer_sim_ros.controllers.gait_controller import wave
+
+CONTROLLERS = ("gait_controller", "goal_controller")
+WALK = {"channel": "humidity", "period": 2.4}
+SWIM = {"channel": "light", "period": 0.6, "width": 0.1, "tolerance": 0.002, "axis": [0.0, 0.0, 1.0]}
+GAIT = {"channels": ["left", "right", "hind"], "phases": [0.0, 0.5, 0.25], "period": 0.4, "low": 0.1, "high": 0.6}
+FAST = 4.0
+"""Simulated seconds a second of a run that nobody waits for."""
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_a_controller_is_one_short_file_that_imports_nothing_of_the_project(root, name):
+    source = (root / f"bilayer_sim_ros/controllers/{name}.py").read_text(encoding="utf-8")
+    assert source.count("\n") < 150
+    nodes = list(ast.walk(ast.parse(source)))
+    names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
+    names += [node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
+    assert not any(node.level for node in nodes if isinstance(node, ast.ImportFrom))
+    assert not [name for name in names if name.startswith("bilayer")]
+
+
+@pytest.mark.parametrize(
+    ("shape", "duty", "values"),
+    [
+        ("square", 0.25, [1.0, 0.0, 0.0, 0.0]),
+        ("triangle", 0.5, [0.0, 0.5, 1.0, 0.5]),
+        ("sine", 0.5, [0.0, 0.5, 1.0, 0.5]),
+        ("triangle", 0.25, [0.0, 1.0, 2.0 / 3.0, 1.0 / 3.0]),
+    ],
+)
+def test_waves_are_periodic_and_between_0_and_1(shape, duty, values):
+    for turns in (-2, 0, 7):
+        assert [wave(shape, turns + k / 4, duty) for k in range(4)] == pytest.approx(values, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_gait_on_three_channels_acts_exactly_and_rests_after_its_periods(start, domain, tmp_path):
+    path = tmp_path / "run.mcap"
+    simulation = {"scene": "steered_walker", "log": path, "duration": 1.0, "lockstep": True, "real_time_factor": 0.0}
+    node = start("sim_node", domain, simulation)
+    start("controllers.gait_controller", domain, GAIT | {"periods": 2})
+    assert node.wait() == 0, node.output
+    run = read_log(path)
+    names = run.description.channels
+    acted = dict(zip(names, run.stimulus.T, strict=True))
+    for name, phase in zip(GAIT["channels"], GAIT["phases"], strict=True):
+        ticks = np.arange(len(run.times) - 1) * 0.02
+        gait = 0.35 - 0.25 * np.cos(2.0 * math.pi * (ticks / 0.4 - phase))
+        # that of a tick is reached at the next one
+        assert acted[name][1:] == pytest.approx(np.where(ticks < 0.8 - 1e-9, gait, 0.1), abs=1e-12)
+
+
+@pytest.mark.slow
+def test_the_walker_comes_to_a_point_and_stops_there_to_5_mm_and_again_bit_for_bit(start, domain, tmp_path):
+    paths, goal = [tmp_path / "a.mcap", tmp_path / "b.mcap"], 0.075
+    for path in paths:
+        simulation = {"scene": "crawling_dual_leg", "log": path, "duration": 21.6}
+        node = start("sim_node", domain, simulation | {"lockstep": True, "real_time_factor": 0.0})
+        controller = start("controllers.goal_controller", domain, WALK | {"goal": [goal, 0.0, 0.0]})
+        assert node.wait() == 0, node.output
+        controller.end()
+    first, second = (read_log(path) for path in paths)
+    assert abs(first.com[-1, 0] - goal) < 5e-3 and first.com[0, 0] < 0.01
+    at_rest = first.com[first.times > first.times[-1] - 1.0, 0]
+    assert np.ptp(at_rest) < 1e-3
+    assert np.array_equal(first.com, second.com) and np.array_equal(first.stimulus, second.stimulus)
+
+
+@pytest.mark.slow
+def test_the_swimmer_holds_a_height_also_after_a_pause_a_reset_and_another_goal(start, connect, domain, tmp_path):
+    simulation = {"scene": "swimming", "real_time_factor": FAST, "start_paused": True, "duration": 1000.0}
+    node = start("sim_node", domain, simulation)
+    controller = start("controllers.goal_controller", domain, SWIM | {"goal": [0.0, 0.0, 0.02]})
+    client = connect(node)
+    heights = client.listen(PointStamped, "/bilayer_sim/com")
+    offset = heights[-1].point.z - 0.0
+
+    def held(height):
+        """Whether it was within 2 mm of a height for three beats."""
+        latest = [m.point.z for m in heights[-int(3 * 0.6 * 50) :]]
+        return len(latest) > 80 and max(abs(z - height) for z in latest) < 2e-3
+
+    assert client.call("resume").success
+    client.spin_until(lambda: held(0.02), "a height that is held")
+    assert client.call("pause").success
+    client.drain()
+    assert client.call("reset").success
+    del heights[:]
+    assert client.call("resume").success
+    client.spin_until(lambda: heights and abs(heights[-1].point.z - offset) < 5e-3, "the start")
+    client.spin_until(lambda: held(0.02), "the same height after a reset")
+    send = client.sender(PointStamped, "/goal_controller/goal")
+    goal = PointStamped()
+    goal.point.z = 0.03
+    send(goal)
+    client.spin_until(lambda: held(0.03), "another height")
+    for process in (controller, node):
+        process.send(signal.SIGINT)
+        assert process.wait(30) == 0, process.output
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters", "told"),
+    [
+        ("gait_controller", {"phases": [0.0, 0.5]}, "parameter 'phases' cannot be [0.0, 0.5]"),
+        ("gait_controller", {"shape": "saw"}, "parameter 'shape' cannot be 'saw'"),
+        ("goal_controller", {"width": 3.0}, "allowed are period > width >= 0"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused(start, domain, name, parameters, told):
+    controller = start(f"controllers.{name}", domain, parameters)
+    assert controller.wait() == 2
+    assert told in controller.output and "Traceback" not in controller.output
+
+
+def test_the_configuration_of_rviz_shows_topics_that_the_node_has(root):
+    content = yaml.safe_load((root / "config/markers.rviz").read_text(encoding="utf-8"))
+    displays = content["Visualization Manager"]["Displays"]
+    shown = {display["Topic"]["Value"] for display in displays if "Topic" in display}
+    assert "/bilayer_sim/markers" in shown
+    assert shown <= {topic.full_name() for topic in output_topics(Simulator(load_scene("bending")).description)}
