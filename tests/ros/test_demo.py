@@ -24,8 +24,8 @@ def driven_directly():
     arms = slice(0, max(strand.nodes.stop for strand in simulator.description.strands))
     frames = []
     for count in range(1, round(scene.duration * scene.output.rate) + 1):
-        simulator.set_stimulus(CHANNEL, min(simulator.time / RAMP_DURATION, 1.0))
         due = count / scene.output.rate
+        simulator.set_stimulus(CHANNEL, min(simulator.time / RAMP_DURATION, 1.0), over=due - simulator.time)
         while simulator.time < due:
             simulator.step(until=due)
         touching = np.any(simulator.contact_forces[arms] != 0.0, axis=1).sum()
