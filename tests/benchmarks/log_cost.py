@@ -24,6 +24,8 @@ LONGEST = 6.0
 """Simulated time of a run at most [s]."""
 SETTLED = 0.3
 """Simulated time from which on a run is measured without its start [s]."""
+CLOSING = 0.02
+"""Before the end of a run: up to there it is measured, without closing the file [s]."""
 
 
 @dataclass
@@ -53,17 +55,18 @@ def run(scene: str, log: Path | None) -> tuple[list[float], float]:
     config = load_scene(scene)
     simulator, thread = Simulator(config), threading.get_ident()
     simulator.compile()
-    settled: list[Reading] = []
+    length = min(config.duration, LONGEST)
+    looks: list[Reading] = []
 
     def look(now: float) -> None:
-        if now >= SETTLED and not settled:
-            settled.append(Reading.of(simulator, thread))
+        if now >= (SETTLED, length - CLOSING)[len(looks)] - 1e-9:
+            looks.append(Reading.of(simulator, thread))
 
     begin = Reading.of(simulator, thread)
     observers = [McapRecorder(log, config.output.rate, config.output.marker_rate, force=True)] if log else []
-    simulator.run(min(config.duration, LONGEST), observers=observers, progress=look)
+    simulator.run(length, observers=observers, progress=lambda now: look(now) if len(looks) < 2 else None)
     end = Reading.of(simulator, thread)
-    rates = end.since(settled[0])
+    rates = looks[1].since(looks[0])
     return rates, end.beyond - begin.beyond - rates[0] * (end.time - begin.time)
 
 
