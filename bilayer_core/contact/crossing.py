@@ -3,9 +3,8 @@
 Contact points of rods are at nodes, so a surface that is smaller than an edge, or that has a corner, can come between
 two of them without touching either. No barrier sees that; this does, after the fact.
 
-An edge and a surface are looked at as they are at the end of a step, and at moments within it that are no farther apart
-than what moves less than the surface is thick; between its start and its end, an edge moves on straight lines in the
-frame of the surface.
+Edges are checked at the end of a step and at samples within it, between which nothing moves by more than half the
+thickness of the surface. Between start and end of the step an edge moves on straight lines in the frame of the surface.
 
 The signed distance φ of a convex shape is convex along a line. So a tangent to φ along an edge bounds it from below,
 and where the tangents at both ends of an interval meet is the least that φ can be within: either that is positive, or
@@ -24,7 +23,7 @@ CUTS = 60
 """Intervals that are looked at in one edge; each is a part of the one before."""
 FINE = 1e-9
 """Part of an edge: a shorter interval is a point."""
-MOMENTS = 256
+SAMPLES = 256
 """Within a step, at most."""
 
 
@@ -59,19 +58,19 @@ def crossing(strands, surfaces, at):
             if not surfaces.edge_can_cross[s, e]:
                 continue
             a = strands.edge_node[e]
-            way = away = onward = square = before = 0.0
+            moved = far = onward = square = before = 0.0
             for c in range(3):  # from the surface's position to the edge's middle, at the start and at the end
                 start = 0.5 * (first[a, c] + first[a + 1, c]) - first_p[s, c]
                 end = 0.5 * (x[a, c] + x[a + 1, c]) - p[s, c]
-                way += (end - start) ** 2
+                moved += (end - start) ** 2
                 onward -= start * (end - start)
-                away += start**2
+                far += start**2
                 square += (x[a + 1, c] - x[a, c]) ** 2
                 before += (first[a + 1, c] - first[a, c]) ** 2
-            part = min(max(onward / way, 0.0), 1.0) if way > 0.0 else 0.0
-            nearest = away - 2.0 * part * onward + part**2 * way
-            reach = surfaces.bound[s] + 0.5 * math.sqrt(max(square, before))
-            if nearest < reach**2 and _meets(surfaces, at, a, s):
+            part = min(max(onward / moved, 0.0), 1.0) if moved > 0.0 else 0.0
+            nearest = far - 2.0 * part * onward + part**2 * moved
+            limit = surfaces.bound[s] + 0.5 * math.sqrt(max(square, before))
+            if nearest < limit**2 and _crosses_within_step(surfaces, at, a, s):
                 return e + s * strands.edge_count
     return -1
 
@@ -88,7 +87,7 @@ def _seen_from(position, axes, s, x, a):
 
 
 @kernel
-def _meets(surfaces, at, a, s):
+def _crosses_within_step(surfaces, at, a, s):
     """Whether the edge behind node a goes through surface s at the end of a step, or at a moment within it."""
     x, position, axes = surfaces.first_position, surfaces.first_surface_position, surfaces.first_surface_rotation
     a0, b0 = _seen_from(position, axes, s, x, a), _seen_from(position, axes, s, x, a + 1)
@@ -96,10 +95,10 @@ def _meets(surfaces, at, a, s):
     a1, b1 = _seen_from(position, axes, s, x, a), _seen_from(position, axes, s, x, a + 1)
     of_a = (a1[0] - a0[0]) ** 2 + (a1[1] - a0[1]) ** 2 + (a1[2] - a0[2]) ** 2
     of_b = (b1[0] - b0[0]) ** 2 + (b1[1] - b0[1]) ** 2 + (b1[2] - b0[2]) ** 2
-    ways, thick = math.sqrt(max(of_a, of_b)), _thickness(surfaces, s)
-    moments = MOMENTS if ways > MOMENTS * thick else int(math.ceil(ways / thick))
-    for k in range(moments, 0, -1):
-        t = k / moments
+    displacement, thickness = math.sqrt(max(of_a, of_b)), _thickness(surfaces, s)
+    samples = SAMPLES if displacement > SAMPLES * thickness else int(math.ceil(displacement / thickness))
+    for k in range(samples, 0, -1):
+        t = k / samples
         r = 1.0 - t
         if _goes_through(
             surfaces,
@@ -108,7 +107,7 @@ def _meets(surfaces, at, a, s):
             (r * b0[0] + t * b1[0], r * b0[1] + t * b1[1], r * b0[2] + t * b1[2]),
         ):
             return True
-    return moments == 0 and _goes_through(surfaces, s, a1, b1)
+    return samples == 0 and _goes_through(surfaces, s, a1, b1)
 
 
 @kernel

@@ -23,7 +23,7 @@ from .actuation import Actuation
 from .energy_account import open_account
 from .error_norm import ErrorNorm
 from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
-from .look import Look, look_at
+from .observables import Observables, observe
 from .potential import add_forces, expand_to_unknowns
 from .report import FAILURES, IntegrationReport
 from .run_extrema import count_shape
@@ -232,11 +232,11 @@ class Engine:
             problem.sums.energy[:] = energy
             self._evaluated = True
 
-    def look_at(self, state: State, seen: Look) -> None:
-        """Have seen what there is to see of a state that is `end`, with forces as they are there."""
+    def observe(self, state: State, out: Observables) -> None:
+        """Evaluate the observables of a state that is `end`, with forces as they are there."""
         self.evaluate_end()
         run = self._parts_for(state)
-        look_at(run.problem, self.joints, run.state, self.end, seen)
+        observe(run.problem, self.joints, run.state, self.end, out)
 
     def open_account(self, state: State) -> None:
         """Begin with the energy of a state that was evaluated, unless its account is its own."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from ..forces.bend_twist import bending_strain
 from ..forces.rod_arms import node_of
 from ..jit import call, kernel, piece
 from ..model.records.problem import Problem
@@ -17,12 +18,8 @@ def count_shape(p, state, at, stage, extrema):
     strands, rest_edge, figures, voronoi = p.strands, stage.rest_edge, extrema.figures, extrema.voronoi_length
     sharpest = 0.0
     for j in range(voronoi.shape[0]):
-        a, b = strands.joint_a[j], strands.joint_b[j]
-        bend, cosine = 0.0, 1.0
-        for c in range(3):  # κ₁ of `forces.bend_twist`; that in `joint_strain` is from before Newton's last correction
-            bend += at.tangent[b, c] * at.director1[a, c] - at.tangent[a, c] * at.director1[b, c]
-            cosine += at.tangent[a, c] * at.tangent[b, c]
-        sharpest = max(sharpest, abs(bend) / (cosine * voronoi[j]))
+        bend = bending_strain(at, strands.joint_a[j], strands.joint_b[j])
+        sharpest = max(sharpest, abs(bend) / voronoi[j])
     largest = 0.0
     for e in range(strands.edge_count):
         largest = max(largest, abs(at.length[e] / strands.rest_length[e] - 1.0 - rest_edge[e]))

@@ -94,6 +94,16 @@ TWO_PI = 2.0 * math.pi
 
 
 @kernel
+def bending_strain(at, a, b):
+    """κ₁ between edges a and b of a configuration as it is: that in `joint_strain` is from before Newton's last
+    correction.
+    """
+    tangent_a, tangent_b = row(at.tangent, a), row(at.tangent, b)
+    bend = dot(tangent_b, row(at.director1, a)) - dot(tangent_a, row(at.director1, b))
+    return bend / (1.0 + dot(tangent_a, tangent_b))
+
+
+@kernel
 def bend_by_strains(off_axis, strands, at, neutral):
     """Write κ̄₁ κ̄₂ ψ̄ of joints at the present strains of edges [rad], from those without any, into `OffAxis.rest`."""
     joint, slope, rest = off_axis.joint, off_axis.slope, off_axis.rest

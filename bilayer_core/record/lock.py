@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import stat
+from contextlib import ExitStack
 from pathlib import Path
 from typing import BinaryIO
 
@@ -34,14 +35,12 @@ def open_alone(path: Path, force: bool) -> BinaryIO:
     OSError
         If it cannot be opened, or is there without `force`.
     """
-    file = open(path, "wb" if force else "xb", opener=_without_emptying)
-    try:
+    with ExitStack() as refused:
+        file = refused.enter_context(open(path, "wb" if force else "xb", opener=_without_emptying))
         _lock(file, path)
         if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             file.truncate(0)
-    except BaseException:
-        file.close()
-        raise
+        refused.pop_all()
     return file
 
 

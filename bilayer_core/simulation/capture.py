@@ -19,7 +19,7 @@ class Capture:
 
     def __init__(self, stepper: Stepper, state: State):
         self.model, self.owners = stepper.model, stepper.contact_owners
-        self.seen, self.touching = stepper.look_at(state)
+        self.seen, self.touching = stepper.observe(state)
         self.values, self.place_of_seal = state.values.copy(), state.place_of_seal
         self.values.flags.writeable = False  # parts of it are handed out as they are
         self.state = Parts(self.values, stepper.places_in(state))

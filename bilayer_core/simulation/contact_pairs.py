@@ -45,7 +45,7 @@ class ContactOwners:
         self.of_surface = np.array([slot[name] for name in model.surfaces.names], dtype=np.int64)
 
     def names_of(self, touching: Array) -> Pairs:
-        """Names of the pairs of what `engine.look` saw touch: a rod comes before a body, and a body before an
+        """Names of the pairs of what `engine.observables` saw touch: a rod comes before a body, and a body before an
         obstacle.
         """
         pairs = (divmod(code, self.count) for code in sorted(touching.tolist()))

@@ -220,7 +220,7 @@ class Simulator:
     def _seen(self) -> Parts:
         """What there is to see of the present state."""
         self.compile()
-        return self._stepper.look_at(self._state)[0]
+        return self._stepper.observe(self._state)[0]
 
     @property
     def curvatures(self) -> Array:

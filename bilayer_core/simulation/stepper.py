@@ -11,9 +11,9 @@ import numpy as np
 from ..engine.energy_account import LARGEST
 from ..engine.engine import Engine
 from ..engine.integrate import TIME_ROUNDING, StepControl
-from ..engine.look import Look, look_of
 from ..engine.modes import EVALUATE_STATE
 from ..engine.newton import LAST_DIGITS
+from ..engine.observables import Observables, observables_of
 from ..engine.report import FAILURES, IntegrationReport
 from ..engine.step import LEAST_LENGTH
 from ..errors import InputError, SimulationError
@@ -134,17 +134,17 @@ class Stepper:
         return self.engine.end
 
     @cached_property
-    def _look(self) -> tuple[Look, Places]:
+    def _observables(self) -> tuple[Observables, Places]:
         owners = self.contact_owners
-        return look_of(self.model, owners.of_point, owners.of_surface, owners.count)
+        return observables_of(self.model, owners.of_point, owners.of_surface, owners.count)
 
-    def look_at(self, state: State) -> tuple[Parts, np.ndarray]:
-        """What there is to see of a state that was reached or evaluated last, by its names in `engine.look.Look`, and
-        the numbers of the pairs that touch: copies.
+    def observe(self, state: State) -> tuple[Parts, np.ndarray]:
+        """Observables of a state that was reached or evaluated last, by their names in `engine.observables`, and the
+        numbers of the pairs that touch: copies.
         """
-        seen, places = self._look
-        self.engine.look_at(state, seen)
-        return Parts(seen.values.copy(), places), seen.touching[: seen.touching_count[0]].copy()
+        found, places = self._observables
+        self.engine.observe(state, found)
+        return Parts(found.values.copy(), places), found.touching[: found.touching_count[0]].copy()
 
     def places_in(self, state: State) -> Places:
         """Of the parts of a state in its values."""
@@ -177,7 +177,7 @@ class Stepper:
     def compile(self, state: State) -> None:
         """Make a step, for its kernels; `state` stays as it is."""
         self._integrate(state.copy(), math.inf, math.inf, 1)
-        self.look_at(state)
+        self.observe(state)
 
     def restart(self, state: State) -> None:
         """Begin again with the first step's length: something has jumped."""

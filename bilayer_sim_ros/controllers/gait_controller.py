@@ -10,12 +10,13 @@ says depends on the time alone, so a reset needs nothing.
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
@@ -56,9 +57,12 @@ class GaitController(Node):
         self.create_subscription(Clock, "/clock", self.hear, 10)
 
     def parameter(self, name: str, default, description: str):
-        """Declare a parameter, and its value."""
+        """Declare a parameter; its value."""
         descriptor = ParameterDescriptor(description=description, read_only=True)
-        return self.declare_parameter(name, default, descriptor).value
+        value = self.declare_parameter(name, default, descriptor).value
+        if value is None:
+            raise ValueError(f"parameter '{name}' is empty")
+        return value
 
     def refuse_nonsense(self) -> None:
         """ValueError with the parameter that cannot be."""
@@ -93,15 +97,14 @@ class GaitController(Node):
 
 def main(argv: list[str] | None = None) -> int:
     """Run the node until it is interrupted; the exit code."""
-    style = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser("gait_controller", description=__doc__, formatter_class=style)
+    parser = ArgumentParser("gait_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
     rclpy.init(args=argv)
     try:
         rclpy.spin(GaitController())
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
-    except ValueError as error:
+    except (ValueError, ParameterException) as error:
         print(f"gait_controller: {error}", file=sys.stderr)
         return 2
     finally:

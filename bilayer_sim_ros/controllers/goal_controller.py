@@ -13,14 +13,15 @@ while the simulation runs freely, is paused, or waits for it in lockstep. Where 
 
 from __future__ import annotations
 
-import argparse
 import math
 import sys
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections import deque
 
 import rclpy
 from geometry_msgs.msg import PointStamped
 from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
@@ -50,9 +51,10 @@ class GoalController(Node):
         self.axis = self.parameter("axis", [1.0, 0.0, 0.0], "direction in which beats move the robot")
         self.goal = self.parameter("goal", [math.nan] * 3, "of the centre of mass [m]; also by the topic ~/goal")
         self.tolerance = self.parameter("tolerance", 0.005, "distance along the axis that is good enough [m]")
-        self.leave = self.parameter("leave", False, "end when it has rested at the goal for two beats")
-        if not (self.period > self.width >= 0.0 and self.tolerance > 0.0 and len(self.axis) == len(self.goal) == 3):
-            raise ValueError("allowed are period > width >= 0, tolerance > 0, and three numbers each for axis and goal")
+        if not (self.period > self.width >= 0.0 and self.tolerance > 0.0):
+            raise ValueError("allowed are period > width >= 0 and tolerance > 0")
+        if not (len(self.axis) == len(self.goal) == 3 and any(self.axis)):
+            raise ValueError("axis and goal are three numbers each, and the axis is not 0")
         self.begin_anew()
         self.publisher = self.create_publisher(JointState, f"{node}/stimulus_stamped", 10)
         self.create_subscription(Clock, "/clock", self.hear, 10)
@@ -60,19 +62,22 @@ class GoalController(Node):
         self.create_subscription(PointStamped, "~/goal", self.aim, 1)
 
     def parameter(self, name: str, default, description: str):
-        """Declare a parameter, and its value."""
-        told = ParameterDescriptor(description=description, read_only=True)
-        return self.declare_parameter(name, default, told).value
+        """Declare a parameter; its value."""
+        descriptor = ParameterDescriptor(description=description, read_only=True)
+        value = self.declare_parameter(name, default, descriptor).value
+        if value is None:
+            raise ValueError(f"parameter '{name}' is empty")
+        return value
 
     def begin_anew(self) -> None:
         """Forget time, places and beats."""
-        self.answered, self.start, self.size, self.before, self.rested = -1, None, 0.0, None, 0
+        self.answered, self.start, self.size, self.before, self.rests = -1, None, 0.0, None, False
         self.seen: deque[tuple[int, float]] = deque(maxlen=200)
         self.brought = {0.0: 0.0}
 
     def aim(self, message: PointStamped) -> None:
         """Take another goal; the present beat goes on to its end."""
-        self.goal, self.rested = [message.point.x, message.point.y, message.point.z], 0
+        self.goal, self.rests = [message.point.x, message.point.y, message.point.z], False
 
     def see(self, message: PointStamped) -> None:
         """Remember how far along the axis the centre of mass is."""
@@ -109,14 +114,9 @@ class GoalController(Node):
         self.start, self.before = now, here
         left = math.nan if here is None else self.along(self.goal) - here
         self.size = 0.0 if math.isnan(left) or left <= 0.5 * self.tolerance else self.size_for(SHARE * left)
-        if math.isnan(left) or self.size > 0.0:
-            self.rested = 0
-            return
-        self.rested += 1
-        if self.rested == 1:
+        rested, self.rests = self.rests, not math.isnan(left) and self.size == 0.0
+        if self.rests and not rested:
             self.get_logger().info(f"rests at t = {1e-9 * now:g} s, {1e3 * left:.2f} mm before the goal")
-        if self.rested > 2 and self.leave:
-            raise SystemExit
 
     def size_for(self, way: float) -> float:
         """Part of the largest beat that is to bring a way [m]."""
@@ -128,16 +128,15 @@ class GoalController(Node):
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the node until it is interrupted, or has done what it was asked for; the exit code."""
-    style = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser("goal_controller", description=__doc__, formatter_class=style)
+    """Run the node until it is interrupted; the exit code."""
+    parser = ArgumentParser("goal_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
     rclpy.init(args=argv)
     try:
         rclpy.spin(GoalController())
-    except (KeyboardInterrupt, ExternalShutdownException, SystemExit):
+    except (KeyboardInterrupt, ExternalShutdownException):
         return 0
-    except ValueError as error:
+    except (ValueError, ParameterException) as error:
         print(f"goal_controller: {error}", file=sys.stderr)
         return 2
     finally:

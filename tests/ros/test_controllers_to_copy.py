@@ -118,7 +118,11 @@ def test_the_swimmer_holds_a_height_also_after_a_pause_a_reset_and_another_goal(
     [
         ("gait_controller", {"phases": [0.0, 0.5]}, "parameter 'phases' cannot be [0.0, 0.5]"),
         ("gait_controller", {"shape": "saw"}, "parameter 'shape' cannot be 'saw'"),
+        ("gait_controller", {"period": 2}, "expecting type 'DOUBLE'"),
+        ("gait_controller", {"channels": []}, "parameter 'channels' is empty"),
         ("goal_controller", {"width": 3.0}, "allowed are period > width >= 0"),
+        ("goal_controller", {"goal": [1, 0, 0]}, "expecting type 'DOUBLE_ARRAY'"),
+        ("goal_controller", {"axis": [0.0, 0.0, 0.0]}, "the axis is not 0"),
     ],
 )
 def test_parameters_that_cannot_be_are_refused(start, domain, name, parameters, told):

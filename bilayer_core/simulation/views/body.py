@@ -25,7 +25,7 @@ class BodyView:
     contact_wrench : Array
         Contact force [N] and moment about its position [N m], in the world's axes, shape (6,).
     clamp_wrench : Array
-        Likewise, what the rods that it holds exert on it; see `engine.look`. At the end of the last
+        Likewise, what the rods that it holds exert on it; see `engine.observables`. At the end of the last
         step: with the inertia of the held nodes, which `implicit_midpoint` does not give at the ends of its steps.
     turning, sliding : Motion or None
         About the hinge and along the rail of a guided body, where the scene has `turning` or `sliding`.

@@ -94,7 +94,7 @@ def test_each_pair_that_touches_is_seen_once(simulator):
         nodes = owners.of_point[rods.contacts.node[: rods.contacts.count[0]]]
         expected |= {tuple(sorted(pair)) for pair in nodes.tolist()}
     for _ in range(2):
-        _, seen = simulator._stepper.look_at(simulator._state)
+        _, seen = simulator._stepper.observe(simulator._state)
         assert sorted(divmod(number, owners.count) for number in seen.tolist()) == sorted(expected)
     assert len(simulator.frame().contacts) == len(expected)
 

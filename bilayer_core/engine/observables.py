@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..forces.bend_twist import bending_strain
 from ..forces.joints import Joints
 from ..jit import call, kernel, piece, record, shapes_of, zeros_in_one
 from ..jit.record import Flags, IndexTable, Indices, Matrix, Vector
 from ..kinematics.copying import copy
 from ..kinematics.rotating import quaternion_of
-from ..kinematics.vector import combine3, cross, dot, row, scaled
+from ..kinematics.vector import combine3, cross, row, scaled
 from ..model.model import Model
 from ..model.records.parts import Fluid
 from ..model.records.problem import Problem
@@ -27,8 +28,8 @@ Array = np.ndarray
 
 
 @record
-class Look:
-    """Where it looks, and what it saw; the latter is in `values`, in one piece."""
+class Observables:
+    """Observables, which are in `values` in one piece, and what they are computed of beside the state."""
 
     voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
     joint_node: Indices  # the node of each, shape (n_bend,)
@@ -45,25 +46,25 @@ class Look:
     touched: Flags = ("owner squared",)  # scratch
     owners: int  # n of the pairs
     values: Vector
-    strain: Vector = ("seen point",)  # of nodes, the mean of their edges', with eigenstrain; 0 at points of bodies
-    curvature: Vector = ("seen point",)  # χ of nodes [1/m]
-    contact_force: Matrix = ("seen point", 3)  # barrier and friction force on nodes and points of bodies [N]
+    strain: Vector = ("observed point",)  # of nodes, the mean of their edges', with eigenstrain; 0 at points of bodies
+    curvature: Vector = ("observed point",)  # χ of nodes [1/m]
+    contact_force: Matrix = ("observed point", 3)  # barrier and friction force on nodes and points of bodies [N]
     quaternion: Matrix = ("body", 4)  # x y z w, w ≥ 0
     contact_wrench: Matrix = ("body", 6)  # contact force [N] and moment about its position [N m] on every body
     clamp: Matrix = ("attached", 6)  # the part of each held node with its direction in the next
-    clamp_wrench: Matrix = ("body", 6)  # of the rods that each body holds [N, N m], see `_see_clamps`
+    clamp_wrench: Matrix = ("body", 6)  # of the rods that each body holds [N, N m], see `_observe_clamps`
     energy: Vector = ("force",)  # of each force, in the order of `model.force_slots` [J]
     kinetic: Vector = (2,)  # of rods and bodies, and of the fluid [J]
 
 
-@piece(int, Problem, Joints, StateArrays, Configuration, Look)
-def look_at(p, joints, state, at, seen):
-    """Write what is seen of a state, which is `at`, with forces as they were evaluated last."""
-    _see_strains(p, at, seen)
-    _see_contact(p, joints, seen)
-    _see_clamps(p, at, seen)
-    _see_touching(p, seen)
-    for b in range(seen.quaternion.shape[0]):
+@piece(int, Problem, Joints, StateArrays, Configuration, Observables)
+def observe(p, joints, state, at, out):
+    """Write what is out of a state, which is `at`, with forces as they were evaluated last."""
+    _observe_strains(p, at, out)
+    _observe_contact(p, joints, out)
+    _observe_clamps(p, at, out)
+    _observe_touching(p, out)
+    for b in range(out.quaternion.shape[0]):
         r = state.body_rotation
         x, y, z, w = quaternion_of(
             *(r[b, 0, 0], r[b, 0, 1], r[b, 0, 2]),
@@ -71,51 +72,48 @@ def look_at(p, joints, state, at, seen):
             *(r[b, 2, 0], r[b, 2, 1], r[b, 2, 2]),
         )
         sign = 1.0 if w >= 0.0 else -1.0
-        seen.quaternion[b, 0], seen.quaternion[b, 1] = sign * x, sign * y
-        seen.quaternion[b, 2], seen.quaternion[b, 3] = sign * z, sign * w
-    copy(p.sums.energy, seen.energy)
-    seen.kinetic[0] = kinetic_energy(p, state)
-    if seen.fluid.exists:
-        copy(state.velocity, seen.fluid.node_velocity)
-        copy(state.spin, seen.fluid.spin)
-        seen.kinetic[1] = call(seen.fluid.fluid_momentum, (seen.fluid, at))
+        out.quaternion[b, 0], out.quaternion[b, 1] = sign * x, sign * y
+        out.quaternion[b, 2], out.quaternion[b, 3] = sign * z, sign * w
+    copy(p.sums.energy, out.energy)
+    out.kinetic[0] = kinetic_energy(p, state)
+    if out.fluid.exists:
+        copy(state.velocity, out.fluid.node_velocity)
+        copy(state.spin, out.fluid.spin)
+        out.kinetic[1] = call(out.fluid.fluid_momentum, (out.fluid, at))
     return READY
 
 
 @kernel
-def _see_strains(p, at, seen):
-    """Of nodes. (Strains of joints were last evaluated before Newton's last correction.)"""
-    strands, strain, curvature = p.strands, seen.strain, seen.curvature
-    for k in range(seen.node.shape[0]):
-        a, b = seen.edges[k, 0], seen.edges[k, 1]
+def _observe_strains(p, at, out):
+    """Of nodes."""
+    strands, strain, curvature = p.strands, out.strain, out.curvature
+    for k in range(out.node.shape[0]):
+        a, b = out.edges[k, 0], out.edges[k, 1]
         before, after = at.length[a] / strands.rest_length[a] - 1.0, at.length[b] / strands.rest_length[b] - 1.0
-        strain[seen.node[k]] = 0.5 * (before + after)
-    for j in range(seen.voronoi_length.shape[0]):
-        a, b = strands.joint_a[j], strands.joint_b[j]
-        tangent_a, tangent_b = row(at.tangent, a), row(at.tangent, b)
-        bend = dot(tangent_b, row(at.director1, a)) - dot(tangent_a, row(at.director1, b))
-        bend /= 1.0 + dot(tangent_a, tangent_b)  # κ₁ of `forces.bend_twist`
-        curvature[seen.joint_node[j]] = bend / seen.voronoi_length[j]
-    for k in range(seen.neighbour.shape[0]):
-        curvature[seen.neighbour[k, 0]] = curvature[seen.neighbour[k, 1]]
-    for k in range(seen.twin.shape[0]):
-        strain[seen.twin[k, 0]] = strain[seen.twin[k, 1]]
-        curvature[seen.twin[k, 0]] = curvature[seen.twin[k, 1]]
+        strain[out.node[k]] = 0.5 * (before + after)
+    for j in range(out.voronoi_length.shape[0]):
+        bend = bending_strain(at, strands.joint_a[j], strands.joint_b[j])
+        curvature[out.joint_node[j]] = bend / out.voronoi_length[j]
+    for k in range(out.neighbour.shape[0]):
+        curvature[out.neighbour[k, 0]] = curvature[out.neighbour[k, 1]]
+    for k in range(out.twin.shape[0]):
+        strain[out.twin[k, 0]] = strain[out.twin[k, 1]]
+        curvature[out.twin[k, 0]] = curvature[out.twin[k, 1]]
 
 
 @kernel
-def _see_contact(p, joints, seen):
+def _observe_contact(p, joints, out):
     """Of nodes, points and bodies; joints and mechanisms are in the sums of bodies too."""
-    for i in range(seen.contact_force.shape[0]):
+    for i in range(out.contact_force.shape[0]):
         for c in range(3):
-            seen.contact_force[i, c] = -p.sums.contact_point[i, c]
-    for b in range(seen.contact_wrench.shape[0]):
+            out.contact_force[i, c] = -p.sums.contact_point[i, c]
+    for b in range(out.contact_wrench.shape[0]):
         for c in range(6):
-            seen.contact_wrench[b, c] = -p.sums.contact[b, c]
+            out.contact_wrench[b, c] = -p.sums.contact[b, c]
     if joints.exists:
-        _leave_out(joints.body, joints.gradient, seen.contact_wrench)
+        _leave_out(joints.body, joints.gradient, out.contact_wrench)
     if p.mechanisms.exists:
-        _leave_out(p.mechanisms.body, p.mechanisms.gradient, seen.contact_wrench)
+        _leave_out(p.mechanisms.body, p.mechanisms.gradient, out.contact_wrench)
 
 
 @kernel
@@ -128,7 +126,7 @@ def _leave_out(body, gradient, wrench):
 
 
 @kernel
-def _see_clamps(p, at, seen):
+def _observe_clamps(p, at, out):
     """Force [N] and moment about its position [N m] that the rods which a body holds exert on it.
 
     They are −∂Φ/∂X and −∂Φ/∂φ of the potential Φ of the step through the nodes x = X + ρ and the fixed directions t
@@ -138,62 +136,62 @@ def _see_clamps(p, at, seen):
 
     Φ has all that acts on what is held: elasticity, weight and inertia of half an edge, contact, drag, damping.
     """
-    seen.clamp_wrench[:] = 0.0
+    out.clamp_wrench[:] = 0.0
     edges = p.strands.edge_count
-    for k in range(seen.clamp.shape[0]):
+    for k in range(out.clamp.shape[0]):
         force, tangent = row(p.sums.attached, k), row(at.tangent, edges + k)
         of_arm, of_edge = cross(row(at.arm, k), force), cross(tangent, row(p.sums.edge, edges + k))
         moment = combine3(1.0, of_arm, 1.0, of_edge, p.sums.edge[edges + k, 3], tangent)
-        seen.clamp[k, 0], seen.clamp[k, 1], seen.clamp[k, 2] = scaled(-1.0, force)
-        seen.clamp[k, 3], seen.clamp[k, 4], seen.clamp[k, 5] = scaled(-1.0, moment)
+        out.clamp[k, 0], out.clamp[k, 1], out.clamp[k, 2] = scaled(-1.0, force)
+        out.clamp[k, 3], out.clamp[k, 4], out.clamp[k, 5] = scaled(-1.0, moment)
         for c in range(6):
-            seen.clamp_wrench[seen.holder[k], c] += seen.clamp[k, c]
+            out.clamp_wrench[out.holder[k], c] += out.clamp[k, c]
 
 
 @kernel
-def _see_touching(p, seen):
+def _observe_touching(p, out):
     """What is nearer to something else than the barrier distance; each pair of owners once."""
-    surfaces, rods, of_point, count = p.surfaces, p.rod_contact, seen.owner_of_point, 0
+    surfaces, rods, of_point, count = p.surfaces, p.rod_contact, out.owner_of_point, 0
     if surfaces.exists:
         for k in range(surfaces.near_count[0]):
             if surfaces.near_gap[k] < surfaces.d_hat:
-                surface = seen.owner_of_surface[surfaces.near_surface[k]]
-                count = _note(of_point[surfaces.near_contact_point[k]], surface, count, seen)
+                surface = out.owner_of_surface[surfaces.near_surface[k]]
+                count = _note(of_point[surfaces.near_contact_point[k]], surface, count, out)
     if rods.exists:
         for k in range(rods.contacts.count[0]):
-            count = _note(of_point[rods.contacts.node[k, 0]], of_point[rods.contacts.node[k, 1]], count, seen)
+            count = _note(of_point[rods.contacts.node[k, 0]], of_point[rods.contacts.node[k, 1]], count, out)
     for k in range(count):
-        seen.touched[seen.touching[k]] = False
-    seen.touching_count[0] = count
+        out.touched[out.touching[k]] = False
+    out.touching_count[0] = count
 
 
 @kernel
-def _note(a, b, count, seen):
+def _note(a, b, count, out):
     """Add a pair unless it is known; how many there are."""
-    number = min(a, b) * seen.owners + max(a, b)
-    if seen.touched[number]:
+    number = min(a, b) * out.owners + max(a, b)
+    if out.touched[number]:
         return count
-    seen.touched[number], seen.touching[count] = True, number
+    out.touched[number], out.touching[count] = True, number
     return count + 1
 
 
-SEEN = tuple(name for name in Look.shapes if name not in ("touching", "touching_count", "touched"))
-"""Names of what it saw, in order."""
+COMPUTED = tuple(name for name in Observables.shapes if name not in ("touching", "touching_count", "touched"))
+"""Names of the observables, in the order of their values."""
 
 
-def look_of(
+def observables_of(
     model: Model, owner_of_point: Array, owner_of_surface: Array, owners: int
-) -> tuple[Look, dict[str, tuple[int, int, tuple[int, ...]]]]:
+) -> tuple[Observables, dict[str, tuple[int, int, tuple[int, ...]]]]:
     """The record of a model, and of each part of its values by name where it begins and ends, and its shape; who owns
     contact points and surfaces are numbers below `owners`.
     """
-    sizes = sizes_of(model) | {"seen point": model.node_count + model.point_count}
+    sizes = sizes_of(model) | {"observed point": model.node_count + model.point_count}
     sizes |= {"pair of owners": owners * (owners + 1) // 2, "owner squared": owners**2}
-    values, parts = zeros_in_one(shapes_of(Look, sizes, SEEN))
-    ends = np.cumsum([0, *(parts[name].size for name in SEEN)]).tolist()
-    places = {name: (*ends[k : k + 2], parts[name].shape) for k, name in enumerate(SEEN)}
+    values, parts = zeros_in_one(shapes_of(Observables, sizes, COMPUTED))
+    ends = np.cumsum([0, *(parts[name].size for name in COMPUTED)]).tolist()
+    places = {name: (*ends[k : k + 2], parts[name].shape) for k, name in enumerate(COMPUTED)}
     bends = slice(model.bend_count)
-    look = Look.zeros(
+    record = Observables.zeros(
         sizes,
         voronoi_length=model.voronoi_length,
         joint_node=model.joint_node[bends].astype(np.int64),
@@ -206,7 +204,7 @@ def look_of(
         values=values,
         **parts,
     )
-    return look, places
+    return record, places
 
 
 def _tables_of(model: Model) -> dict[str, Array]:
