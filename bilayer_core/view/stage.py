@@ -1,5 +1,5 @@
-"""A run drawn by VTK. The ground is smooth by itself and drawn as it is; the part of the picture where anything else is
-seen is drawn with twice as many pixels along each side, and made smaller, which smooths its edges.
+"""A run drawn by VTK. The ground is smooth by itself and drawn as it is. Over it comes the part of the picture where
+anything else is seen, drawn with twice as many pixels along each side and made smaller, which smooths its edges.
 """
 
 from __future__ import annotations
@@ -26,12 +26,11 @@ from bilayer_core.view.theme import (
     SIDE_SHADE,
     Theme,
 )
-from bilayer_core.view.window import Part, Window, part_around
+from bilayer_core.view.window import FINER, Part, Window, lay_over, part_around
 
 if TYPE_CHECKING:
     from PIL import Image
 
-FINER = 2  # times as many pixels along each side are drawn of what has edges
 _MARK, _LIGHT = "//VTK::Light::Impl", """
 float near = max(normalVCVSOutput.z, 0.0), over = max(dot(normalVCVSOutput, vec3(-0.4657, 0.6985, 0.5433)), 0.0);
 float first = near * near, second = max(dot(normalVCVSOutput, vec3(-0.2651, 0.3976, 0.8784)), 0.0);
@@ -86,18 +85,19 @@ class Stage:
         self._run, self._moments, self._colouring, self._theme = run, moments, colouring, theme
         self._size, self._ground, self._arrows = size, ground, arrows
         self._arrow_radius = ARROW_RADIUS * arrow_size
-        self._window = Window(theme, size)
+        self._window = Window(theme, size, clear=True)
         self._renderer = self._window.renderer
         self._all_layers, self._rows, self._nodes = self._chain_layers()
         self._ribbons = self._add_ribbons()
         self._moving = self._add_moving()
         self._arrow_data = {name: self._add_arrows() for name in arrows}
-        self._fixed = self._add_fixed()  # last: the ground is then drawn where it is seen only
+        self._fixed = self._add_fixed()
+        planes = [o.shape for o in run.description.obstacles if o.shape.kind == "plane"]
+        self._planes = [(plane, add_plane(self._renderer, plane, ground, theme)) for plane in planes]
         self._background: Window | None = None
         self._behind: tuple[Shot, Image.Image] | None = None
-        planes = [o.shape for o in run.description.obstacles if o.shape.kind == "plane"]
         if planes:
-            self._background = Window(theme, size)
+            self._background = Window(theme, size, clear=theme.transparent)
             for plane in planes:
                 add_plane(self._background.renderer, plane, ground, theme)
         self._background_finer = 1 if len(planes) < 2 else FINER  # where two planes meet is an edge
@@ -111,15 +111,25 @@ class Stage:
 
     def draw(self, moment: Moment, shot: Shot) -> Image.Image:
         """The run at a time, from an eye: RGB, or RGBA with a transparent background."""
+        from PIL import Image
+
         points = [self._fixed, self._place_ribbons(moment)]
         points += [self._place_moving(moment, *moving) for moving in self._moving]
         points += [self._place_arrows(name, data, moment) for name, data in self._arrow_data.items()]
-        part = self._part(shot, np.concatenate(points))
-        whole = part == (0, 0, *self._size)
-        picture = self._window.nothing() if whole else self._picture_behind(shot)
+        places = np.concatenate(points)
+        hiding = [_hides(plane, shot, places) for plane, _ in self._planes]
+        for (_, actor), hides in zip(self._planes, hiding, strict=True):
+            actor.SetVisibility(hides)
+        part = self._part(shot, places)
+        picture = self._picture_behind(shot)
         if part is not None:
-            picture.paste(self._window.draw(shot, part, FINER), part[:2])
-        return picture.convert("RGBA") if self._theme.transparent else picture
+            left, upper, right, lower = part
+            if self._theme.transparent and any(hiding):
+                picture[upper:lower, left:right] = 0  # the ground is drawn with all else
+            lay_over(picture, self._window.draw(shot, part, FINER), part)
+        if self._theme.transparent:
+            return Image.frombytes("RGBa", self._size, picture.tobytes()).convert("RGBA")
+        return Image.frombytes("RGB", self._size, picture, "raw", "RGBX")
 
     def _part(self, shot: Shot, points: np.ndarray) -> Part | None:
         """The part of the picture that shows points, as large as the last one unless that is much too large."""
@@ -132,13 +142,22 @@ class Stage:
             self._drawn = (part[2] - part[0], part[3] - part[1])
         return part
 
-    def _picture_behind(self, shot: Shot) -> Image.Image:
-        """Of the ground alone: the last one as long as the eye stays where it is."""
-        if self._background is None:
-            return self._window.nothing()
-        if self._behind is None or not _equal(shot, self._behind[0]):
-            self._behind = shot, self._background.draw(shot, (0, 0, *self._size), self._background_finer)
+    def _picture_behind(self, shot: Shot) -> np.ndarray:
+        """The ground alone, RGBA, colours times opacity: the last one as long as the eye stays where it is."""
+        if self._behind is None or not (self._background is None or _equal(shot, self._behind[0])):
+            self._behind = shot, self._ground_alone(shot)
         return self._behind[1].copy()
+
+    def _ground_alone(self, shot: Shot) -> np.ndarray:
+        width, height = self._size
+        if self._background is None:
+            empty = (0, 0, 0, 0) if self._theme.transparent else (*self._theme.background, 255)
+            return np.tile(np.array(empty, np.uint8), (height, width, 1))
+        drawn = self._background.draw(shot, (0, 0, width, height), self._background_finer)
+        if self._background_finer == 1:
+            return drawn
+        four = drawn.reshape(height, FINER, width, FINER, 4)
+        return np.rint(four.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
 
     # what is there
 
@@ -173,9 +192,8 @@ class Stage:
         """Corners of boxes round all that has edges and does not move [m], shape (points, 3)."""
         found = [np.zeros((0, 3))]
         for obstacle in self._run.description.obstacles:
-            _, corners = self._add_shape(obstacle.shape, OBSTACLE_COLOURS)
             if obstacle.shape.kind != "plane":
-                found.append(corners)
+                found.append(self._add_shape(obstacle.shape, OBSTACLE_COLOURS)[1])
         for joint in self._run.description.joints:
             if joint.body < 0:
                 found.append(self._add_shape(joint.shape, JOINT_COLOURS)[1])
@@ -261,6 +279,15 @@ class Stage:
         shades = np.tile(np.array(colour, np.uint8), (len(blank), 1))
         data.ShallowCopy(_poly_data(blank, normals if len(vertices) else blank, shades, triangles))
         return vertices
+
+
+def _hides(plane: ShapeInfo, shot: Shot, points: np.ndarray) -> bool:
+    """Whether a plane is between the eye and one of the points, or may be: no eye is on a side without a direction."""
+    normal = geometry.plane_axes(plane)[2]
+    heights = (points - np.array(plane.position)) @ normal
+    back = shot.eye - shot.target if shot.half_height is not None else shot.eye - np.array(plane.position)
+    side = float(back @ normal)
+    return bool((np.sign(side) * heights < 0.0).any()) or side == 0.0
 
 
 def _equal(first: Shot, second: Shot) -> bool:

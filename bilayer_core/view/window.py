@@ -6,16 +6,13 @@ import ctypes.util
 import importlib.util
 import math
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.view.camera import HALF_SLOPE, Shot
 from bilayer_core.view.theme import Theme
-
-if TYPE_CHECKING:
-    from PIL import Image
 
 MISSING = "pictures and films need VTK; install it with: pip install 'bilayer_sim_ros[film]'"
 MISSING_DRIVER = (
@@ -25,6 +22,8 @@ MISSING_DRIVER = (
 Part = tuple[int, int, int, int]
 """Of a picture: its left, upper, right and lower edge, in pixels from the upper left corner."""
 
+FINER = 2  # times as many pixels along each side are drawn of what has edges
+_LANES = np.uint64(0x00FF00FF00FF00FF)
 ROOM = 2  # pixels round what is seen
 
 
@@ -70,6 +69,8 @@ class Window:
         Of the background.
     size : tuple of int
         Width and height of whole pictures.
+    clear : bool
+        Whether pictures have no background, to be laid over others.
 
     Attributes
     ----------
@@ -81,17 +82,15 @@ class Window:
         If VTK or a driver is missing.
     """
 
-    def __init__(self, theme: Theme, size: tuple[int, int]):
+    def __init__(self, theme: Theme, size: tuple[int, int], clear: bool):
         require_vtk()
         import vtkmodules.vtkRenderingOpenGL2  # noqa: F401, the classes below are then its own
         from vtkmodules.vtkRenderingCore import vtkRenderer
 
-        self._size, self._clear = size, theme.transparent
-        self._mode = "RGBa" if theme.transparent else "RGB"
-        self._empty = (0, 0, 0, 0) if theme.transparent else theme.background
+        self._size = size
         self.renderer = vtkRenderer()
-        self.renderer.SetBackground(*(c / 255 for c in self._empty[:3]))
-        self.renderer.SetBackgroundAlpha(0.0 if theme.transparent else 1.0)
+        self.renderer.SetBackground(*((0.0, 0.0, 0.0) if clear else (c / 255 for c in theme.background)))
+        self.renderer.SetBackgroundAlpha(0.0 if clear else 1.0)
         self._window = _offscreen()
         self._window.SetMultiSamples(0)
         self._window.SetAlphaBitPlanes(1)
@@ -102,14 +101,8 @@ class Window:
         """Give the window back."""
         self._window.Finalize()
 
-    def nothing(self) -> Image.Image:
-        """A whole picture of the background."""
-        from PIL import Image
-
-        return Image.new(self._mode, self._size, self._empty)
-
-    def draw(self, shot: Shot, part: Part, finer: int) -> Image.Image:
-        """A part of the picture: RGB, or with a transparent background RGBa, colours times opacity.
+    def draw(self, shot: Shot, part: Part, finer: int) -> np.ndarray:
+        """A part of the picture.
 
         Parameters
         ----------
@@ -118,12 +111,17 @@ class Window:
         part : tuple of int
         finer : int
             How many times as many pixels are drawn along each side.
+
+        Returns
+        -------
+        ndarray
+            RGBA, colours times opacity, as bytes from the upper row on; shape (finer x rows, finer x columns, 4).
         """
         left, upper, right, lower = part
         self._window.SetSize(finer * (right - left), finer * (lower - upper))
         self._look(shot, part)
         self._window.Render()
-        return self._pixels(finer)
+        return self._pixels()
 
     def _add_light(self) -> None:
         """One from the eye: materials say by themselves what it lights (`stage.py`)."""
@@ -151,22 +149,49 @@ class Window:
             camera.SetViewAngle(2.0 * math.degrees(math.atan(share * HALF_SLOPE)))
         self.renderer.ResetCameraClippingRange()
 
-    def _pixels(self, finer: int) -> Image.Image:
-        from PIL import Image
+    def _pixels(self) -> np.ndarray:
         from vtkmodules.util.numpy_support import vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkUnsignedCharArray
 
         width, height = self._window.GetSize()
         found = vtkUnsignedCharArray()
         self._window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, found)
-        data = vtk_to_numpy(found)
-        if finer == 1 and not self._clear:
-            return Image.frombytes("RGB", (width, height), data, "raw", "RGBX", 0, -1)
-        drawn = Image.frombuffer("RGBX", (width, height), data, "raw", "RGBX", 0, 1)
-        drawn = drawn.reduce(finer).transpose(Image.Transpose.FLIP_TOP_BOTTOM)
-        if self._clear:
-            return Image.frombytes("RGBa", drawn.size, drawn.tobytes())
-        return drawn.convert("RGB")
+        return vtk_to_numpy(found).reshape(height, width, 4)[::-1]
+
+
+def lay_over(picture: np.ndarray, drawn: np.ndarray, part: Part) -> None:
+    """Lay what was drawn with twice as many pixels along each side over a part of a picture, smaller by as much.
+
+    Parameters
+    ----------
+    picture : ndarray
+        RGBA, colours times opacity, as bytes, shape (rows, columns, 4); changed.
+    drawn : ndarray
+        The same, shape (2 x rows of the part, 2 x its columns, 4).
+    part : tuple of int
+    """
+    left, upper, _, _ = part
+    pairs = drawn.reshape(len(drawn), -1).view(np.uint64)  # of pixels beside each other
+    rows, columns = np.nonzero(pairs[0::2] | pairs[1::2])  # most is empty
+    above, below = pairs[2 * rows, columns], pairs[2 * rows + 1, columns]
+    # Bytes are added in lanes of 16 bits: red and blue, green and opacity.
+    red_blue = _both((above & _LANES) + (below & _LANES))
+    green_opacity = _both(((above >> 8) & _LANES) + ((below >> 8) & _LANES))
+    blended = (red_blue >> 2) & 0xFF00FF | ((green_opacity >> 2) & 0xFF00FF) << 8
+    whole = picture.reshape(picture.shape[0], -1).view(np.uint32)
+    rows, columns = rows + upper, columns + left
+    seen_through = 4 * 255 + 2 - (green_opacity >> 16)
+    edge = np.flatnonzero(seen_through)
+    behind = whole[rows[edge], columns[edge]].view(np.uint8).reshape(-1, 4)
+    own = blended[edge].astype(np.uint32).view(np.uint8).reshape(-1, 4)
+    mixed = own + seen_through[edge, None].astype(np.uint32) * behind // (4 * 255)
+    whole[rows, columns] = blended
+    whole[rows[edge], columns[edge]] = mixed.astype(np.uint8).view(np.uint32)[:, 0]
+
+
+def _both(lanes: np.ndarray) -> np.ndarray:
+    """Sums over two pixels beside each other, and what rounds a quarter of them."""
+    return ((lanes + (lanes >> 32)) & 0xFFFFFFFF) + 0x20002
 
 
 def part_around(
