@@ -20,13 +20,28 @@ HALF_BANDWIDTH = {
 
 
 class ReadOnlyArrays:
-    """Base of frozen dataclasses whose arrays nobody writes to, either."""
+    """Base of frozen dataclasses whose arrays nobody writes to, either, and are shown by their shapes."""
+
+    def __init_subclass__(cls) -> None:
+        if "__repr__" not in cls.__dict__:
+            cls.__repr__ = ReadOnlyArrays.__repr__  # which dataclasses leave as it is
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={_short(value)}' for name, value in vars(self).items())})"
 
     def __post_init__(self):
         for value in vars(self).values():
             for array in value if isinstance(value, tuple) else (value,):
                 if isinstance(array, np.ndarray):
                     array.flags.writeable = False
+
+
+def _short(value: object) -> str:
+    """An array as its type and shape; of several parts, how many there are."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape}"
+    parts = isinstance(value, tuple) and value and not isinstance(value[0], (str, int, float))
+    return f"({len(value)} x {type(value[0]).__name__})" if parts else repr(value)
 
 
 def columns(pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -208,6 +208,10 @@ class Model(ReadOnlyArrays):
     pair_stiffness: Array  # along m1, m2, m3 [N/m], shape (n_pair, 3)
     pair_rest: Array  # likewise [m]
 
+    def __repr__(self) -> str:
+        counts = f"{len(self.strands)} strands, {self.node_count} nodes, {self.edge_count} edges"
+        return f"Model({self.scene.name}: {counts}, {self.unknowns} unknowns; forces: {', '.join(self.forces)})"
+
     @property
     def strain_slope(self) -> Array:
         """b/|ē| of coupled joints [rad/m], 0 for a clamp edge, shape (n_coupled, 2): ∂κ̄₁ by lengths."""

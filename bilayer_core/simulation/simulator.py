@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ from ..observed.inputs import LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_
 from ..observed.observer import Observer
 from ..observed.system import versions
 from ..scene.config import SceneConfig
-from ..scene.loader import scene_text
+from ..scene.loader import load_scene, scene_text
 from . import observation as observe
 from .capture import make_frame
 from .energy_budget import EnergyLedger
@@ -57,8 +57,8 @@ class Simulator:
 
     Parameters
     ----------
-    scene : SceneConfig
-        From `bilayer_core.load_scene`.
+    scene : SceneConfig, str, Path or mapping
+        From `bilayer_core.load_scene`, or what that takes: a file, the name of a bundled scene, or content.
     model, dimension, integrator : str or int
         Override the scene's; ``"auto"`` keeps them.
     dt : float, optional
@@ -79,7 +79,7 @@ class Simulator:
 
     def __init__(
         self,
-        scene: SceneConfig,
+        scene: SceneConfig | str | Path | Mapping[str, Any],
         *,
         model: str = "auto",
         dimension: str | int = "auto",
@@ -88,6 +88,7 @@ class Simulator:
         tolerance: float | None = None,
         budget: bool = False,
     ) -> None:
+        scene = scene if isinstance(scene, SceneConfig) else load_scene(scene)
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         method = INTEGRATORS[self.plan.integrator]
         self.steps = choose_steps(scene, method, dt, tolerance)

@@ -1,6 +1,6 @@
 """How fast the node goes while a controller drives it, and how far off it is (Linux, two processors).
 
-    python tests/benchmarks/closed_loop.py [--only sine] [--scene NAME] [--duration S] [--interpolation hold]
+    python tests/benchmarks/closed_loop.py [--only sine] [--scene NAME] [--set PATH=VALUE] [--duration S]
 
 The node, with its log, has processor 0, the controller processor 1. The controller follows /clock and sends a signal at
 a rate in simulated time, so that the same acts on a slow machine. The node is asked for the real-time factor that is
@@ -95,6 +95,18 @@ def cpu_time(pid: int) -> float:
     return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
 
 
+def scene_with(overrides: list[str], scene: str, directory: Path) -> str:
+    """The scene itself, or a file with some of its values changed."""
+    from bilayer_core import load_scene
+    from bilayer_core.scene.loader import scene_text
+
+    if not overrides:
+        return scene
+    path = directory / "scene.yaml"
+    path.write_text(scene_text(load_scene(scene, overrides)), encoding="utf-8")
+    return str(path)
+
+
 def measure(name: str, log: Path, options: argparse.Namespace) -> dict[str, float]:
     """Run a node with a controller: CPU time of its steps and of all of it, real time [s], and how often it warned."""
     from bilayer_core import load_scene
@@ -146,6 +158,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", choices=SIGNALS)
     parser.add_argument("--scene", default="gripping")
+    parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="of the scene")
     parser.add_argument("--duration", type=float, default=10.0, help="simulated time [s]")
     parser.add_argument("--interpolation", default="linear", choices=["linear", "hold"])
     parser.add_argument("--tolerance", type=float, default=0.0, help="of steps; 0 = as the scene says")
@@ -161,10 +174,12 @@ def main() -> None:
         return
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     figures = {}
-    print(f"{options.scene}, {options.interpolation}, {options.duration:g} s; load average {os.getloadavg()[0]:.1f}")
+    what = " ".join([options.scene, *options.set])
+    print(f"{what}, {options.interpolation}, {options.duration:g} s; load average {os.getloadavg()[0]:.1f}")
     print("| signal | messages/s | asked | reached | by CPU of steps | by CPU of node | largest error | last error |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as directory:
+        options.scene = scene_with(options.set, options.scene, Path(directory))
         for name in [options.only] if options.only else SIGNALS:
             log = (options.keep or Path(directory)) / f"{name.split()[0]}{len(figures)}.mcap"
             found = measure(name, log, options)

@@ -199,6 +199,12 @@ def test_a_scene_that_starts_in_penetration_names_the_node_and_the_depth():
         Simulator(load_scene(sunk))
 
 
+def test_a_simulator_is_made_of_what_names_a_scene_as_well():
+    assert Simulator("bending").scene == load_scene("bending")
+    with pytest.raises(InputError, match="bendin"):
+        Simulator("bendin")
+
+
 @pytest.mark.parametrize(("key", "value"), [("model", "three_rod"), ("dimension", "7"), ("integrator", "leapfrog")])
 def test_an_unknown_choice_is_refused_with_those_that_exist(key, value):
     with pytest.raises(SceneError, match=f"{key}: {value} does not exist; allowed: auto, "):

@@ -118,7 +118,8 @@ def test_whatever_is_public_is_shown_within_a_screen(gripper):
     shown = [gripper, gripper.rods, rod, rod.layers, gripper.bodies, gripper.clamps, gripper.joints, gripper.scene]
     shown += [gripper.frame(), gripper.description, *gripper.description.strands, gripper.scene.rods[0]]
     shown += [*gripper.bodies.values(), *gripper.clamps.values(), *rod.layers.values(), gripper.run(0.0)]
-    shown += [gripper.scene.bodies[1], gripper.plan]
+    shown += [gripper.scene.bodies[1], gripper.plan, gripper.model, gripper.model.strands[0], gripper.model.layout]
+    shown += [gripper.model.bodies, gripper.model.surfaces, gripper.statistics]
     for thing in shown:
         assert 0 < len(repr(thing)) <= 2000, type(thing)
         assert "object at 0x" not in repr(thing) and "array(" not in repr(thing), type(thing)
