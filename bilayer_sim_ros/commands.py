@@ -1,4 +1,4 @@
-"""Poses of bodies and factors of loads from topics: the latest of each waits for the next tick."""
+"""Poses of bodies, factors of loads and other changes from outside: the latest of each waits for the next tick."""
 
 from __future__ import annotations
 
@@ -21,17 +21,24 @@ class Commands:
     ----------
     refuse : callable
         Called with the reason when something cannot be done, in the stepping thread.
+
+    Attributes
+    ----------
+    forgotten : callable
+        Called by `reset`, in the stepping thread.
     """
 
     def __init__(self, refuse: Callable[[str], None]):
         self._refuse = refuse
         self._lock = threading.Lock()
         self._waiting: dict[tuple[str, str], Callable[[Simulator, float], None]] = {}
+        self.forgotten: Callable[[], None] = lambda: None
 
     def reset(self) -> None:
         """Forget what waits, as at the start of a run."""
         with self._lock:
             self._waiting = {}
+        self.forgotten()
 
     def ask_pose(self, body: str, message: PoseStamped) -> None:
         """Have a body go to a pose; InputError if its frame is not that of the world."""
@@ -39,13 +46,14 @@ class Commands:
             frame = message.header.frame_id
             raise InputError(f"pose of body {body!r}: frame {frame!r} is not allowed; it must be 'world'")
         position, quaternion = position_and_quaternion(message.pose)
-        self._keep(("pose", body), lambda simulator, _: simulator.set_pose(body, position, quaternion))
+        self.ask(("pose", body), lambda simulator, _: simulator.set_pose(body, position, quaternion))
 
     def ask_load(self, name: str, factor: float) -> None:
         """Have a load act with a factor."""
-        self._keep(("load", name), lambda simulator, over: simulator.set_load(name, factor, over=over))
+        self.ask(("load", name), lambda simulator, over: simulator.set_load(name, factor, over=over))
 
-    def _keep(self, key: tuple[str, str], action: Callable[[Simulator, float], None]) -> None:
+    def ask(self, key: tuple[str, str], action: Callable[[Simulator, float], None]) -> None:
+        """Have something done at the next tick, instead of what waits under the same key."""
         with self._lock:
             self._waiting[key] = action
 

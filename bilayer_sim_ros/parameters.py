@@ -27,7 +27,7 @@ class NodeParameter:
     default : bool, float, str or list of str
         A list is ``[""]`` for none: the parameter files of ROS have no empty lists.
     minimum : float
-        Smallest value of a number.
+        Smallest value of a number; a default below it is allowed too.
     above_minimum : bool
         Whether `minimum` itself is excluded.
     choices : tuple of str
@@ -55,7 +55,8 @@ class NodeParameter:
             return "one of " + ", ".join(self.choices) if self.choices else "a text"
         if math.isinf(self.minimum):
             return "a finite number"
-        return f"a finite number {'>' if self.above_minimum else '>='} {self.minimum:g}"
+        below = f", or {self.default:g}" if self.default < self.minimum else ""
+        return f"a finite number {'>' if self.above_minimum else '>='} {self.minimum:g}{below}"
 
     def accept(self, value: object) -> Value:
         """`value` as the parameter's type (an integer will do for a number), or InputError."""
@@ -74,7 +75,7 @@ class NodeParameter:
             return isinstance(value, str) and (not self.choices or value in self.choices)
         if not isinstance(value, (int, float)) or not math.isfinite(value):
             return False
-        return value > self.minimum if self.above_minimum else value >= self.minimum
+        return value == self.default or (value > self.minimum if self.above_minimum else value >= self.minimum)
 
 
 def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) -> dict[str, Value]:
@@ -94,6 +95,10 @@ def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) 
     return {name: parameter.accept(overrides.get(name, parameter.default)) for name, parameter in known.items()}
 
 
+FRICTION_OF_SCENE = -1.0
+FRICTION = ("friction", "friction.forward", "friction.backward", "friction.sideways")
+"""Coefficients of friction; what they mean says `contact.friction` of scenes."""
+
 SIM_NODE = (
     NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
     NodeParameter(
@@ -108,6 +113,16 @@ SIM_NODE = (
     ),
     NodeParameter(
         "real_time_factor", 1.0, "simulated seconds per second, at most; 0 = as fast as possible", 0.0, live=True
+    ),
+    *(
+        NodeParameter(
+            name,
+            FRICTION_OF_SCENE,
+            f"coefficient of {name.replace('.', ', ')}, from the next tick on; -1 = as the scene says",
+            0.0,
+            live=True,
+        )
+        for name in FRICTION
     ),
     NodeParameter("duration", 0.0, "simulated time after which the node ends [s]; 0 = until it is stopped", 0.0),
     NodeParameter("publish_clock", True, "publish simulated time on /clock"),

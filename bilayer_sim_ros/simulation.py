@@ -14,10 +14,11 @@ from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_sim_ros.answers import Answers
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import SHORTEST_PERIOD, Control, tick_rate
+from bilayer_sim_ros.live_friction import LiveFriction, friction_overrides
 from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.parameters import SIM_NODE, Value
+from bilayer_sim_ros.parameters import FRICTION, SIM_NODE, Value
 from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
@@ -33,6 +34,8 @@ UNPACED_PATIENCE = 0.25
 def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
     """Simulate until the duration is reached or `stop` is set; raises what the simulation stopped with."""
     scene = load_scene(parameters["scene"])
+    if changed := friction_overrides(scene, parameters):
+        scene = load_scene(parameters["scene"], changed)
     rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
     rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
@@ -87,8 +90,10 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         "real_time_factor": worker.set_real_time_factor,
         "rate": lambda value: worker.set_rate(value or scene.output.rate),
         "marker_rate": lambda value: worker.set_marker_rate(value or scene.output.marker_rate),
+        **LiveFriction(simulator, commands, lambda event: worker.tell(event)).changes,
     }
-    LiveParameters(node, SIM_NODE, changes)
+    live = LiveParameters(node, SIM_NODE, changes)
+    commands.forgotten = lambda: node.executor.create_task(live.show, {name: parameters[name] for name in FRICTION})
     services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
     state = "paused" if parameters["start_paused"] else "running"
     try:
