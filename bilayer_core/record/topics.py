@@ -63,14 +63,14 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
 
     ================================ ==================================================================================
     ``/clock``                       simulation time
-    ``stimulus_applied``             value of each channel; every layout label is a channel
+    ``stimulus_applied``             value of each channel; the label of its layout has the channels, commas between
     ``com``                          mass centre of the robot [m]
-    ``energy``                       energy of each term [J]; every label is a term
-    ``solver``                       labels iterations, residual [m/s], substeps, min_gap [m], cpu_time [s]: see `Frame`
+    ``energy``                       energy of each term [J]; the label has the terms
+    ``solver``                       iterations, residual [m/s], substeps, min_gap [m], cpu_time [s]: see `Frame`
     ``body_pose/<body>``             mass centre and orientation
     ``contact_wrench/<body>``        contact force [N] and moment about the mass centre [N m], world frame
     ``clamp_wrench/<body>``          likewise of the rods that the body holds, for bodies that hold some
-    ``state``                        all that a restart needs; every label is ``name:shape``, its size that of the part
+    ``state``                        all that a restart needs; the label has ``name:shape`` of each part
     ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
                                      frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
     ``points``                       x y z strain curvature fx fy fz of the same nodes, then of contact points of bodies
@@ -104,7 +104,7 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
 INPUTS = TopicSpec("inputs", MULTI_ARRAY, Rate.EVENT)
 """What acted from outside, exactly: a message for each `observed.inputs.Input`, at the time from which on it acted.
 
-Labels are ``step``, ``time`` [s] and ``kind:name``, whose size is the number of its values.
+The label is ``step,time,kind:name``: two numbers, time in [s], and then the values of that kind.
 """
 
 
