@@ -126,6 +126,7 @@ SIM_NODE = (
     ),
     NodeParameter("duration", 0.0, "simulated time after which the node ends [s]; 0 = until it is stopped", 0.0),
     NodeParameter("publish_clock", True, "publish simulated time on /clock"),
+    NodeParameter("tf", False, "publish and log frames of bodies and of the ends of rods on /tf; needs tf2_msgs"),
     NodeParameter("start_paused", False, "wait for the service ~/resume at the start"),
     NodeParameter(
         "stimulus_timeout", 0.0, "simulated time without a message after which the fallback acts [s]; 0 = never", 0.0

@@ -25,6 +25,7 @@ from bilayer_sim_ros.saying import Announcer
 from bilayer_sim_ros.services import Services, trigger
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 from bilayer_sim_ros.subscriptions import Rest, subscribe_commands, subscribe_stimuli, warn_of_refusal
+from bilayer_sim_ros.tf import tf_prefix
 from bilayer_sim_ros.worker import SimulationWorker
 
 UNPACED_PATIENCE = 0.25
@@ -39,7 +40,8 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
     rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
-    recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience)
+    tf = tf_prefix(node, parameters)
+    recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience, tf)
     simulator = Simulator(
         scene,
         model=parameters["model"],
@@ -73,7 +75,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     worker = SimulationWorker(
         simulator,
         control=Control(inputs, commands, ticks, parameters["stimulus_interpolation"], gate),
-        publisher=FramePublisher(node, description, rate, marker_rate, clock and not lockstep),
+        publisher=FramePublisher(node, description, rate, marker_rate, clock and not lockstep, tf),
         recording=recording,
         rate=rate,
         marker_rate=marker_rate,

@@ -15,7 +15,8 @@ from bilayer_core.observed.inputs import Input
 from bilayer_core.record.cdr import SEPARATOR, Template, read_float64_multi_array
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
-from bilayer_core.record.topics import FRAME_ID, Rate, output_topics
+from bilayer_core.record.tf_frames import TfEncoder
+from bilayer_core.record.topics import FRAME_ID, TF, Rate, output_topics
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
 SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")
@@ -123,6 +124,8 @@ class FrameEncoder:
     ----------
     description : Description
         Of the model whose frames come.
+    tf : str
+        What the names of frames on ``/tf`` begin with; empty: there is no such topic.
 
     Attributes
     ----------
@@ -130,8 +133,8 @@ class FrameEncoder:
         What `encode` understands, see `output_topics`.
     """
 
-    def __init__(self, description: Description):
-        self.topics = output_topics(description)
+    def __init__(self, description: Description, tf: str = ""):
+        self.topics = output_topics(description, bool(tf))
         self._node_frames = NodeFrames(description)
         self._energy: tuple[tuple[str, ...], SmallMessage] = ((), SmallMessage(multi_array_template(())))
         self._encoders: dict[str, Callable[[Frame], bytes]] = {
@@ -150,6 +153,8 @@ class FrameEncoder:
             "points": self._points_encoder(description),
             "markers": MarkerEncoder(description, self._node_frames).encode,
         }
+        if tf:
+            self._encoders[TF.name] = TfEncoder(description, self._node_frames, tf).encode
         for index, body in enumerate(description.bodies):
             self._encoders[f"body_pose/{body.name}"] = SmallMessage(
                 stamped_template(7),
@@ -168,9 +173,9 @@ class FrameEncoder:
         return self._encoders[name](frame)
 
     def small_messages(self, frame: Frame) -> dict[str, SmallMessage]:
-        """Encoders of all topics of `Rate.OUTPUT` by name, in order; of the run of which `frame` is one."""
-        found = {spec.name: self._encoders[spec.name] for spec in self.topics if spec.rate is Rate.OUTPUT}
-        return found | {"energy": self._energy_message(frame)}
+        """Encoders of all topics of `Rate.OUTPUT` but `TF` by name, in order; of the run of which `frame` is one."""
+        names = [spec.name for spec in self.topics if spec.rate is Rate.OUTPUT and spec is not TF]
+        return {name: self._encoders[name] for name in names} | {"energy": self._energy_message(frame)}
 
     def _encode_energy(self, frame: Frame) -> bytes:
         return self._energy_message(frame)(frame)

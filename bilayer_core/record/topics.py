@@ -56,10 +56,14 @@ class TopicSpec:
 
 
 MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+TF = TopicSpec("/tf", "tf2_msgs/msg/TFMessage", Rate.OUTPUT, depth=100)
+"""Frames of bodies and ends of rods (`record.tf_frames`), where they are asked for; the depth is that of tf2 itself.
+They come with every frame: who looks one up by the stamp of a pose, a wrench or `com` finds just that time.
+"""
 
 
-def output_topics(description: Description) -> tuple[TopicSpec, ...]:
-    """All topics that a run of this model sends.
+def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec, ...]:
+    """All topics that a run of this model sends, with `TF` if that is asked for.
 
     ================================ ==================================================================================
     ``/clock``                       simulation time
@@ -95,6 +99,7 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
             if body.holds_rods
         ),
         TopicSpec("state", MULTI_ARRAY, output),
+        *((TF,) if tf else ()),
         TopicSpec("nodes", "geometry_msgs/msg/PoseArray", display),
         TopicSpec("points", "sensor_msgs/msg/PointCloud2", display),
         TopicSpec("markers", "visualization_msgs/msg/MarkerArray", display),
