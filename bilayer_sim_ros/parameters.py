@@ -171,25 +171,6 @@ SIM_NODE = (
     ),
 )
 
-RAMP_CONTROLLER = (
-    NodeParameter("node", "/bilayer_sim", "full name of the simulation node"),
-    NodeParameter("channel", "humidity", "stimulus channel"),
-    NodeParameter("start_value", 0.0, "value at the start, in the channel's unit"),
-    NodeParameter("end_value", 1.0, "value at the end, in the channel's unit"),
-    NodeParameter("duration", 1.0, "time from the start value to the end value [s]", 0.0, above_minimum=True),
-    NodeParameter("simulated_time", True, "ramp in the simulation's time, that of /clock; false = in real time"),
-    NodeParameter(
-        "rate",
-        50.0,
-        "messages per second in real time [Hz]; in simulated time each time on /clock is answered once",
-        0.0,
-        above_minimum=True,
-    ),
-    NodeParameter("hold", False, "go on sending the end value until interrupted"),
-    NodeParameter("resume", False, "call the simulation's service ~/resume once the stimulus topic is connected"),
-    NodeParameter("connection_timeout", 180.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
-)
-
 REPLAY_NODE = (
     NodeParameter("log", "", "MCAP log to play, with an index; may also be the command's argument"),
     NodeParameter(
