@@ -153,7 +153,7 @@ SIM_NODE = (
     NodeParameter(
         "lockstep_answers",
         [""],
-        "channels whose answers complete a tick; none = any message does",
+        "channels, and mount_pose/<body>, whose answers complete a tick; none = any stimulus does",
     ),
     NodeParameter(
         "lockstep_timeout",

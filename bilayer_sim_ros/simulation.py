@@ -24,7 +24,13 @@ from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
 from bilayer_sim_ros.services import Services, trigger
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
-from bilayer_sim_ros.subscriptions import Rest, subscribe_commands, subscribe_stimuli, warn_of_refusal
+from bilayer_sim_ros.subscriptions import (
+    Rest,
+    controlled_bodies,
+    subscribe_commands,
+    subscribe_stimuli,
+    warn_of_refusal,
+)
 from bilayer_sim_ros.tf import tf_prefix
 from bilayer_sim_ros.worker import SimulationWorker
 
@@ -50,7 +56,9 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         tolerance=parameters["tolerance"] or None,
     )
     lockstep, clock = parameters["lockstep"], parameters["publish_clock"]
-    needed = channels_that_answer(parameters["lockstep_answers"], list(scene.stimuli))
+    needed = channels_that_answer(
+        parameters["lockstep_answers"], list(scene.stimuli), controlled_bodies(simulator.model)
+    )
     if lockstep:
         refuse_without_clock(clock)
     shortest = simulator.dt if lockstep and simulator.tolerance is None else SHORTEST_PERIOD
@@ -87,7 +95,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     )
     rest = None if lockstep else Rest(ticks, lambda: pacer.factor)
     subscribe_stimuli(node, inputs, description.channels, rest)
-    subscribe_commands(node, commands, simulator.model)
+    subscribe_commands(node, commands, inputs, simulator.model)
     changes = {
         "real_time_factor": worker.set_real_time_factor,
         "rate": lambda value: worker.set_rate(value or scene.output.rate),
