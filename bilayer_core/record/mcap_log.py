@@ -61,8 +61,7 @@ class McapRecorder:
         ends the run: whole frames are left out and counted, but no input and not the last frame. What failed is in
         `failure`, and `close` raises it.
     tf : str
-        What the names of frames on ``/tf`` begin with (`record.tf_frames`), such as ``bilayer_sim``; empty: the log has
-        no such topic.
+        What names of frames on ``/tf`` begin with (`record.tf_frames`); empty: the log has no such topic.
 
     Attributes
     ----------
