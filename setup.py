@@ -118,7 +118,7 @@ setup(
             "bilayer = bilayer_core.cli:main",
             "sim_node = bilayer_sim_ros.sim_node:main",
             "replay_node = bilayer_sim_ros.replay_node:main",
-            "ramp_controller = bilayer_sim_ros.ramp_controller:main",
+            "ramp_controller = bilayer_sim_ros.controllers.ramp_controller:main",
             "gait_controller = bilayer_sim_ros.controllers.gait_controller:main",
             "goal_controller = bilayer_sim_ros.controllers.goal_controller:main",
         ],

@@ -8,6 +8,11 @@ LATE, DUPLICATE, FOREIGN = "late", "duplicate", "foreign"
 """Why a stamped answer is ignored: its tick has been left, its channel has answered, or there is no such tick."""
 
 
+def mount(body: str) -> str:
+    """What the pose of a body is called among the answers to a tick: its topic."""
+    return f"mount_pose/{body}"
+
+
 class Answers:
     """Judges answers to the tick that is open, if one is; `StimulusInputs` guards it against other threads.
 
@@ -16,7 +21,7 @@ class Answers:
     channels : iterable of str
         All that there are.
     needed : collection of str
-        Those that complete a tick; empty means that any answer does.
+        Those that complete a tick, and names of `mount`; empty means that any answer does.
 
     Attributes
     ----------
@@ -46,9 +51,13 @@ class Answers:
     @property
     def complete(self) -> bool:
         """Whether nothing more is waited for; so it is where there is no channel."""
-        if not self._open or not self._channels:
+        if not self._open or not (self._channels or self._needed):
             return True
         return self._needed <= self._given if self._needed else bool(self._given)
+
+    def waits_for(self, name: str) -> bool:
+        """Whether no tick is complete without an answer of that name."""
+        return name in self._needed
 
     def take(self, channels: Collection[str], stamp: int | None) -> str:
         """Note an answer of some channels.

@@ -1,4 +1,4 @@
-"""Poses of bodies and factors of loads from topics: the latest of each waits for the next tick."""
+"""Poses of bodies, factors of loads and other changes from outside: the latest of each waits for the next tick."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from bilayer_core.simulation.simulator import Simulator
 
 FRAMES = ("", "world")
 """Frames in which a pose may be given."""
+POSE = "pose"
 
 
 class Commands:
@@ -21,31 +22,42 @@ class Commands:
     ----------
     refuse : callable
         Called with the reason when something cannot be done, in the stepping thread.
+
+    Attributes
+    ----------
+    forgotten : callable
+        Called by `reset`, in the stepping thread.
     """
 
     def __init__(self, refuse: Callable[[str], None]):
         self._refuse = refuse
         self._lock = threading.Lock()
         self._waiting: dict[tuple[str, str], Callable[[Simulator, float], None]] = {}
+        self.forgotten: Callable[[], None] = lambda: None
+        self._first: dict[tuple[str, str], Callable[[Simulator, float], None]] = {}
+        self._begun = False
 
-    def reset(self) -> None:
-        """Forget what waits, as at the start of a run."""
+    def reset(self, keep_first: bool = False) -> None:
+        """Forget what waits, as at the start of a run, but poses that acted at its start if they are to again."""
         with self._lock:
-            self._waiting = {}
+            self._waiting = self._first | self._waiting if keep_first else {}
+        self._first, self._begun = {}, False
+        self.forgotten()
 
-    def ask_pose(self, body: str, message: PoseStamped) -> None:
-        """Have a body go to a pose; InputError if its frame is not that of the world."""
+    def pose(self, body: str, message: PoseStamped) -> Callable[[], None]:
+        """What asks for a body to go to a pose; InputError if its frame is not that of the world."""
         if message.header.frame_id not in FRAMES:
             frame = message.header.frame_id
             raise InputError(f"pose of body {body!r}: frame {frame!r} is not allowed; it must be 'world'")
         position, quaternion = position_and_quaternion(message.pose)
-        self._keep(("pose", body), lambda simulator, _: simulator.set_pose(body, position, quaternion))
+        return lambda: self.ask((POSE, body), lambda simulator, _: simulator.set_pose(body, position, quaternion))
 
     def ask_load(self, name: str, factor: float) -> None:
         """Have a load act with a factor."""
-        self._keep(("load", name), lambda simulator, over: simulator.set_load(name, factor, over=over))
+        self.ask(("load", name), lambda simulator, over: simulator.set_load(name, factor, over=over))
 
-    def _keep(self, key: tuple[str, str], action: Callable[[Simulator, float], None]) -> None:
+    def ask(self, key: tuple[str, str], action: Callable[[Simulator, float], None]) -> None:
+        """Have something done at the next tick, instead of what waits under the same key."""
         with self._lock:
             self._waiting[key] = action
 
@@ -57,16 +69,18 @@ class Commands:
         bool
             Whether anything did.
         """
-        if not self._waiting:
+        if self._begun and not self._waiting:
             return False
         with self._lock:
             waiting, self._waiting = self._waiting, {}
+        if not self._begun:
+            self._begun, self._first = True, {key: action for key, action in waiting.items() if key[0] == POSE}
         for key in sorted(waiting):  # whichever came first
             try:
                 waiting[key](simulator, over)
             except InputError as error:
                 self._refuse(str(error))
-        return True
+        return bool(waiting)
 
 
 def position_and_quaternion(pose: Pose) -> tuple[Sequence[float], Sequence[float]]:

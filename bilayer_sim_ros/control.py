@@ -87,7 +87,7 @@ class Control:
         """
         self._stands = self._lockstep is not None and self._count == 0
         self._inputs.reset(keep_first=self._stands)
-        self._commands.reset()
+        self._commands.reset(keep_first=self._stands)
         self._open = self._commanded = False
 
     def act(self, simulator: Simulator) -> None:

@@ -111,7 +111,7 @@ def simulate(log: Path, duration: float, console: Console) -> None:
         lockstep=True,
     )
     controller = node_command(
-        "ramp_controller",
+        "controllers.ramp_controller",
         channel=CHANNEL,
         duration=RAMP_DURATION,
         hold=True,

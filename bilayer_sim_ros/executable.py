@@ -158,4 +158,6 @@ def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
     """The range of a number that has one with a first value; tools show it."""
     if not isinstance(parameter.default, float) or math.isinf(parameter.minimum) or parameter.above_minimum:
         return []
+    if parameter.default < parameter.minimum:
+        return []
     return [FloatingPointRange(from_value=parameter.minimum, to_value=sys.float_info.max)]

@@ -7,6 +7,7 @@ import time as clock
 from collections.abc import Callable, Sequence
 
 from bilayer_core.errors import InputError
+from bilayer_sim_ros.answers import mount
 from bilayer_sim_ros.conversions import to_nanoseconds
 from bilayer_sim_ros.stimulus import StimulusInputs
 
@@ -52,15 +53,18 @@ class Lockstep:
         self.wait_ends_at = math.inf
 
 
-def channels_that_answer(names: Sequence[str], channels: Sequence[str]) -> list[str]:
-    """`names` of the parameter ``lockstep_answers``, without empty ones; InputError if one is no channel, or twice."""
+def channels_that_answer(names: Sequence[str], channels: Sequence[str], bodies: Sequence[str] = ()) -> list[str]:
+    """`names` of the parameter ``lockstep_answers``, without empty ones; InputError if one is no channel and no pose of
+    a body that controllers may move, or twice.
+    """
+    allowed = [*channels, *map(mount, bodies)]
     needed = [name for name in names if name]
     for name in needed:
-        if name not in channels or needed.count(name) > 1:
-            fault = "is there twice" if name in channels else "is no channel of the scene"
+        if name not in allowed or needed.count(name) > 1:
+            fault = "is there twice" if name in allowed else "is no channel of the scene"
             raise InputError(
                 f"parameter 'lockstep_answers' is {needed}: '{name}' {fault}; allowed are, each once, "
-                f"{', '.join(channels) or 'none, as the scene has no channel'}"
+                f"{', '.join(allowed) or 'none, as the scene has no channel'}"
             )
     return needed
 

@@ -27,7 +27,7 @@ class NodeParameter:
     default : bool, float, str or list of str
         A list is ``[""]`` for none: the parameter files of ROS have no empty lists.
     minimum : float
-        Smallest value of a number.
+        Smallest value of a number; a default below it is allowed too.
     above_minimum : bool
         Whether `minimum` itself is excluded.
     choices : tuple of str
@@ -55,7 +55,8 @@ class NodeParameter:
             return "one of " + ", ".join(self.choices) if self.choices else "a text"
         if math.isinf(self.minimum):
             return "a finite number"
-        return f"a finite number {'>' if self.above_minimum else '>='} {self.minimum:g}"
+        below = f", or {self.default:g}" if self.default < self.minimum else ""
+        return f"a finite number {'>' if self.above_minimum else '>='} {self.minimum:g}{below}"
 
     def accept(self, value: object) -> Value:
         """`value` as the parameter's type (an integer will do for a number), or InputError."""
@@ -74,7 +75,7 @@ class NodeParameter:
             return isinstance(value, str) and (not self.choices or value in self.choices)
         if not isinstance(value, (int, float)) or not math.isfinite(value):
             return False
-        return value > self.minimum if self.above_minimum else value >= self.minimum
+        return value == self.default or (value > self.minimum if self.above_minimum else value >= self.minimum)
 
 
 def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) -> dict[str, Value]:
@@ -94,6 +95,10 @@ def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) 
     return {name: parameter.accept(overrides.get(name, parameter.default)) for name, parameter in known.items()}
 
 
+FRICTION_OF_SCENE = -1.0
+FRICTION = ("friction", "friction.forward", "friction.backward", "friction.sideways")
+"""Coefficients of friction; what they mean says `contact.friction` of scenes."""
+
 SIM_NODE = (
     NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
     NodeParameter(
@@ -109,8 +114,19 @@ SIM_NODE = (
     NodeParameter(
         "real_time_factor", 1.0, "simulated seconds per second, at most; 0 = as fast as possible", 0.0, live=True
     ),
+    *(
+        NodeParameter(
+            name,
+            FRICTION_OF_SCENE,
+            f"coefficient of {name.replace('.', ', ')}, from the next tick on; -1 = as the scene says",
+            0.0,
+            live=True,
+        )
+        for name in FRICTION
+    ),
     NodeParameter("duration", 0.0, "simulated time after which the node ends [s]; 0 = until it is stopped", 0.0),
     NodeParameter("publish_clock", True, "publish simulated time on /clock"),
+    NodeParameter("tf", False, "publish and log frames of bodies and of the ends of rods on /tf; needs tf2_msgs"),
     NodeParameter("start_paused", False, "wait for the service ~/resume at the start"),
     NodeParameter(
         "stimulus_timeout", 0.0, "simulated time without a message after which the fallback acts [s]; 0 = never", 0.0
@@ -137,7 +153,7 @@ SIM_NODE = (
     NodeParameter(
         "lockstep_answers",
         [""],
-        "channels whose answers complete a tick; none = any message does",
+        "channels, and mount_pose/<body>, whose answers complete a tick; none = any stimulus does",
     ),
     NodeParameter(
         "lockstep_timeout",
@@ -153,25 +169,6 @@ SIM_NODE = (
     NodeParameter(
         "tolerance", 0.0, "largest error per adaptive step, over the longest rod; 0 = as the scene says", 0.0
     ),
-)
-
-RAMP_CONTROLLER = (
-    NodeParameter("node", "/bilayer_sim", "full name of the simulation node"),
-    NodeParameter("channel", "humidity", "stimulus channel"),
-    NodeParameter("start_value", 0.0, "value at the start, in the channel's unit"),
-    NodeParameter("end_value", 1.0, "value at the end, in the channel's unit"),
-    NodeParameter("duration", 1.0, "time from the start value to the end value [s]", 0.0, above_minimum=True),
-    NodeParameter("simulated_time", True, "ramp in the simulation's time, that of /clock; false = in real time"),
-    NodeParameter(
-        "rate",
-        50.0,
-        "messages per second in real time [Hz]; in simulated time each time on /clock is answered once",
-        0.0,
-        above_minimum=True,
-    ),
-    NodeParameter("hold", False, "go on sending the end value until interrupted"),
-    NodeParameter("resume", False, "call the simulation's service ~/resume once the stimulus topic is connected"),
-    NodeParameter("connection_timeout", 180.0, "longest wait for the simulation node [s]", 0.0, above_minimum=True),
 )
 
 REPLAY_NODE = (

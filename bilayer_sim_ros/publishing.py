@@ -32,10 +32,14 @@ class FramePublisher:
         Of frames, and of the topics made to be looked at [Hz]; the smaller one counts for those.
     clock : bool
         Whether to publish /clock with every frame.
+    tf : str
+        What the names of frames on /tf begin with; empty: there is no such topic.
     """
 
-    def __init__(self, node: Node, description: Description, rate: float, marker_rate: float, clock: bool):
-        self._encoder = FrameEncoder(description)
+    def __init__(
+        self, node: Node, description: Description, rate: float, marker_rate: float, clock: bool, tf: str = ""
+    ):
+        self._encoder = FrameEncoder(description, tf)
         self._gate = DisplayGate(rate, marker_rate)
         self._topics: list[tuple[TopicSpec, Publisher]] = [
             (spec, node.create_publisher(message_class(spec.type), spec.full_name("~"), quality_of_service(spec)))

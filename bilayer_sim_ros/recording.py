@@ -46,6 +46,8 @@ class Recording:
         Of all messages, and of the large ones made to be looked at [Hz].
     patience : float
         Longest time for which a disk that is behind may hold the simulation up [s].
+    tf : str
+        What the names of frames on /tf begin with; empty: it is not logged.
     run : int
         Runs before this one, each ended by a reset; from the second run on the number is part of the file names:
         ``<name>_1.mcap``.
@@ -56,13 +58,22 @@ class Recording:
         At once: a file exists already or has another ending, or its directory cannot be written to.
     """
 
-    def __init__(self, log_path: str, rrd_path: str, rate: float, marker_rate: float, patience: float, run: int = 0):
-        self._settings = (log_path, rrd_path, rate, marker_rate, patience)
+    def __init__(
+        self,
+        log_path: str,
+        rrd_path: str,
+        rate: float,
+        marker_rate: float,
+        patience: float,
+        tf: str = "",
+        run: int = 0,
+    ):
+        self._settings = (log_path, rrd_path, rate, marker_rate, patience, tf)
         self._run = run
         self._lost: OutputError | None = None
         self._log: McapRecorder | None = None
         if log_path:
-            self._log = McapRecorder(self._new_file(log_path), rate, marker_rate, patience=patience)
+            self._log = McapRecorder(self._new_file(log_path), rate, marker_rate, patience=patience, tf=tf)
         rrd = None
         if rrd_path:
             if not rrd_path.endswith(RRD_ENDING):
@@ -82,8 +93,8 @@ class Recording:
 
     def set_rates(self, rate: float, marker_rate: float) -> None:
         """Go on with other rates [Hz], also in the next run."""
-        log_path, rrd_path, _, _, patience = self._settings
-        self._settings = (log_path, rrd_path, rate, marker_rate, patience)
+        log_path, rrd_path, _, _, patience, tf = self._settings
+        self._settings = (log_path, rrd_path, rate, marker_rate, patience, tf)
         if self._log:
             self._log.set_rates(rate, marker_rate)
 

@@ -14,16 +14,24 @@ from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_sim_ros.answers import Answers
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import SHORTEST_PERIOD, Control, tick_rate
+from bilayer_sim_ros.live_friction import LiveFriction, friction_overrides
 from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.parameters import SIM_NODE, Value
+from bilayer_sim_ros.parameters import FRICTION, SIM_NODE, Value
 from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
 from bilayer_sim_ros.services import Services, trigger
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
-from bilayer_sim_ros.subscriptions import Rest, subscribe_commands, subscribe_stimuli, warn_of_refusal
+from bilayer_sim_ros.subscriptions import (
+    Rest,
+    controlled_bodies,
+    subscribe_commands,
+    subscribe_stimuli,
+    warn_of_refusal,
+)
+from bilayer_sim_ros.tf import tf_prefix
 from bilayer_sim_ros.worker import SimulationWorker
 
 UNPACED_PATIENCE = 0.25
@@ -33,10 +41,13 @@ UNPACED_PATIENCE = 0.25
 def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
     """Simulate until the duration is reached or `stop` is set; raises what the simulation stopped with."""
     scene = load_scene(parameters["scene"])
+    if changed := friction_overrides(scene, parameters):
+        scene = load_scene(parameters["scene"], changed)
     rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
     rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
-    recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience)
+    tf = tf_prefix(node, parameters)
+    recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience, tf)
     simulator = Simulator(
         scene,
         model=parameters["model"],
@@ -45,7 +56,9 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         tolerance=parameters["tolerance"] or None,
     )
     lockstep, clock = parameters["lockstep"], parameters["publish_clock"]
-    needed = channels_that_answer(parameters["lockstep_answers"], list(scene.stimuli))
+    needed = channels_that_answer(
+        parameters["lockstep_answers"], list(scene.stimuli), controlled_bodies(simulator.model)
+    )
     if lockstep:
         refuse_without_clock(clock)
     shortest = simulator.dt if lockstep and simulator.tolerance is None else SHORTEST_PERIOD
@@ -70,7 +83,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     worker = SimulationWorker(
         simulator,
         control=Control(inputs, commands, ticks, parameters["stimulus_interpolation"], gate),
-        publisher=FramePublisher(node, description, rate, marker_rate, clock and not lockstep),
+        publisher=FramePublisher(node, description, rate, marker_rate, clock and not lockstep, tf),
         recording=recording,
         rate=rate,
         marker_rate=marker_rate,
@@ -82,13 +95,15 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     )
     rest = None if lockstep else Rest(ticks, lambda: pacer.factor)
     subscribe_stimuli(node, inputs, description.channels, rest)
-    subscribe_commands(node, commands, simulator.model)
+    subscribe_commands(node, commands, inputs, simulator.model)
     changes = {
         "real_time_factor": worker.set_real_time_factor,
         "rate": lambda value: worker.set_rate(value or scene.output.rate),
         "marker_rate": lambda value: worker.set_marker_rate(value or scene.output.marker_rate),
+        **LiveFriction(simulator, commands, lambda event: worker.tell(event)).changes,
     }
-    LiveParameters(node, SIM_NODE, changes)
+    live = LiveParameters(node, SIM_NODE, changes)
+    commands.forgotten = lambda: node.executor.create_task(live.show, {name: parameters[name] for name in FRICTION})
     services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
     state = "paused" if parameters["start_paused"] else "running"
     try:

@@ -19,7 +19,8 @@ STATUS_PERIOD = 1.0
 
 @dataclass
 class Status:
-    """How the run is doing: since the status before, except for `time`, `paused`, `asked_factor`, `waited` and `log`.
+    """How the run is doing: since the status before, except for `time`, `paused`, `asked_factor`, `rejected_in_all`,
+    `numerical_energy`, `waited` and `log`.
 
     Attributes
     ----------
@@ -38,10 +39,12 @@ class Status:
         What that went to, in part: cause (`pacing`) to seconds.
     steps, substeps, rejected, iterations : int
         Steps, the parts in which they were taken, attempts that were not accepted, and Newton iterations.
+    rejected_in_all : int
+        Such attempts since the start.
     residual : float
         Largest of the last velocity corrections of steps [m/s].
-    numerical_energy : float
-        What steps have made or, below zero, lost of energy since the start, over the largest energy of the run.
+    numerical_energy, largest_energy : float
+        What steps have made or, below zero, lost of energy since the start, and the largest energy of the run [J].
     waited : float
         Real time for which there has been no step because no controller answers [s].
     log : LogStatus
@@ -61,7 +64,9 @@ class Status:
     rejected: int = 0
     iterations: int = 0
     residual: float = 0.0
+    rejected_in_all: int = 0
     numerical_energy: float = 0.0
+    largest_energy: float = 0.0
     waited: float = 0.0
     log: LogStatus = LogStatus()
     dropped: int = 0
@@ -121,8 +126,8 @@ class StatusReporter:
         if real < STATUS_PERIOD:
             return
         status, simulated = self._status, simulator.time
-        made, largest = numerical_energy(simulator)
-        status.numerical_energy = made / largest if largest > 0.0 else 0.0
+        status.numerical_energy, status.largest_energy = numerical_energy(simulator)
+        status.rejected_in_all = simulator.statistics.rejected
         status.real_time_factor = (simulated - status.time) / real
         status.time, status.paused, status.real = simulated, paused, real
         status.asked_factor = self._pacer.factor

@@ -146,6 +146,33 @@ class StimulusInputs:
         pairs = zip(names, values, strict=True)
         return self._keep({name: self._channels[name].accept(value) for name, value in pairs}, tick)
 
+    def answer(self, name: str, tick: int | None, take: Callable[[], None]) -> str:
+        """Have something else than a stimulus taken, and where ticks wait for it, as an answer to one.
+
+        Parameters
+        ----------
+        name : str
+            As in `Answers`.
+        tick : int or None
+            The one that it answers [ns]; None for the open one.
+        take : callable
+            Called if it counts; `changes`, which comes first at a tick, waits until it has been.
+
+        Returns
+        -------
+        str
+            As from `receive_stamped`.
+        """
+        if self._answers is None or not self._answers.waits_for(name):
+            take()
+            return ""
+        with self._lock:
+            fault = self._answers.take([name], tick)
+            if not fault:
+                take()
+        self.notify()
+        return fault
+
     def _keep(self, values: Mapping[str, float], tick: int | None = None) -> str:
         with self._lock:
             fault = self._answers.take(values.keys(), tick) if self._answers is not None else ""

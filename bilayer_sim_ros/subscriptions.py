@@ -15,6 +15,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from bilayer_core.errors import InputError
 from bilayer_core.model.model import Model
+from bilayer_sim_ros.answers import mount
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.conversions import nanoseconds_of
 from bilayer_sim_ros.stimulus import StimulusInputs
@@ -86,12 +87,7 @@ def subscribe_stimuli(
         tick = nanoseconds_of(message.header.stamp)
         fault = inputs.receive_stamped(tick, message.name, message.position)
         if fault:
-            counts = ", ".join(f"{count} {why}" for why, count in inputs.ignored.items() if count)
-            node.get_logger().warning(
-                f"lockstep: an answer of {', '.join(message.name)} to t = {tick * 1e-9:.9g} s is {fault} and is "
-                f"ignored (so far: {counts})",
-                throttle_duration_sec=IGNORED_PERIOD,
-            )
+            _warn_of_ignored(node, inputs, message.name, tick, fault)
 
     _subscribe(node, Float64MultiArray, "~/stimulus", all_channels, depth)
     for channel in channels:
@@ -99,15 +95,37 @@ def subscribe_stimuli(
     _subscribe(node, JointState, "~/stimulus_stamped", stamped, STAMPED_DEPTH)
 
 
-def subscribe_commands(node: Node, commands: Commands, model: Model) -> None:
-    """Take the poses of bodies that controllers may move, and factors of loads."""
-    for index in model.bodies.controlled:
-        body = model.bodies.names[index]
-        _subscribe(node, PoseStamped, f"~/mount_pose/{body}", partial(commands.ask_pose, body))
+def subscribe_commands(node: Node, commands: Commands, inputs: StimulusInputs, model: Model) -> None:
+    """Take the poses of bodies that controllers may move, and factors of loads. Where ticks of a lockstep wait for the
+    pose of a body, its stamp says which one it answers; without a stamp that is the open one.
+    """
+
+    def pose(body: str, message: PoseStamped) -> None:
+        tick = nanoseconds_of(message.header.stamp) or None
+        fault = inputs.answer(mount(body), tick, commands.pose(body, message))
+        if fault:
+            _warn_of_ignored(node, inputs, [mount(body)], tick or 0, fault)
+
+    for body in controlled_bodies(model):
+        _subscribe(node, PoseStamped, f"~/{mount(body)}", partial(pose, body))
     for load in model.scene.loads:
         _subscribe(
             node, Float64, f"~/load/{load.name}", lambda message, name=load.name: commands.ask_load(name, message.data)
         )
+
+
+def controlled_bodies(model: Model) -> list[str]:
+    """Names of bodies that controllers may move."""
+    return [model.bodies.names[index] for index in model.bodies.controlled]
+
+
+def _warn_of_ignored(node: Node, inputs: StimulusInputs, names: Sequence[str], tick: int, fault: str) -> None:
+    counts = ", ".join(f"{count} {why}" for why, count in inputs.ignored.items() if count)
+    node.get_logger().warning(
+        f"lockstep: an answer of {', '.join(names)} to t = {tick * 1e-9:.9g} s is {fault} and is ignored "
+        f"(so far: {counts})",
+        throttle_duration_sec=IGNORED_PERIOD,
+    )
 
 
 def warn_of_refusal(node: Node, reason: str) -> None:

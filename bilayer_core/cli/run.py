@@ -43,6 +43,7 @@ OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_stat
 @click.option(
     "--log-rate", type=Rate(), metavar="HZ", help="Frames recorded per simulated second; the run stays the same."
 )
+@click.option("--tf", is_flag=True, help="Have frames of bodies and ends of rods on /tf in the log.")
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
 @click.option("--summary", metavar="FILE.json", help="Write all figures of the run.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
@@ -133,8 +134,12 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     observers, rate = [], options["log_rate"] or output.rate
     if options["log"]:
         from bilayer_core.record.mcap_log import McapRecorder
+        from bilayer_core.record.topics import LOG_NAMESPACE
 
-        observers.append(McapRecorder(options["log"], rate, output.marker_rate, force))
+        tf = LOG_NAMESPACE.strip("/") if options["tf"] else ""
+        observers.append(McapRecorder(options["log"], rate, output.marker_rate, force, tf=tf))
+    elif options["tf"]:
+        raise InputError("--tf: is written into a log; give --log FILE.mcap too")
     if options["rrd"]:
         from bilayer_core.view.rerun_view import RrdRecorder
 

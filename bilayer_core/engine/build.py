@@ -10,6 +10,7 @@ from ..contact.broad_phase import RodSearch
 from ..forces.added_mass import fluid_momentum
 from ..forces.restitution import damping_of
 from ..model.force_slots import slot_of
+from ..model.friction import contact_point_friction
 from ..model.layout import columns
 from ..model.lit import light_of
 from ..model.model import Model, PointLoads
@@ -40,6 +41,7 @@ from ..model.records.parts import (
     Viscosity,
 )
 from ..model.records.problem import Border, System
+from ..scene.config import Friction
 
 Array = np.ndarray
 NONE = np.zeros(0, dtype=np.int64)
@@ -241,15 +243,15 @@ def _arm_factor(model: Model) -> float:
     return float(np.max(1.0 + 4.0 * slope + turn, initial=1.0))
 
 
-def sliding_of(model: Model, sizes: dict[str, int]) -> Sliding:
-    """Without contacts."""
-    contact_points, law = model.contact_points, model.scene.contact.friction
+def sliding_of(model: Model, sizes: dict[str, int], law: Friction | None) -> Sliding:
+    """Without contacts; by a law, the scene's or one that differs from it in coefficients."""
+    contact_points = model.contact_points
     axis = np.zeros(3) if law is None or law.axis is None else np.array(law.axis)
     return Sliding.zeros(
         sizes,
         acts=law is not None and law.acts,
         threshold=law.speed_threshold if law is not None else 0.0,
-        coefficient=contact_points.friction,
+        coefficient=contact_point_friction(law, contact_points.body >= 0),
         node_axis=contact_points.node_axis,
         grained=bool(axis.any() or model.surfaces.grain.any() or contact_points.grain.any()),
         along_grain=np.array(law.of_rods if law is not None else (0.0, 0.0, 0.0)),
@@ -274,11 +276,13 @@ def rod_contact_of(
     search: RodSearch,
     now: RodContactList,
     old: RodContactList,
+    law: Friction | None,
     **motion: Array,
 ) -> RodContact:
-    """With contacts of now, and `old` ones of the start of a stage; `motion` is that of the list of near rods."""
+    """With contacts of now, and `old` ones of the start of a stage; `law` as for `sliding_of`, `motion` is that of the
+    list of near rods.
+    """
     contact, surfaces = model.scene.contact, model.rod_surfaces
-    law = contact.friction
     return RodContact.zeros(
         sizes,
         d_hat=contact.barrier_distance,

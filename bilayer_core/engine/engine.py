@@ -98,6 +98,7 @@ class Engine:
     def integrate(self, state: State, until: float, due: float, most: int) -> IntegrationReport:
         """Make at most so many steps, by `integrate.integrate`. One that fails leaves `state` as it is."""
         counts, outcome = self._counts, self._outcome
+        self._storage.set_friction(state.friction)
         clear(counts)
         done = integrate(self._parts_for(state), until, due, most, *self._newton)
         status, pair = int(outcome.counts[STATUS]), int(outcome.counts[PAIR])
@@ -119,6 +120,7 @@ class Engine:
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
         """What is asked of a state at rest (`engine.modes`), with what acts set before."""
+        self._storage.set_friction(state.friction)
         while True:
             run = self._parts_for(state)
             status = treat_state(run.problem, run.state, run.work, mode, length, tolerance, self._newton[1])

@@ -98,6 +98,7 @@ class Evaluator:
         take_state(self.problem, self._arrays, at)
 
     def _take(self, state: State) -> None:
+        self._storage.set_friction(state.friction)
         for name in StateArrays.names:
             if name != "values":
                 own, values = getattr(self._state, name), getattr(state, name)

@@ -10,6 +10,7 @@ from ..forces.friction_limit import PATH_SIZE
 from ..forces.mechanisms import mechanisms_record
 from ..forces.register import force_table, memory_size, require_computed
 from ..jit import shapes_of, zeros_in_one
+from ..model.friction import friction_law, none_given
 from ..model.model import Model
 from ..model.records.contacts import ContactColumns, RodContact, RodContactList, Sliding, Slips, Surfaces
 from ..model.records.outcome import COUNTS, FIGURES
@@ -84,6 +85,7 @@ class Storage:
         self._sums, of_dimension = self._lasting_sums()
         self._groups = lasting_groups(model, self._sizes) | of_dimension
         self._problem: Problem | None = None
+        self._friction = none_given()  # as in `State.friction`
 
     def _lasting_sums(self) -> tuple[dict[str, Array], dict[str, Space | Plane]]:
         """The parts of `Sums` that have no capacity, and the record of the dimension, whose hessians are among them."""
@@ -141,9 +143,11 @@ class Storage:
         return Problem(**records, calls=calls_of(model), outcome=self.outcome, forces=force_table(model, records))
 
     def _sliding(self, before: Problem | None, sizes: dict[str, int]) -> Sliding:
-        sliding = sliding_of(self._model, sizes)
+        sliding = sliding_of(self._model, sizes, friction_law(self._model.scene, self._model.forces, self._friction))
         if before is not None:
             _take_over(before.sliding, sliding, int(before.sliding.count[0]))
+        if not sliding.acts:
+            sliding.count[0] = 0
         return sliding
 
     def _rod_contact(self, before: Problem | None) -> RodContact:
@@ -153,7 +157,18 @@ class Storage:
         now = RodContactList.zeros({"contact": capacity.contacts})
         ways = np.array([0.0, -1.0, 0.0, -np.inf]) if before is None else before.rod_contact.ways
         last = np.zeros((self._sizes["node"], 3)) if before is None else before.rod_contact.last
-        return rod_contact_of(self._model, self._sizes, self._pairs.search, now, of_stage, ways=ways, last=last)
+        law = friction_law(self._model.scene, self._model.forces, self._friction)
+        return rod_contact_of(self._model, self._sizes, self._pairs.search, now, of_stage, law, ways=ways, last=last)
+
+    def set_friction(self, given: Array) -> None:
+        """Have the coefficients of friction of a state (`State.friction`) in the records, before something is computed.
+
+        Like `grow`, it leaves contacts and sums as they are.
+        """
+        if given.tobytes() != self._friction.tobytes():  # NaN is NaN there
+            self._friction = given.copy()
+            if self._problem is not None:
+                self._problem = self._make()
 
     def grow(self, status: int) -> bool:
         """Have the capacity that a kernel lacked; false if that is not what it lacked.

@@ -82,7 +82,6 @@ def build_contact(
     contact_points = ContactPoints(
         weight=np.concatenate([of_rods.node_weight, [p.length for p in others], of_rods.weight]),
         radius=np.concatenate([of_rods.node_radius, [p.radius for p in others], of_rods.radius]),
-        friction=_friction_of_contact_points(scene, nodes, len(others), len(of_rods.node)),
         grain=np.concatenate([np.zeros((nodes, 3)), *(p.grain[None] for p in others), np.zeros((len(free), 3))]),
         node_edges=found.column("node_edges", np.int64, 2),
         node_axis=found.column("node_axis", np.int64),
@@ -191,14 +190,6 @@ def _from_clamp(node: int, strand: StrandArrays, gap: np.ndarray, clear: float) 
             break
         held.append(other)
     return held
-
-
-def _friction_of_contact_points(scene: SceneConfig, nodes: int, others: int, of_rods: int) -> np.ndarray:
-    """Friction coefficients forward, backward and sideways of each contact point, shape (n_contact_point, 3)."""
-    law = scene.contact.friction if scene.contact else None
-    coefficients = np.full((nodes + others + of_rods, 3), law.of_rods if law else 0.0)
-    coefficients[nodes : nodes + others] = law.coefficient if law else 0.0
-    return coefficients
 
 
 def contact_point_names(model: Model) -> list[str]:

@@ -55,7 +55,6 @@ class ContactPoints(ReadOnlyArrays):
 
     weight: Array  # Δl of the barrier [m], 0 of a node that its rod points stand for, shape (n_contact_point,)
     radius: Array  # half the thickness, offset, or radius [m], shape (n_contact_point,)
-    friction: Array  # coefficients forward, backward and sideways, shape (n_contact_point, 3)
     grain: Array  # of the surface that it belongs to, in the body's frame, 0 without one, shape (n_contact_point, 3)
     node_edges: Array  # edges before and after each node, the same at an end, shape (n_node, 2)
     node_axis: Array  # which direction counts as forward: 0 t, 1 m1, ±2 ± m2, shape (n_node,)

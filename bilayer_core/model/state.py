@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from .fingerprint import FREE, difference
+from .friction import none_given
 from .lit import light_of, part_seen
 from .mechanisms import start_rates
 from .model import Model
@@ -71,6 +72,7 @@ class State:
     conditions: Array  # number of all that a state may be taken into another scene for, shape (1,)
     seal: Array  # checksum of a flat state, 0 before it is one, shape (1,)
     override: Array  # what is set from outside of channels, then of loads (`model.override`), shape (n, 4)
+    friction: Array  # what is set from outside of its coefficients (`model.friction`), shape (4,)
     pose_goal: Array  # of controlled bodies; see `simulation.poses`, shape (n_controlled, 26), zeros where none acts
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
 
@@ -119,9 +121,10 @@ class State:
             raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}{why}")
         if differs:
             raise InputError(f"saved state: is of another scene, with other {differs}; allowed to differ are {FREE}")
-        may_be_nan = size - marks - self.pose_goal.size - self.override.size
+        may_be_nan = self.override.size + self.friction.size
+        first = size - marks - self.pose_goal.size - may_be_nan
         finite = np.isfinite(flat)
-        finite[may_be_nan : may_be_nan + self.override.size] = True
+        finite[first : first + may_be_nan] = True
         bad = np.flatnonzero(~finite)
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
@@ -232,6 +235,7 @@ def initial_state(
         conditions=np.array([conditions]),
         seal=np.zeros(1),
         override=no_overrides(len(channels) + len(model.scene.loads)),
+        friction=none_given(),
         pose_goal=np.zeros((len(bodies.controlled), POSE_GOAL)),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),
     )

@@ -6,11 +6,12 @@ kind         values                                     from
 ``stimulus`` value in the unit of the channel, over [s] `Simulator.set_stimulus`
 ``load``     factor, over [s]                           `Simulator.set_load`
 ``pose``     position [m], quaternion, least time [s]   `Simulator.set_pose`
+``friction`` coefficient                                `Simulator.set_friction`
 ``until``    time [s]                                   whoever makes steps: where adaptive ones must end
 ``reset``    none                                       `Simulator.reset`
 ============ ========================================== ================================================================
 
-NaN stands for what is not given: of a stimulus or a load, its schedule acts again.
+NaN stands for what is not given: of a stimulus or a load, its schedule acts again, of friction the scene's coefficient.
 Logs of earlier versions have no ``over``, which is 0 then: a jump.
 """
 
@@ -22,8 +23,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 Values = Sequence[float]
-STIMULUS, LOAD, POSE, UNTIL, RESET = "stimulus", "load", "pose", "until", "reset"
-SIZES = {STIMULUS: 2, LOAD: 2, POSE: 8, UNTIL: 1, RESET: 0}
+STIMULUS, LOAD, POSE, FRICTION, UNTIL, RESET = "stimulus", "load", "pose", "friction", "until", "reset"
+SIZES = {STIMULUS: 2, LOAD: 2, POSE: 8, FRICTION: 1, UNTIL: 1, RESET: 0}
 """Number of values of each kind."""
 POSITION, QUATERNION, OVER = slice(0, 3), slice(3, 7), 7
 """Values of a pose."""
@@ -38,6 +39,8 @@ class Acted(Protocol):
 
     def set_pose(self, name: str, position: Values | None, quaternion: Values | None, *, over: float) -> None: ...
 
+    def set_friction(self, value: float | None, key: str) -> None: ...
+
 
 @dataclass(frozen=True)
 class Input:
@@ -51,7 +54,7 @@ class Input:
         At the end of the last of them [s].
     kind : str
     name : str
-        Of the channel, load or body; empty for others.
+        Of the channel, load, body or coefficient; empty for others.
     values : tuple of float
     """
 
@@ -68,6 +71,8 @@ class Input:
                 simulator.set_stimulus(self.name, _given(self.values[0]), over=self._over)
             case "load":
                 simulator.set_load(self.name, _given(self.values[0]), over=self._over)
+            case "friction":
+                simulator.set_friction(_given(self.values[0]), self.name)
             case "pose":
                 position, quaternion = self.values[POSITION], self.values[QUATERNION]
                 simulator.set_pose(

@@ -13,6 +13,8 @@ import numpy as np
 HEADER = b"\x00\x01\x00\x00"
 _STAMP = struct.Struct("<iI")
 NANOSECONDS = 1_000_000_000
+SEPARATOR = ","
+"""Between the names in the label of an array of numbers."""
 
 
 def nanoseconds(time: float) -> int:
@@ -115,8 +117,10 @@ def decode(data: bytes | bytearray | memoryview, field: tuple[int, np.dtype, tup
     return np.frombuffer(data, dtype, int(np.prod(shape)), offset if np.prod(shape) else 0).reshape(shape)
 
 
-def read_float64_multi_array(data: bytes) -> tuple[list[tuple[str, int]], np.ndarray]:
-    """Labels with their sizes, and the values, of a ``std_msgs/Float64MultiArray``."""
+def read_float64_multi_array(data: bytes) -> tuple[list[str], np.ndarray]:
+    """Names and values of a ``std_msgs/Float64MultiArray``: names stand in the label of its one dimension, or, as older
+    logs have them, each in one of its own.
+    """
     position = len(HEADER)
 
     def unsigned() -> int:
@@ -131,9 +135,10 @@ def read_float64_multi_array(data: bytes) -> tuple[list[tuple[str, int]], np.nda
         length = unsigned()
         label = data[position : position + length - 1].decode()
         position += length
-        labels.append((label, unsigned()))
-        unsigned()  # stride
+        labels.append(label)
+        unsigned(), unsigned()  # size, stride
     unsigned()  # data_offset
     count = unsigned()
     position += -(position - len(HEADER)) % 8 if count else 0
-    return labels, np.frombuffer(data, "<f8", count, position)
+    names = [name for name in labels[0].split(SEPARATOR) if name] if len(labels) == 1 else labels
+    return names, np.frombuffer(data, "<f8", count, position)

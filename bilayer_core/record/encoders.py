@@ -5,25 +5,29 @@ Each message is a template whose arrays are overwritten: some microseconds inste
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import Input
-from bilayer_core.record.cdr import Template, read_float64_multi_array
+from bilayer_core.record.cdr import SEPARATOR, Template, read_float64_multi_array
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
-from bilayer_core.record.topics import FRAME_ID, Rate, output_topics
+from bilayer_core.record.tf_frames import TfEncoder
+from bilayer_core.record.topics import FRAME_ID, TF, Rate, output_topics
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
 SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")
 _FLOAT32_FIELD = 7  # sensor_msgs/PointField.FLOAT32
 
 
-def state_labels(description: Description) -> list[tuple[str, int]]:
-    """Labels ``name:shape`` of the parts of a state, for example ``positions:393x3``, with their sizes."""
-    return [(f"{name}:{'x'.join(map(str, shape))}", int(np.prod(shape))) for name, shape in description.state_layout]
+def state_template(description: Description) -> Template:
+    """A state: each name is ``name:shape`` of a part, for example ``positions:393x3``."""
+    layout = description.state_layout
+    names = (f"{name}:{'x'.join(map(str, shape))}" for name, shape in layout)
+    return multi_array_template(names, sum(math.prod(shape) for _, shape in layout))
 
 
 def clock_template() -> Template:
@@ -40,17 +44,18 @@ def float64_template() -> Template:
     return template
 
 
-def multi_array_template(labels: Iterable[tuple[str, int]]) -> Template:
-    """``std_msgs/Float64MultiArray`` whose dimensions name consecutive parts of ``data`` with their sizes."""
-    labels = list(labels)
+def multi_array_template(names: Iterable[str], size: int | None = None) -> Template:
+    """``std_msgs/Float64MultiArray``: one dimension of so many values, by default one for each name; its label has the
+    names, with commas between.
+    """
+    names = list(names)
+    size = len(names) if size is None else size
     template = Template()
-    template.put("<u4", len(labels))
-    for label, size in labels:
-        template.text(label)
-        template.put("<u4", size, size)  # size, stride
-    total = sum(size for _, size in labels)
-    template.put("<u4", 0, total)  # data_offset, length of data
-    template.array("data", "<f8", (total,))
+    template.put("<u4", 1)
+    template.text(SEPARATOR.join(names))
+    template.put("<u4", size, size)  # size, stride
+    template.put("<u4", 0, size)  # data_offset, length of data
+    template.array("data", "<f8", (size,))
     return template
 
 
@@ -98,15 +103,14 @@ def encode_float64(value: float) -> bytes:
 
 def encode_input(told: Input) -> bytes:
     """An input, as a message of `topics.INPUTS`."""
-    labels = [("step", 1), ("time", 1), (f"{told.kind}:{told.name}", len(told.values))]
-    template = multi_array_template(labels)
+    template = multi_array_template(("step", "time", f"{told.kind}:{told.name}"), 2 + len(told.values))
     template.views()["data"][:] = (told.step, told.time, *told.values)
     return template.to_bytes()
 
 
 def decode_input(data: bytes) -> Input:
     """The input of such a message."""
-    (_, _, (label, _)), values = read_float64_multi_array(data)
+    (_, _, label), values = read_float64_multi_array(data)
     kind, _, name = label.partition(":")
     return Input(int(values[0]), float(values[1]), kind, name, tuple(values[2:].tolist()))
 
@@ -120,6 +124,8 @@ class FrameEncoder:
     ----------
     description : Description
         Of the model whose frames come.
+    tf : str
+        What the names of frames on ``/tf`` begin with; empty: there is no such topic.
 
     Attributes
     ----------
@@ -127,26 +133,28 @@ class FrameEncoder:
         What `encode` understands, see `output_topics`.
     """
 
-    def __init__(self, description: Description):
-        self.topics = output_topics(description)
+    def __init__(self, description: Description, tf: str = ""):
+        self.topics = output_topics(description, bool(tf))
         self._node_frames = NodeFrames(description)
         self._energy: tuple[tuple[str, ...], SmallMessage] = ((), SmallMessage(multi_array_template(())))
         self._encoders: dict[str, Callable[[Frame], bytes]] = {
             "/clock": SmallMessage(clock_template()),
             "stimulus_applied": SmallMessage(
-                multi_array_template((name, 1) for name in description.channels), lambda frame: frame.stimulus
+                multi_array_template(description.channels), lambda frame: frame.stimulus
             ),
             "com": SmallMessage(stamped_template(3), lambda frame: frame.com),
             "energy": self._encode_energy,
             "solver": SmallMessage(
-                multi_array_template((name, 1) for name in SOLVER_LABELS),
+                multi_array_template(SOLVER_LABELS),
                 lambda frame: [getattr(frame, name) for name in SOLVER_LABELS],
             ),
-            "state": SmallMessage(multi_array_template(state_labels(description)), lambda frame: frame.state),
+            "state": SmallMessage(state_template(description), lambda frame: frame.state),
             "nodes": self._nodes_encoder(),
             "points": self._points_encoder(description),
             "markers": MarkerEncoder(description, self._node_frames).encode,
         }
+        if tf:
+            self._encoders[TF.name] = TfEncoder(description, self._node_frames, tf).encode
         for index, body in enumerate(description.bodies):
             self._encoders[f"body_pose/{body.name}"] = SmallMessage(
                 stamped_template(7),
@@ -165,9 +173,9 @@ class FrameEncoder:
         return self._encoders[name](frame)
 
     def small_messages(self, frame: Frame) -> dict[str, SmallMessage]:
-        """Encoders of all topics of `Rate.OUTPUT` by name, in order; of the run of which `frame` is one."""
-        found = {spec.name: self._encoders[spec.name] for spec in self.topics if spec.rate is Rate.OUTPUT}
-        return found | {"energy": self._energy_message(frame)}
+        """Encoders of all topics of `Rate.OUTPUT` but `TF` by name, in order; of the run of which `frame` is one."""
+        names = [spec.name for spec in self.topics if spec.rate is Rate.OUTPUT and spec is not TF]
+        return {name: self._encoders[name] for name in names} | {"energy": self._energy_message(frame)}
 
     def _encode_energy(self, frame: Frame) -> bytes:
         return self._energy_message(frame)(frame)
@@ -175,8 +183,7 @@ class FrameEncoder:
     def _energy_message(self, frame: Frame) -> SmallMessage:
         # The terms are known from the first frame on and do not change in a run.
         if self._energy[0] != tuple(frame.energy):
-            template = multi_array_template((name, 1) for name in frame.energy)
-            message = SmallMessage(template, lambda frame: list(frame.energy.values()))
+            message = SmallMessage(multi_array_template(frame.energy), lambda frame: list(frame.energy.values()))
             self._energy = (tuple(frame.energy), message)
         return self._energy[1]
 

@@ -115,7 +115,7 @@ def late_stimulus(time: float, missing: str, acting: str) -> Event:
 
 
 def changed_setting(time: float, text: str) -> Event:
-    """A node goes on with another setting, which changes nothing of the robot."""
+    """A node goes on with another setting."""
     return Event(time, INFO, SETTING, text)
 
 

@@ -250,7 +250,7 @@ class LogSource:
             _, _, data = next(self._file.messages({_full(name)}))
             labels, values = read_float64_multi_array(data)
             offset = len(data) - values.nbytes
-            return _Topic(name, len(data), offset, values.dtype, values.shape, stamps, tuple(k for k, _ in labels))
+            return _Topic(name, len(data), offset, values.dtype, values.shape, stamps, tuple(labels))
         template, part = self._template(name)
         offset, dtype, shape = template.fields[part]
         return _Topic(name, len(template), offset, dtype, shape, stamps)

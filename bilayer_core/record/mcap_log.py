@@ -27,7 +27,7 @@ from bilayer_core.record.lock import open_alone, refuse_file_in_use
 from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import EVENTS, INPUTS, QOS, DisplayGate, Rate, TopicSpec, input_topics
+from bilayer_core.record.topics import EVENTS, INPUTS, QOS, TF, DisplayGate, Rate, TopicSpec, input_topics
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
 GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wakes ten times a second [s of wall time]
@@ -60,6 +60,8 @@ class McapRecorder:
         as it takes, nothing is lost, and a disk that fails is an error of the run. With one, 0 included, the disk never
         ends the run: whole frames are left out and counted, but no input and not the last frame. What failed is in
         `failure`, and `close` raises it.
+    tf : str
+        What names of frames on ``/tf`` begin with (`record.tf_frames`); empty: the log has no such topic.
 
     Attributes
     ----------
@@ -80,13 +82,14 @@ class McapRecorder:
         marker_rate: float = 20.0,
         force: bool = False,
         patience: float | None = None,
+        tf: str = "",
     ):
         self.path = check_output_path(path, force, SUFFIX)
         refuse_file_in_use(self.path)
         self.rate = rate
         self.dropped = 0
         self._gate = DisplayGate(rate, marker_rate)
-        self._force, self._patience = force, patience
+        self._force, self._patience, self._tf = force, patience, tf
         self._last_time = 0.0
         self._left_out: Frame | None = None
         self._backlog: Backlog[Frame | Input | Event | dict[str, str]] = Backlog(QUEUE_LENGTH, GATHERING_PERIOD)
@@ -111,7 +114,7 @@ class McapRecorder:
             If it cannot be written; nothing is left then.
         """
         try:
-            log = _LogFile(self.path, self._force, description, self._gate)
+            log = _LogFile(self.path, self._force, description, self._gate, self._tf)
         except OSError as error:
             raise unwritable(self.path, error) from error
         # A daemon, so that a program that ends without `close` is not kept alive; its log is then cut off.
@@ -271,15 +274,16 @@ class McapRecorder:
 class _LogFile:
     """The file itself, used by one thread at a time."""
 
-    def __init__(self, path: Path, force: bool, description: Description, gate: DisplayGate):
+    def __init__(self, path: Path, force: bool, description: Description, gate: DisplayGate, tf: str):
         import mcap
 
         from bilayer_core.observed.system import machine, versions
 
         self._gate = gate
-        self._encoder = FrameEncoder(description)
+        self._encoder = FrameEncoder(description, tf)
         self._events = EventDetector(description)
         self._file = open_alone(path, force)
+        self._each = [TF.name] if tf else []
         self._large = [spec.name for spec in self._encoder.topics if spec.rate is Rate.DISPLAY]
         self._block: FrameBlock | None = None
         self._sequence = 0
@@ -329,9 +333,8 @@ class _LogFile:
         stamp, display = nanoseconds(frame.time), self._gate.is_due(frame.time)
         self._block.fill(frame, self._sequence)
         self._log.add_records(self._block.records, self._block.places, stamp)
-        if display:
-            for name in self._large:
-                self._add(name, stamp, self._encoder.encode(name, frame))
+        for name in (*self._each, *(self._large if display else ())):
+            self._add(name, stamp, self._encoder.encode(name, frame))
 
     def _add_events(self, events: list[Event]) -> None:
         for event in events:

@@ -44,6 +44,15 @@ float64 y
 float64 z
 float64 w
 """,
+    "geometry_msgs/Transform": """\
+geometry_msgs/Vector3 translation
+geometry_msgs/Quaternion rotation
+""",
+    "geometry_msgs/TransformStamped": """\
+std_msgs/Header header
+string child_frame_id
+geometry_msgs/Transform transform
+""",
     "geometry_msgs/Vector3": """\
 float64 x
 float64 y
@@ -129,6 +138,9 @@ uint32 stride
     "std_msgs/MultiArrayLayout": """\
 std_msgs/MultiArrayDimension[] dim
 uint32 data_offset
+""",
+    "tf2_msgs/TFMessage": """\
+geometry_msgs/TransformStamped[] transforms
 """,
     "visualization_msgs/Marker": """\
 int32 ARROW=0

@@ -56,21 +56,25 @@ class TopicSpec:
 
 
 MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+TF = TopicSpec("/tf", "tf2_msgs/msg/TFMessage", Rate.OUTPUT, depth=100)
+"""Frames of bodies and ends of rods (`record.tf_frames`), where they are asked for; the depth is that of tf2 itself.
+They come with every frame: who looks one up by the stamp of a pose, a wrench or `com` finds just that time.
+"""
 
 
-def output_topics(description: Description) -> tuple[TopicSpec, ...]:
-    """All topics that a run of this model sends.
+def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec, ...]:
+    """All topics that a run of this model sends, with `TF` if that is asked for.
 
     ================================ ==================================================================================
     ``/clock``                       simulation time
-    ``stimulus_applied``             value of each channel; every layout label is a channel
+    ``stimulus_applied``             value of each channel; the label of its layout has the channels, commas between
     ``com``                          mass centre of the robot [m]
-    ``energy``                       energy of each term [J]; every label is a term
-    ``solver``                       labels iterations, residual [m/s], substeps, min_gap [m], cpu_time [s]: see `Frame`
+    ``energy``                       energy of each term [J]; the label has the terms
+    ``solver``                       iterations, residual [m/s], substeps, min_gap [m], cpu_time [s]: see `Frame`
     ``body_pose/<body>``             mass centre and orientation
     ``contact_wrench/<body>``        contact force [N] and moment about the mass centre [N m], world frame
     ``clamp_wrench/<body>``          likewise of the rods that the body holds, for bodies that hold some
-    ``state``                        all that a restart needs; every label is ``name:shape``, its size that of the part
+    ``state``                        all that a restart needs; the label has ``name:shape`` of each part
     ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
                                      frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
     ``points``                       x y z strain curvature fx fy fz of the same nodes, then of contact points of bodies
@@ -95,6 +99,7 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
             if body.holds_rods
         ),
         TopicSpec("state", MULTI_ARRAY, output),
+        *((TF,) if tf else ()),
         TopicSpec("nodes", "geometry_msgs/msg/PoseArray", display),
         TopicSpec("points", "sensor_msgs/msg/PointCloud2", display),
         TopicSpec("markers", "visualization_msgs/msg/MarkerArray", display),
@@ -104,7 +109,7 @@ def output_topics(description: Description) -> tuple[TopicSpec, ...]:
 INPUTS = TopicSpec("inputs", MULTI_ARRAY, Rate.EVENT)
 """What acted from outside, exactly: a message for each `observed.inputs.Input`, at the time from which on it acted.
 
-Labels are ``step``, ``time`` [s] and ``kind:name``, whose size is the number of its values.
+The label is ``step,time,kind:name``: two numbers, time in [s], and then the values of that kind.
 """
 
 

@@ -36,7 +36,10 @@ ACROSS = ("spin", "twist", "spin_acceleration")
 """Parts that are zero in a plane."""
 OF_ELEMENTS = ("strain_rate", "strain_acceleration")
 """Parts of which half is zero in a plane."""
-STILL = ("fingerprint", "override", "pose_goal", "memory", "touched", "conditions", "has_history", "fluid_excess")
+STILL = (
+    *("fingerprint", "override", "friction", "pose_goal", "memory", "touched", "conditions", "has_history"),
+    "fluid_excess",
+)
 """Parts that hardly change from frame to frame."""
 
 

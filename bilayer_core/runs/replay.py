@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.model.friction import COEFFICIENTS
 from bilayer_core.observed.frame import Description
-from bilayer_core.observed.inputs import LOAD, STIMULUS, UNTIL, Input
+from bilayer_core.observed.inputs import FRICTION, LOAD, STIMULUS, UNTIL, Input
 from bilayer_core.observed.system import machine, versions
 from bilayer_core.record.cdr import read_float64_multi_array
 from bilayer_core.record.encoders import decode_input
@@ -206,6 +207,10 @@ def branch(
     simulator.load_state(state)
     set_from_outside(simulator, stimuli, loads)
     changed = {(STIMULUS, channel) for channel in stimuli} | {(LOAD, name) for name in loads}
+    asked = _friction_in(overrides) if simulator.friction else COEFFICIENTS
+    for key in asked if simulator.friction else ():
+        simulator.set_friction(None, key)
+    changed |= {(FRICTION, key) for key in asked}
     return simulator, [told for told in inputs_after(path, state) if (told.kind, told.name) not in changed]
 
 
@@ -217,6 +222,13 @@ def set_from_outside(
         simulator.set_stimulus(channel, value)
     for name, factor in loads.items():
         simulator.set_load(name, factor)
+
+
+def _friction_in(overrides: Sequence[str]) -> list[str]:
+    """Coefficients that changes to a scene are about, which then act instead of those set in a log's run."""
+    asked = {of.partition("=")[0] for of in overrides}
+    whole = bool(asked & {"contact", "contact.friction"})
+    return [key for key in COEFFICIENTS if whole or f"contact.friction.{key}" in asked]
 
 
 def inputs_after(path: str | Path, state: Array) -> list[Input]:
@@ -329,6 +341,8 @@ class _Comparison:
         nodes = max(s.nodes.stop for s in description.strands) if description.strands else 0
         if name.startswith("body_") and shape[0] == len(description.bodies):
             return f"body {description.bodies[row].name}"
+        if name == "friction":
+            return COEFFICIENTS[row]
         if name == "override":
             return description.channels[row] if row < len(description.channels) else f"load {row}"
         for strand in description.strands:

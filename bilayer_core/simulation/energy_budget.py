@@ -80,6 +80,7 @@ class _Instant:
     velocity: Array  # of nodes [m/s], shape (n_node, 3)
     rest: RestStrains
     load_factor: Array
+    friction: Array
     resistance: tuple[Array, Array]  # ∂E/∂η of edges [J], ∂E/∂κ̄₁ of joints [N m], shapes (n_edge,), (bend_count,)
     energy: dict[str, float]
     gradient: dict[str, Gradient]
@@ -107,8 +108,11 @@ class EnergyLedger:
         self._stimulus = 0.0
 
     def begin_step(self, state: State, rest: RestStrains, load_factor: Array) -> None:
-        """Take the factors of loads with which a step begins, where they have jumped since the last one ended."""
-        if not np.array_equal(load_factor, self._last.load_factor):
+        """Take the factors of loads, and the coefficients of friction, with which a step begins, where they have jumped
+        since the last one ended.
+        """
+        same = np.array_equal(state.friction, self._last.friction, equal_nan=True)
+        if not (same and np.array_equal(load_factor, self._last.load_factor)):
             self._last = self._evaluate_state(state, rest, load_factor)
 
     def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
@@ -237,6 +241,7 @@ class EnergyLedger:
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
             rest=rest,
             load_factor=load_factor.copy(),
+            friction=state.friction.copy(),
             resistance=_resistance(model, at, rest),
             energy=energy,
             gradient=gradient,

@@ -24,7 +24,7 @@ from ..model.override import acts, jump_to, ramp_to
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
 from ..observed.frame import Description, Frame
-from ..observed.inputs import LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_of_pose
+from ..observed.inputs import FRICTION, LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_of_pose
 from ..observed.observer import Observer
 from ..observed.system import versions
 from ..scene.config import SceneConfig
@@ -33,6 +33,7 @@ from . import observation as observe
 from .capture import make_frame
 from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
+from .friction import change_friction, coefficients
 from .observers import Schedule, first_failure
 from .parts import Parts
 from .plane_watch import PlaneWatch
@@ -186,6 +187,11 @@ class Simulator:
         return dict(zip(self.scene.stimuli, self._stepper.stimulus.tolist(), strict=True))
 
     @property
+    def friction(self) -> dict[str, float]:
+        """Coefficients of friction that act, by their keys in `contact.friction`; empty where there is none."""
+        return coefficients(self.model, self._state)
+
+    @property
     def rods(self) -> ByName[RodView]:
         """Every rod by name: positions, strain, curvature, directors and contact forces of its nodes, and its layers.
 
@@ -327,6 +333,28 @@ class Simulator:
         if self._override(len(self.scene.stimuli) + names.index(name), f"load {name!r}", factor, over):
             self._state.has_history.fill(0.0)  # accelerations jump with a load
         self._note(LOAD, name, math.nan if factor is None else float(factor), float(over))
+
+    def set_friction(self, value: float | None, key: str = "coefficient") -> None:
+        """Have a coefficient of friction jump to a value, from the next step on.
+
+        Parameters
+        ----------
+        value : float or None
+            None gives it back to the scene.
+        key : str
+            Of `contact.friction`: ``coefficient``, ``forward``, ``backward`` or ``sideways``. Those that the scene does
+            not give, and that are not set, go with ``coefficient``.
+
+        Raises
+        ------
+        InputError
+            If nothing slides against friction in the scene, there is no such coefficient, or the value is not finite or
+            below 0; nothing is changed then.
+        """
+        if change_friction(self.model, self._state, value, key):
+            self._stepper.restart(self._state)
+            self._state.has_history.fill(0.0)  # accelerations jump
+        self._note(FRICTION, key, math.nan if value is None else float(value))
 
     def set_pose(
         self,
@@ -664,7 +692,7 @@ class Simulator:
             attached.start_over()
 
     def reset(self) -> None:
-        """Go back to the start of the scene; stimuli, loads and poses set from outside are forgotten."""
+        """Go back to the start of the scene; what was set from outside is forgotten."""
         self._note(RESET, "")
         self.load_state(self._initial_state().flat())
 

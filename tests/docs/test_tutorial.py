@@ -13,7 +13,7 @@ from processes import TIMEOUT, claimed_domain, environment
 MODULES = {
     "bilayer": "bilayer_core",
     "sim_node": "bilayer_sim_ros.sim_node",
-    "ramp_controller": "bilayer_sim_ros.ramp_controller",
+    "ramp_controller": "bilayer_sim_ros.controllers.ramp_controller",
 }
 RUN = ("sh", "sh ros", "python")
 EDITED = "my_robot.yaml"

@@ -140,7 +140,7 @@ def test_mcap_ros2_reads_every_message_in_order_of_time(log):
     assert last["/bilayer_sim/stimulus/humidity"][0] == 500_000_000
     stamp, told = last["/bilayer_sim/inputs"]
     assert stamp == 500_000_000
-    assert [(part.label, part.size) for part in told.layout.dim] == [("step", 1), ("time", 1), ("stimulus:humidity", 1)]
+    assert [(part.label, part.size) for part in told.layout.dim] == [("step,time,stimulus:humidity", 3)]
     assert list(told.data) == [25.0, 0.5, 0.25]
 
 

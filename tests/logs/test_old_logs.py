@@ -1,5 +1,7 @@
 """Logs of older versions, or of which something was taken out, say what they lack in words that help."""
 
+import math
+
 import numpy as np
 import pytest
 import synthetic_run
@@ -9,8 +11,11 @@ from mcap.writer import CompressionType, Writer
 from bilayer_core import Simulator, compare, load_scene, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.record.cdr import Template, read_float64_multi_array
+from bilayer_core.record.log_reader import read_info, read_state
 from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.record.topics import MULTI_ARRAY
+from bilayer_core.runs.replay import verify
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +27,24 @@ def log(tmp_path_factory):
     return path
 
 
-def stripped(log, path, topics=(), metadata=(), qos=True):
-    """A copy without some topics and metadata records, and without the quality of service."""
+def as_before(data):
+    """A vector with names as logs once had it: a dimension for each name, with the number of its values."""
+    names, values = read_float64_multi_array(data)
+    sizes = [math.prod(map(int, name.split(":")[1].split("x"))) if ":" in name else 1 for name in names[:-1]]
+    sizes += [len(values) - sum(sizes)] if names else []
+    template = Template()
+    template.put("<u4", len(names))
+    for name, size in zip(names, sizes, strict=True):
+        template.text(name)
+        template.put("<u4", size, size)
+    template.put("<u4", 0, len(values))
+    template.array("data", "<f8", (len(values),))
+    template.views()["data"][:] = values
+    return template.to_bytes()
+
+
+def stripped(log, path, topics=(), metadata=(), qos=True, vector=lambda data: data):
+    """A copy without some topics and metadata records, without the quality of service, or with vectors changed."""
     with log.open("rb") as source, path.open("wb") as target:
         reader, writer = make_reader(source), Writer(target, compression=CompressionType.LZ4)
         writer.start("ros2")
@@ -32,22 +53,47 @@ def stripped(log, path, topics=(), metadata=(), qos=True):
         for item in reader.iter_metadata():
             if item.name not in metadata:
                 writer.add_metadata(item.name, item.metadata)
-        summary, numbers = reader.get_summary(), {}
+        summary, numbers, types = reader.get_summary(), {}, {}
         for number, channel in summary.channels.items():
             if channel.topic not in topics:
                 schema = summary.schemas[channel.schema_id]
                 schema_number = writer.register_schema(schema.name, schema.encoding, schema.data)
-                of = channel.metadata if qos else {}
+                of, types[number] = channel.metadata if qos else {}, schema.name
                 numbers[number] = writer.register_channel(channel.topic, "cdr", schema_number, of)
         for _, channel, message in reader.iter_messages(log_time_order=False):
             if channel.id in numbers:
-                writer.add_message(numbers[channel.id], message.log_time, message.data, message.publish_time)
+                data = vector(message.data) if types[channel.id] == MULTI_ARRAY else message.data
+                writer.add_message(numbers[channel.id], message.log_time, data, message.publish_time)
         writer.finish()
     return path
 
 
 def test_a_log_of_this_version_lacks_nothing(log):
     assert read_info(log).lacks == ()
+
+
+def test_a_log_with_a_dimension_for_each_name_is_read_and_replayed_as_ever(log, tmp_path, capsys):
+    old = stripped(log, tmp_path / "old.mcap", vector=as_before)
+    with old.open("rb") as file:
+        (_, _, energy), *_ = make_reader(file).iter_messages(topics=["/bilayer_sim/energy"])
+    assert int.from_bytes(energy.data[4:8], "little") == 3  # dimensions
+    assert read_info(old).lacks == () and compare(log, old).equal
+    whole, run = read_log(log), read_log(old)
+    assert list(run.quantities) == list(whole.quantities) and "energy/bending" in run.quantities
+    for name in run.quantities:
+        np.testing.assert_array_equal(run[name].values, whole[name].values, err_msg=name)
+    assert run.to_dataframe().equals(whole.to_dataframe())
+    assert verify(old).passed
+    np.testing.assert_array_equal(read_state(old)[0], read_state(log)[0])
+    for command in (
+        ["plot", old, "energy/*", "--out", tmp_path / "plot.png"],
+        ["view", old, "--save", tmp_path / "old.rrd"],
+        ["export", old, "--npz", tmp_path / "old.npz"],
+        ["repair", old, tmp_path / "whole.mcap"],
+    ):
+        assert main([str(part) for part in command]) == 0
+    assert "energy/bending" in np.load(tmp_path / "old.npz")
+    assert compare(log, tmp_path / "whole.mcap").equal
 
 
 def test_a_log_without_what_acted_says_that_it_cannot_be_replayed(log, tmp_path, capsys):

@@ -14,7 +14,7 @@ from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.topics import output_topics
 from bilayer_sim_ros.controllers.gait_controller import wave
 
-CONTROLLERS = ("gait_controller", "goal_controller")
+CONTROLLERS = ("ramp_controller", "gait_controller", "goal_controller")
 WALK = {"channel": "humidity", "period": 2.4}
 SWIM = {"channel": "light", "period": 0.6, "width": 0.1, "tolerance": 0.002, "axis": [0.0, 0.0, 1.0]}
 GAIT = {"channels": ["left", "right", "hind"], "phases": [0.0, 0.5, 0.25], "period": 0.4, "low": 0.1, "high": 0.6}
@@ -120,6 +120,9 @@ def test_the_swimmer_holds_a_height_also_after_a_pause_a_reset_and_another_goal(
         ("gait_controller", {"shape": "saw"}, "parameter 'shape' cannot be 'saw'"),
         ("gait_controller", {"period": 2}, "expecting type 'DOUBLE'"),
         ("gait_controller", {"channels": []}, "parameter 'channels' is empty"),
+        ("ramp_controller", {"duration": 0.0}, "parameter 'duration' cannot be 0.0; allowed is a finite number > 0"),
+        ("ramp_controller", {"end_value": ".nan"}, "allowed are finite numbers"),
+        ("ramp_controller", {"duration": 1}, "expecting type 'DOUBLE'"),
         ("goal_controller", {"width": 3.0}, "allowed are period > width >= 0"),
         ("goal_controller", {"goal": [1, 0, 0]}, "expecting type 'DOUBLE_ARRAY'"),
         ("goal_controller", {"axis": [0.0, 0.0, 0.0]}, "the axis is not 0"),

@@ -1,13 +1,14 @@
 """Ticks and answers, without ROS topics."""
 
+import threading
 import time
 
 import pytest
 
 from bilayer_core.errors import InputError
 from bilayer_core.scene.schedule import Hold
-from bilayer_sim_ros.answers import Answers
-from bilayer_sim_ros.commands import Commands
+from bilayer_sim_ros.answers import DUPLICATE, LATE, Answers, mount
+from bilayer_sim_ros.commands import POSE, Commands
 from bilayer_sim_ros.control import Control, tick_rate
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.periods import Periods
@@ -168,6 +169,47 @@ def test_a_tick_is_complete_when_every_channel_that_is_needed_has_answered():
     assert not run.waiting
 
 
+def test_a_tick_may_wait_for_a_pose_too_which_is_taken_before_it_acts():
+    run, taken = Run(needed=("heat", mount("hub"))), []
+    run.inputs.receive("heat", 0.5)
+    assert run.waiting
+    acted = threading.Thread(target=run.act)
+
+    def take():
+        acted.start()
+        acted.join(0.1)
+        assert acted.is_alive()  # it waits for the pose to be taken
+        taken.append(1)
+
+    assert run.inputs.answer(mount("hub"), 20 * TICK, take) == ""
+    acted.join(10.0)
+    assert not acted.is_alive() and not run.waiting
+    run.advance(2.1)
+    assert run.inputs.answer(mount("hub"), 20 * TICK, lambda: taken.append(2)) == LATE
+    assert run.inputs.answer(mount("hub"), 21 * TICK, lambda: taken.append(5)) == ""
+    assert run.inputs.answer(mount("hub"), 21 * TICK, lambda: taken.append(3)) == DUPLICATE
+    assert run.inputs.answer(mount("other"), 7, lambda: taken.append(4)) == ""  # nobody waits for it
+    assert taken == [1, 5, 4] and run.inputs.ignored[LATE] == run.inputs.ignored[DUPLICATE] == 1
+
+
+def test_without_channels_ticks_wait_for_a_pose_that_is_listed():
+    run = Run(channels=(), needed=(mount("hub"),))
+    assert run.waiting
+    run.inputs.answer(mount("hub"), None, lambda: None)
+    assert not run.waiting
+
+
+def test_a_pose_that_acted_at_the_start_acts_again_where_nobody_heard_of_a_later_time():
+    moved, commands = [], Commands(pytest.fail)
+    commands.ask((POSE, "hub"), lambda simulator, over: moved.append("pose"))
+    commands.ask(("load", "push"), lambda simulator, over: moved.append("load"))
+    assert commands.apply(None, 0.0) and sorted(moved) == ["load", "pose"]
+    commands.reset(keep_first=True)
+    assert commands.apply(None, 0.0) and sorted(moved) == ["load", "pose", "pose"]
+    commands.reset()
+    assert not commands.apply(None, 0.0) and len(moved) == 3
+
+
 @pytest.mark.parametrize(
     ("stamp", "why"), [(20, "late"), (20.5, "late"), (21, "duplicate"), (22, "foreign"), (300, "foreign")]
 )
@@ -272,6 +314,12 @@ def test_lockstep_without_a_clock_is_refused():
     refuse_without_clock(True)
     with pytest.raises(InputError, match="'publish_clock' is False; with 'lockstep' allowed is True"):
         refuse_without_clock(False)
+
+
+def test_a_pose_that_ticks_wait_for_is_one_of_a_body_that_may_move():
+    assert channels_that_answer(["a", "mount_pose/hub"], ["a"], ["hub"]) == ["a", "mount_pose/hub"]
+    with pytest.raises(InputError, match="'mount_pose/wall' is no channel .*each once, a, mount_pose/hub"):
+        channels_that_answer(["mount_pose/wall"], ["a"], ["hub"])
 
 
 def test_channels_that_answer_are_channels_each_once():

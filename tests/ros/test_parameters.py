@@ -2,7 +2,7 @@ import pytest
 import yaml
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.parameters import RAMP_CONTROLLER, REPLAY_NODE, SIM_NODE, NodeParameter, accept_all
+from bilayer_sim_ros.parameters import REPLAY_NODE, SIM_NODE, NodeParameter, accept_all
 
 RATE = NodeParameter("rate", 50.0, "messages per second [Hz]", minimum=0.0, above_minimum=True)
 MODE = NodeParameter("mode", "hold", "what acts", choices=("hold", "zero"))
@@ -52,7 +52,7 @@ def test_the_parameter_file_lists_every_parameter_with_its_default(root):
     assert content["/**"]["ros__parameters"] == {p.name: p.default for p in SIM_NODE}
 
 
-@pytest.mark.parametrize("table", [SIM_NODE, REPLAY_NODE, RAMP_CONTROLLER])
+@pytest.mark.parametrize("table", [SIM_NODE, REPLAY_NODE])
 def test_every_default_is_allowed(table):
     assert accept_all(table, {}) == {p.name: p.default for p in table}
 

@@ -7,15 +7,17 @@ import time
 import numpy as np
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from std_msgs.msg import Float64
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray
 
 from bilayer_core.record.log_reader import read_log
-from bilayer_sim_ros.ramp import FINAL_MESSAGES, RampSender, ramp
+from bilayer_sim_ros.controllers.ramp_controller import FINAL_MESSAGES, RampController, ramp
 
 DURATION = 1.0
 
@@ -25,27 +27,65 @@ def test_a_ramp_is_linear_and_constant_before_and_after(elapsed, value):
     assert ramp(elapsed, 10.0, 2.0, 14.0) == value
 
 
-@pytest.mark.parametrize("hold", [False, True])
-def test_each_time_is_answered_once_until_the_end_value_has_been_sent_often_enough(hold):
-    sent, ended = [], []
-    parameters = {"duration": 1.0, "start_value": 0.0, "end_value": 1.0, "hold": hold}
-    sender = RampSender(sent.append, lambda: ended.append(len(sent)), parameters)
+@pytest.fixture
+def controller(domain, monkeypatch, request):
+    """A controller in this process, connected to nobody: itself, and what it has answered."""
+    arguments = [part for name, value in request.param.items() for part in ("-p", f"{name}:={value}")]
+    monkeypatch.setattr(RampController, "connected", True)
+    rclpy.init(args=["--ros-args", *arguments], domain_id=domain)
+    node, answers = RampController(), []
+    monkeypatch.setattr(node.publisher, "publish", answers.append)
+    yield node, answers
+    node.destroy_node()
+    rclpy.shutdown()
+
+
+def stamp(nanoseconds):
+    return Time(sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
+
+
+@pytest.mark.parametrize("controller", [{}, {"hold": "true"}], indirect=True, ids=["ends", "holds"])
+def test_each_time_is_answered_once_until_the_end_value_has_been_sent_often_enough(controller):
+    node, answers = controller
     start = 4_000_000_000
-    assert not sender.begun
-    for now in (0, 0, 500_000_000, 500_000_000, *range(1_000_000_000, 1_000_000_000 + FINAL_MESSAGES)):
-        sender.hear(start + now)
-    assert sender.begun
-    assert sent == [0.0, 0.5] + [1.0] * FINAL_MESSAGES
-    assert ended == ([] if hold else [len(sent)])
+    times = (0, 0, 500_000_000, 500_000_000, *range(1_000_000_000, 1_000_000_000 + FINAL_MESSAGES))
+    for now in times:
+        assert not node.done.done()
+        node.hear(stamp(start + now))
+    assert [list(answer.position) for answer in answers] == [[0.0], [0.5]] + [[1.0]] * FINAL_MESSAGES
+    assert [answer.header.stamp for answer in answers] == [stamp(start + now) for now in dict.fromkeys(times)]
+    assert {tuple(answer.name) for answer in answers} == {("humidity",)}
+    assert node.done.done() is not node.hold
 
 
-def test_when_time_goes_back_the_ramp_begins_again():
-    sent = []
-    parameters = {"duration": 1.0, "start_value": 0.0, "end_value": 1.0, "hold": True}
-    sender = RampSender(sent.append, lambda: None, parameters)
+@pytest.mark.parametrize("controller", [{"hold": "true"}], indirect=True, ids=["holds"])
+def test_when_time_goes_back_the_ramp_begins_again(controller):
+    node, answers = controller
     for now in (0, 500_000_000, 2_000_000_000, 0, 250_000_000, 250_000_000):
-        sender.hear(now)
-    assert sent == [0.0, 0.5, 1.0, 0.0, 0.25]
+        node.hear(stamp(now))
+    assert [answer.position[0] for answer in answers] == [0.0, 0.5, 1.0, 0.0, 0.25]
+
+
+def test_a_free_ramp_stands_still_in_a_pause_and_begins_anew_after_a_reset(start, connect, domain):
+    simulation = start("sim_node", domain, {"scene": "bending", "start_paused": True, "real_time_factor": 1.0})
+    ramping = start("controllers.ramp_controller", domain, {"channel": "swelling", "duration": 2.0, "hold": True})
+    client = connect(simulation)
+    applied = client.listen(Float64MultiArray, "/bilayer_sim/stimulus_applied")
+    for _ in range(2):
+        begun = len(applied)
+        assert client.call("resume").success
+        client.spin_until(lambda: applied[-1].data[0] > 0.4, "a part of the ramp")
+        values = [message.data[0] for message in applied[begun:]]
+        assert min(values) < 0.1 and max(np.diff(values)) < 0.2  # it rises from the start on
+        assert client.call("pause").success
+        client.drain()
+        still = applied[-1].data[0]
+        until = time.monotonic() + 1.2  # in which the paused time is sent once more
+        client.spin_until(lambda until=until: time.monotonic() > until, "a while")
+        assert applied[-1].data[0] == still
+        assert client.call("reset").success
+        client.spin_until(lambda: applied[-1].data[0] == 0.0, "the start")
+    assert ramping.running
 
 
 def test_in_lockstep_the_ramp_acts_exactly_at_each_time_and_holds_until_interrupted(start, domain, tmp_path):
@@ -53,7 +93,7 @@ def test_in_lockstep_the_ramp_acts_exactly_at_each_time_and_holds_until_interrup
     parameters = {"scene": "bending", "log": path, "duration": 0.4, "lockstep": True, "real_time_factor": 0.0}
     simulation = start("sim_node", domain, parameters | {"start_paused": True, "rate": 50.0})
     controller = start(
-        "ramp_controller", domain, {"channel": "swelling", "duration": 0.2, "hold": True, "resume": True}
+        "controllers.ramp_controller", domain, {"channel": "swelling", "duration": 0.2, "hold": True, "resume": True}
     )
     assert simulation.wait() == 0, simulation.output
     # A frame shows the stimulus of the step that ends with it, and that of a tick is reached at the next one.
@@ -74,7 +114,7 @@ def log(domain_of_module, start, tmp_path_factory):
         {"scene": "bending", "log": path, "start_paused": True, "duration": 1.5 * DURATION},
     )
     controller = start(
-        "ramp_controller",
+        "controllers.ramp_controller",
         domain_of_module,
         {"channel": "swelling", "start_value": 0.25, "end_value": 0.75, "duration": DURATION, "resume": True},
     )
@@ -118,7 +158,7 @@ def test_each_stimulus_is_logged_at_the_time_from_which_it_acts(log, run):
 
 
 def test_a_controller_without_a_simulation_gives_up_with_exit_code_2(start, domain):
-    controller = start("ramp_controller", domain, {"connection_timeout": 0.5})
+    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 0.5})
     assert controller.wait() == 2
     assert "nobody subscribes to /bilayer_sim/stimulus/humidity (waited 0.5 s)" in controller.output
 
@@ -130,7 +170,10 @@ def subscriber(domain):
     context = Context()
     rclpy.init(context=context, domain_id=domain)
     node = Node("robot", context=context)
-    node.create_subscription(Float64, "/bilayer_sim/stimulus/humidity", lambda message: values.append(message.data), 10)
+    node.create_subscription(Float64, "/bilayer_sim/stimulus/humidity", lambda message: None, 10)
+    node.create_subscription(
+        JointState, "/bilayer_sim/stimulus_stamped", lambda message: values.append(message.position[0]), 10
+    )
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(node)
     thread = threading.Thread(target=executor.spin, daemon=True)
@@ -143,7 +186,7 @@ def subscriber(domain):
 
 
 def test_without_a_clock_the_controller_does_not_take_real_time_for_simulated(start, domain, subscriber):
-    controller = start("ramp_controller", domain, {"connection_timeout": 8.0})
+    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 8.0})
     assert controller.wait() == 2
     assert "/clock is silent, and simulated_time is true (waited 8 s)" in controller.output
     assert not subscriber
@@ -151,15 +194,16 @@ def test_without_a_clock_the_controller_does_not_take_real_time_for_simulated(st
 
 def test_a_ramp_in_real_time_needs_no_clock(start, domain, subscriber):
     begin = time.monotonic()
-    controller = start("ramp_controller", domain, {"simulated_time": False, "duration": 0.5})
+    controller = start("controllers.ramp_controller", domain, {"simulated_time": False, "duration": 0.5})
     assert controller.wait() == 0, controller.output
     assert time.monotonic() - begin > 0.5
     assert subscriber[-1] == 1.0 and len(set(subscriber)) > 10
     assert np.all(np.diff(subscriber) >= 0.0)
 
 
-def test_a_waiting_controller_can_be_interrupted(start, domain):
-    controller = start("ramp_controller", domain, {"connection_timeout": 100})
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_waiting_controller_can_be_interrupted(start, domain, number):
+    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 100.0})
     controller.wait_for("waiting for a subscriber")
-    controller.send(signal.SIGINT)
+    controller.send(number)
     assert controller.wait(10) == 0

@@ -99,7 +99,8 @@ def test_a_message_with_all_channels_changes_the_applied_stimulus(client, heard,
     values = [0.375 * stimulus.maximum for stimulus in scene.stimuli.values()]
     client.sender(Float64MultiArray, "/bilayer_sim/stimulus")(Float64MultiArray(data=values))
     found = until(client, applied, lambda message: list(message.data) == values)
-    assert [dimension.label for dimension in found.layout.dim] == list(scene.stimuli)
+    (dimension,) = found.layout.dim
+    assert dimension.label.split(",") == list(scene.stimuli) and dimension.size == dimension.stride == len(values)
 
 
 @pytest.mark.parametrize("bad", [[math.nan], [], [0.5, 0.5], [1e9]], ids=["nan", "empty", "too long", "out of range"])

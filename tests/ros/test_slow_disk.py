@@ -23,6 +23,7 @@ from bilayer_core.runs.replay import verify
 from bilayer_core.scene.schedule import Hold
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import Control
+from bilayer_sim_ros.conversions import to_diagnostics
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
@@ -104,6 +105,10 @@ def test_while_the_disk_hangs_steps_keep_their_rhythm_and_the_log_still_replays(
     dropped = worker.log_status.dropped
     assert dropped > 0.5 * STALL * RATE - QUEUE_LENGTH and worker.log_status.failure == ""
     assert statuses[-1].log.dropped > 0 and sum(status.dropped for status in statuses) == statuses[-1].log.dropped
+    shown = [to_diagnostics(status, "/sim", {}).status[0] for status in statuses if status.dropped]
+    worst = {value.key: value.value for value in shown[-1].values}
+    assert {report.level for report in shown} == {DiagnosticStatus.WARN}
+    assert int(worst["in the queue of the log"]) >= QUEUE_LENGTH and int(worst["frames left out of the log"]) > 0
     told = [decode_input(data) for _, _, _, data in read_messages(log, {INPUTS.full_name()}) if data is not None]
     heats = [of for of in told if of.kind == STIMULUS and at_stall < of.time < at_stall + went_on]
     assert len(heats) > 0.5 * sent
