@@ -1,4 +1,4 @@
-"""Worker processes that run cases: they stay, so that kernels are loaded once, and are killed at a case's limits."""
+"""Worker processes that run cases: they stay, as kernels take time to load, and are killed at the limits of a case."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from .case import Outcome, Record, StressCase
 
 MEMORY = 3 * 2**30
 """Address space that a worker may take beyond what it has when it begins [bytes]."""
+CASES_A_WORKER = 100
+"""Then another takes its place: memory that cases gave back is not always of use to the next one."""
 GRACE, LEAST_TIME = 12.0, 120.0
 """Wall time after which a worker is killed, over the case's limit of CPU time (a run, a finer one, and a remedy), and
 the least [s].
@@ -40,7 +42,7 @@ def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record]
     except ImportError:
         raise InputError("`bilayer stress` needs pebble: pip install 'bilayer_sim_ros[stress]'") from None
     left = list(reversed(list(cases)))
-    with ProcessPool(workers, context=get_context("spawn"), initializer=_begin) as pool:
+    with ProcessPool(workers, CASES_A_WORKER, context=get_context("spawn"), initializer=_begin) as pool:
         waiting = {}
         try:
             while left or waiting:
