@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from bilayer_sim_ros.signals import Signals
+from bilayer_sim_ros.signals import Signals, Stop
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -12,6 +12,7 @@ def main(argv: list[str] | None = None) -> int:
     signals = Signals("sim_node")  # before what takes long to import
     try:
         from bilayer_sim_ros.executable import leave, run
+        from bilayer_sim_ros.graph_watch import warn_of_unused_remaps
         from bilayer_sim_ros.parameters import SIM_NODE
         from bilayer_sim_ros.simulation_node import SimulationNode
     except ModuleNotFoundError as error:
@@ -20,8 +21,9 @@ def main(argv: list[str] | None = None) -> int:
         return explain_missing_ros("sim_node", error)
     nodes = []
 
-    def work(node: SimulationNode, stop) -> None:
+    def work(node: SimulationNode, stop: Stop) -> None:
         nodes.append(node)
+        warn_of_unused_remaps(node, sys.argv if argv is None else argv)
         node.simulate(stop)
 
     code = run(signals, "sim_node", SIM_NODE, lambda _: SimulationNode(), work, argv)

@@ -13,6 +13,7 @@ from bilayer_core import Simulator, load_scene
 from bilayer_sim_ros.answers import Answers
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import SHORTEST_PERIOD, Control, tick_rate
+from bilayer_sim_ros.graph_watch import GraphWatch
 from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.pacing import Pacer
@@ -129,5 +130,6 @@ def wire(node: Node, parameters: Mapping[str, Value], finished: Callable[[], Non
     }
     LiveParameters(node, SIM_NODE, changes)
     services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
+    GraphWatch(node)
     state = "paused" if parameters["start_paused"] else "running"
     return Simulation(simulator, worker, services, announcer, state)

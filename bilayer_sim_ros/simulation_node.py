@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -35,7 +36,7 @@ class SimulationNode(ConfiguredNode):
 
     Raises
     ------
-    InputError
+    BilayerError
         For a parameter with a mistyped name or a value that is not allowed, and for a scene or a log that cannot be.
 
     Examples
@@ -60,7 +61,14 @@ class SimulationNode(ConfiguredNode):
         except BaseException:
             super().destroy_node()
             raise
-        self.context.on_shutdown(self._stop_with_context)
+        # A weak method, which `on_shutdown` makes of a bound one, complains when a program just ends.
+        node = weakref.ref(self)
+
+        def stop_with_context() -> None:
+            if (left := node()) is not None:
+                left.stop(SHUT_DOWN)
+
+        self.context.on_shutdown(stop_with_context)
 
     @property
     def simulated_time(self) -> float:
@@ -146,9 +154,6 @@ class SimulationNode(ConfiguredNode):
             else:
                 self._run.close()
         super().destroy_node()
-
-    def _stop_with_context(self) -> None:
-        self._run.stop(SHUT_DOWN)
 
     def _tell_end(self) -> None:
         if self._when_ended is not None:
