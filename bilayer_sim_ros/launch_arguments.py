@@ -12,10 +12,9 @@ from bilayer_sim_ros.parameters import NodeParameter, Value
 NODE_ARGUMENTS = {
     "name": "name of the node",
     "namespace": "namespace of the node",
-    "params_file": "file of parameters, as config/sim_node.yaml; empty = none",
+    "params_file": "file of parameters, such as config/sim_node.yaml; arguments that are not empty override it",
 }
 """Arguments that are no parameters."""
-AS_ELSEWHERE = "empty = as the file of parameters says, or else"
 RENAMED = {"play.clock_publish_frequency": "clock"}
 """Parameters whose argument has another name."""
 PREFIX = "play."
@@ -32,7 +31,7 @@ def describe(parameter: NodeParameter) -> str:
     default = parameter.default
     shown = ", ".join(default) if isinstance(default, list) else str(default)
     shown = shown.lower() if isinstance(default, bool) else shown or "none"
-    return f"{parameter.description} [{parameter.allowed}]; {AS_ELSEWHERE} {shown}"
+    return f"{parameter.description} [{parameter.allowed}; default: {shown}]"
 
 
 def parameters_of(table: Iterable[NodeParameter], given: Mapping[str, str]) -> dict[str, Value]:

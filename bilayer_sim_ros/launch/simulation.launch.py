@@ -1,4 +1,4 @@
-"""Start the simulation: `ros2 launch bilayer_sim_ros simulation.launch.py scene:=gripping log:=run.mcap namespace:=lab`.
+"""Start the simulation: `ros2 launch bilayer_sim_ros simulation.launch.py scene:=gripping log:=run.mcap`.
 
 `ros2 launch bilayer_sim_ros simulation.launch.py --show-args` lists the arguments, one for each parameter.
 """
