@@ -48,8 +48,8 @@ def parameters_of(table: Iterable[NodeParameter], given: Mapping[str, str]) -> d
     InputError
         For a text that says no value of the parameter's type.
     """
-    texts = {parameter: given.get(argument_name(parameter), "") for parameter in table}
-    return {parameter.name: value_of(parameter, text) for parameter, text in texts.items() if text}
+    texts = [(parameter, given.get(argument_name(parameter), "")) for parameter in table]
+    return {parameter.name: value_of(parameter, text) for parameter, text in texts if text}
 
 
 def value_of(parameter: NodeParameter, text: str) -> Value:
