@@ -22,6 +22,7 @@ from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
 from bilayer_sim_ros.services import Services, trigger
+from bilayer_sim_ros.simulator_services import simulator_services
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 from bilayer_sim_ros.subscriptions import Rest, subscribe_commands, subscribe_stimuli, warn_of_refusal
 from bilayer_sim_ros.validity import WhileValid, while_valid
@@ -54,7 +55,9 @@ class Simulation:
     state: str
 
 
-def wire(node: Node, parameters: Mapping[str, Value], finished: Callable[[], None]) -> Simulation:
+def wire(
+    node: Node, parameters: Mapping[str, Value], finished: Callable[[], None], end: Callable[[str], None]
+) -> Simulation:
     """The simulation that parameters ask for, on topics and services of a node.
 
     Parameters
@@ -64,6 +67,8 @@ def wire(node: Node, parameters: Mapping[str, Value], finished: Callable[[], Non
         Values of `SIM_NODE`.
     finished : callable
         Called when a run has ended by itself, in its thread.
+    end : callable
+        Ends it, for a reason.
 
     Raises
     ------
@@ -129,7 +134,8 @@ def wire(node: Node, parameters: Mapping[str, Value], finished: Callable[[], Non
         "marker_rate": lambda value: worker.set_marker_rate(value or scene.output.marker_rate),
     }
     LiveParameters(node, SIM_NODE, changes)
-    services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
+    offered = [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")]
+    services = Services(node, offered + simulator_services(node, worker, description, end))
     GraphWatch(node)
     state = "paused" if parameters["start_paused"] else "running"
     return Simulation(simulator, worker, services, announcer, state)

@@ -52,7 +52,7 @@ class SimulationRun:
         self._turn = threading.Event()  # compiled, or to be stopped
         self._reason = ""
         self._lock = threading.Lock()
-        self._simulation = wire(node, parameters, self._stop.set)
+        self._simulation = wire(node, parameters, self._stop.set, self.stop)
         self._compilation = threading.Thread(target=self._compile, name="compilation", daemon=True)
         self._thread = threading.Thread(target=self._live, name="simulation run", daemon=True)
 

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.observed.frame import Frame
@@ -118,6 +118,11 @@ class SimulationWorker:
         """How the log of the present run is doing, or has done."""
         return self._recording.log_status
 
+    @property
+    def begun(self) -> bool:
+        """Whether it was started."""
+        return self._thread.ident is not None
+
     def start(self) -> None:
         """Start the thread."""
         self._thread.start()
@@ -167,6 +172,10 @@ class SimulationWorker:
     def reset(self) -> Future:
         """Ask to go back to the start of the scene; paused stays paused."""
         return self._requests.ask(self._do_reset)
+
+    def look(self, read: Callable[[Simulator, bool], Any]) -> Future:
+        """Ask what `read(simulator, paused)` says between two steps."""
+        return self._requests.ask(lambda answer: answer.set_result(read(self._simulator, self._paused)))
 
     def set_real_time_factor(self, factor: float) -> Future:
         """Ask to go on at another factor; 0 = as fast as possible."""
