@@ -7,7 +7,7 @@ import sys
 from glob import glob
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import Distribution, find_packages, setup
 
 NAME = "bilayer_sim_ros"
 # colcon's symlink install runs a link to this file in a directory that has no README.
@@ -53,8 +53,23 @@ if {"bdist_wheel", "editable_wheel"} & set(sys.argv):
     # pip puts them into bin, so a wheel carries launchers that call them.
     executables = ("sim_node", "replay_node", "ramp_controller", "gait_controller", "goal_controller")
     data_files.append((f"lib/{NAME}", [f"resource/{name}" for name in executables]))
+else:
+    # colcon puts the directory bin of a package on the PATH if there is one.
+    data_files.append(("bin", ["resource/bilayer"]))
+
+
+class WithData(Distribution):
+    """A distribution whose data files an editable installation installs too (as copies).
+
+    The command `editable_wheel` of setuptools asks `has_data`, which no distribution has; others ask `has_data_files`.
+    """
+
+    def has_data(self):
+        return self.has_data_files()
+
 
 setup(
+    distclass=WithData,
     name=NAME,
     version="0.1.0",
     description="Simulator of bilayer soft robots: discrete elastic rods, contact, stimuli; for Python and ROS 2",

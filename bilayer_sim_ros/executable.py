@@ -1,41 +1,46 @@
-"""What all executables of the package share: command line, parameters, signals, exit codes."""
+"""What all executables of the package share: command line, signals, exit codes."""
 
 from __future__ import annotations
 
 import argparse
-import math
-import signal
+import os
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 import rclpy
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
 from bilayer_core.errors import BilayerError, InputError
-from bilayer_sim_ros.parameters import NodeParameter, Value, accept_all
+from bilayer_sim_ros.configured_node import ConfiguredNode
+from bilayer_sim_ros.parameters import NodeParameter, Value
+from bilayer_sim_ros.signals import Signals, Stop
 
-Work = Callable[[Node, Mapping[str, Value], threading.Event], None]
+SomeNode = TypeVar("SomeNode", bound=Node)
+Make = Callable[[Mapping[str, Value]], SomeNode]
+Work = Callable[[SomeNode, Stop], None]
+Task = Callable[[Node, Mapping[str, Value], Stop], None]
 
 
 def run(
+    signals: Signals,
     executable: str,
-    node_name: str,
     table: Sequence[NodeParameter],
-    work: Work,
+    make: Make[SomeNode],
+    work: Work[SomeNode],
     argv: list[str] | None,
     *,
     argument: str | None = None,
 ) -> int:
-    """Run `work` as a ROS 2 executable.
+    """Run one node as a ROS 2 executable.
 
-    `work(node, parameters, stop)` runs on the main thread, beside an executor that serves the node's topics and
-    services; it returns when it is done, or soon after `stop` is set. Signals only set `stop`, however many come.
-    The parameter that is called `argument` may be given without its name.
+    `make(given)` makes the node, with what was given on the command line beside its ROS part. `work(node, stop)` runs
+    on the main thread, beside an executor that serves the node's topics and services; it returns when it is done, or
+    soon after `stop` is set. The parameter that is called `argument` may be given without its name.
 
     Returns
     -------
@@ -43,6 +48,7 @@ def run(
         0 done, also after SIGINT or SIGTERM, which are how nodes end; 2 bad input; 3 the simulation could not go on, or
         its log is not whole.
     """
+    stop = signals.take()
     argv = sys.argv if argv is None else [executable, *argv]
     try:
         arguments = remove_ros_args(argv)[1:]
@@ -51,17 +57,44 @@ def run(
         return InputError.exit_code
     options = _parse(executable, table, arguments, argument)
     given = {argument: options.argument} if argument is not None and options.argument is not None else {}
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
     try:
-        _run_node(node_name, table, work, stop, argv, given)
+        _run_node(signals, make, work, stop, argv, given)
     except BilayerError as error:
         if options.debug:
             raise
         print(f"{executable}: {error}", file=sys.stderr)
         return error.exit_code
     return 0
+
+
+def run_task(
+    signals: Signals,
+    executable: str,
+    node_name: str,
+    table: Sequence[NodeParameter],
+    task: Task,
+    argv: list[str] | None,
+    *,
+    argument: str | None = None,
+) -> int:
+    """Run `task(node, parameters, stop)` as a ROS 2 executable, with a node that has no life of its own; see `run`."""
+
+    def make(given: Mapping[str, Value]) -> ConfiguredNode:
+        return ConfiguredNode(node_name, table, given)
+
+    def work(node: ConfiguredNode, stop: Stop) -> None:
+        task(node, node.values, stop)
+        if stop.reason:
+            node.get_logger().info(stop.reason)
+
+    return run(signals, executable, table, make, work, argv, argument=argument)
+
+
+def leave(code: int) -> None:
+    """End the process at once, with all that was printed: for threads that cannot be ended, as the compiler's."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _parse(
@@ -85,12 +118,12 @@ def _parse(
 
 
 def _run_node(
-    name: str,
-    table: Sequence[NodeParameter],
-    work: Work,
-    stop: threading.Event,
+    signals: Signals,
+    make: Make[SomeNode],
+    work: Work[SomeNode],
+    stop: Stop,
     argv: list[str],
-    given: Mapping[str, str],
+    given: Mapping[str, Value],
 ) -> None:
     try:
         rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
@@ -99,17 +132,12 @@ def _run_node(
     executor = SingleThreadedExecutor()
     thread = threading.Thread(target=_spin, args=(executor,), name="executor", daemon=True)
     try:
-        try:
-            node = Node(name, automatically_declare_parameters_from_overrides=True)
-        except ValueError as error:  # "Cannot declare a statically typed parameter ... of type PARAMETER_NOT_SET"
-            raise InputError(
-                'a parameter has no value: allowed is one of its type, and [""] for a list of nothing'
-            ) from error
-        values = declare(node, table, given)
+        node = make(given)
         executor.add_node(node)
         thread.start()
-        work(node, values, stop)
+        work(node, stop)
     finally:
+        signals.end()
         rclpy.try_shutdown()
         if thread.ident is not None:
             thread.join()
@@ -126,38 +154,3 @@ def _spin(executor: SingleThreadedExecutor) -> None:
         executor.spin()
     except ExternalShutdownException:
         return
-
-
-def declare(node: Node, table: Sequence[NodeParameter], given: Mapping[str, str] | None = None) -> dict[str, Value]:
-    """Declare the parameters in `table`; their values, with those that were `given` in another way.
-
-    The node declares overrides by itself, so that a mistyped name is seen; the others are declared here.
-    Parameters that are not live are read at the start only, and an integer will do for a number.
-    """
-    given = given or {}
-    overrides = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
-    for name in given.keys() & overrides.keys():
-        raise InputError(f"'{name}' is given twice: {given[name]!r}, and as a parameter {overrides[name]!r}")
-    values = accept_all(table, {**overrides, **given})
-    for parameter in table:
-        descriptor = ParameterDescriptor(
-            description=parameter.description,
-            additional_constraints=parameter.allowed,
-            read_only=not parameter.live,
-            dynamic_typing=True,
-            floating_point_range=_range_of(parameter),
-        )
-        if node.has_parameter(parameter.name):
-            node.set_descriptor(parameter.name, descriptor)
-        else:
-            node.declare_parameter(parameter.name, values[parameter.name], descriptor)
-    return values
-
-
-def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
-    """The range of a number that has one with a first value; tools show it."""
-    if not isinstance(parameter.default, float) or math.isinf(parameter.minimum) or parameter.above_minimum:
-        return []
-    if parameter.default < parameter.minimum:
-        return []
-    return [FloatingPointRange(from_value=parameter.minimum, to_value=sys.float_info.max)]

@@ -59,7 +59,9 @@ class NodeParameter:
         return f"a finite number {'>' if self.above_minimum else '>='} {self.minimum:g}{below}"
 
     def accept(self, value: object) -> Value:
-        """`value` as the parameter's type (an integer will do for a number), or InputError."""
+        """`value` as the parameter's type, or InputError; an integer will do for a number, and for a choice."""
+        if self.choices and isinstance(value, int) and not isinstance(value, bool):
+            value = str(value)
         if isinstance(self.default, list) and isinstance(value, str):
             value = [value]
         if self._is_allowed(value):
@@ -164,7 +166,7 @@ SIM_NODE = (
     NodeParameter("log", "", "MCAP file to write; empty = none"),
     NodeParameter("rerun", "off", "rerun recording: off, or an .rrd file to write when the run ends"),
     NodeParameter("model", "auto", "auto, or a model's name"),
-    NodeParameter("dimension", "auto", "auto, 2 or 3"),
+    NodeParameter("dimension", "auto", "2 in a plane, 3 in space", choices=("auto", "2", "3")),
     NodeParameter("dt", 0.0, "fixed steps of this length, with `tolerance` the first [s]; 0 = as the scene says", 0.0),
     NodeParameter(
         "tolerance", 0.0, "largest error per adaptive step, over the longest rod; 0 = as the scene says", 0.0

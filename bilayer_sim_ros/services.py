@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
@@ -66,6 +68,7 @@ class Services:
     def __init__(self, node: Node, services: Iterable[Service]):
         self._node = node
         self._unanswered = 0
+        self._answered_at = -math.inf
         self._all_answered = threading.Condition()
         group = ReentrantCallbackGroup()
         for service in services:
@@ -80,6 +83,7 @@ class Services:
         service.answer(response, future)
         with self._all_answered:
             self._unanswered -= 1
+            self._answered_at = time.monotonic()
             self._all_answered.notify_all()
         return response
 
@@ -96,9 +100,14 @@ class Services:
         return awaited
 
     def finish(self) -> None:
-        """Return when the answers to all that was asked are sent; their futures are done."""
+        """Return when the answers to all that was asked are sent; their futures are done. Nobody is to wait for longer
+        than `LAST_ANSWERS`, as where the executor has ended.
+        """
         with self._all_answered:
             self._all_answered.wait_for(lambda: self._unanswered == 0, LAST_ANSWERS)
+        executor = self._node.executor
+        if executor is None or time.monotonic() - self._answered_at > LAST_ANSWERS:
+            return
         sent = threading.Event()
-        self._node.executor.create_task(sent.set)
+        executor.create_task(sent.set)
         sent.wait(LAST_ANSWERS)

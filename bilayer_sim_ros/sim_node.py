@@ -1,21 +1,35 @@
-"""Executable `sim_node`: the simulation as a ROS 2 node, `bilayer_sim` by default."""
+"""Executable `sim_node`: a `SimulationNode` alone in its process, `bilayer_sim` by default."""
 
 from __future__ import annotations
 
 import sys
 
-from bilayer_sim_ros.missing import explain_missing_ros
-from bilayer_sim_ros.parameters import SIM_NODE
+from bilayer_sim_ros.signals import Signals, Stop
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the node; the exit code."""
+    """Run the node; the exit code, 0 also after SIGINT and SIGTERM."""
+    signals = Signals("sim_node")  # before what takes long to import
     try:
-        from bilayer_sim_ros.executable import run
-        from bilayer_sim_ros.simulation import simulate
+        from bilayer_sim_ros.executable import leave, run
+        from bilayer_sim_ros.graph_watch import warn_of_unused_remaps
+        from bilayer_sim_ros.parameters import SIM_NODE
+        from bilayer_sim_ros.simulation_node import SimulationNode
     except ModuleNotFoundError as error:
+        from bilayer_sim_ros.missing import explain_missing_ros
+
         return explain_missing_ros("sim_node", error)
-    return run("sim_node", "bilayer_sim", SIM_NODE, simulate, argv)
+    nodes = []
+
+    def work(node: SimulationNode, stop: Stop) -> None:
+        nodes.append(node)
+        warn_of_unused_remaps(node, sys.argv if argv is None else argv)
+        node.simulate(stop)
+
+    code = run(signals, "sim_node", SIM_NODE, lambda _: SimulationNode(), work, argv)
+    if any(node.compiling for node in nodes):
+        leave(code)
+    return code
 
 
 if __name__ == "__main__":

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import partial
 
 from rclpy.node import Node
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_sim_ros.answers import Answers
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import SHORTEST_PERIOD, Control, tick_rate
+from bilayer_sim_ros.graph_watch import GraphWatch
 from bilayer_sim_ros.live_friction import LiveFriction, friction_overrides
 from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
@@ -23,6 +23,7 @@ from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
 from bilayer_sim_ros.services import Services, trigger
+from bilayer_sim_ros.simulator_services import simulator_services
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 from bilayer_sim_ros.subscriptions import (
     Rest,
@@ -32,14 +33,56 @@ from bilayer_sim_ros.subscriptions import (
     warn_of_refusal,
 )
 from bilayer_sim_ros.tf import tf_prefix
+from bilayer_sim_ros.validity import WhileValid, while_valid
 from bilayer_sim_ros.worker import SimulationWorker
 
 UNPACED_PATIENCE = 0.25
 """Longest wait for the disk of a simulation that goes as fast as it can, and has no rhythm to keep [s]."""
 
 
-def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
-    """Simulate until the duration is reached or `stop` is set; raises what the simulation stopped with."""
+@dataclass(frozen=True)
+class Simulation:
+    """A simulation with all its topics and services; what is asked for and sent before it runs waits.
+
+    Attributes
+    ----------
+    simulator : Simulator
+        At its start, not compiled.
+    worker : SimulationWorker
+        Not started.
+    services : Services
+    announcer : Announcer
+    state : str
+        ``paused`` or ``running``, as it starts.
+    """
+
+    simulator: Simulator
+    worker: SimulationWorker
+    services: Services
+    announcer: Announcer
+    state: str
+
+
+def wire(
+    node: Node, parameters: Mapping[str, Value], finished: Callable[[], None], end: Callable[[str], None]
+) -> Simulation:
+    """The simulation that parameters ask for, on topics and services of a node.
+
+    Parameters
+    ----------
+    node : Node
+    parameters : mapping
+        Values of `SIM_NODE`.
+    finished : callable
+        Called when a run has ended by itself, in its thread.
+    end : callable
+        Ends it, for a reason.
+
+    Raises
+    ------
+    InputError
+        For parameters that cannot be.
+    """
     scene = load_scene(parameters["scene"])
     if changed := friction_overrides(scene, parameters):
         scene = load_scene(parameters["scene"], changed)
@@ -76,22 +119,24 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     commands = Commands(partial(warn_of_refusal, node))
     gate = None
     if lockstep:
-        gate = Lockstep(inputs, ClockPublisher(node, description).publish, parameters["lockstep_timeout"])
+        publish = while_valid(node, ClockPublisher(node, description).publish)
+        gate = Lockstep(inputs, publish, parameters["lockstep_timeout"])
         inputs.notify = lambda: worker.wake()
     announcer = Announcer(node, inputs, parameters, lambda event: worker.tell(event))
+    frames = WhileValid(node, FramePublisher(node, description, rate, marker_rate, clock and not lockstep, tf))
     pacer = Pacer(parameters["real_time_factor"])
     worker = SimulationWorker(
         simulator,
         control=Control(inputs, commands, ticks, parameters["stimulus_interpolation"], gate),
-        publisher=FramePublisher(node, description, rate, marker_rate, clock and not lockstep, tf),
+        publisher=frames,
         recording=recording,
         rate=rate,
         marker_rate=marker_rate,
         pacer=pacer,
         duration=parameters["duration"] or math.inf,
         paused=parameters["start_paused"],
-        report=announcer.report,
-        finished=stop.set,
+        report=while_valid(node, announcer.report),
+        finished=finished,
     )
     rest = None if lockstep else Rest(ticks, lambda: pacer.factor)
     subscribe_stimuli(node, inputs, description.channels, rest)
@@ -104,22 +149,8 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     }
     live = LiveParameters(node, SIM_NODE, changes)
     commands.forgotten = lambda: node.executor.create_task(live.show, {name: parameters[name] for name in FRICTION})
-    services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
+    offered = [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")]
+    services = Services(node, offered + simulator_services(node, worker, description, end))
+    GraphWatch(node)
     state = "paused" if parameters["start_paused"] else "running"
-    try:
-        # What is asked for and sent meanwhile waits.
-        ensure_compiled(announcer.say_compiling)
-        seconds = simulator.compile()
-        node.get_logger().info(
-            f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}"
-        )
-        worker.start()
-        stop.wait()
-    finally:
-        worker.stop()
-        services.finish()
-    if worker.log_status.dropped:
-        node.get_logger().warning(f"the log lacks {worker.log_status.dropped} frames: the disk was too slow")
-    if worker.error is not None:
-        raise worker.error
-    node.get_logger().info(f"ended at t = {simulator.time:.6g} s; CPU time of the steps: {simulator.cpu_time:.3f} s")
+    return Simulation(simulator, worker, services, announcer, state)

@@ -9,11 +9,11 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.observed.frame import Frame
-from bilayer_core.record.events import Event, changed_setting
+from bilayer_core.record.events import Event, changed_setting, ended_run
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
 from bilayer_core.simulation.simulator import Simulator
@@ -109,7 +109,8 @@ class SimulationWorker:
         self._frame_is_out = True
         # Single steps asked for while paused that have not ended.
         self._single_steps: deque[Future] = deque()
-        self._thread = threading.Thread(target=self._work, name="simulation")
+        self._thread = threading.Thread(target=self._work, name="simulation", daemon=True)
+        self._reason = ""
         self.error: Exception | None = None
 
     @property
@@ -117,18 +118,35 @@ class SimulationWorker:
         """How the log of the present run is doing, or has done."""
         return self._recording.log_status
 
+    @property
+    def begun(self) -> bool:
+        """Whether it was started."""
+        return self._thread.ident is not None
+
     def start(self) -> None:
         """Start the thread."""
         self._thread.start()
 
-    def stop(self) -> None:
-        """End after the present step, finish the files, and return when that is done; also where it never began."""
+    def stop(self, reason: str = "") -> None:
+        """End after the present step, finish the files, and return when that is done; also where it never began.
+
+        The first reason that is given is told as an event, and as what ended the run.
+        """
+        self._reason = self._reason or reason
         self._stopping.set()
         self._requests.wake()
         if self._thread.ident is None:
             self._requests.close()
         else:
             self._thread.join()
+
+    def tell_failure(self, reason: str) -> None:
+        """Write files that say why there was no run; the thread is never started."""
+        try:
+            self._recording.start(self._simulator.description)
+            self._recording.close(False, reason)
+        except Exception as error:
+            self.error = self.error or error
 
     def wake(self) -> None:
         """Look at once whether what was waited for has come."""
@@ -154,6 +172,10 @@ class SimulationWorker:
     def reset(self) -> Future:
         """Ask to go back to the start of the scene; paused stays paused."""
         return self._requests.ask(self._do_reset)
+
+    def look(self, read: Callable[[Simulator, bool], Any]) -> Future:
+        """Ask what `read(simulator, paused)` says between two steps."""
+        return self._requests.ask(lambda answer: answer.set_result(read(self._simulator, self._paused)))
 
     def set_real_time_factor(self, factor: float) -> Future:
         """Ask to go on at another factor; 0 = as fast as possible."""
@@ -182,6 +204,9 @@ class SimulationWorker:
                 self._show_again_when_due()
             if not self._stopping.is_set():
                 complete, termination = True, Termination.COMPLETED.value
+            elif self._reason:
+                termination = self._reason
+                self.tell(ended_run(self._simulator.time, self._reason))
         except Exception as error:
             self.error, termination = error, str(error)
         finally:

@@ -15,7 +15,7 @@ from bilayer_core.observed.frame import Description, Frame
 DEBUG, INFO, WARN = 10, 20, 30
 """Levels of ``rcl_interfaces/msg/Log``."""
 LEVEL_NAMES = {DEBUG: "DEBUG", INFO: "INFO", WARN: "WARN"}
-CONTACT, STEPS, FLIGHT, STIMULUS, SETTING = "contact", "steps", "flight", "stimulus", "setting"
+CONTACT, STEPS, FLIGHT, STIMULUS, SETTING, END = "contact", "steps", "flight", "stimulus", "setting", "end"
 """Names of events."""
 REJECTED_FRAMES = 50
 """Frames between two messages about rejected steps, which sum up those between; the first comes at once."""
@@ -32,7 +32,7 @@ class Event:
     level : int
         `DEBUG`, `INFO` or `WARN`.
     name : str
-        Its kind: ``contact``, ``steps``, ``flight``, ``stimulus`` or ``setting``.
+        Its kind: ``contact``, ``steps``, ``flight``, ``stimulus``, ``setting`` or ``end``.
     text : str
     """
 
@@ -117,6 +117,11 @@ def late_stimulus(time: float, missing: str, acting: str) -> Event:
 def changed_setting(time: float, text: str) -> Event:
     """A node goes on with another setting."""
     return Event(time, INFO, SETTING, text)
+
+
+def ended_run(time: float, reason: str) -> Event:
+    """A run is ended from outside."""
+    return Event(time, INFO, END, f"run {reason}")
 
 
 def _contacts(time: float, pairs: Iterable[tuple[str, str]], what: str) -> list[Event]:

@@ -12,10 +12,9 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from bilayer_core.record.log_reader import read_log
-from bilayer_sim_ros import simulation
-from bilayer_sim_ros.executable import declare
-from bilayer_sim_ros.parameters import SIM_NODE
+from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_sim_ros import simulation_run
+from bilayer_sim_ros.simulation_node import SimulationNode
 
 LIMIT = 60.0
 
@@ -29,15 +28,13 @@ def spin(executor):
 
 @pytest.fixture
 def nodes(domain):
-    """Two nodes in this process, with an executor each in a thread: of the simulation, and of its client."""
+    """Makes nodes in this process, with an executor each in a thread: of the simulation, and of its client."""
     context = Context()
     rclpy.init(context=context, domain_id=domain)
 
-    def node(name, **values):
+    def node(kind, *name, **values):
         overrides = [Parameter(key, value=value) for key, value in values.items()]
-        node = Node(
-            name, context=context, parameter_overrides=overrides, automatically_declare_parameters_from_overrides=True
-        )
+        node = kind(*name, context=context, parameter_overrides=overrides)
         executor = SingleThreadedExecutor(context=context)
         executor.add_node(node)
         threads.append(threading.Thread(target=spin, args=[executor]))
@@ -52,24 +49,20 @@ def nodes(domain):
 
 
 def test_what_is_sent_and_asked_for_while_it_compiles_acts_when_it_is_ready(nodes, monkeypatch, tmp_path):
-    compiled, told, ended, stop = threading.Event(), threading.Event(), threading.Event(), threading.Event()
+    compiled, told = threading.Event(), threading.Event()
     said = []
 
     def compile_slowly(report):
         while not compiled.wait(0.1):
             report(3, 60)
 
-    monkeypatch.setattr(simulation, "ensure_compiled", compile_slowly)
+    monkeypatch.setattr(simulation_run, "ensure_compiled", compile_slowly)
     log = tmp_path / "run.mcap"
-    node = nodes("bilayer_sim", scene="bending", log=str(log), start_paused=True, real_time_factor=0.0, duration=0.2)
-
-    def simulate():
-        simulation.simulate(node, declare(node, SIM_NODE), stop)
-        ended.set()
-
-    runs = threading.Thread(target=simulate)
-    runs.start()
-    client = nodes("client")
+    node = nodes(
+        SimulationNode, scene="bending", log=str(log), start_paused=True, real_time_factor=0.0, duration=0.2
+    )
+    node.start()
+    client = nodes(Node, "client")
 
     def hear(message):
         said.append(message.status[0].message)
@@ -89,9 +82,30 @@ def test_what_is_sent_and_asked_for_while_it_compiles_acts_when_it_is_ready(node
         assert not answered.wait(0.5)
         compiled.set()
         assert answered.wait(LIMIT) and answer.result().success
-        assert ended.wait(LIMIT)
+        assert node.wait(LIMIT) and node.error is None
     finally:
         compiled.set()
-        stop.set()
-        runs.join()
     assert read_log(log).stimulus[-1, 0] == pytest.approx(0.75, abs=1e-12)
+
+
+def test_a_node_that_is_stopped_while_it_compiles_ends_at_once_and_its_log_says_why(nodes, monkeypatch, tmp_path):
+    begun, go_on = threading.Event(), threading.Event()
+
+    def compile_for_long(report):
+        begun.set()
+        go_on.wait(LIMIT)
+        report(1, 60)
+
+    monkeypatch.setattr(simulation_run, "ensure_compiled", compile_for_long)
+    monkeypatch.setattr(simulation_run, "PATIENCE", 0.1)
+    log = tmp_path / "run.mcap"
+    node = nodes(SimulationNode, scene="bending", log=str(log))
+    try:
+        node.start()
+        assert begun.wait(LIMIT)
+        node.stop("ended by SIGTERM")
+        assert node.wait(2.0) and node.compiling and node.error is None
+        info = read_info(log)
+        assert (info.complete, info.termination) == (False, "ended by SIGTERM while kernels were compiled")
+    finally:
+        go_on.set()

@@ -114,7 +114,7 @@ def test_without_a_controller_time_stands_still_and_the_node_says_so(start, conn
     assert node.wait(30) == 0, node.output
     assert "Traceback" not in node.output
     info = read_info(log)
-    assert (info.complete, info.termination, info.last_time) == (False, "interrupted", 0.0)
+    assert (info.complete, info.termination, info.last_time) == (False, "ended by SIGINT", 0.0)
     assert info.topics["/bilayer_sim/state"]["count"] == 1
 
 

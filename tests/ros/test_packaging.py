@@ -25,6 +25,50 @@ def prefix(root, tmp_path_factory):
     return directory / "prefix"
 
 
+EXECUTABLES = ["sim_node", "replay_node", "ramp_controller", "gait_controller", "goal_controller"]
+
+
+def test_ros2_finds_executables_and_launch_files_after_an_editable_installation(root, tmp_path):
+    shutil.copytree(root, tmp_path / "sources", ignore=NOT_SOURCES)
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--ignore-installed"]
+    subprocess.run([*pip, "--prefix", tmp_path / "prefix", "--editable", tmp_path / "sources"], check=True)
+    # `ros2 run` and `ros2 launch` look for the package in the index of each prefix, and then beside it.
+    (index,) = tmp_path.glob("prefix/**/share/ament_index/resource_index/packages/bilayer_sim_ros")
+    prefix = index.parents[4]
+    executables = {path.name for path in (prefix / "lib/bilayer_sim_ros").iterdir() if os.access(path, os.X_OK)}
+    assert executables == set(EXECUTABLES) and (prefix / "bin/bilayer").exists()
+    launch_files = {path.name for path in (prefix / "share/bilayer_sim_ros").rglob("*.launch.py")}
+    assert launch_files == {"simulation.launch.py", "replay.launch.py"}
+
+
+@pytest.mark.parametrize("kind", ["install", "develop"])
+def test_colcon_puts_the_command_on_the_path_and_executables_where_ros2_run_looks(root, tmp_path, kind):
+    """colcon calls setup.py itself, and makes links to data files where it is asked for links."""
+    shutil.copytree(root, tmp_path / "sources", ignore=NOT_SOURCES)
+    prefix, sources = tmp_path / "prefix", tmp_path / "sources"
+    setup = [sys.executable, "-W", "ignore", "setup.py", "--quiet"]
+    if kind == "install":
+        command = ["install", "--prefix", prefix, "--single-version-externally-managed", "--record", "files.log"]
+        subprocess.run([*setup, *command], cwd=sources, check=True)
+        (packages,) = prefix.glob("lib/python3*/site-packages")
+    else:
+        packages = prefix / "packages"
+        packages.mkdir(parents=True)
+        command = ["develop", "--install-dir", packages, "--script-dir", prefix / "lib/bilayer_sim_ros", "--no-deps"]
+        path = os.environ | {"PYTHONPATH": str(packages)}
+        subprocess.run([*setup, *command], cwd=sources, check=True, env=path)
+        (prefix / "bin").mkdir()
+        (prefix / "bin/bilayer").symlink_to(sources / "resource/bilayer")
+    names = {path.name for path in (prefix / "lib/bilayer_sim_ros").iterdir()}
+    assert names == {"bilayer", *EXECUTABLES}
+    environment = os.environ | {"PYTHONPATH": f"{packages}{os.pathsep}{sources}", "AMENT_PREFIX_PATH": str(prefix)}
+    path = f"{prefix / 'bin'}{os.pathsep}{os.environ['PATH']}"  # as colcon does for a package with a bin
+    shown = subprocess.run(
+        ["bilayer", "scenes"], env=environment | {"PATH": path}, cwd=tmp_path, capture_output=True, text=True
+    )
+    assert shown.returncode == 0 and "gripping" in shown.stdout, shown.stderr
+
+
 @pytest.fixture
 def run(prefix, tmp_path):
     """Runs a command with the installation before everything else, away from the checkout."""
@@ -51,7 +95,7 @@ def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
         assert (prefix / "share/bilayer_sim_ros" / name).is_file()
 
 
-@pytest.mark.parametrize("name", ["sim_node", "replay_node", "ramp_controller", "gait_controller", "goal_controller"])
+@pytest.mark.parametrize("name", EXECUTABLES)
 def test_executables_are_where_ros2_run_looks_for_them(prefix, run, name):
     shown = run(prefix / "lib/bilayer_sim_ros" / name, "--help")
     assert shown.returncode == 0, shown.stderr

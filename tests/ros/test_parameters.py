@@ -31,6 +31,12 @@ def test_a_text_outside_the_choices_is_refused_and_the_choices_are_listed(value)
         MODE.accept(value)
 
 
+def test_an_integer_will_do_for_a_choice_that_is_one():
+    assert accept_all(SIM_NODE, {"dimension": 2})["dimension"] == "2"
+    with pytest.raises(InputError, match="'dimension' is '4'; allowed is one of auto, 2, 3"):
+        accept_all(SIM_NODE, {"dimension": 4})
+
+
 @pytest.mark.parametrize("value", [1, "yes", 0.0])
 def test_a_switch_takes_only_true_or_false(value):
     with pytest.raises(InputError, match="'clock'.*true or false"):

@@ -136,7 +136,9 @@ def test_an_interrupted_node_ends_with_0_and_a_log_readable_to_its_end(start, co
     assert node.wait(30) == 0, node.output
     assert "Traceback" not in node.output
     info = read_info(log)
-    assert (info.complete, info.termination) == (False, "interrupted")
+    reason = f"ended by {signals[0].name}"
+    assert (info.complete, info.termination) == (False, reason) and f"{reason} at t = " in node.output
+    assert read_log(log).events[-1].text == f"run {reason}"
     with log.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         assert reader.get_summary() is not None

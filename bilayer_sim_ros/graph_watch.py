@@ -1,0 +1,77 @@
+"""Watches the graph for others who miss a node by a letter or a type, and for a second clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock as NodeClock
+from rclpy.clock import ClockType
+from rclpy.node import Node
+
+from bilayer_sim_ros.message_types import CLOCK_TOPIC
+from bilayer_sim_ros.near_misses import nearest, of_topics, remap_sources
+
+PERIOD = 1.0
+"""Real time between two looks [s]."""
+
+
+class GraphWatch:
+    """Warns, once for each topic, while the node's executor spins.
+
+    Parameters
+    ----------
+    node : Node
+        With all its topics.
+    """
+
+    def __init__(self, node: Node):
+        self._node = node
+        self._prefix = node.get_fully_qualified_name() + "/"
+        self._inputs = {own.topic_name: _type_name(own.msg_type) for own in node.subscriptions}
+        self._outputs = {own.topic_name for own in node.publishers}
+        self._told: set[str] = set()
+        steady = NodeClock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(PERIOD, self.look, callback_group=MutuallyExclusiveCallbackGroup(), clock=steady)
+
+    def look(self) -> None:
+        """Say what has not been said."""
+        published, subscribed = {}, set()
+        for topic, types in self._node.get_topic_names_and_types():
+            if topic in self._told or not (topic.startswith(self._prefix) or topic in self._inputs):
+                continue
+            if topic in self._inputs and types == [self._inputs[topic]]:
+                continue
+            if publishers := self._node.get_publishers_info_by_topic(topic):
+                published[topic] = {publisher.topic_type for publisher in publishers}
+            elif topic not in self._outputs:
+                subscribed.add(topic)
+        said = of_topics(self._prefix, self._inputs, self._outputs, published, subscribed)
+        if CLOCK_TOPIC in self._outputs and CLOCK_TOPIC not in self._told:
+            others = self._node.count_publishers(CLOCK_TOPIC) - 1
+            if others > 0:
+                said[CLOCK_TOPIC] = (
+                    f"{CLOCK_TOPIC} is published by {others} more: who hears it hears several times. "
+                    "Set publish_clock to false for all but one, or remap it"
+                )
+        for topic, text in said.items():
+            self._told.add(topic)
+            self._node.get_logger().warning(text)
+
+
+def warn_of_unused_remaps(node: Node, argv: Sequence[str]) -> None:
+    """Warn of remappings of names that a node does not have but almost has."""
+    topics = {own.topic_name for own in (*node.subscriptions, *node.publishers)}
+    services = {own.service_name for own in node.services}
+    prefix = node.get_fully_qualified_name() + "/"
+    for source in remap_sources(argv):
+        if node.resolve_topic_name(source) in topics or node.resolve_service_name(source) in services:
+            continue
+        meant = nearest(node.resolve_topic_name(source, only_expand=True), topics | services, prefix)
+        if meant:
+            node.get_logger().warning(f"{source} is remapped, but is no name of this node: did you mean {meant}?")
+
+
+def _type_name(message_type: type) -> str:
+    """Name of a message type as graphs have it."""
+    return f"{message_type.__module__.partition('.')[0]}/msg/{message_type.__name__}"

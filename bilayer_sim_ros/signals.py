@@ -1,0 +1,67 @@
+"""SIGINT and SIGTERM end a node with exit code 0, whenever they come and however many; the first one is the reason.
+
+This module imports hardly anything: handlers are to be there before all that takes long to import.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # what checkers of types take for true, without an import of milliseconds
+    from types import FrameType
+
+NUMBERS = (signal.SIGINT, signal.SIGTERM)
+STANDARD_ERROR = 2
+"""Its descriptor."""
+
+
+class Stop(threading.Event):
+    """Set when a node is to end.
+
+    Attributes
+    ----------
+    reason : str
+        Why, if a signal asked for it, such as ``ended by SIGINT``; else empty.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reason = ""
+
+
+class Signals:
+    """The handlers of a process that is one node. Until `take` is called a signal ends the process at once.
+
+    Parameters
+    ----------
+    executable : str
+        Begins what is said then.
+    """
+
+    def __init__(self, executable: str):
+        self._executable = executable
+        self._stop: Stop | None = None
+        for number in NUMBERS:
+            signal.signal(number, self._handle)
+
+    def take(self) -> Stop:
+        """From now on a signal sets what is returned, and does nothing else."""
+        self._stop = Stop()
+        return self._stop
+
+    def end(self) -> None:
+        """Heed no more signals: the process ends by itself. Handlers in Python would be gone before it has ended."""
+        for number in NUMBERS:
+            signal.signal(number, signal.SIG_IGN)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        reason = f"ended by {signal.Signals(number).name}"
+        if self._stop is None:
+            # An exception might be caught by what is being imported; there is nothing yet to be closed.
+            os.write(STANDARD_ERROR, f"{self._executable}: {reason}, before there was a node\n".encode())
+            os._exit(0)
+        self._stop.reason = self._stop.reason or reason
+        self._stop.set()

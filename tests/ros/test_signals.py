@@ -1,0 +1,104 @@
+"""Signals at chosen moments of the node's life, sent by the process to itself: each ends it with 0 and a reason."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from bilayer_core.record.log_reader import read_info
+
+LIMIT = 120.0
+HEAD = """
+import os, signal, sys, time
+from bilayer_sim_ros import sim_node
+NUMBERS = [getattr(signal, name) for name in sys.argv.pop(1).split(",")]
+
+def send(number_of_times=1):
+    for number in NUMBERS * number_of_times:
+        os.kill(os.getpid(), number)
+"""
+WHILE_IMPORTING = """
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "rclpy":
+            send()
+sys.meta_path.insert(0, Finder())
+"""
+WHILE_COMPILING = """
+from bilayer_sim_ros import simulation_run
+def compile_for_long(report):
+    send()
+    time.sleep(60.0)
+simulation_run.ensure_compiled = compile_for_long
+simulation_run.PATIENCE = 0.2
+"""
+WHILE_STEPPING = """
+from bilayer_core import Simulator
+step, steps = Simulator.step, []
+def count_steps(self, **arguments):
+    steps.append(self.time)
+    if len(steps) == 20:
+        send()
+    return step(self, **arguments)
+Simulator.step = count_steps
+"""
+WHILE_CLOSING = """
+from bilayer_core.record.mcap_log import McapRecorder
+close = McapRecorder.close
+def close_slowly(self, *arguments):
+    send(5)
+    time.sleep(0.2)
+    send(5)
+    close(self, *arguments)
+McapRecorder.close = close_slowly
+"""
+WHILE_LEAVING = """
+import atexit
+atexit.register(send, 5)
+"""
+TAIL = "\nsys.exit(sim_node.main())\n"
+
+
+@pytest.fixture
+def ended(tmp_path, domain):
+    """Runs a node that signals reach at some moment; its exit code and what it printed."""
+
+    def run(program, signals):
+        arguments = [signals, "--ros-args", "-p", "scene:=bending", "-p", "log:=run.mcap"]
+        finished = subprocess.run(
+            [sys.executable, "-c", HEAD + program + TAIL, *arguments],
+            cwd=tmp_path,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=LIMIT,
+        )
+        assert "Traceback" not in finished.stdout
+        return finished.returncode, finished.stdout
+
+    return run
+
+
+@pytest.mark.parametrize("signals", ["SIGINT", "SIGTERM", "SIGINT,SIGINT"])
+def test_a_signal_while_modules_are_imported_ends_it_with_0_and_a_line(ended, signals):
+    code, output = ended(WHILE_IMPORTING, signals)
+    assert (code, output) == (0, f"sim_node: ended by {signals.partition(',')[0]}, before there was a node\n")
+
+
+def test_signals_while_kernels_are_compiled_end_it_at_once_and_the_log_says_so(ended, tmp_path):
+    code, output = ended(WHILE_COMPILING, "SIGTERM,SIGTERM")
+    reason = "ended by SIGTERM while kernels were compiled"
+    assert code == 0 and reason in output
+    info = read_info(tmp_path / "run.mcap")
+    assert (info.complete, info.termination) == (False, reason)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("program", [WHILE_CLOSING, WHILE_LEAVING], ids=["closing", "leaving"])
+def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(ended, tmp_path, program):
+    code, output = ended(WHILE_STEPPING + program, "SIGINT,SIGTERM")
+    assert code == 0, output
+    info = read_info(tmp_path / "run.mcap")
+    assert (info.complete, info.termination) == (False, "ended by SIGINT")
