@@ -148,7 +148,8 @@ def wire(
         **LiveFriction(simulator, commands, lambda event: worker.tell(event)).changes,
     }
     live = LiveParameters(node, SIM_NODE, changes)
-    commands.forgotten = lambda: node.executor.create_task(live.show, {name: parameters[name] for name in FRICTION})
+    as_given = {name: parameters[name] for name in FRICTION}
+    commands.forgotten = lambda: node.executor and node.executor.create_task(live.show, as_given)
     offered = [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")]
     services = Services(node, offered + simulator_services(node, worker, description, end))
     GraphWatch(node)
