@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -90,6 +91,31 @@ class Duration(click.ParamType):
             fault = error.errors()[0]
             note = f", {fault['ctx']['note']}" if fault["ctx"]["note"] else ""
             self.fail(f"found {value!r}{note}; {fault['msg']}", param, context)
+
+
+def renamed(old: str, new: str, name: str, **settings: Any) -> Callable[[Callable], Callable]:
+    """An option's spelling of earlier releases, which works on for this one with a note, and is not in the help.
+
+    Parameters
+    ----------
+    old, new : str
+        Spellings, such as ``"--time"``.
+    name : str
+        Of the function's argument, which is the option's of the new spelling.
+    **settings
+        Of `click.option`, as for the new spelling.
+    """
+
+    def take(context: click.Context, option: click.Parameter, value: Any) -> Any:
+        if context.get_parameter_source(option.name) is not click.core.ParameterSource.COMMANDLINE:
+            return None
+        click.echo(f"bilayer: {old} is called {new} now; the old name goes with the next release", err=True)
+        if context.params.get(name) not in (None, False, ()):
+            raise InputError(f"{old}: is the old name of {new}; give it once")
+        context.params[name] = value
+        return None
+
+    return click.option(old, f"old_{name}", hidden=True, expose_value=False, is_eager=False, callback=take, **settings)
 
 
 def output_directory(out: str) -> Path:

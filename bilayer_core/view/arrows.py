@@ -64,7 +64,12 @@ def scaled_reactions(run: RunData, scales: Scales, references: Mapping[str, floa
     """Arrows of these sizes."""
     found = {}
     for name, reference in references.items():
-        scale = 1.0 / rounded_up(reference / (ARROW_SHARE * scales.size))
+        scale = metres_per(reference, scales.size)
         wrenches = run.clamp_wrenches[:, :, REACTIONS[name]]
         found[name] = Arrows(run.times, run.body_positions, wrenches, scale, SHOWN_SHARE * reference)
     return found
+
+
+def metres_per(reference: float, size: float) -> float:
+    """Length of arrows by the size that they are scaled by, for a robot of a size [m]: [m/N] or [1/N]."""
+    return 1.0 / rounded_up(reference / (ARROW_SHARE * size))

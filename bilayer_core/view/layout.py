@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from bilayer_core.observed.frame import Description
 from bilayer_core.observed.system import versions
 from bilayer_core.record.run_data import RunData
-from bilayer_core.view.arrows import Arrows, reaction_arrows
+from bilayer_core.view.arrows import reaction_arrows
 from bilayer_core.view.camera import is_worth_following
 from bilayer_core.view.colouring import Colouring
 from bilayer_core.view.scales import Scales, place_moving_eye
@@ -141,7 +141,8 @@ def whole(content: rrb.Container | rrb.View, time_panel: str, play: str = "pause
 
 def summary(run: RunData, scales: Scales, colouring: Colouring) -> str:
     """What is shown and at which scales, in Markdown."""
-    contact, reactions = bool(run.contact_forces.any()), reaction_arrows(run, scales)
+    contact = bool(run.contact_forces.any())
+    reactions = {name: arrows.metres_per_unit for name, arrows in reaction_arrows(run, scales).items()}
     span = f", simulated: {run.times[-1] - run.times[0]:.6g} s"
     return explanation(run.description, scales, colouring, contact, reactions, span)
 
@@ -151,10 +152,12 @@ def explanation(
     scales: Scales,
     colouring: Colouring,
     contact: bool,
-    reactions: Mapping[str, Arrows],
+    reactions: Mapping[str, float],
     more: str = "",
 ) -> str:
-    """What is shown at which scales, in Markdown; `contact` says whether there are contact forces."""
+    """What is shown at which scales, in Markdown; `contact` says whether there are contact forces, `reactions` how
+    long the arrows of those that act are, by their sizes [m/N, 1/N].
+    """
     nodes = sum(strand.nodes.stop - strand.nodes.start for strand in description.strands)
     settings = [f"{name} {_short(text)}" for name, text in description.settings.items() if name not in versions()]
     lines = [
@@ -166,9 +169,9 @@ def explanation(
     ]
     if contact:
         lines.append(f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.")
-    for name, arrows in reactions.items():
+    for name, metres_per_unit in reactions.items():
         colour, unit = ("Blue", "mN") if name == "clamp_forces" else ("Purple", "mN m")
-        size = f"{10 / arrows.metres_per_unit:.4g} {unit} for 10 mm"
+        size = f"{10 / metres_per_unit:.4g} {unit} for 10 mm"
         lines.append(f"- **{colour}:** {name.split('_')[1]} of rods on bodies, {size}.")
     if any(obstacle.shape.kind == "plane" for obstacle in description.obstacles):
         lines.append(f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.")
