@@ -146,7 +146,11 @@ SIM_NODE = (
         0.0,
     ),
     NodeParameter("log", "", "MCAP file to write; empty = none"),
-    NodeParameter("rerun", "off", "rerun recording: off, or an .rrd file to write when the run ends"),
+    NodeParameter(
+        "rerun", "off", "off, serve (show the run while it goes on, at 127.0.0.1), or an .rrd file to write at the end"
+    ),
+    NodeParameter("rerun_bind", "127.0.0.1", "with rerun: serve, where to listen; 0.0.0.0 = for all who reach this"),
+    NodeParameter("rerun_port", 0.0, "with rerun: serve, the port for viewers; 0 = the first free one from 9876", 0.0),
     NodeParameter("model", "auto", "auto, or a model's name"),
     NodeParameter("dimension", "auto", "auto, 2 or 3"),
     NodeParameter("dt", 0.0, "fixed steps of this length, with `tolerance` the first [s]; 0 = as the scene says", 0.0),

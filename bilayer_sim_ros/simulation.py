@@ -15,6 +15,7 @@ from bilayer_sim_ros.answers import Answers
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.control import SHORTEST_PERIOD, Control, tick_rate
 from bilayer_sim_ros.live_parameters import LiveParameters
+from bilayer_sim_ros.live_view import SERVE, live_view
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.parameters import SIM_NODE, Value
@@ -34,7 +35,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     """Simulate until the duration is reached or `stop` is set; raises what the simulation stopped with."""
     scene = load_scene(parameters["scene"])
     rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
-    rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
+    rerun_path = "" if parameters["rerun"] in ("off", SERVE) else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
     recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience)
     simulator = Simulator(
@@ -67,10 +68,11 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         inputs.notify = lambda: worker.wake()
     announcer = Announcer(node, inputs, parameters, lambda event: worker.tell(event))
     pacer = Pacer(parameters["real_time_factor"])
+    publisher = FramePublisher(node, description, rate, marker_rate, clock and not lockstep)
     worker = SimulationWorker(
         simulator,
         control=Control(inputs, commands, ticks, parameters["stimulus_interpolation"], gate),
-        publisher=FramePublisher(node, description, rate, marker_rate, clock and not lockstep),
+        publisher=publisher,
         recording=recording,
         rate=rate,
         marker_rate=marker_rate,
@@ -90,6 +92,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     }
     LiveParameters(node, SIM_NODE, changes)
     services = Services(node, [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")])
+    viewers = live_view(node, parameters)
     state = "paused" if parameters["start_paused"] else "running"
     try:
         # What is asked for and sent meanwhile waits.
@@ -98,10 +101,13 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         node.get_logger().info(
             f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}"
         )
+        viewers.wait(stop)
         worker.start()
         stop.wait()
     finally:
         worker.stop()
+        publisher.finish()
+        viewers.end()
         services.finish()
     if worker.log_status.dropped:
         node.get_logger().warning(f"the log lacks {worker.log_status.dropped} frames: the disk was too slow")
