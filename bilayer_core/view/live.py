@@ -50,11 +50,6 @@ class LiveView:
         self._arriving = ArrivingRun(description)
         self._sender: RunSender | None = None
         self._scales: LiveScales | None = None
-        sinks: list = [rr.GrpcSink(self._server.url)]
-        if self._save is not None:
-            sinks.append(rr.FileSink(suffixed(self._save, self._number)))
-        self._recording = rr.RecordingStream("bilayer_sim")
-        self._recording.set_sinks(*sinks)
 
     def add(self, topic: str, stamp: int, data: bytes) -> None:
         """Take a message: full name of its topic in a log, time [ns]."""
@@ -84,7 +79,11 @@ class LiveView:
 
     def _start(self, run: RunData) -> None:
         self._scales = LiveScales(run, self._colour)
-        self._recording.send_blueprint(_layout(run, self._scales), make_active=False, make_default=True)
+        sinks: list = [rr.GrpcSink(self._server.url)]
+        if self._save is not None:
+            sinks.append(rr.FileSink(suffixed(self._save, self._number)))
+        self._recording = rr.RecordingStream("bilayer_sim")
+        self._recording.set_sinks(*sinks, default_blueprint=_layout(run, self._scales))
         self._sender = RunSender(self._recording, run.description)
         self._sender.begin(self._scales.scales)
         self._explain(float(run.times[0]))

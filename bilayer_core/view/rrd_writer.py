@@ -105,17 +105,20 @@ class RunSender:
 
     def explain(self, text: str, colouring: Colouring, time: float | None = None) -> None:
         """Say in Markdown what is shown and draw the colour bar: for the whole run, or from a time on [s]."""
-        recording, static = self._recording, time is None
-        if time is not None:
-            recording.set_time(TIMELINE, duration=time)
-        recording.log("summary", rr.TextDocument(text, media_type="text/markdown"), static=static)
         bar = np.tile(_bytes(colouring.colour_map[:, :3]), (LEGEND_HEIGHT, 1, 1))
-        recording.log("legend", rr.Image(bar), static=static)
         steps = bar.shape[1]
         ticks = [[min(max(6.0, place * steps), steps - 6.0), LEGEND_HEIGHT + 8] for place, _ in colouring.ticks]
         texts = [text for _, text in colouring.ticks]
-        labels = rr.Points2D(ticks, labels=texts, radii=0.01, colors=(200, 200, 200), show_labels=True)
-        recording.log("legend/ticks", labels, static=static)
+        shown = {
+            "summary": rr.TextDocument(text, media_type="text/markdown"),
+            "legend": rr.Image(bar),
+            "legend/ticks": rr.Points2D(ticks, labels=texts, radii=0.01, colors=(200, 200, 200), show_labels=True),
+        }
+        if time is not None:
+            self._recording.set_log_time_enabled(False)  # the only time is that of the run
+            self._recording.set_time(TIMELINE, duration=time)
+        for path, archetype in shown.items():
+            self._recording.log(path, archetype, static=time is None)
 
     def send(self, run: RunData, scales: Scales, colouring: Colouring, reactions: Mapping[str, Arrows]) -> None:
         """Send all that changes with time; `reactions` by name."""
