@@ -23,6 +23,9 @@ DEPTH = 200
 NICENESS = 10
 """Of a follower beside a node: the simulation comes first."""
 
+STANDARD_INPUT = 0
+"""Its descriptor."""
+
 
 def main(argv: list[str] | None = None) -> int:
     """Follow until a signal comes or the window is closed; the exit code."""
@@ -60,7 +63,8 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 def _wait_for_the_end(stop: threading.Event) -> None:
     """The node holds the other end of the standard input, which closes with it."""
-    sys.stdin.buffer.read()
+    while os.read(STANDARD_INPUT, 1024):  # past Python's buffer, which would be in use where the program ends
+        pass
     stop.set()
 
 

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from rclpy.node import Node
@@ -32,8 +32,8 @@ _LOOK = 0.05
 class Viewers(Protocol):
     """Who looks at the run while it goes on."""
 
-    def wait(self, stop: threading.Event) -> None:
-        """Return once the first frame would be seen, or the node is to end."""
+    def wait(self, stop: threading.Event, seen: Callable[[], bool]) -> None:
+        """Return once the first frame would be `seen`, or the node is to end."""
 
     def end(self) -> None:
         """The run is over."""
@@ -42,7 +42,7 @@ class Viewers(Protocol):
 class Nobody:
     """No live view was asked for."""
 
-    def wait(self, stop: threading.Event) -> None:
+    def wait(self, stop: threading.Event, seen: Callable[[], bool]) -> None:
         """Return at once."""
 
     def end(self) -> None:
@@ -85,7 +85,7 @@ class LiveView:
         command = [sys.executable, "-m", FOLLOWER, f"--node={node.get_fully_qualified_name()}", "--serve"]
         command += [f"--bind={bind}", "--beside-node"] + ([f"--port={port}"] if port else [])
         self._ready = threading.Event()
-        self._ending = False
+        self._ending, self._said = False, ""
         self._process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,  # its end tells the process that the node is gone
@@ -98,11 +98,20 @@ class LiveView:
         self._listener = threading.Thread(target=self._listen, name="live view", daemon=True)
         self._listener.start()
 
-    def wait(self, stop: threading.Event) -> None:
-        """Return once the first frame would be seen, or nobody is there to see it."""
+    def wait(self, stop: threading.Event, seen: Callable[[], bool]) -> None:
+        """Return once the first frame would be `seen`, or nobody is there to see it.
+
+        Raises
+        ------
+        InputError
+            If it cannot be served where it was asked for.
+        """
         deadline = time.monotonic() + START_LIMIT
-        while not self._ready.is_set() and not stop.wait(_LOOK):
+        while not (self._ready.is_set() and seen()) and not stop.wait(_LOOK):
             if self._process.poll() is not None:
+                self._listener.join(EXIT_LIMIT)
+                if self._process.returncode == InputError.exit_code:
+                    raise InputError(f"rerun: {SERVE}: {self._said.removeprefix('bilayer: ')}")
                 return
             if time.monotonic() > deadline:
                 self._logger.warning(f"the live view has not begun for {START_LIMIT:g} s; the simulation begins")
@@ -122,9 +131,10 @@ class LiveView:
     def _listen(self) -> None:
         """Repeat what it says, until it ends."""
         for line in self._process.stdout:
-            self._logger.info(f"live view: {line.rstrip()}")
+            self._said = line.rstrip()
+            self._logger.info(f"live view: {self._said}")
             if line.startswith(READY):
                 self._ready.set()
         code = self._process.wait()
-        if not self._ending:
+        if not self._ending and code != InputError.exit_code:  # which `wait` tells
             self._logger.error(f"the live view has ended with exit code {code}; the simulation goes on without it")

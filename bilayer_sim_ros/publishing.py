@@ -72,6 +72,10 @@ class FramePublisher:
         self._events.tell(event)
         self._live.tell(event)
 
+    def is_shown(self) -> bool:
+        """Whether anybody shows the run while it goes on."""
+        return self._live.wanted
+
     def finish(self) -> None:
         """Send what was held back, after the last frame."""
         self._live.finish()

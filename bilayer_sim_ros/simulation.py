@@ -101,7 +101,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
         node.get_logger().info(
             f"'{description.scene_name}' is ready ({seconds:.1f} s to compile or load kernels), {state}"
         )
-        viewers.wait(stop)
+        viewers.wait(stop, publisher.is_shown)
         worker.start()
         stop.wait()
     finally:
