@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,11 +35,32 @@ def _debug_option() -> click.Option:
 
 
 class Verb(click.Command):
-    """A command that takes --debug after its name too."""
+    """A command that takes --debug after its name too.
 
-    def __init__(self, *arguments: Any, **settings: Any):
+    Parameters
+    ----------
+    old_spellings : mapping
+        Options of earlier releases that are not in the help, such as ``"--time"`` to ``"--at"``; they work on for this
+        one, with a note.
+    """
+
+    def __init__(self, *arguments: Any, old_spellings: Mapping[str, str] | None = None, **settings: Any):
         super().__init__(*arguments, **settings)
         self.params.append(_debug_option())
+        self._old_spellings = old_spellings or {}
+
+    def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
+        """Understand old spellings, up to ``--``."""
+        args = list(args)
+        for place, argument in enumerate(args):
+            if argument == "--":
+                break
+            name, equals, value = argument.partition("=")
+            if name in self._old_spellings:
+                new = self._old_spellings[name]
+                say_renamed(name, new)
+                args[place] = f"{new}{equals}{value}"
+        return super().parse_args(context, args)
 
 
 class VerbGroup(click.Group):
@@ -93,29 +114,9 @@ class Duration(click.ParamType):
             self.fail(f"found {value!r}{note}; {fault['msg']}", param, context)
 
 
-def renamed(old: str, new: str, name: str, **settings: Any) -> Callable[[Callable], Callable]:
-    """An option's spelling of earlier releases, which works on for this one with a note, and is not in the help.
-
-    Parameters
-    ----------
-    old, new : str
-        Spellings, such as ``"--time"``.
-    name : str
-        Of the function's argument, which is the option's of the new spelling.
-    **settings
-        Of `click.option`, as for the new spelling.
-    """
-
-    def take(context: click.Context, option: click.Parameter, value: Any) -> Any:
-        if context.get_parameter_source(option.name) is not click.core.ParameterSource.COMMANDLINE:
-            return None
-        click.echo(f"bilayer: {old} is called {new} now; the old name goes with the next release", err=True)
-        if context.params.get(name) not in (None, False, ()):
-            raise InputError(f"{old}: is the old name of {new}; give it once")
-        context.params[name] = value
-        return None
-
-    return click.option(old, f"old_{name}", hidden=True, expose_value=False, is_eager=False, callback=take, **settings)
+def say_renamed(old: str, new: str) -> None:
+    """Tell on standard error that a spelling of earlier releases works for this one more."""
+    click.echo(f"bilayer: {old} is {new} now; the old spelling goes with the next release", err=True)
 
 
 def output_directory(out: str) -> Path:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import click
 
-from bilayer_core.cli.options import Duration, Verb, renamed
+from bilayer_core.cli.options import Duration, Verb
 
 NODE = "/bilayer_sim"
 FOLLOWING = {"node": "--node", "bind": "--bind", "port": "--port", "serve": "--serve"}
 
 
-@click.command(cls=Verb)
+@click.command(cls=Verb, old_spellings={"--time": "--at"})
 @click.argument("file", metavar="[FILE.mcap|FILE.rrd]", required=False)
 @click.option("--follow", is_flag=True, help="Show a run while it goes on: of a node, or in a log that is written.")
 @click.option("--node", metavar="NAME", help=f"Which node to follow; default: {NODE}.")
@@ -25,7 +25,6 @@ FOLLOWING = {"node": "--node", "bind": "--bind", "port": "--port", "serve": "--s
 @click.option("--save", metavar="FILE.rrd", help="Write a rerun recording; with --follow, as well.")
 @click.option("--screenshot", "picture", metavar="FILE.png", help="Write a picture, without a screen.")
 @click.option("--at", "moment", type=Duration(from_zero=True), help="Time of the picture; default: the end.")
-@renamed("--time", "--at", "moment", type=Duration(from_zero=True))
 @click.option(
     "--colour",
     type=click.Choice(["strain", "curvature", "contact"]),

@@ -55,6 +55,7 @@ def test_a_served_node_says_where_at_this_machine_and_its_viewers_end_with_it(st
     assert "has ended" not in node.output and "Traceback" not in node.output
 
 
+@pytest.mark.slow
 def test_the_viewers_of_a_killed_node_end_as_well(start, domain):
     node = start("sim_node", domain, SERVED | {"start_paused": True})
     node.wait_for("live view: following")
@@ -64,6 +65,7 @@ def test_the_viewers_of_a_killed_node_end_as_well(start, domain):
     assert len(below) == 2 and all(map(gone, below))
 
 
+@pytest.mark.slow
 def test_a_follower_shows_a_run_from_its_first_frame_and_a_reset_as_another(start, connect, domain, tmp_path):
     node = start("sim_node", domain, {"scene": "bending", "start_paused": True, "real_time_factor": 0.5, "rate": 50.0})
     client = connect(node)
@@ -135,6 +137,7 @@ def test_what_a_run_is_of_is_told_to_who_comes_late(start, connect, domain):
     assert [strand.name for strand in found.strands] == [strand.name for strand in expected.strands]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_served_ends_the_node_before_it_begins(start, domain):
     node = start("sim_node", domain, SERVED | {"rerun_port": 0.5})
     assert node.wait() == 2 and "'rerun_port' is 0.5; allowed is a whole number from 0 to 65535" in node.output
@@ -143,6 +146,7 @@ def test_what_cannot_be_served_ends_the_node_before_it_begins(start, domain):
     assert "sim_node: rerun: serve: --bind: cannot listen at 192.0.2.7" in node.output
 
 
+@pytest.mark.slow
 def test_a_follower_waits_for_its_node_and_refuses_what_is_no_name(start, domain):
     follower = start("follower", domain, arguments=["--serve", "--node=not a name"])
     assert follower.wait() == 2 and "is no name of a node" in follower.output
