@@ -14,6 +14,8 @@ Value = bool | float | int | str | list[str]
 # Parameters that every rclpy node has of itself.
 BUILT_IN = ("use_sim_time", "start_type_description_service")
 BUILT_IN_PREFIX = "qos_overrides."
+OFF = "off"
+"""What a parameter file, and ``-p NAME:=off``, understand as false."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,8 @@ class NodeParameter:
         """`value` as the parameter's type (an integer will do for a number), or InputError."""
         if isinstance(self.default, list) and isinstance(value, str):
             value = [value]
+        if value is False and self.default == OFF:
+            value = OFF
         if self._is_allowed(value):
             return float(value) if isinstance(self.default, float) else value
         raise InputError(f"parameter '{self.name}' is {value!r}; allowed is {self.allowed} ({self.description})")
@@ -147,9 +151,11 @@ SIM_NODE = (
     ),
     NodeParameter("log", "", "MCAP file to write; empty = none"),
     NodeParameter(
-        "rerun", "off", "off, serve (show the run while it goes on, at 127.0.0.1), or an .rrd file to write at the end"
+        "rerun", OFF, "off, serve (show the run while it goes on, at 127.0.0.1), or an .rrd file to write at the end"
     ),
-    NodeParameter("rerun_bind", "127.0.0.1", "with rerun: serve, where to listen; 0.0.0.0 = for all who reach this"),
+    NodeParameter(
+        "rerun_bind", "127.0.0.1", "with rerun: serve, where to listen; 0.0.0.0 = for all who reach this machine"
+    ),
     NodeParameter("rerun_port", 0.0, "with rerun: serve, the port for viewers; 0 = the first free one from 9876", 0.0),
     NodeParameter("model", "auto", "auto, or a model's name"),
     NodeParameter("dimension", "auto", "auto, 2 or 3"),

@@ -18,7 +18,7 @@ from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.live_view import SERVE, live_view
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.parameters import SIM_NODE, Value
+from bilayer_sim_ros.parameters import OFF, SIM_NODE, Value
 from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
@@ -35,7 +35,7 @@ def simulate(node: Node, parameters: Mapping[str, Value], stop: threading.Event)
     """Simulate until the duration is reached or `stop` is set; raises what the simulation stopped with."""
     scene = load_scene(parameters["scene"])
     rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
-    rerun_path = "" if parameters["rerun"] in ("off", SERVE) else parameters["rerun"]
+    rerun_path = "" if parameters["rerun"] in (OFF, SERVE) else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
     recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience)
     simulator = Simulator(

@@ -32,6 +32,8 @@ VISITORS = 50
 STAY = 15.0
 """How long one stays, on average [s]."""
 NAN, INF = math.nan, math.inf
+LOW, HIGH, AWAY = 3e-3, 6e-3, 0.03
+"""Heights that the body is sent to [m], and the one in poses that are refused."""
 
 
 def pose(z, quaternion=(0.0, 0.0, 0.0, 1.0), frame="world"):
@@ -53,7 +55,7 @@ def good(generator):
     yield "stimulus/heat", Float64(data=value)
     yield "stimulus_stamped", stamped(["heat"], [value])
     yield "load/push", Float64(data=value)
-    yield "mount_pose/hand", pose(generator.uniform(3e-3, 6e-3))
+    yield "mount_pose/hand", pose(generator.uniform(LOW, HIGH))
 
 
 def malformed(generator):
@@ -68,10 +70,10 @@ def malformed(generator):
     yield from (("load/push", Float64(data=value)) for value in (NAN, INF))
     yield "load/unknown", Float64(data=1.0)
     yield "mount_pose/unknown", pose(0.01)
-    yield "mount_pose/hand", pose(4e-3, (NAN, 0.0, 0.0, 1.0))
-    yield "mount_pose/hand", pose(4e-3, (0.0, 0.0, 0.0, 0.0))
+    yield "mount_pose/hand", pose(AWAY, (NAN, 0.0, 0.0, 1.0))
+    yield "mount_pose/hand", pose(AWAY, (0.0, 0.0, 0.0, 0.0))
     yield "mount_pose/hand", pose(NAN)
-    yield "mount_pose/hand", pose(4e-3, frame="elsewhere")
+    yield "mount_pose/hand", pose(AWAY, frame="elsewhere")
 
 
 def send(stop):

@@ -1,5 +1,6 @@
 """Logs that are shown while they are written."""
 
+import io
 import os
 import re
 import shutil
@@ -15,6 +16,7 @@ import psutil
 import pytest
 import recordings
 import synthetic_run
+from PIL import Image
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.arriving import ArrivingRun
@@ -23,6 +25,7 @@ from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.packing import pack, unpack
 from bilayer_core.record.topics import Rate, output_topics
+from bilayer_core.view import viewer_process
 from bilayer_core.view.server import ViewServer
 
 TIMES = np.arange(0, 101) * 0.04
@@ -200,3 +203,26 @@ def test_parts_of_a_frame_come_back_and_a_frame_that_lacks_some_is_refused():
     for bad in [(label, data + b"6"), ("com", b""), ("com:x", b"1"), ("com:-1", b"")]:
         with pytest.raises(InputError, match="parts of a frame"):
             unpack(*bad)
+
+
+@pytest.mark.slow
+def test_a_viewer_that_connects_late_sees_the_robot_with_its_layout_at_any_time(log, tmp_path):
+    with following(tmp_path, log) as follower, viewer_process.HeadlessViewer() as viewer:
+        follower.wait_for("is finished")
+        viewer.open(re.search(r"rerun\+http://\S+", follower.said)[0])
+        shown = []
+        for moment in (0.0, 4.0):
+            viewer.set_time(moment)
+            picture = Image.open(io.BytesIO(viewer.picture())).convert("RGB")
+            shown.append(np.asarray(picture).astype(int)[70:860, :1195])
+        assert viewer.complaints() == []
+        views = {view.name for view in viewer.client.get_state().views}
+        (recording,) = viewer.client.get_state().recordings
+    assert {"Robot", "axial strain [%]", "Run", "Stimulus", "Contact force [N]", "Solver", "Events"} <= views
+    assert [(item.name, item.start, item.end) for item in recording.timelines] == [("sim_time", 0, 4 * 10**9)]
+    red, green = (
+        [np.count_nonzero((part[..., a] > 110) & (part[..., a] > 1.7 * part[..., b])) for part in shown]
+        for a, b in ((0, 2), (1, 0))
+    )
+    assert red[1] > red[0] + 3000  # arms that are strained, beside the ball
+    assert green[0] == 0 and green[1] > 500  # arrows of contact
