@@ -107,7 +107,7 @@ def open_for(
     if not serving.window:
         return None
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
-        say("there is no screen here: open the address on a machine that has one")
+        say("there is no screen here: no window is opened, viewers may connect from elsewhere")
         return None
     if serving.web:
         import webbrowser
