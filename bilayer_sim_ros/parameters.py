@@ -14,6 +14,8 @@ Value = bool | float | int | str | list[str]
 # Parameters that every rclpy node has of itself.
 BUILT_IN = ("use_sim_time", "start_type_description_service")
 BUILT_IN_PREFIX = "qos_overrides."
+OFF = "off"
+"""What a parameter file, and ``-p NAME:=off``, understand as false."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class NodeParameter:
             value = str(value)
         if isinstance(self.default, list) and isinstance(value, str):
             value = [value]
+        if value is False and self.default == OFF:
+            value = OFF
         if self._is_allowed(value):
             return float(value) if isinstance(self.default, float) else value
         raise InputError(f"parameter '{self.name}' is {value!r}; allowed is {self.allowed} ({self.description})")
@@ -164,7 +168,13 @@ SIM_NODE = (
         0.0,
     ),
     NodeParameter("log", "", "MCAP file to write; empty = none"),
-    NodeParameter("rerun", "off", "rerun recording: off, or an .rrd file to write when the run ends"),
+    NodeParameter(
+        "rerun", OFF, "off, serve (show the run while it goes on, at 127.0.0.1), or an .rrd file to write at the end"
+    ),
+    NodeParameter(
+        "rerun_bind", "127.0.0.1", "with rerun: serve, where to listen; 0.0.0.0 = for all who reach this machine"
+    ),
+    NodeParameter("rerun_port", 0.0, "with rerun: serve, the port for viewers; 0 = the first free one from 9876", 0.0),
     NodeParameter("model", "auto", "auto, or a model's name"),
     NodeParameter("dimension", "auto", "2 in a plane, 3 in space", choices=("auto", "2", "3")),
     NodeParameter("dt", 0.0, "fixed steps of this length, with `tolerance` the first [s]; 0 = as the scene says", 0.0),

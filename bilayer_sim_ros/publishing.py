@@ -13,6 +13,7 @@ from bilayer_core.record.events import Event
 from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec, output_topics
 from bilayer_sim_ros.conversions import to_time
 from bilayer_sim_ros.events import EventPublisher
+from bilayer_sim_ros.live_topic import LivePublisher
 from bilayer_sim_ros.message_types import CLOCK_TOPIC, message_class
 
 
@@ -47,15 +48,19 @@ class FramePublisher:
             if clock or spec.name != CLOCK_TOPIC
         ]
         self._events = EventPublisher(node, description)
+        self._live = LivePublisher(node, description, self._encoder, rate, marker_rate)
 
     def set_rates(self, rate: float, marker_rate: float) -> None:
         """Go on with other rates [Hz]."""
         self._gate.set_rates(rate, marker_rate)
+        self._live.set_rates(rate, marker_rate)
 
     @property
     def wanted(self) -> bool:
         """Whether anybody subscribes to anything."""
-        return self._events.wanted or any(of.get_subscription_count() > 0 for _, of in self._topics)
+        if self._events.wanted or self._live.wanted:
+            return True
+        return any(of.get_subscription_count() > 0 for _, of in self._topics)
 
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send `frame` on every topic that has a subscriber and is due, or on every one of them."""
@@ -64,10 +69,20 @@ class FramePublisher:
             if (display or spec.rate is not Rate.DISPLAY) and publisher.get_subscription_count() > 0:
                 publisher.publish(self._encoder.encode(spec.name, frame))
         self._events.publish(frame)
+        self._live.publish(frame, everything)
 
     def tell(self, event: Event) -> None:
         """Send an event that frames do not show."""
         self._events.tell(event)
+        self._live.tell(event)
+
+    def is_shown(self) -> bool:
+        """Whether anybody shows the run while it goes on."""
+        return self._live.wanted
+
+    def finish(self) -> None:
+        """Send what was held back, after the last frame."""
+        self._live.finish()
 
 
 class ClockPublisher:

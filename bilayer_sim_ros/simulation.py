@@ -16,9 +16,10 @@ from bilayer_sim_ros.control import SHORTEST_PERIOD, Control, tick_rate
 from bilayer_sim_ros.graph_watch import GraphWatch
 from bilayer_sim_ros.live_friction import LiveFriction, friction_overrides
 from bilayer_sim_ros.live_parameters import LiveParameters
+from bilayer_sim_ros.live_view import SERVE
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
 from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.parameters import FRICTION, SIM_NODE, Value
+from bilayer_sim_ros.parameters import FRICTION, OFF, SIM_NODE, Value
 from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
 from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
@@ -50,6 +51,8 @@ class Simulation:
         At its start, not compiled.
     worker : SimulationWorker
         Not started.
+    frames : WhileValid
+        Where its frames are published.
     services : Services
     announcer : Announcer
     state : str
@@ -58,6 +61,7 @@ class Simulation:
 
     simulator: Simulator
     worker: SimulationWorker
+    frames: WhileValid
     services: Services
     announcer: Announcer
     state: str
@@ -87,7 +91,7 @@ def wire(
     if changed := friction_overrides(scene, parameters):
         scene = load_scene(parameters["scene"], changed)
     rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
-    rerun_path = "" if parameters["rerun"] == "off" else parameters["rerun"]
+    rerun_path = "" if parameters["rerun"] in (OFF, SERVE) else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
     tf = tf_prefix(node, parameters)
     recording = Recording(parameters["log"], rerun_path, rate, marker_rate, patience, tf)
@@ -154,4 +158,4 @@ def wire(
     services = Services(node, offered + simulator_services(node, worker, description, end))
     GraphWatch(node)
     state = "paused" if parameters["start_paused"] else "running"
-    return Simulation(simulator, worker, services, announcer, state)
+    return Simulation(simulator, worker, frames, services, announcer, state)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import atexit
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from rclpy.node import Node
 
+from bilayer_core.errors import BilayerError
 from bilayer_core.jit.compile_all import ensure_compiled
+from bilayer_sim_ros.live_view import Nobody, Viewers, live_view
 from bilayer_sim_ros.parameters import Value
 from bilayer_sim_ros.simulation import wire
 
@@ -52,6 +55,7 @@ class SimulationRun:
         self._turn = threading.Event()  # compiled, or to be stopped
         self._reason = ""
         self._lock = threading.Lock()
+        self._show: Callable[[], Viewers] = partial(live_view, node, parameters)
         self._simulation = wire(node, parameters, self._stop.set, self.stop)
         self._compilation = threading.Thread(target=self._compile, name="compilation", daemon=True)
         self._thread = threading.Thread(target=self._live, name="simulation run", daemon=True)
@@ -101,10 +105,15 @@ class SimulationRun:
 
     def _live(self) -> None:
         worker, simulator = self._simulation.worker, self._simulation.simulator
+        viewers = self._begin_view()
         try:
-            self._compilation.start()
-            self._turn.wait()
-            if self._stop.is_set():
+            if self.error is None:
+                self._compilation.start()
+                self._turn.wait()
+            in_time = not self._stop.is_set()
+            if in_time:
+                self._await_viewers(viewers)
+            if not in_time:
                 worker.stop()
                 reason = f"{self._reason} while kernels were compiled"
                 worker.tell_failure(reason)
@@ -123,9 +132,25 @@ class SimulationRun:
         except Exception as error:
             self.error = self.error or error
         finally:
+            self._simulation.frames.finish()
+            viewers.end()
             atexit.unregister(self._end_with_program)
             self._over.set()
             self._ended()
+
+    def _begin_view(self) -> Viewers:
+        try:
+            return self._show()
+        except BilayerError as error:
+            self.error = error
+            return Nobody()
+
+    def _await_viewers(self, viewers: Viewers) -> None:
+        if self.error is None:
+            try:
+                viewers.wait(self._stop, self._simulation.frames.is_shown)
+            except BilayerError as error:
+                self.error = error
 
     def _compile(self) -> None:
         try:

@@ -53,17 +53,25 @@ class WhileValid:
         self._publish = while_valid(node, publisher.publish)
         self.set_rates = publisher.set_rates
         self.tell: Callable[[Event], None] = while_valid(node, publisher.tell)
+        self.finish: Callable[[], None] = while_valid(node, publisher.finish)
 
     @property
     def wanted(self) -> bool:
         """Whether anybody subscribes to anything."""
-        try:
-            return self._publisher.wanted
-        except Exception:
-            if is_valid(self._node):
-                raise
-            return False
+        return self._if_valid(lambda: self._publisher.wanted)
+
+    def is_shown(self) -> bool:
+        """Whether anybody shows the run while it goes on."""
+        return self._if_valid(self._publisher.is_shown)
 
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send what somebody listens to."""
         self._publish(frame, everything)
+
+    def _if_valid(self, ask: Callable[[], bool]) -> bool:
+        try:
+            return ask()
+        except Exception:
+            if is_valid(self._node):
+                raise
+            return False

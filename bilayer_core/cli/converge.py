@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Duration, Verb, scene_argument, set_option
 from bilayer_core.cli.watch import compile_kernels
 
@@ -18,7 +19,7 @@ from bilayer_core.cli.watch import compile_kernels
 @click.option("--quantity", "quantities", multiple=True, metavar="NAME", help="A figure to judge, such as com.x.")
 @set_option
 @click.option("--workers", type=click.IntRange(1), help="Runs side by side; default: one a core.")
-@click.option("--json", "json_file", metavar="FILE.json", help="Write all values.")
+@json_option("Write all values")
 @click.option("--quiet", is_flag=True, help="No progress.")
 def converge(
     scene: str,
@@ -31,12 +32,9 @@ def converge(
 ) -> None:
     """Run SCENE at twice and half its time step, with half and twice its edges: observed orders and error bars."""
     from bilayer_core.converge import study
-    from bilayer_core.record.paths import check_output_path, write_text
     from bilayer_core.scene.loader import load_scene
 
     config = load_scene(scene, overrides)
-    if json_file:
-        check_output_path(json_file, force=True, suffix=".json")
     runs = len(study.planned_runs(config))
     done = 0
 
@@ -46,14 +44,14 @@ def converge(
         if not quiet:
             click.echo(f"  run {done} of {runs} done: {name}", err=True)
 
-    compile_kernels(quiet)
-    found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
-    click.echo(f"{config.name}: {found.integrator}, steps {found.stepping}")
-    _print_table(found.rows)
-    for name, reason in found.missing.items():
-        click.echo(f"  {name}: {reason}")
-    if json_file:
-        write_text(json_file, json.dumps(_content(config.name, found), indent=2) + "\n", force=True)
+    with json_to(json_file) as write_json:
+        compile_kernels(quiet)
+        found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
+        click.echo(f"{config.name}: {found.integrator}, steps {found.stepping}")
+        _print_table(found.rows)
+        for name, reason in found.missing.items():
+            click.echo(f"  {name}: {reason}")
+        write_json(json.dumps(_content(config.name, found), indent=2))
 
 
 def _print_table(rows: list) -> None:

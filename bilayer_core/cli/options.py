@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,11 +35,32 @@ def _debug_option() -> click.Option:
 
 
 class Verb(click.Command):
-    """A command that takes --debug after its name too."""
+    """A command that takes --debug after its name too.
 
-    def __init__(self, *arguments: Any, **settings: Any):
+    Parameters
+    ----------
+    old_spellings : mapping
+        Options of earlier releases that are not in the help, such as ``"--time"`` to ``"--at"``; they work on for this
+        one, with a note.
+    """
+
+    def __init__(self, *arguments: Any, old_spellings: Mapping[str, str] | None = None, **settings: Any):
         super().__init__(*arguments, **settings)
         self.params.append(_debug_option())
+        self._old_spellings = old_spellings or {}
+
+    def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
+        """Understand old spellings, up to ``--``."""
+        args = list(args)
+        for place, argument in enumerate(args):
+            if argument == "--":
+                break
+            name, equals, value = argument.partition("=")
+            if name in self._old_spellings:
+                new = self._old_spellings[name]
+                say_renamed(name, new)
+                args[place] = f"{new}{equals}{value}"
+        return super().parse_args(context, args)
 
 
 class VerbGroup(click.Group):
@@ -90,6 +112,11 @@ class Duration(click.ParamType):
             fault = error.errors()[0]
             note = f", {fault['ctx']['note']}" if fault["ctx"]["note"] else ""
             self.fail(f"found {value!r}{note}; {fault['msg']}", param, context)
+
+
+def say_renamed(old: str, new: str) -> None:
+    """Tell on standard error that a spelling of earlier releases works for this one more."""
+    click.echo(f"bilayer: {old} is {new} now; the old spelling goes with the next release", err=True)
 
 
 def output_directory(out: str) -> Path:

@@ -15,7 +15,7 @@ from bilayer_core.cli.check import check
 from bilayer_core.cli.compare import compare
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.export import export
-from bilayer_core.cli.logs import info, view
+from bilayer_core.cli.info import info
 from bilayer_core.cli.new import new
 from bilayer_core.cli.options import Settings, VerbGroup
 from bilayer_core.cli.plot import plot
@@ -27,6 +27,7 @@ from bilayer_core.cli.scenes import scenes, schema
 from bilayer_core.cli.signals import Signals
 from bilayer_core.cli.stress import stress
 from bilayer_core.cli.validate import validate
+from bilayer_core.cli.view import view
 from bilayer_core.errors import BilayerError
 
 INTERNAL_ERROR = 70

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.nodes import become_replay_node
 from bilayer_core.cli.options import Duration, Verb, set_option
 from bilayer_core.cli.signals import Interruption
@@ -29,7 +30,7 @@ MANY = "Many runs, each with another value of stimulus.CHANNEL, load.NAME or a k
 @click.argument("log", metavar="LOG.mcap")
 @click.option("--verify", "verifies", is_flag=True, help="Simulate the run again, and compare every state in the log.")
 @click.option("--tolerance", type=float, metavar="X", help="Part of the longest rod by which positions may differ.")
-@click.option("--json", "json_file", metavar="FILE.json", help="Write what came of it; - is standard output.")
+@json_option("Write what came of it")
 @click.option("--from", "moment", type=Duration(from_zero=True), metavar="T", help="Go on from this time of the log.")
 @set_option
 @click.option("--stimulus", "stimuli", multiple=True, metavar="CHANNEL=VALUE", help=THENCE)
@@ -105,23 +106,16 @@ def replay(
 
 
 def _verify(log: str, tolerance: float | None, json_file: str | None, force: bool, quiet: bool) -> int:
-    from bilayer_core.record.paths import check_output_path, write_text
     from bilayer_core.runs.replay import verify
 
     if tolerance is not None and not tolerance > 0.0:
         raise InputError(f"--tolerance: {tolerance} is not allowed; it must be a part of the longest rod above 0")
-    if json_file not in (None, "-"):
-        check_output_path(json_file, force, ".json")
-    compile_kernels(quiet)
-    found = verify(log, tolerance)
-    if json_file is not None:
-        text = json.dumps(_as_json(found), indent=2) + "\n"
-        if json_file == "-":
-            click.echo(text, nl=False)
-        else:
-            write_text(json_file, text, force)
-    if not quiet and json_file != "-":
-        _tell(found)
+    with json_to(json_file, force) as write_json:
+        compile_kernels(quiet)
+        found = verify(log, tolerance)
+        write_json(json.dumps(_as_json(found), indent=2))
+        if not quiet:
+            _tell(found)
     return 0 if found.passed else DIFFERS
 
 

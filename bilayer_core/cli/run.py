@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import sys
+from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from bilayer_core.cli.json_output import STANDARD_OUTPUT
 from bilayer_core.cli.options import Duration, Rate, Verb, scene_argument, set_option
 from bilayer_core.cli.report import summary_lines
 from bilayer_core.cli.signals import Interruption
@@ -45,7 +48,7 @@ OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_stat
 )
 @click.option("--tf", is_flag=True, help="Have frames of bodies and ends of rods on /tf in the log.")
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
-@click.option("--summary", metavar="FILE.json", help="Write all figures of the run.")
+@click.option("--summary", metavar="FILE.json|-", help="Write all figures of the run; - is standard output.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
 @click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
 @click.option("--at", type=Duration(from_zero=True), metavar="T", help="Of the log of --from-state, its state at T.")
@@ -74,7 +77,8 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     failure = _write_outputs(simulator, summary, options, failure)
     try:
         if not quiet:
-            _tell(simulator, summary, options, judge)
+            with redirect_stdout(sys.stderr) if _is_stdout("summary", options) else nullcontext():
+                _tell(simulator, summary, options, judge)
     finally:  # that nobody reads what is told hides nothing
         if failure is not None:
             raise failure
@@ -82,6 +86,11 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
             raise Interruption(interrupt.wished)
         if judge is not None and judge.interruption is not None:
             raise judge.interruption
+
+
+def _is_stdout(key: str, options: dict[str, Any]) -> bool:
+    """Whether an output goes to standard output, which then has nothing else."""
+    return key == "summary" and options[key] == STANDARD_OUTPUT
 
 
 class _Judge:
@@ -126,7 +135,7 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     from bilayer_core.record.paths import check_output_path
 
     force, output = options["force"], config.output
-    paths = {key: options[key] for key in OUTPUT_SUFFIXES if options[key]}
+    paths = {key: options[key] for key in OUTPUT_SUFFIXES if options[key] and not _is_stdout(key, options)}
     for place, (key, path) in enumerate(paths.items()):
         check_output_path(path, force, OUTPUT_SUFFIXES[key])
         if Path(path).resolve() in {Path(other).resolve() for other in [*paths.values()][:place]}:
@@ -237,7 +246,11 @@ def _write_outputs(
         write_state(path, simulator.save_state(), simulator.description, options["force"])
 
     def figures(path: str) -> None:
-        write_text(path, json.dumps(summary, indent=2, allow_nan=False) + "\n", options["force"])
+        text = json.dumps(summary, indent=2, allow_nan=False)
+        if _is_stdout("summary", options):
+            click.echo(text)
+        else:
+            write_text(path, text + "\n", options["force"])
 
     for key, write in (("save_state", state), ("summary", figures)):
         if not options[key]:

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Verb, output_directory
 from bilayer_core.cli.watch import compile_kernels, count_bar
 
@@ -23,7 +24,7 @@ DEFAULT_DIRECTORY = "runs/stress"
 @click.option("--list", "listed", is_flag=True, help="Name the cases and why they are outside the region of validity.")
 @click.option("--resume", is_flag=True, help="Go on with the results in DIR.")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
-@click.option("--json", "json_file", metavar="FILE.json", help="Write all results to one file.")
+@json_option("Write all results to one file")
 @click.option("--workers", type=click.IntRange(1), help="Cases side by side; default: one a core.")
 @click.option("--mutations", is_flag=True, help="Put bugs into copies of this checkout, and see what notices them.")
 @click.option("--shrink/--no-shrink", default=True, show_default=True, help="Make the scenes of failures smaller.")
@@ -49,7 +50,6 @@ def stress(
     workers = workers or len(os.sched_getaffinity(0))
     if mutations:
         return _judge_seeded_bugs(only, listed, resume, output_directory(out), workers, quiet)
-    from bilayer_core.record.paths import check_output_path
     from bilayer_core.stress import report
     from bilayer_core.stress.journal import Journal, head_of
     from bilayer_core.stress.run import chosen_cases, measure, write
@@ -60,22 +60,20 @@ def stress(
         _list(cases)
         return 0
     check_matplotlib()
-    if json_file:
-        check_output_path(json_file, force=True, suffix=".json")
     directory = output_directory(out)
     journal = Journal(directory, head_of(cases), resume)
-    compile_kernels(quiet)
-    with count_bar(len(cases) - len(journal.records), quiet) as show:
-        measure(cases, journal, workers, lambda record: _tell(record, show))
-    for path in write(cases, journal, directory, shrink, workers):
-        click.echo(f"wrote {path}")
-    records = list(journal.records.values())
-    if json_file:
-        _write_json(json_file, journal)
-    for line in report.summary_lines(records):
-        click.echo(line)
-    for line in report.shortfalls(records):
-        click.echo(line)
+    with json_to(json_file) as write_json:
+        compile_kernels(quiet)
+        with count_bar(len(cases) - len(journal.records), quiet) as show:
+            measure(cases, journal, workers, lambda record: _tell(record, show))
+        for path in write(cases, journal, directory, shrink, workers):
+            click.echo(f"wrote {path}")
+        records = list(journal.records.values())
+        write_json(_as_json(journal))
+        for line in report.summary_lines(records):
+            click.echo(line)
+        for line in report.shortfalls(records):
+            click.echo(line)
     return FAILED if any(record.outcome == "FAILED" for record in records) else 0
 
 
@@ -115,8 +113,6 @@ def _list(cases: dict) -> None:
         click.echo(f"{name}  [outside: {'; '.join(case.outside)}]" if case.outside else name)
 
 
-def _write_json(path: str, journal: Any) -> None:
-    from bilayer_core.record.paths import write_text
-
+def _as_json(journal: Any) -> str:
     content = journal.head | {"results": [json.loads(record.line()) for record in journal.records.values()]}
-    write_text(path, json.dumps(content, indent=1) + "\n", force=True)
+    return json.dumps(content, indent=1)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Verb, output_directory
 from bilayer_core.cli.watch import compile_kernels
 
@@ -22,7 +22,7 @@ WIDTHS = (52, 13, 13, 9, 7, 6)
 
 @click.command(cls=Verb)
 @click.option("--out", metavar="DIR", help="Write table (json, csv, Markdown) and figures into a directory.")
-@click.option("--json", "json_file", metavar="FILE.json", help="Write the table.")
+@json_option("Write the table")
 @click.option("--only", metavar="PATTERN", help="Cases with this in their name; * and ? stand for anything.")
 @click.option("--quick", is_flag=True, help="Leave out the cases that take long.")
 @click.option("--list", "listing", is_flag=True, help="Say what each case is checked against, and compute nothing.")
@@ -38,24 +38,20 @@ def validate(out: str | None, json_file: str | None, only: str | None, quick: bo
     directory = None if out is None else output_directory(out)
     if directory is not None:
         figures.check_matplotlib()
-    if json_file:
-        from bilayer_core.record.paths import check_output_path
-
-        check_output_path(json_file, force=True, suffix=".json")
-    compile_kernels(quiet=False)
-    _print_line(("case", "computed", "reference", "error", "limit", ""), "bold")
-    results = register.run(cases, _print_result)
-    if json_file:
-        report.write_json(results, Path(json_file))
-    if directory is not None:
-        report.write_json(results, directory / "validation.json")
-        report.write_csv(results, directory / "validation.csv")
-        report.write_page(results, directory / "validation.md")
-        for path in figures.draw(cases, directory):
-            click.echo(f"wrote {path}")
-    failed = sum(not result.passed for result in results)
-    cpu_time = sum(result.cpu_time for result in results)
-    click.echo(f"{len(results)} cases, {failed} failed; {cpu_time:.1f} s of CPU, compilation included")
+    with json_to(json_file) as write_json:
+        compile_kernels(quiet=False)
+        _print_line(("case", "computed", "reference", "error", "limit", ""), "bold")
+        results = register.run(cases, _print_result)
+        write_json(report.as_json(results))
+        if directory is not None:
+            report.write_json(results, directory / "validation.json")
+            report.write_csv(results, directory / "validation.csv")
+            report.write_page(results, directory / "validation.md")
+            for path in figures.draw(cases, directory):
+                click.echo(f"wrote {path}")
+        failed = sum(not result.passed for result in results)
+        cpu_time = sum(result.cpu_time for result in results)
+        click.echo(f"{len(results)} cases, {failed} failed; {cpu_time:.1f} s of CPU, compilation included")
     return FAILED if failed else 0
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, fields
 
 import numpy as np
 
+from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import BodyInfo, Description, JointInfo, ObstacleInfo, ShapeInfo, Strand
 
 LATER = ("joints", "channel_units")
@@ -61,3 +62,25 @@ def from_text(attributes: dict[str, str], scene_text: str) -> Description:
     values["channel_units"] = tuple(values.get("channel_units", [""] * len(values["channels"])))
     values["state_layout"] = tuple((name, tuple(shape)) for name, shape in values["state_layout"])
     return Description(scene_text=scene_text, **values)
+
+
+def to_json(description: Description) -> str:
+    """All of it as one JSON object, the scene's text included."""
+    values = {name: json.loads(text) for name, text in to_text(description).items()}
+    return json.dumps({**values, "scene_text": description.scene_text}, ensure_ascii=False)
+
+
+def from_json(text: str) -> Description:
+    """The description of which `text` is `to_json`.
+
+    Raises
+    ------
+    InputError
+        If it is none, or that of another version.
+    """
+    try:
+        values = json.loads(text)
+        scene = values.pop("scene_text")
+        return from_text({name: json.dumps(value) for name, value in values.items()}, scene)
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise InputError("what describes the run is not understood: it is of another version, or damaged") from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -62,6 +63,16 @@ class _Queue:
     seen: int = 0
 
 
+class MessageSource(Protocol):
+    """Messages of a run: a file, or what has come of it so far."""
+
+    topics: dict[str, str]
+
+    def times(self, topic: str) -> Array: ...
+
+    def messages(self, topics: set[str] | None = None) -> Iterator[tuple[str, int, bytes]]: ...
+
+
 class LogSource:
     """The quantities of a log.
 
@@ -69,7 +80,7 @@ class LogSource:
     ----------
     path : str or Path
     head : Head, optional
-    file : LogFile, optional
+    file : MessageSource, optional
         If they are read already.
 
     Attributes
@@ -88,7 +99,7 @@ class LogSource:
         If the file is no log, or is damaged; that a chunk is damaged is told when it is read.
     """
 
-    def __init__(self, path: str | Path, head: Head | None = None, file: LogFile | None = None):
+    def __init__(self, path: str | Path, head: Head | None = None, file: MessageSource | None = None):
         self.path = Path(path)
         self.description: Description = (head or read_head(self.path)).description
         self._file = file or LogFile(self.path)

@@ -117,6 +117,14 @@ EVENTS = TopicSpec("events", "rcl_interfaces/msg/Log", Rate.EVENT)
 """What happened, in words (`record.events`)."""
 
 
+DESCRIPTION = TopicSpec("description", "std_msgs/msg/String", Rate.EVENT, depth=1)
+"""What does not change in a run, as JSON (`record.description_text`): sent once, and kept for those who come late."""
+
+
+LIVE = TopicSpec("live", "std_msgs/msg/UInt8MultiArray", Rate.DISPLAY, depth=5)
+"""All messages of a frame in one, for viewers (`record.packing`); not in logs."""
+
+
 def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
     """The topics on which single channels are set; a log holds each value at the time from which it acted."""
     return tuple(TopicSpec(f"stimulus/{name}", "std_msgs/msg/Float64", Rate.EVENT) for name in description.channels)

@@ -15,10 +15,14 @@ from .case import Result
 NOTHING = 1e-8
 
 
-def write_json(results: Sequence[Result], path: Path) -> None:
+def as_json(results: Sequence[Result]) -> str:
     """``{"cases": [{case, computed, reference, error, limit, pass, …}, …]}``."""
-    text = json.dumps({"cases": [result.record() for result in results]}, indent=2, allow_nan=False)
-    write_text(path, text + "\n", force=True)
+    return json.dumps({"cases": [result.record() for result in results]}, indent=2, allow_nan=False)
+
+
+def write_json(results: Sequence[Result], path: Path) -> None:
+    """The same, as a file."""
+    write_text(path, as_json(results) + "\n", force=True)
 
 
 def write_csv(results: Sequence[Result], path: Path) -> None:

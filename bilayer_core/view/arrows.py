@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,13 +48,28 @@ def contact_arrows(run: RunData, scales: Scales) -> Arrows:
 
 def reaction_arrows(run: RunData, scales: Scales) -> dict[str, Arrows]:
     """Of what rods exert on each body that holds some, by `REACTIONS`; those alone that ever act."""
-    found, arms = {}, {"clamp_forces": 1.0, "clamp_moments": scales.size}
+    return scaled_reactions(run, scales, reaction_references(run, scales.size))
+
+
+def reaction_references(run: RunData, size: float) -> dict[str, float]:
+    """The sizes that these are scaled by, of those that act [N, N m]; `size` is that of the robot [m]."""
+    arms = {"clamp_forces": 1.0, "clamp_moments": size}
     acting = {name: run.clamp_wrenches[:, :, part] for name, part in REACTIONS.items()}
     references = {name: reference_of(of) for name, of in acting.items() if of.any()}
     largest = max((reference / arms[name] for name, reference in references.items()), default=0.0)
+    return {name: reference for name, reference in references.items() if reference / arms[name] > NOISE * largest}
+
+
+def scaled_reactions(run: RunData, scales: Scales, references: Mapping[str, float]) -> dict[str, Arrows]:
+    """Arrows of these sizes."""
+    found = {}
     for name, reference in references.items():
-        wrenches = acting[name]
-        if reference / arms[name] > NOISE * largest:
-            scale = 1.0 / rounded_up(reference / (ARROW_SHARE * scales.size))
-            found[name] = Arrows(run.times, run.body_positions, wrenches, scale, SHOWN_SHARE * reference)
+        scale = metres_per(reference, scales.size)
+        wrenches = run.clamp_wrenches[:, :, REACTIONS[name]]
+        found[name] = Arrows(run.times, run.body_positions, wrenches, scale, SHOWN_SHARE * reference)
     return found
+
+
+def metres_per(reference: float, size: float) -> float:
+    """Length of arrows by the size that they are scaled by, for a robot of a size [m]: [m/N] or [1/N]."""
+    return 1.0 / rounded_up(reference / (ARROW_SHARE * size))

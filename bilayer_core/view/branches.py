@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.drawable import refuse_undrawable
 from bilayer_core.view.layout import TIMELINE, whole
-from bilayer_core.view.rrd_writer import log_obstacles, send_bodies
+from bilayer_core.view.rrd_writer import log_bodies, log_obstacles, send_bodies
 from bilayer_core.view.scales import Scales, choose_scales
 from bilayer_core.view.theme import BACKGROUND
 
@@ -66,7 +66,7 @@ def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) 
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     text = rr.TextDocument(summary(branches, name), media_type="text/markdown")
     recording.log("summary", text, static=True)
-    log_obstacles(recording, widest, scales)
+    log_obstacles(recording, widest.description, scales)
     digits = len(str(len(branches) - 1))
     extent = float(np.ptp(values)) or 1.0
     for number, of in enumerate(branches):
@@ -75,7 +75,8 @@ def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) 
         colour = np.rint(FIRST + share * (LAST - FIRST)).astype(np.uint8)
         under = f"world/branches/{number:0{digits}}"
         _send_rods(recording, under, of.run, colour)
-        send_bodies(recording, of.run, scales, f"{under}/bodies")
+        log_bodies(recording, of.run.description, scales, f"{under}/bodies")
+        send_bodies(recording, of.run, f"{under}/bodies")
         _send_curves(recording, f"{number:0{digits}}", f"{name} = {of.value:.4g}", of.run, colour)
     Path(rrd_path).write_bytes(memory.drain_as_bytes())
     recording.disconnect()

@@ -81,7 +81,7 @@ def choose_colouring(run: RunData, quantity: str = STRAIN) -> Colouring:
     """Colours that suit a run."""
     found = np.concatenate([np.abs(_values(run, layer, quantity)).ravel() for layer in run.description.layers])
     found = found[np.isfinite(found)]
-    least, exceeded = SMALLEST[quantity], False
+    least = SMALLEST[quantity]
     if quantity == CURVATURE:
         least /= max(float(np.ptp(run.positions[0], axis=0).max()), 1e-9)
     largest = float(found.max(initial=0.0))
@@ -89,7 +89,11 @@ def choose_colouring(run: RunData, quantity: str = STRAIN) -> Colouring:
         acting = found[found > 0.0]
         largest = float(np.percentile(acting, PRESSURE_SHARE)) if len(acting) else 0.0
     limit = rounded_up(max(largest, least))
-    exceeded = bool((found > limit * (1.0 + 1e-6)).any())
+    return colouring_up_to(quantity, limit, bool((found > limit * (1.0 + 1e-6)).any()))
+
+
+def colouring_up_to(quantity: str, limit: float, exceeded: bool = False) -> Colouring:
+    """Colours with a given limit, in SI units."""
     if quantity == STRAIN:
         title, shown = "axial strain [%]", f"{100 * limit:.4g}"
     elif quantity == CURVATURE:

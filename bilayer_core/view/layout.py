@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+
 import numpy as np
 import rerun.blueprint as rrb
 
+from bilayer_core.observed.frame import Description
 from bilayer_core.observed.system import versions
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.arrows import reaction_arrows
@@ -30,11 +33,11 @@ CHANNEL_COLOURS = (
 )
 
 
-def energy_groups(run: RunData) -> dict[str, dict[str, np.ndarray]]:
-    """Energies that ever act, by name of the axes that show them [mJ]: gravity, whose zero is anywhere, would flatten
-    the others.
+def energy_groups(run: RunData, known: Collection[str] = ()) -> dict[str, dict[str, np.ndarray]]:
+    """Energies that ever act, or are `known` to, by name of the axes that show them [mJ]: gravity, whose zero is
+    anywhere, would flatten the others.
     """
-    acting = {name: 1e3 * values for name, values in run.energy.items() if np.any(values)}
+    acting = {name: 1e3 * values for name, values in run.energy.items() if name in known or np.any(values)}
     groups = {
         "energy": {name: values for name, values in acting.items() if name != GRAVITY},
         GRAVITY: {name: values for name, values in acting.items() if name == GRAVITY},
@@ -51,14 +54,6 @@ def blueprint(run: RunData, scales: Scales, colouring: Colouring) -> rrb.Bluepri
     """The robot at the left, large, over its legend; curves at the right, in tabs with each energy on axes of its own
     and with what happened.
     """
-    robot = _robot(run, scales)
-    legend = rrb.Spatial2DView(
-        name=colouring.title,
-        origin="legend",
-        background=BACKGROUND,
-        visual_bounds=rrb.VisualBounds2D(x_range=[-12, 269], y_range=[-4, 40]),
-    )
-    text = rrb.TextDocumentView(name="Run", origin="summary")
     plots = [("stimulus", "Stimulus")] if run.description.channels else []
     plots += [("contact_force", "Contact force [N]")] if run.contact_forces.any() else []
     plots += [("clamp_force", "Force on clamps [N]")] if run.clamp_wrenches.any() else []
@@ -66,17 +61,38 @@ def blueprint(run: RunData, scales: Scales, colouring: Colouring) -> rrb.Bluepri
     plots += [("height", "Height of mass centres [mm]")]
     plots += [(name, f"{name.capitalize()} [mJ]") for name in groups] + [("solver", "Solver")]
     alone = [(f"{group}/{entity_name(name)}", f"{name} [mJ]") for group, series in groups.items() for name in series]
+    return arranged(_robot(run, scales), colouring.title, plots, alone, events=bool(run.events))
+
+
+def arranged(
+    robot: rrb.Spatial3DView,
+    colours: str,
+    plots: list[tuple[str, str]],
+    alone: list[tuple[str, str]],
+    events: bool,
+    play: str = "paused",
+) -> rrb.Blueprint:
+    """The window with these views: `colours` is the title of the legend, curves have a path and a name, those `alone`
+    a tab of their own.
+    """
+    legend = rrb.Spatial2DView(
+        name=colours,
+        origin="legend",
+        background=BACKGROUND,
+        visual_bounds=rrb.VisualBounds2D(x_range=[-12, 269], y_range=[-4, 40]),
+    )
+    text = rrb.TextDocumentView(name="Run", origin="summary")
     tabs: list = [rrb.Vertical(*map(_curves, plots), name="Curves")]
     tabs += [rrb.Grid(*map(_curves, alone), name="Energies")] if alone else []
     right: rrb.Container | rrb.View = rrb.Tabs(*tabs)
-    if run.events:
+    if events:
         right = rrb.Vertical(right, rrb.TextLogView(name="Events", origin=EVENTS), row_shares=[5, 1])
     content = rrb.Horizontal(
         rrb.Vertical(robot, rrb.Horizontal(legend, text, column_shares=[3, 5]), row_shares=[9, 2]),
         right,
         column_shares=[5, 3],
     )
-    return whole(content, time_panel="collapsed")
+    return whole(content, time_panel="collapsed", play=play)
 
 
 def _curves(plot: tuple[str, str]) -> rrb.TimeSeriesView:
@@ -91,6 +107,11 @@ def _robot(run: RunData, scales: Scales) -> rrb.Spatial3DView:
     follows = is_worth_following(still, moving)
     if not follows:
         eye, target = scales.eye, scales.target
+    return robot_view(eye, target, follows)
+
+
+def robot_view(eye: np.ndarray, target: np.ndarray, follows: bool) -> rrb.Spatial3DView:
+    """The robot from an eye, which may follow it, to what it looks at [m], shape (3,)."""
     return rrb.Spatial3DView(
         name="Robot",
         origin="world",
@@ -106,11 +127,11 @@ def _robot(run: RunData, scales: Scales) -> rrb.Spatial3DView:
     )
 
 
-def whole(content: rrb.Container | rrb.View, time_panel: str) -> rrb.Blueprint:
-    """The layout of a window."""
+def whole(content: rrb.Container | rrb.View, time_panel: str, play: str = "paused") -> rrb.Blueprint:
+    """The layout of a window; `play` is how time goes in it."""
     return rrb.Blueprint(
         content,
-        rrb.TimePanel(timeline=TIMELINE, state=time_panel, play_state="paused"),
+        rrb.TimePanel(timeline=TIMELINE, state=time_panel, play_state=play),
         rrb.BlueprintPanel(state="hidden"),
         rrb.SelectionPanel(state="hidden"),
         auto_views=False,
@@ -120,21 +141,37 @@ def whole(content: rrb.Container | rrb.View, time_panel: str) -> rrb.Blueprint:
 
 def summary(run: RunData, scales: Scales, colouring: Colouring) -> str:
     """What is shown and at which scales, in Markdown."""
-    description = run.description
+    contact = bool(run.contact_forces.any())
+    reactions = {name: arrows.metres_per_unit for name, arrows in reaction_arrows(run, scales).items()}
+    span = f", simulated: {run.times[-1] - run.times[0]:.6g} s"
+    return explanation(run.description, scales, colouring, contact, reactions, span)
+
+
+def explanation(
+    description: Description,
+    scales: Scales,
+    colouring: Colouring,
+    contact: bool,
+    reactions: Mapping[str, float],
+    more: str = "",
+) -> str:
+    """What is shown at which scales, in Markdown; `contact` says whether there are contact forces, `reactions` how
+    long the arrows of those that act are, by their sizes [m/N, 1/N].
+    """
     nodes = sum(strand.nodes.stop - strand.nodes.start for strand in description.strands)
     settings = [f"{name} {_short(text)}" for name, text in description.settings.items() if name not in versions()]
     lines = [
         f"**{description.scene_name}: {description.title}**",
         "",
-        f"Strands: {len(description.strands)}, nodes: {nodes}, simulated: {run.times[-1] - run.times[0]:.6g} s.",
+        f"Strands: {len(description.strands)}, nodes: {nodes}{more}.",
         "",
         f"- **Colour:** {colouring.sentence()}.",
     ]
-    if run.contact_forces.any():
+    if contact:
         lines.append(f"- **Arrows:** contact force on each node, {10 / scales.metres_per_newton:.4g} mN for 10 mm.")
-    for name, arrows in reaction_arrows(run, scales).items():
+    for name, metres_per_unit in reactions.items():
         colour, unit = ("Blue", "mN") if name == "clamp_forces" else ("Purple", "mN m")
-        size = f"{10 / arrows.metres_per_unit:.4g} {unit} for 10 mm"
+        size = f"{10 / metres_per_unit:.4g} {unit} for 10 mm"
         lines.append(f"- **{colour}:** {name.split('_')[1]} of rods on bodies, {size}.")
     if any(obstacle.shape.kind == "plane" for obstacle in description.obstacles):
         lines.append(f"- **Squares on the ground:** {1e3 * scales.cell:g} mm.")

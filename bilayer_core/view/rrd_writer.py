@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
 
-from bilayer_core.observed.frame import ShapeInfo
+from bilayer_core.observed.frame import Description, ShapeInfo, Strand
 from bilayer_core.record.events import LEVEL_NAMES
 from bilayer_core.record.node_frames import layer_rows
 from bilayer_core.record.run_data import RunData
@@ -18,6 +19,7 @@ from bilayer_core.view.drawable import refuse_undrawable
 from bilayer_core.view.layout import (
     CHANNEL_COLOURS,
     EVENTS,
+    GRAVITY,
     MIDDLE,
     TIMELINE,
     blueprint,
@@ -41,6 +43,9 @@ CHUNK = 150  # frames in a chunk: chunks are what the viewer loads, caches and d
 LEGEND_HEIGHT = 14  # pixels of the colour bar
 EVENT_COLOURS = {"flight": (255, 214, 90), "contact": (64, 224, 148), "stimulus": (255, 130, 110)}
 PLAIN_COLOUR = (200, 204, 210)
+BODIES = "world/bodies"
+SUMMED = "on nodes, sizes summed"
+"""Curve of all contact forces."""
 
 
 def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) -> None:
@@ -58,27 +63,182 @@ def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) ->
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
     recording.send_blueprint(blueprint(run, scales, colouring), make_active=False, make_default=True)
-    _send(recording, run, scales, colouring)
+    sender = RunSender(recording, run.description)
+    sender.begin(scales)
+    sender.explain(summary(run, scales, colouring), colouring)
+    sender.send(run, scales, colouring, reaction_arrows(run, scales))
     Path(rrd_path).write_bytes(memory.drain_as_bytes())
     recording.disconnect()
 
 
-def _send(recording: rr.RecordingStream, run: RunData, scales: Scales, colouring: Colouring) -> None:
-    """All of a run."""
-    recording.send_recording_name(f"{run.description.scene_name}: {run.description.title}")
-    recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    recording.log("summary", rr.TextDocument(summary(run, scales, colouring), media_type="text/markdown"), static=True)
-    _log_legend(recording, colouring)
-    log_obstacles(recording, run, scales)
-    _send_strands(recording, run, colouring)
-    send_bodies(recording, run, scales, "world/bodies")
-    _send_middle(recording, run)
-    _send_joints(recording, run)
-    _send_arrows(recording, "world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
-    for name, arrows in reaction_arrows(run, scales).items():
-        _send_arrows(recording, f"world/{name}", REACTION_COLOURS[name], arrows, scales)
-    _send_series(recording, run)
-    _send_events(recording, run)
+class RunSender:
+    """Sends a run to a recording, as a whole or piece by piece: what never changes goes there once.
+
+    Parameters
+    ----------
+    recording : rerun.RecordingStream
+    description : Description
+        Of the run.
+    """
+
+    def __init__(self, recording: rr.RecordingStream, description: Description):
+        self._recording = recording
+        self._description = description
+        self._rows = layer_rows(description)
+        self._declared: set[str] = set()
+        self._curves: dict[str, list[str]] = {}
+
+    def begin(self, scales: Scales) -> None:
+        """Send what stands still, and what moving things are made of."""
+        recording, description = self._recording, self._description
+        recording.send_recording_name(f"{description.scene_name}: {description.title}")
+        recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        log_obstacles(recording, description, scales)
+        log_bodies(recording, description, scales, BODIES)
+        for layer in description.layers:
+            triangles = geometry.ribbon_triangles(layer.nodes.stop - layer.nodes.start)
+            recording.log(_strand(layer), rr.Mesh3D.from_fields(triangle_indices=triangles), static=True)
+        for joint in description.joints:
+            recording.log(f"world/{joint.name}", _mesh(geometry.shape_mesh(joint.shape, JOINT_COLOURS)), static=True)
+        # The viewer follows what it draws, and draws points of no size.
+        recording.log(MIDDLE, rr.Points3D.from_fields(radii=0.0), static=True)
+
+    def explain(self, text: str, colouring: Colouring, time: float | None = None) -> None:
+        """Say in Markdown what is shown and draw the colour bar: for the whole run, or from a time on [s]."""
+        bar = np.tile(_bytes(colouring.colour_map[:, :3]), (LEGEND_HEIGHT, 1, 1))
+        steps = bar.shape[1]
+        ticks = [[min(max(6.0, place * steps), steps - 6.0), LEGEND_HEIGHT + 8] for place, _ in colouring.ticks]
+        texts = [text for _, text in colouring.ticks]
+        shown = {
+            "summary": rr.TextDocument(text, media_type="text/markdown"),
+            "legend": rr.Image(bar),
+            "legend/ticks": rr.Points2D(ticks, labels=texts, radii=0.01, colors=(200, 200, 200), show_labels=True),
+        }
+        if time is not None:
+            self._recording.set_log_time_enabled(False)  # the only time is that of the run
+            self._recording.set_time(TIMELINE, duration=time)
+        for path, archetype in shown.items():
+            self._recording.log(path, archetype, static=time is None)
+
+    def send(self, run: RunData, scales: Scales, colouring: Colouring, reactions: Mapping[str, Arrows]) -> None:
+        """Send all that changes with time; `reactions` by name."""
+        recording = self._recording
+        self._send_strands(run, colouring)
+        send_bodies(recording, run, BODIES)
+        middles = middles_of(run)
+        columns = rr.Points3D.columns(positions=middles).partition([1] * len(middles))
+        recording.send_columns(MIDDLE, _time(run.shape_times), columns)
+        self._send_joints(run)
+        self._send_arrows("world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
+        for name, arrows in reactions.items():
+            self._send_arrows(f"world/{name}", REACTION_COLOURS[name], arrows, scales)
+        self._send_series(run)
+        self._send_events(run)
+
+    def _send_strands(self, run: RunData, colouring: Colouring) -> None:
+        shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
+        for layer, rows in zip(run.description.layers, self._rows, strict=True):
+            positions, frames = run.positions[:, layer.nodes], run.material_frames[:, rows]
+            values = colouring.values(run, layer)
+            for part in _chunks(len(run.shape_times)):
+                vertices = geometry.ribbon_vertices(layer, positions[part], frames[part])
+                colours = _bytes(colouring.colours(values[part])[:, :, None, :3] * shade)
+                sizes = [positions.shape[1] * geometry.CORNERS] * len(vertices)
+                self._recording.send_columns(
+                    _strand(layer),
+                    _time(run.shape_times[part]),
+                    rr.Mesh3D.columns(
+                        vertex_positions=vertices.reshape(-1, 3), vertex_colors=colours.reshape(-1, 3)
+                    ).partition(sizes),
+                )
+
+    def _send_joints(self, run: RunData) -> None:
+        """Joints and guides, each on the body that carries it."""
+        for joint in run.description.joints:
+            if joint.body < 0:
+                continue
+            for part in _chunks(len(run.times)):
+                poses = run.body_positions[part, joint.body], run.body_quaternions[part, joint.body]
+                moved = rr.Transform3D.columns(translation=poses[0], quaternion=poses[1])
+                self._recording.send_columns(f"world/{joint.name}", _time(run.times[part]), moved)
+
+    def _send_arrows(self, path: str, colour: tuple, arrows: Arrows, scales: Scales) -> None:
+        if path not in self._declared:
+            self._declared.add(path)
+            looks = rr.Arrows3D.from_fields(colors=colour, radii=0.005 * scales.size)
+            self._recording.log(path, looks, static=True)
+        shown = np.linalg.norm(arrows.forces, axis=2) > arrows.shown
+        for part in _chunks(len(arrows.times)):
+            which = shown[part]
+            self._recording.send_columns(
+                path,
+                _time(arrows.times[part]),
+                rr.Arrows3D.columns(
+                    origins=arrows.origins[part][which], vectors=arrows.forces[part][which] * arrows.metres_per_unit
+                ).partition(which.sum(axis=1)),
+            )
+
+    def _send_series(self, run: RunData) -> None:
+        """Curves: stimulus, forces of contact and of rods on each body, heights, energies, the solver's health."""
+        groups: dict[str, dict[str, np.ndarray]] = {
+            "stimulus": {name: run.stimulus[:, i] for i, name in enumerate(run.description.channels)},
+            "contact_force": self._sizes("contact_force", run, run.contact_wrenches),
+            "clamp_force": self._sizes("clamp_force", run, run.clamp_wrenches),
+            "height": {
+                "robot": 1e3 * run.com[:, 2],
+                **{
+                    body.name: 1e3 * run.body_positions[:, i, 2]
+                    for i, body in enumerate(run.description.bodies)
+                    if not body.prescribed
+                },
+            },
+            **energy_groups(run, set(self._curves.get("energy", ())) | set(self._curves.get(GRAVITY, ()))),
+            "solver": {"iterations per step": run.solver["iterations"] / np.maximum(run.solver["substeps"], 1)},
+        }
+        if np.isfinite(run.solver["min_gap"]).all():  # infinite where nothing can touch
+            groups["solver"]["smallest gap [mm]"] = 1e3 * run.solver["min_gap"]
+        for group, series in groups.items():
+            for name, values in series.items():
+                self._send_curve(group, name, run.times, values)
+        if run.contact_forces.any() or SUMMED in self._curves.get("contact_force", ()):
+            # Forces that hold a body cancel in their sum; this shows how hard it is held.
+            total = np.linalg.norm(run.contact_forces, axis=2).sum(axis=1)
+            self._send_curve("contact_force", SUMMED, run.shape_times, total)
+
+    def _sizes(self, group: str, run: RunData, wrenches: np.ndarray) -> dict[str, np.ndarray]:
+        """How large the forces on each body are that any acts on, or has acted on [N]."""
+        sizes = {
+            f"on {body.name}": np.linalg.norm(wrenches[:, i, :3], axis=1)
+            for i, body in enumerate(run.description.bodies)
+        }
+        known = self._curves.get(group, ())
+        return {name: size for name, size in sizes.items() if name in known or size.any()}
+
+    def _send_events(self, run: RunData) -> None:
+        """What happened, as text."""
+        if not run.events:
+            return
+        colours = [EVENT_COLOURS.get(event.name, PLAIN_COLOUR) for event in run.events]
+        columns = rr.TextLog.columns(
+            text=[event.text for event in run.events],
+            level=[LEVEL_NAMES.get(event.level, "INFO") for event in run.events],
+            color=colours,
+        )
+        self._recording.send_columns(EVENTS, _time(np.array([event.time for event in run.events])), columns)
+
+    def _send_curve(self, group: str, name: str, times: np.ndarray, values: np.ndarray) -> None:
+        path, known = f"plots/{group}/{entity_name(name)}", self._curves.setdefault(group, [])
+        if name not in known:
+            colour = CHANNEL_COLOURS[len(known) % len(CHANNEL_COLOURS)]
+            self._recording.log(path, rr.SeriesLines(names=name, colors=colour, widths=2), static=True)
+            known.append(name)
+        for part in _chunks(len(times)):
+            self._recording.send_columns(path, _time(times[part]), rr.Scalars.columns(scalars=values[part]))
+
+
+def _strand(layer: Strand) -> str:
+    """Entity of a layer of a rod."""
+    return f"world/strands/{layer.name}"
 
 
 def _chunks(count: int):
@@ -94,20 +254,9 @@ def _bytes(colours: np.ndarray) -> np.ndarray:
     return np.rint(colours * 255).astype(np.uint8)
 
 
-def _log_legend(recording: rr.RecordingStream, colouring: Colouring) -> None:
-    """The colour bar with its labels."""
-    bar = np.tile(_bytes(colouring.colour_map[:, :3]), (LEGEND_HEIGHT, 1, 1))
-    recording.log("legend", rr.Image(bar), static=True)
-    steps = bar.shape[1]
-    ticks = [[min(max(6.0, place * steps), steps - 6.0), LEGEND_HEIGHT + 8] for place, _ in colouring.ticks]
-    texts = [text for _, text in colouring.ticks]
-    labels = rr.Points2D(ticks, labels=texts, radii=0.01, colors=(200, 200, 200), show_labels=True)
-    recording.log("legend/ticks", labels, static=True)
-
-
-def log_obstacles(recording: rr.RecordingStream, run: RunData, scales: Scales) -> None:
+def log_obstacles(recording: rr.RecordingStream, description: Description, scales: Scales) -> None:
     """Fixed surfaces."""
-    for obstacle in run.description.obstacles:
+    for obstacle in description.obstacles:
         shape = obstacle.shape
         mesh = _plane(shape, scales) if shape.kind == "plane" else _mesh(geometry.shape_mesh(shape, OBSTACLE_COLOURS))
         recording.log(f"world/obstacles/{obstacle.name}", mesh, static=True)
@@ -127,137 +276,23 @@ def _mesh(parts: geometry.Mesh) -> rr.Mesh3D:
     )
 
 
-def _send_strands(recording: rr.RecordingStream, run: RunData, colouring: Colouring) -> None:
-    for layer, rows in zip(run.description.layers, layer_rows(run.description), strict=True):
-        path = f"world/strands/{layer.name}"
-        positions, frames = run.positions[:, layer.nodes], run.material_frames[:, rows]
-        nodes, values = positions.shape[1], colouring.values(run, layer)
-        triangles = geometry.ribbon_triangles(nodes)
-        recording.log(path, rr.Mesh3D.from_fields(triangle_indices=triangles), static=True)
-        shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
-        for part in _chunks(len(run.shape_times)):
-            vertices = geometry.ribbon_vertices(layer, positions[part], frames[part])
-            colours = _bytes(colouring.colours(values[part])[:, :, None, :3] * shade)
-            sizes = [nodes * geometry.CORNERS] * len(vertices)
-            recording.send_columns(
-                path,
-                _time(run.shape_times[part]),
-                rr.Mesh3D.columns(
-                    vertex_positions=vertices.reshape(-1, 3), vertex_colors=colours.reshape(-1, 3)
-                ).partition(sizes),
-            )
-
-
-def send_bodies(recording: rr.RecordingStream, run: RunData, scales: Scales, under: str) -> None:
-    """Bodies as they are; one without a surface has a pose alone."""
-    for index, body in enumerate(run.description.bodies):
-        path = f"{under}/{body.name}"
+def log_bodies(recording: rr.RecordingStream, description: Description, scales: Scales, under: str) -> None:
+    """Surfaces of bodies; one without any has a pose alone."""
+    for body in description.bodies:
         if body.shape is not None:
             plane = body.shape.kind == "plane"
             shape = _plane(body.shape, scales) if plane else _mesh(geometry.shape_mesh(body.shape, BALL_COLOURS))
-            recording.log(path, shape, static=True)
+            recording.log(f"{under}/{body.name}", shape, static=True)
+
+
+def send_bodies(recording: rr.RecordingStream, run: RunData, under: str) -> None:
+    """Where bodies are."""
+    for index, body in enumerate(run.description.bodies):
         for part in _chunks(len(run.times)):
             recording.send_columns(
-                path,
+                f"{under}/{body.name}",
                 _time(run.times[part]),
                 rr.Transform3D.columns(
                     translation=run.body_positions[part, index], quaternion=run.body_quaternions[part, index]
                 ),
             )
-
-
-def _send_middle(recording: rr.RecordingStream, run: RunData) -> None:
-    """The middle of the rods, which the camera follows."""
-    middles = middles_of(run)  # the viewer follows what it draws, and draws points of no size
-    recording.log(MIDDLE, rr.Points3D.from_fields(radii=0.0), static=True)
-    recording.send_columns(
-        MIDDLE, _time(run.shape_times), rr.Points3D.columns(positions=middles).partition([1] * len(middles))
-    )
-
-
-def _send_joints(recording: rr.RecordingStream, run: RunData) -> None:
-    """Joints and guides, each on the body that carries it."""
-    for joint in run.description.joints:
-        path = f"world/{joint.name}"
-        recording.log(path, _mesh(geometry.shape_mesh(joint.shape, JOINT_COLOURS)), static=True)
-        if joint.body < 0:
-            continue
-        for part in _chunks(len(run.times)):
-            poses = run.body_positions[part, joint.body], run.body_quaternions[part, joint.body]
-            moved = rr.Transform3D.columns(translation=poses[0], quaternion=poses[1])
-            recording.send_columns(path, _time(run.times[part]), moved)
-
-
-def _send_arrows(recording: rr.RecordingStream, path: str, colour: tuple, arrows: Arrows, scales: Scales) -> None:
-    recording.log(path, rr.Arrows3D.from_fields(colors=colour, radii=0.005 * scales.size), static=True)
-    shown = np.linalg.norm(arrows.forces, axis=2) > arrows.shown
-    for part in _chunks(len(arrows.times)):
-        which = shown[part]
-        recording.send_columns(
-            path,
-            _time(arrows.times[part]),
-            rr.Arrows3D.columns(
-                origins=arrows.origins[part][which], vectors=arrows.forces[part][which] * arrows.metres_per_unit
-            ).partition(which.sum(axis=1)),
-        )
-
-
-def _sizes(run: RunData, wrenches: np.ndarray) -> dict[str, np.ndarray]:
-    """How large the forces on each body are that any acts on [N]."""
-    return {
-        f"on {body.name}": np.linalg.norm(wrenches[:, i, :3], axis=1)
-        for i, body in enumerate(run.description.bodies)
-        if wrenches[:, i].any()
-    }
-
-
-def _send_series(recording: rr.RecordingStream, run: RunData) -> None:
-    """Curves: stimulus, forces of contact and of rods on each body, heights, energies, the solver's health."""
-    groups: dict[str, dict[str, np.ndarray]] = {
-        "stimulus": {name: run.stimulus[:, i] for i, name in enumerate(run.description.channels)},
-        "contact_force": _sizes(run, run.contact_wrenches),
-        "clamp_force": _sizes(run, run.clamp_wrenches),
-        "height": {
-            "robot": 1e3 * run.com[:, 2],
-            **{
-                body.name: 1e3 * run.body_positions[:, i, 2]
-                for i, body in enumerate(run.description.bodies)
-                if not body.prescribed
-            },
-        },
-        **energy_groups(run),
-        "solver": {"iterations per step": run.solver["iterations"] / np.maximum(run.solver["substeps"], 1)},
-    }
-    if np.isfinite(run.solver["min_gap"]).all():  # infinite where nothing can touch
-        groups["solver"]["smallest gap [mm]"] = 1e3 * run.solver["min_gap"]
-    for group, series in groups.items():
-        for index, (name, values) in enumerate(series.items()):
-            _send_curve(recording, f"plots/{group}", name, index, run.times, values)
-    if run.contact_forces.any():
-        # Forces that hold a body cancel in their sum; this shows how hard it is held.
-        total = np.linalg.norm(run.contact_forces, axis=2).sum(axis=1)
-        index = len(groups["contact_force"])
-        _send_curve(recording, "plots/contact_force", "on nodes, sizes summed", index, run.shape_times, total)
-
-
-def _send_events(recording: rr.RecordingStream, run: RunData) -> None:
-    """What happened, as text."""
-    if not run.events:
-        return
-    colours = [EVENT_COLOURS.get(event.name, PLAIN_COLOUR) for event in run.events]
-    columns = rr.TextLog.columns(
-        text=[event.text for event in run.events],
-        level=[LEVEL_NAMES.get(event.level, "INFO") for event in run.events],
-        color=colours,
-    )
-    recording.send_columns(EVENTS, _time(np.array([event.time for event in run.events])), columns)
-
-
-def _send_curve(
-    recording: rr.RecordingStream, group: str, name: str, index: int, times: np.ndarray, values: np.ndarray
-) -> None:
-    path = f"{group}/{entity_name(name)}"
-    colour = CHANNEL_COLOURS[index % len(CHANNEL_COLOURS)]
-    recording.log(path, rr.SeriesLines(names=name, colors=colour, widths=2), static=True)
-    for part in _chunks(len(times)):
-        recording.send_columns(path, _time(times[part]), rr.Scalars.columns(scalars=values[part]))

@@ -44,7 +44,7 @@ def show(recording: Path, web: bool) -> None:
     if web:
         command += ["--web-viewer", "--bind", "127.0.0.1", "--port", "auto", "--web-viewer-port", "0"]
     else:
-        command += ["--new"]
+        command += ["--bind", "127.0.0.1", "--port", "auto"]
     code = subprocess.call(command, env=viewer_environment())
     if code:
         raise InputError(f"the viewer ended with exit code {code}; without a screen use a browser or a screenshot")

@@ -192,7 +192,7 @@ def test_a_scene_that_starts_in_penetration_is_refused_with_the_node_and_the_dep
         (["info", "absent.mcap"], "absent.mcap: cannot be read: No such file or directory"),
         (["view", "absent.mcap", "--screenshot", "absent/x.png"], "absent/x.png: cannot be written: there is no"),
         (["view", "x.rrd", "--save", "y.rrd"], "--save: x.rrd is a rerun recording already"),
-        (["view", "x.rrd", "--time", "1"], "--time: is the time of a picture; give --screenshot"),
+        (["view", "x.rrd", "--at", "1"], "--at: is the time of a picture; give --screenshot"),
     ],
 )  # fmt: skip
 def test_bad_input_is_refused_with_exit_code_2_and_a_message(arguments, message, capsys, tmp_path, monkeypatch):

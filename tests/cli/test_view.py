@@ -26,7 +26,7 @@ def viewer(monkeypatch, tmp_path):
         (["run.mcap", "--save", "run.rrd"], [("convert_log", "run.mcap", "run.rrd", "strain")]),
         (["run.mcap", "--screenshot", "run.png"], [("screenshot", "run.mcap", "run.png", None, "strain")]),
         (
-            ["run.rrd", "--screenshot", "run.png", "--time", "500 ms"],
+            ["run.rrd", "--screenshot", "run.png", "--at", "500 ms"],
             [("screenshot", "run.rrd", "run.png", 0.5, "strain")],
         ),
         (

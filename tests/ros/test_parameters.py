@@ -43,6 +43,13 @@ def test_a_switch_takes_only_true_or_false(value):
         CLOCK.accept(value)
 
 
+def test_off_is_a_word_though_parameter_files_take_it_for_false():
+    rerun = next(of for of in SIM_NODE if of.name == "rerun")
+    assert rerun.accept(False) == rerun.accept("off") == "off"
+    with pytest.raises(InputError, match="'rerun' is True"):
+        rerun.accept(True)
+
+
 def test_a_mistyped_name_is_refused_with_a_suggestion_and_all_names():
     with pytest.raises(InputError, match=r"no parameter 'raet': did you mean 'rate'\?.*rate, mode, clock"):
         accept_all(TABLE, {"raet": 1.0})

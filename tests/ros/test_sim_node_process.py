@@ -32,7 +32,7 @@ FAST = {"scene": "bending", "real_time_factor": 0}
             {"scene": "bending", "lockstep": True, "dt": 2e-3, "control_period": 1e-3},
             "'control_period' is 0.001; allowed is a finite number >= 0.002",
         ),
-        ({"rerun": "serve"}, "serve: the name of a rerun recording ends in .rrd"),
+        ({"rerun": "served"}, "served: the name of a rerun recording ends in .rrd"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
 )

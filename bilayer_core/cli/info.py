@@ -1,4 +1,4 @@
-"""The verbs about logs: ``info`` and ``view``."""
+"""The verb ``info``."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 import click
 
-from bilayer_core.cli.options import Duration, Verb
+from bilayer_core.cli.options import Verb
 
 
 @click.command(cls=Verb)
@@ -54,49 +54,3 @@ def _list_quantities(file: str, as_json: bool) -> None:
         unit = f"[{entry.unit}]" if entry.unit else ""
         of_nodes = "each node: " if entry.of_shape and entry.labels else "each node" if entry.of_shape else ""
         click.echo(f"  {entry.name:44}{unit:12}{of_nodes}{' '.join(entry.labels)}".rstrip())
-
-
-@click.command(cls=Verb)
-@click.argument("file", metavar="FILE.mcap|FILE.rrd")
-@click.option("--web", is_flag=True, help="In a browser.")
-@click.option("--save", metavar="FILE.rrd", help="Write a rerun recording instead of opening the viewer.")
-@click.option("--screenshot", "picture", metavar="FILE.png", help="Write a picture, without a screen.")
-@click.option("--time", "moment", type=Duration(from_zero=True), help="Time of the picture; default: the end.")
-@click.option(
-    "--colour",
-    type=click.Choice(["strain", "curvature", "contact"]),
-    help="What the colours of rods say: axial strain (default), curvature, or the pressure of contact.",
-)
-@click.option("--force", is_flag=True, help="Replace existing files.")
-def view(
-    file: str,
-    web: bool,
-    save: str | None,
-    picture: str | None,
-    moment: float | None,
-    colour: str | None,
-    force: bool,
-) -> None:
-    """Show a run in rerun."""
-    from bilayer_core.errors import InputError
-    from bilayer_core.record.paths import check_output_path
-    from bilayer_core.view.colouring import STRAIN
-    from bilayer_core.view.rerun_view import convert_log, open_viewer, screenshot
-
-    if moment is not None and picture is None:
-        raise InputError("--time: is the time of a picture; give --screenshot FILE.png as well")
-    if colour and file.endswith(".rrd"):
-        raise InputError(f"--colour: {file} is a rerun recording, whose colours are made already; give the log instead")
-    if save and file.endswith(".rrd"):
-        raise InputError(f"--save: {file} is a rerun recording already")
-    for path, suffix in ((save, ".rrd"), (picture, ".png")):
-        if path:
-            check_output_path(path, force, suffix)
-    if save:
-        convert_log(file, save, colour or STRAIN)
-        click.echo(f"recording  {save}")
-    if picture:
-        screenshot(save or file, picture, moment, colour or STRAIN)
-        click.echo(f"picture    {picture}")
-    if not save and not picture:
-        open_viewer(file, web, colour or STRAIN)

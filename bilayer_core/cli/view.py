@@ -1,0 +1,120 @@
+"""The verb ``view``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from bilayer_core.cli.options import Duration, Verb
+
+NODE = "/bilayer_sim"
+FOLLOWING = {"node": "--node", "bind": "--bind", "port": "--port", "serve": "--serve"}
+
+
+@click.command(cls=Verb, old_spellings={"--time": "--at"})
+@click.argument("file", metavar="[FILE.mcap|FILE.rrd]", required=False)
+@click.option("--follow", is_flag=True, help="Show a run while it goes on: of a node, or in a log that is written.")
+@click.option("--node", metavar="NAME", help=f"Which node to follow; default: {NODE}.")
+@click.option("--serve", is_flag=True, help="With --follow: open no window, say only where viewers may connect.")
+@click.option("--bind", metavar="ADDRESS", help="With --follow: listen there; default: 127.0.0.1, this machine alone.")
+@click.option(
+    "--port", type=click.IntRange(1, 65535), help="With --follow: for viewers; default: the first free one from 9876."
+)
+@click.option("--web", is_flag=True, help="In a browser.")
+@click.option("--save", metavar="FILE.rrd", help="Write a rerun recording; with --follow, as well.")
+@click.option("--screenshot", "picture", metavar="FILE.png", help="Write a picture, without a screen.")
+@click.option("--at", "moment", type=Duration(from_zero=True), help="Time of the picture; default: the end.")
+@click.option(
+    "--colour",
+    type=click.Choice(["strain", "curvature", "contact"]),
+    help="What the colours of rods say: axial strain (default), curvature, or the pressure of contact.",
+)
+@click.option("--force", is_flag=True, help="Replace existing files.")
+def view(
+    file: str | None,
+    follow: bool,
+    node: str | None,
+    serve: bool,
+    bind: str | None,
+    port: int | None,
+    web: bool,
+    save: str | None,
+    picture: str | None,
+    moment: float | None,
+    colour: str | None,
+    force: bool,
+) -> None:
+    """Show a run in rerun; with --follow one that goes on."""
+    from bilayer_core.errors import InputError
+    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.view.colouring import STRAIN
+
+    if moment is not None and picture is None:
+        raise InputError("--at: is the time of a picture; give --screenshot FILE.png as well")
+    given = {"node": node, "bind": bind, "port": port, "serve": serve}
+    if not follow:
+        for name, value in given.items():
+            if value:
+                raise InputError(f"{FOLLOWING[name]}: is for a run that goes on; give --follow as well")
+        if file is None:
+            raise InputError("say what to show: FILE.mcap, FILE.rrd, or --follow for a node that runs")
+    if file and file.endswith(".rrd"):
+        if follow:
+            raise InputError(f"--follow: {file} is a rerun recording; what can be followed is a log, or a node")
+        if colour:
+            raise InputError(
+                f"--colour: {file} is a rerun recording, whose colours are made already; give the log instead"
+            )
+        if save:
+            raise InputError(f"--save: {file} is a rerun recording already")
+    for path, suffix in ((save, ".rrd"), (picture, ".png")):
+        if path:
+            check_output_path(path, force, suffix)
+    if follow:
+        if picture:
+            raise InputError("--screenshot: is of a run that is over; leave out --follow")
+        if file and node:
+            raise InputError(f"--node: is followed without a log; leave out {file}")
+        _follow(file, node or NODE, bind, port, serve, web, save, colour or STRAIN)
+        return
+    from bilayer_core.view.rerun_view import convert_log, open_viewer, screenshot
+
+    if save:
+        convert_log(file, save, colour or STRAIN)
+        click.echo(f"recording  {save}")
+    if picture:
+        screenshot(save or file, picture, moment, colour or STRAIN)
+        click.echo(f"picture    {picture}")
+    if not save and not picture:
+        open_viewer(file, web, colour or STRAIN)
+
+
+def _follow(
+    file: str | None,
+    node: str,
+    bind: str | None,
+    port: int | None,
+    serve: bool,
+    web: bool,
+    save: str | None,
+    colour: str,
+) -> None:
+    """Follow a log here, or a node as a node that takes this process over."""
+    if file is None:
+        from bilayer_core.cli.nodes import become_follower
+
+        options = {"--bind": bind, "--port": port, "--save": save, "--colour": colour}
+        flags = {"--serve": serve, "--web": web}
+        become_follower(node, options, flags)
+    from bilayer_core.view.follow import Serving, follow_log
+
+    serving = Serving(
+        bind=bind or Serving.bind,
+        port=port,
+        window=not serve,
+        web=web,
+        save=Path(save) if save else None,
+        colour=colour,
+    )
+    follow_log(file, serving, lambda line: click.echo(line))

@@ -1,0 +1,117 @@
+"""A log that another program is writing: its messages, as chunks come."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from bilayer_core.errors import InputError
+from bilayer_core.record.log_head import Head, read_head
+from bilayer_core.record.log_records import (
+    CHANNEL,
+    CHUNK,
+    FOOTER,
+    MAGIC,
+    MESSAGE,
+    MESSAGE_HEAD,
+    content,
+    parse,
+    records_of,
+    unpacked,
+    walk,
+)
+from bilayer_core.record.opening import open_log
+
+Message = tuple[str, int, bytes]
+
+
+class GrowingLog:
+    """What has been added to a log since it was looked at last; only whole chunks are read.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Attributes
+    ----------
+    path : Path
+    head : Head
+        Its scene, versions and settings.
+    finished : bool
+        Whether its writer has finished it.
+
+    Raises
+    ------
+    InputError
+        If it is no log, or, from `read` too, is damaged.
+    """
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+        self._begin()
+
+    def _begin(self) -> None:
+        self.head: Head = read_head(self.path)
+        self.finished = False
+        self._place = len(MAGIC)
+        self._channels: dict[int, str] = {}
+        self._file_number = os.stat(self.path).st_ino
+
+    @property
+    def replaced(self) -> bool:
+        """Whether another log has been begun under its name."""
+        try:
+            now = os.stat(self.path)
+        except FileNotFoundError:
+            return False
+        return now.st_ino != self._file_number or now.st_size < self._place
+
+    def restart(self) -> bool:
+        """Go on with the log that replaced this one; False as long as its head is not written."""
+        try:
+            self._begin()
+        except InputError:
+            return False
+        return True
+
+    def read(self) -> list[Message]:
+        """Topic, time [ns] and data of each message that was added, those of about 8 MB at most."""
+        from mcap.records import Channel
+
+        found: list[Message] = []
+        size = 0
+        with open_log(self.path) as file:
+            for place in walk(file, self._place):
+                self._place = place.end
+                if place.opcode == CHANNEL:
+                    self._add(parse(Channel, content(file, place)))
+                elif place.opcode == CHUNK:
+                    inside = unpacked(content(file, place))
+                    size += len(inside)
+                    found += self._messages(inside)
+                elif place.opcode == FOOTER:
+                    self.finished = True
+                    break
+                if size > MOST_AT_ONCE:
+                    break
+        return found
+
+    def _messages(self, inside: bytes) -> list[Message]:
+        from mcap.records import Channel
+
+        found: list[Message] = []
+        for opcode, start, end in records_of(inside):
+            if opcode == CHANNEL:
+                self._add(parse(Channel, inside[start:end]))
+            elif opcode == MESSAGE:
+                number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
+                if number in self._channels:
+                    found.append((self._channels[number], time, inside[start + MESSAGE_HEAD.size : end]))
+        return found
+
+    def _add(self, channel) -> None:
+        self._channels[channel.id] = channel.topic
+
+
+MOST_AT_ONCE = 8 << 20
+"""About as much is unpacked at once [bytes]."""

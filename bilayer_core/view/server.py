@@ -1,0 +1,171 @@
+"""The server of rerun as a process of its own: viewers connect to it, also late ones, and it never holds anybody up."""
+
+from __future__ import annotations
+
+import ctypes
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time as clock
+from pathlib import Path
+
+from bilayer_core.errors import InputError, OutputError
+from bilayer_core.view.viewer_process import viewer_environment, viewer_executable
+
+LOCAL = "127.0.0.1"
+PORT, WEB_PORT = 9876, 9090
+"""Where viewers and browsers look first."""
+PORTS_TRIED = 50
+MEMORY_LIMIT = "1GB"
+"""Of what is kept for viewers that come late; beyond it the oldest is dropped."""
+START_LIMIT = 30.0  # longest wait for the server to answer [s]
+EXIT_LIMIT = 5.0  # longest wait for it to end before it is killed [s]
+_PR_SET_PDEATHSIG = 1
+
+
+class ViewServer:
+    """Takes what is sent to it, and hands it to all viewers that connect, from its beginning on.
+
+    It ends with the ``with`` block, and is ended by the system if this process dies.
+
+    Parameters
+    ----------
+    bind : str
+        Address of this machine at which it listens; ``0.0.0.0`` for all, where whoever reaches the machine can look.
+    port : int, optional
+        For viewers; by default the first free one from `PORT` on.
+
+    Attributes
+    ----------
+    port, web_port : int
+        For viewers and for browsers.
+    url : str
+        For recordings of this machine.
+
+    Raises
+    ------
+    InputError
+        If the address or the port cannot be had.
+    """
+
+    def __init__(self, bind: str = LOCAL, port: int | None = None):
+        self.bind = bind
+        self.port = _free_port(bind, PORT, "") if port is None else _free_port(bind, port, "--port")
+        self.web_port = _free_port(bind, WEB_PORT, "", but=self.port)
+        self._host = socket.gethostname() if bind in ("0.0.0.0", "::") else bind
+        local = LOCAL if bind in ("0.0.0.0", "::") else bind
+        self.url = f"rerun+http://{_bracketed(local)}:{self.port}/proxy"
+
+    @property
+    def viewer_address(self) -> str:
+        """For ``rerun ADDRESS``."""
+        return f"rerun+http://{_bracketed(self._host)}:{self.port}/proxy"
+
+    @property
+    def web_address(self) -> str:
+        """For a browser."""
+        quoted = self.viewer_address.replace("+", "%2B")
+        return f"http://{_bracketed(self._host)}:{self.web_port}/?url={quoted}"
+
+    @property
+    def address(self) -> str:
+        """Both, in words for a screen."""
+        return f"rerun {self.viewer_address}  or in a browser  {self.web_address}"
+
+    def __enter__(self) -> ViewServer:
+        command = [str(viewer_executable()), "--serve-web", "--bind", self.bind, "--port", str(self.port)]
+        command += ["--web-viewer-port", str(self.web_port), "--server-memory-limit", MEMORY_LIMIT]
+        command += ["--cors-allow-origin", f"http://{_bracketed(self._host)}:{self.web_port}"]
+        libc = ctypes.CDLL(None) if sys.platform == "linux" else None
+        self._output = tempfile.TemporaryFile()
+        self._process = subprocess.Popen(
+            command,
+            env=viewer_environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=self._output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            preexec_fn=(lambda: libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)) if libc else None,
+        )
+        try:
+            self._wait()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        try:
+            self._process.wait(EXIT_LIMIT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._output.close()
+
+    def check(self) -> None:
+        """Raise OutputError if it has ended."""
+        if self._process.poll() is not None:
+            self._output.seek(0)
+            said = self._output.read().decode(errors="replace").strip().splitlines()
+            raise OutputError(
+                f"the viewer's server ended with exit code {self._process.returncode}; it said:\n"
+                + "\n".join(said[-5:])
+            )
+
+    def _wait(self) -> None:
+        deadline = clock.monotonic() + START_LIMIT
+        address = self.url.partition("//")[2].rpartition(":")[0].strip("[]")
+        while True:
+            self.check()
+            try:
+                socket.create_connection((address, self.port), timeout=1.0).close()
+                return
+            except OSError:
+                if clock.monotonic() > deadline:
+                    raise OutputError(f"the viewer's server has not answered for {START_LIMIT:g} s") from None
+                clock.sleep(0.05)
+
+
+def open_window(server: ViewServer) -> subprocess.Popen:
+    """A viewer with a window that shows what a server has."""
+    command = [str(viewer_executable()), "--connect", server.url, "--bind", LOCAL, "--port", "auto"]
+    return subprocess.Popen(command, env=viewer_environment(), stdin=subprocess.DEVNULL)
+
+
+def _bracketed(host: str) -> str:
+    """As addresses want it."""
+    return f"[{host}]" if ":" in host else host
+
+
+def _free_port(bind: str, first: int, option: str, but: int | None = None) -> int:
+    """`first` itself if an option asks for it, else the first free port from there on."""
+    for port in range(first, first + 1 if option else first + PORTS_TRIED):
+        if port == but:
+            continue
+        with socket.socket(socket.AF_INET6 if ":" in bind else socket.AF_INET) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((bind, port))
+                probe.listen(1)
+            except (OSError, OverflowError) as error:
+                if not isinstance(error, OSError) or error.errno not in _TAKEN:
+                    raise InputError(
+                        f"--bind: cannot listen at {bind}, port {port}: {getattr(error, 'strerror', None) or error}"
+                    ) from error
+                continue
+        return port
+    if option:
+        raise InputError(f"{option}: {first} is taken by another program; leave it out for the first free one")
+    raise InputError(f"--port: no port from {first} to {first + PORTS_TRIED - 1} is free")
+
+
+_TAKEN = (98, 48, 10048)
+"""EADDRINUSE of Linux, macOS and Windows."""
+
+
+def suffixed(path: Path, number: int) -> Path:
+    """The name of a run's file: those after a reset are numbered, as logs are."""
+    return path.with_stem(f"{path.stem}_{number}") if number else path
