@@ -90,8 +90,7 @@ def descriptor_of(parameter: NodeParameter) -> ParameterDescriptor:
 
 
 def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
-    """The range of a number that has a least one."""
-    if not isinstance(parameter.default, float) or math.isinf(parameter.minimum):
+    """The range of a number that has a least one; that of others is in words."""
+    if not isinstance(parameter.default, float) or math.isinf(parameter.minimum) or parameter.above_minimum:
         return []
-    first = math.nextafter(parameter.minimum, math.inf) if parameter.above_minimum else parameter.minimum
-    return [FloatingPointRange(from_value=first, to_value=sys.float_info.max)]
+    return [FloatingPointRange(from_value=parameter.minimum, to_value=sys.float_info.max)]
