@@ -90,8 +90,8 @@ def descriptor_of(parameter: NodeParameter) -> ParameterDescriptor:
 
 
 def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
-    """The range of a number that has a least one, which the default keeps to as well."""
-    if not isinstance(parameter.default, float) or not -math.inf < parameter.minimum <= parameter.default:
+    """The range of a number that has a least one, which the default keeps to as well; that of others is in words."""
+    has_least = isinstance(parameter.default, float) and -math.inf < parameter.minimum <= parameter.default
+    if not has_least or parameter.above_minimum:
         return []
-    first = math.nextafter(parameter.minimum, math.inf) if parameter.above_minimum else parameter.minimum
-    return [FloatingPointRange(from_value=first, to_value=sys.float_info.max)]
+    return [FloatingPointRange(from_value=parameter.minimum, to_value=sys.float_info.max)]
