@@ -18,6 +18,7 @@ from bilayer_core.view.rrd_writer import RunSender
 from bilayer_core.view.scales import place_moving_eye
 from bilayer_core.view.server import ViewServer, suffixed
 
+APPLICATION = "bilayer_sim"
 STILL_ROOM, MOVING_ROOM = 1.6, 1.3
 """Times as far as the first frame asks for: what will come is not known."""
 
@@ -42,14 +43,16 @@ class LiveView:
         self._number = -1
         self._recording: rr.RecordingStream | None = None
         self._arriving: ArrivingRun | None = None
+        self._sender: RunSender | None = None
+        self._scales: LiveScales | None = None
+        self._arranged = ""
 
     def begin(self, description: Description) -> None:
         """From now on messages are those of another run."""
         self.close()
         self._number += 1
         self._arriving = ArrivingRun(description)
-        self._sender: RunSender | None = None
-        self._scales: LiveScales | None = None
+        self._scales = None
 
     def add(self, topic: str, stamp: int, data: bytes) -> None:
         """Take a message: full name of its topic in a log, time [ns]."""
@@ -75,15 +78,20 @@ class LiveView:
         if self._recording is not None:
             self._recording.flush()
             self._recording.disconnect()
-            self._recording = None
+            self._recording = self._sender = None
+            # Which is how rerun gives back the threads and the memory of recordings that nobody holds.
+            rr.init(APPLICATION, recording_id="none", send_properties=False)
 
     def _start(self, run: RunData) -> None:
         self._scales = LiveScales(run, self._colour)
         sinks: list = [rr.GrpcSink(self._server.url)]
         if self._save is not None:
             sinks.append(rr.FileSink(suffixed(self._save, self._number)))
-        self._recording = rr.RecordingStream("bilayer_sim")
-        self._recording.set_sinks(*sinks, default_blueprint=_layout(run, self._scales))
+        self._recording = rr.RecordingStream(APPLICATION)
+        # The viewer keeps one layout for all runs, and rerun never gives back the memory of one: it goes there once.
+        needed = self._save is not None or self._arranged != run.description.scene_text
+        self._recording.set_sinks(*sinks, default_blueprint=_layout(run, self._scales) if needed else None)
+        self._arranged = run.description.scene_text
         self._sender = RunSender(self._recording, run.description)
         self._sender.begin(self._scales.scales)
         self._explain(float(run.times[0]))

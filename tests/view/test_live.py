@@ -26,6 +26,7 @@ from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.packing import pack, unpack
 from bilayer_core.record.topics import Rate, output_topics
 from bilayer_core.view import viewer_process
+from bilayer_core.view.live import LiveView
 from bilayer_core.view.server import ViewServer
 
 TIMES = np.arange(0, 101) * 0.04
@@ -203,6 +204,20 @@ def test_parts_of_a_frame_come_back_and_a_frame_that_lacks_some_is_refused():
     for bad in [(label, data + b"6"), ("com", b""), ("com:x", b"1"), ("com:-1", b"")]:
         with pytest.raises(InputError, match="parts of a frame"):
             unpack(*bad)
+
+
+def test_many_runs_leave_no_threads_behind_in_who_shows_them(log):
+    messages, process = GrowingLog(log).read()[:300], psutil.Process()
+    with ViewServer() as server:
+        view, used = LiveView(server), []
+        for _ in range(12):
+            view.begin(synthetic_run.description())
+            for message in messages:
+                view.add(*message)
+            view.show()
+            used.append(process.num_threads())
+        view.close()
+    assert used[-1] <= used[3]
 
 
 @pytest.mark.slow
