@@ -201,7 +201,7 @@ def test_a_scene_that_starts_in_penetration_names_the_node_and_the_depth():
 
 def test_a_simulator_is_made_of_what_names_a_scene_as_well():
     assert Simulator("bending").scene == load_scene("bending")
-    with pytest.raises(InputError, match="bendin"):
+    with pytest.raises(SceneError, match="bendin"):
         Simulator("bendin")
 
 
