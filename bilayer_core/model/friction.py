@@ -1,17 +1,17 @@
 """Coefficients of friction that are set from outside, in place of those of the scene (`contact.friction`).
 
-`State.friction` has one value for each of `COEFFICIENTS`, NaN where the scene's acts, as everywhere without friction.
+`State.friction` has one value for each of `COEFFICIENTS`, -1 where the scene's acts, as everywhere without friction.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
 from ..scene.config import Friction, SceneConfig
 
 Array = np.ndarray
+OF_SCENE = -1.0
+"""What stands for the scene's own."""
 COEFFICIENTS = ("coefficient", "forward", "backward", "sideways")
 """Keys of `contact.friction` that may change while a run goes on."""
 FRICTION, ROD_FRICTION, ROD_BARRIER = "friction", "rod friction", "rod barrier"
@@ -25,7 +25,7 @@ def acts(forces: tuple[str, ...]) -> bool:
 
 def none_given() -> Array:
     """What a state has where nothing is set, shape (4,)."""
-    return np.full(len(COEFFICIENTS), math.nan)
+    return np.full(len(COEFFICIENTS), OF_SCENE)
 
 
 def friction_law(scene: SceneConfig, forces: tuple[str, ...], given: Array) -> Friction | None:
@@ -35,7 +35,7 @@ def friction_law(scene: SceneConfig, forces: tuple[str, ...], given: Array) -> F
     law = scene.contact.friction if scene.contact is not None else None
     if not acts(forces):
         return law
-    set_from_outside = {key: value for key, value in zip(COEFFICIENTS, given.tolist(), strict=True) if value == value}
+    set_from_outside = {key: value for key, value in zip(COEFFICIENTS, given.tolist(), strict=True) if value != OF_SCENE}
     return law.model_copy(update=set_from_outside) if law is not None and set_from_outside else law
 
 

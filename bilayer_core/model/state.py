@@ -121,8 +121,8 @@ class State:
             raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}{why}")
         if differs:
             raise InputError(f"saved state: is of another scene, with other {differs}; allowed to differ are {FREE}")
-        may_be_nan = self.override.size + self.friction.size
-        first = size - marks - self.pose_goal.size - may_be_nan
+        may_be_nan = self.override.size
+        first = size - marks - self.pose_goal.size - may_be_nan - self.friction.size
         finite = np.isfinite(flat)
         finite[first : first + may_be_nan] = True
         bad = np.flatnonzero(~finite)

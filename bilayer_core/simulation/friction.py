@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..errors import InputError
-from ..model.friction import COEFFICIENTS, ROD_BARRIER, ROD_FRICTION, acts, friction_law
+from ..model.friction import COEFFICIENTS, OF_SCENE, ROD_BARRIER, ROD_FRICTION, acts, friction_law
 from ..model.model import Model
 from ..model.state import State
 
@@ -21,7 +21,7 @@ def change_friction(model: Model, state: State, value: float | None, key: str) -
     """
     refuse_friction(model, value, key)
     before, given = friction_law(model.scene, model.forces, state.friction), state.friction.copy()
-    given[COEFFICIENTS.index(key)] = math.nan if value is None else value
+    given[COEFFICIENTS.index(key)] = OF_SCENE if value is None else value
     state.friction[:] = given
     return friction_law(model.scene, model.forces, given) != before
 
