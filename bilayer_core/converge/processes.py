@@ -28,9 +28,9 @@ def side_by_side(count: int) -> Iterator[ProcessPoolExecutor]:
         try:
             yield pool
         finally:
-            pool.shutdown(wait=False, cancel_futures=True)
             for process in set(active_children()) - before:
                 process.terminate()
+            pool.shutdown(wait=True, cancel_futures=True)  # without its thread, Python's end would race with that one's
 
 
 @contextmanager

@@ -35,8 +35,8 @@ def friction_law(scene: SceneConfig, forces: tuple[str, ...], given: Array) -> F
     law = scene.contact.friction if scene.contact is not None else None
     if not acts(forces):
         return law
-    set_from_outside = {key: value for key, value in zip(COEFFICIENTS, given.tolist(), strict=True) if value != OF_SCENE}
-    return law.model_copy(update=set_from_outside) if law is not None and set_from_outside else law
+    from_outside = {key: value for key, value in zip(COEFFICIENTS, given.tolist(), strict=True) if value != OF_SCENE}
+    return law.model_copy(update=from_outside) if law is not None and from_outside else law
 
 
 def contact_point_friction(law: Friction | None, of_bodies: Array) -> Array:

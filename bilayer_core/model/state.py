@@ -86,6 +86,8 @@ class State:
             start += part.size
             if name == "seal":
                 self.place_of_seal = start - 1
+            elif name == "override":
+                self.places_of_override = slice(start - part.size, start)
 
     def copy(self) -> State:
         """A state of its own with the same values."""
@@ -121,10 +123,8 @@ class State:
             raise InputError(f"saved state: has {flat.size} values, this scene's state has {size}{why}")
         if differs:
             raise InputError(f"saved state: is of another scene, with other {differs}; allowed to differ are {FREE}")
-        may_be_nan = self.override.size
-        first = size - marks - self.pose_goal.size - may_be_nan - self.friction.size
         finite = np.isfinite(flat)
-        finite[first : first + may_be_nan] = True
+        finite[self.places_of_override] = True  # NaN is the scene's own stimulus
         bad = np.flatnonzero(~finite)
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
