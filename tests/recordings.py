@@ -28,7 +28,13 @@ def seen_late(address, path, seconds) -> dict[str, np.ndarray]:
     from bilayer_core.view.viewer_process import viewer_environment, viewer_executable
 
     command = [viewer_executable(), address, "--save", path, "--bind", "127.0.0.1", "--port", "auto"]
-    viewer = subprocess.Popen(command, env=viewer_environment(), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    viewer = subprocess.Popen(
+        command,
+        env=viewer_environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in what shells run in the background
+    )
     try:
         time.sleep(seconds)
     finally:
