@@ -88,6 +88,12 @@ class Engine:
         )
         self.start_over(-math.inf)
 
+    def take_scene(self, model: Model, control: StepControl, newton_tolerance: float, max_iterations: int) -> None:
+        """Have the same model with another scene, of which the arrays know nothing but coefficients of friction."""
+        self._model, self._control, self._newton = model, control, (newton_tolerance, max_iterations)
+        self._storage.take_scene(model)
+        self._state = self._integration = None
+
     def start_over(self, height: float) -> None:
         """Forget the extrema of the run; the mass centre is at `height` [m]."""
         extrema = self.extrema

@@ -160,6 +160,16 @@ class Storage:
         law = friction_law(self._model.scene, self._model.forces, self._friction)
         return rod_contact_of(self._model, self._sizes, self._pairs.search, now, of_stage, law, ways=ways, last=last)
 
+    def take_scene(self, model: Model) -> None:
+        """Have the same model with another scene, whose coefficients of friction may be others."""
+        before, law = (
+            friction_law(of.scene, of.forces, self._friction) if of.scene.contact else None
+            for of in (self._model, model)
+        )
+        self._model = model
+        if law != before and self._problem is not None:
+            self._problem = self._make()
+
     def set_friction(self, given: Array) -> None:
         """Have the coefficients of friction of a state (`State.friction`) in the records, before something is computed.
 

@@ -65,6 +65,13 @@ class PlaneWatch:
         self._space: Stepper | None = None
         self.restart(0.0)
 
+    def take_scene(self, duration: float, take: Callable[[Stepper], None]) -> None:
+        """Have another scene of the same model, which `take` gives to a stepper."""
+        self._slowest = GROWTH / duration
+        if self._space is not None:
+            take(self._space)
+            take(self._plane)
+
     def restart(self, time: float) -> None:
         """Begin anew at a time [s]."""
         self.since: float | None = None

@@ -40,6 +40,7 @@ from .plane_watch import PlaneWatch
 from .poses import LEAST_TIME, new_goal
 from .result import RunResult, Termination
 from .run_loop import Callbacks, advance_to, time_left
+from .same_model import differing
 from .statistics import RunStatistics, center_of_mass
 from .step_choice import choose_steps
 from .stepper import Stepper, StepReport
@@ -92,7 +93,8 @@ class Simulator:
         scene = scene if isinstance(scene, SceneConfig) else load_scene(scene)
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         method = INTEGRATORS[self.plan.integrator]
-        self.steps = choose_steps(scene, method, dt, tolerance)
+        self._asked_steps = dt, tolerance
+        self.steps = choose_steps(scene, method, *self._asked_steps)
         self.dt, self.tolerance = self.steps.dt, self.steps.tolerance
         self.scene = scene
         self.model = build_model(scene, self.plan.model, self.plan.dimension)
@@ -691,10 +693,51 @@ class Simulator:
         for attached in self._attached:
             attached.start_over()
 
-    def reset(self) -> None:
-        """Go back to the start of the scene; what was set from outside is forgotten."""
+    def reset(self, scene: SceneConfig | str | Path | Mapping[str, Any] | None = None) -> None:
+        """Go back to the start of the scene; what was set from outside is forgotten.
+
+        Parameters
+        ----------
+        scene : SceneConfig, str, Path or mapping, optional
+            Another scene with the same model (`same_model`), which is taken from now on: the run is that of a new
+            simulator, bit for bit, without the time to build one. What the simulator was made with (`dt`, `tolerance`,
+            `budget`) stays.
+
+        Raises
+        ------
+        InputError
+            If its model is another, or somebody observes the run: a log is of one scene. Nothing is changed then.
+        """
+        if scene is not None:
+            self._take_scene(scene if isinstance(scene, SceneConfig) else load_scene(scene))
         self._note(RESET, "")
         self.load_state(self._initial_state().flat())
+
+    def same_model(self, scene: SceneConfig) -> bool:
+        """Whether `reset` takes a scene: one that differs at most in texts, duration, output, schedules of stimuli and
+        loads, steps and tolerances, and coefficients of friction that are and stay above 0.
+        """
+        return not differing(self.scene, scene)
+
+    def _take_scene(self, scene: SceneConfig) -> None:
+        if others := differing(self.scene, scene):
+            told = ", ".join(sorted(others))
+            raise InputError(
+                f"reset: the scene {scene.name!r} has another model than {self.scene.name!r}, by its {told}; allowed "
+                "to differ are texts, duration, output, schedules of stimuli and loads, steps and tolerances, and "
+                "coefficients of friction above 0; make a new Simulator"
+            )
+        if self._listeners or self._attached:
+            raise InputError("reset: takes no other scene while a log or an observer is attached; detach it first")
+        steps, iterations = choose_steps(scene, self._method, *self._asked_steps), scene.solver.max_newton_iterations
+        self._stepper.take_scene(scene, steps, iterations)
+        self.scene, self.model, self.steps = scene, self._stepper.model, steps
+        self.dt, self.tolerance = steps.dt, steps.tolerance
+        self._conditions = float(conditions_of(scene))
+        self._ledger = EnergyLedger(self.model) if self.keeps_budget else None
+        self._state = self._initial_state()
+        if self.plane_watch is not None:
+            self.plane_watch.take_scene(scene.duration, lambda stepper: stepper.take_scene(scene, steps, iterations))
 
     def summary(self) -> dict[str, Any]:
         """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for

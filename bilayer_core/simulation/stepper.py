@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from ..model.model import Model
 from ..model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
 from ..model.records.step import Configuration
 from ..model.state import NOT_KNOWN, State
+from ..scene.config import SceneConfig
 from .collapse import collapsed
 from .contact_pairs import ContactOwners
 from .crossed import crossed, edge_of_strand
@@ -96,16 +97,28 @@ class Stepper:
     """
 
     def __init__(self, model: Model, method: Method, steps: Steps, max_iterations: int):
+        self._method = method
+        control = self._control_of(model, steps)
+        self.engine = Engine(model, method, control, steps.newton_tolerance, max_iterations)
+        self.engine.actuation = self.surroundings.actuation
+        self.ledger: EnergyLedger | None = None
+        self._places: tuple[int, Places] = (-1, {})
+
+    def _control_of(self, model: Model, steps: Steps) -> StepControl:
+        """Take steps of a model, with what acts on it."""
+        method = self._method
         if steps.adaptive and method.estimate is None:
             raise InputError(
                 f"tolerance: {steps.tolerance:g} is not allowed with the integrator {method.name}, which has no "
                 "estimate of its error; leave it out, or take another integrator"
             )
-        self.model, self.steps, self._method = model, steps, method
+        self.model, self.steps = model, steps
         first = min(steps.dt, steps.longest) if steps.adaptive else steps.dt
         self._same = first * (TIME_ROUNDING if steps.adaptive else FIXED_ROUNDING)
         self._same = max(self._same, LAST_DIGITS * model.scene.duration)
-        control = StepControl(
+        self._first = first
+        self.surroundings = Surroundings(model, ahead=2.0 * first)
+        return StepControl(
             dt=0.0 if steps.adaptive else steps.dt,
             order=method.order,
             tolerance=steps.tolerance or math.inf,
@@ -116,12 +129,13 @@ class Stepper:
             output_rate=float(model.scene.output.rate),
             same=self._same,
         )
-        self._first = first
-        self.surroundings = Surroundings(model, ahead=2.0 * first)
-        self.engine = Engine(model, method, control, steps.newton_tolerance, max_iterations)
+
+    def take_scene(self, scene: SceneConfig, steps: Steps, max_iterations: int) -> None:
+        """Have another scene of the same model (`simulation.same_model`), with its steps; nothing is built."""
+        model = replace(self.model, scene=scene)
+        control = self._control_of(model, steps)
+        self.engine.take_scene(model, control, steps.newton_tolerance, max_iterations)
         self.engine.actuation = self.surroundings.actuation
-        self.ledger: EnergyLedger | None = None
-        self._places: tuple[int, Places] = (-1, {})
 
     @property
     def same_time(self) -> float:
