@@ -83,7 +83,7 @@ def _report(simulator) -> dict[str, Any]:
 def _parts(scene) -> dict[str, list[str]]:
     """What the robot and its surroundings are made of, by name."""
     from bilayer_core.model.findings import few
-    from bilayer_core.model.validity import EdgeFigures
+    from bilayer_core.model.validity import edge_figures
     from bilayer_core.scene.mechanism import resistance
     from bilayer_core.scene.profile import extremes
 
@@ -106,7 +106,7 @@ def _parts(scene) -> dict[str, list[str]]:
         ]
         if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):
             lines.append(_own_laws(rod.pattern))
-        figures = EdgeFigures(scene, rod)
+        figures = edge_figures(scene, rod)
         strain, curvature = figures.eigenstrain.max(), figures.free_curvature().max()
         natural = abs(figures.natural_change()).max()
         if natural > 0.0:

@@ -94,6 +94,10 @@ class ContactPair:
 
 def contact_pairs(scene: SceneConfig, dimension: int = 3) -> tuple[ContactPair, ...]:
     """Which parts of a scene can meet, each with how it is resolved in a dimension."""
+    return scene.keep(("contact pairs", dimension), (), lambda: _contact_pairs(scene, dimension))
+
+
+def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[ContactPair, ...]:
     if scene.contact is None:
         return ()
     bodies, obstacles = colliders(scene)

@@ -210,7 +210,12 @@ FORCES: tuple[Force, ...] = (
 
 def planned(scene: SceneConfig, model: str, dimension: int) -> dict[str, str]:
     """What becomes of each force: ``"active"`` or ``"skipped: reason"``."""
-    question = Question(scene, model, dimension)
+    return dict(
+        scene.keep(("forces", model, dimension), (FORCES,), lambda: _planned(Question(scene, model, dimension)))
+    )
+
+
+def _planned(question: Question) -> dict[str, str]:
     reasons = {force.name: force.skipped(question) for force in FORCES}
     return {name: "active" if reason is None else f"skipped: {reason}" for name, reason in reasons.items()}
 

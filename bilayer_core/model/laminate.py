@@ -100,6 +100,10 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
 
 
 def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
+    return scene.keep("layers in place", (rod,), lambda: _layers_in_place(scene, rod))
+
+
+def _layers_in_place(scene: SceneConfig, rod: Rod) -> list[_Placed]:
     last_node = stations_of(rod)[1]
     nodes, edges = rod.on_path(np.arange(last_node + 1)), np.arange(last_node)
     own = edges % (rod.stations - 1)

@@ -108,9 +108,13 @@ def _bond_twist(scene: SceneConfig, rod: Rod, halves: list[LayerHalves]) -> Arra
     if len(halves) == 1:
         return 0.0
     stations = (np.arange(len(halves[0].ratio))[:, None] + [0.25, 0.75]).ravel()
-    bottom, top = (sections(rod, layer, scene.materials[layer.material], stations) for layer in rod.layers)
-    law = bond(bottom, top, scene.coupling, rod.torsion)
-    stiffness = (law.tilt * (0.5 * (bottom.thickness + top.thickness)) ** 2).reshape(-1, 2)
+
+    def made() -> Array:
+        bottom, top = (sections(rod, layer, scene.materials[layer.material], stations) for layer in rod.layers)
+        law = bond(bottom, top, scene.coupling, rod.torsion)
+        return (law.tilt * (0.5 * (bottom.thickness + top.thickness)) ** 2).reshape(-1, 2)
+
+    stiffness = scene.keep("twist of bonds", (rod,), made)
     bonded = (halves[0].axial > 0.0) & (halves[1].axial > 0.0)
     return bonded * stiffness / (0.5 * (halves[0].ratio + halves[1].ratio))
 

@@ -29,6 +29,10 @@ ROUNDING = 1e-9
 
 def find_plane(scene: SceneConfig) -> tuple[Plane | None, str]:
     """The plane of a scene and why it stays in it, or None and what leaves the plane of its first rod."""
+    return scene.keep("plane", (), lambda: _find_plane(scene))
+
+
+def _find_plane(scene: SceneConfig) -> tuple[Plane | None, str]:
     plane = _plane_of(scene.rods[0].copies[0])
     offence = next(_Survey(scene, plane).offences(), None)
     return (plane, f"all stays in {plane}") if offence is None else (None, offence)

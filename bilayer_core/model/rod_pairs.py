@@ -28,7 +28,7 @@ from ..scene.profile import values_at
 from ..scene.rod import Rod
 from .findings import Finding
 from .section import sections
-from .validity import EdgeFigures
+from .validity import edge_figures
 
 HALF_TURN = math.pi
 
@@ -58,6 +58,10 @@ class RodPair:
 
 def rod_pairs(scene: SceneConfig) -> tuple[RodPair, ...]:
     """All pairs of rods, with the decision and its reason."""
+    return scene.keep("rod pairs", (), lambda: _rod_pairs(scene))
+
+
+def _rod_pairs(scene: SceneConfig) -> tuple[RodPair, ...]:
     found, regions = [], [_regions(scene, rod) for rod in scene.rods]
     for index, rod in enumerate(scene.rods):
         possible, geometry, angle = _can_close(scene, rod)
@@ -98,7 +102,7 @@ def _decide(scene: SceneConfig, by_geometry: tuple[bool, str]) -> tuple[bool, bo
 def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str, float]:
     """Whether a rod can turn far enough to meet itself, the reason, and how far it can turn [rad]."""
     length, middles = rod.path.length, np.arange(rod.stations - 1) + 0.5
-    figures = EdgeFigures(scene, rod)
+    figures = edge_figures(scene, rod)
     layers = [sections(rod, layer, scene.materials[layer.material], middles) for layer in rod.layers]
     stiffness = sum(layer.bending_stiffness[0] for layer in layers)
     if len(layers) == 2:
@@ -139,7 +143,7 @@ def _can_reach(
 
 def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
     """Balls that the copies of a rod do not leave; None for one that no prescribed body holds."""
-    figures = EdgeFigures(scene, rod)
+    figures = edge_figures(scene, rod)
     extent = rod.path.length * (1.0 + figures.eigenstrain.max()) + figures.thickness.max()
     bodies = {body.name: body for body in scene.bodies if isinstance(body.motion, Prescribed)}
     ends = rod.frames_at(np.array([0.0, rod.path.length]))[0]

@@ -13,7 +13,7 @@ from ..scene.rod import Rod
 from .layout import ReadOnlyArrays
 from .rod_pairs import rod_pairs
 from .strands import Collected
-from .validity import EdgeFigures
+from .validity import edge_figures
 
 Array = np.ndarray
 WITHIN = 1.0 - 1e-9
@@ -71,7 +71,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         can_collide[np.ix_(second, first)] |= meet.T
     joined = _joined(scene, rods)
     node_radius, rest_length = found.column("node_radius"), found.column("rest_length")
-    thickness = [float(EdgeFigures(scene, rod).thickness.max()) for rod in scene.rods]
+    thickness = [float(edge_figures(scene, rod).thickness.max()) for rod in scene.rods]
     thickest = [thickness[index] for index in scene_index]
     for strand in found.strands:
         number, own = numbers[strand.rod], slice(strand.first_node, strand.first_node + strand.node_count)

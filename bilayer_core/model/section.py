@@ -13,13 +13,14 @@ import numpy as np
 from ..scene.config import Coupling, Material
 from ..scene.profile import values_at
 from ..scene.rod import Layer, Rod
+from .layout import ReadOnlyArrays
 from .torsion_section import bond_torsion, rectangle_torsion
 
 Array = np.ndarray
 
 
 @dataclass(frozen=True)
-class Section:
+class Section(ReadOnlyArrays):
     """A layer's cross-sections.
 
     Attributes
@@ -52,13 +53,13 @@ class Section:
 
 def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Section:
     """Sections of a layer at stations of its rod, which may be whole numbers or lie between."""
-    along = rod.edge_length * rod.on_path(stations)
-    return rectangle(
-        material,
-        values_at(rod.width, along),
-        values_at(layer.thickness, along),
-        values_at(layer.stiffness, along),
-    )
+
+    def made() -> Section:
+        along = rod.edge_length * rod.on_path(stations)
+        varying = (values_at(value, along) for value in (rod.width, layer.thickness, layer.stiffness))
+        return rectangle(material, *varying)
+
+    return rod.keep(("sections", stations.tobytes()), (layer, material), made)
 
 
 def outline(rod: Rod, stations: Array) -> tuple[Array, Array]:

@@ -39,7 +39,7 @@ from ..scene.config import SceneConfig
 from ..scene.profile import extremes, values_at
 from ..scene.rod import Rod
 from .section import bond, outline, sections
-from .validity import EdgeFigures, Figure
+from .validity import Figure, edge_figures
 
 Array = np.ndarray
 HELIX = 0.01
@@ -162,7 +162,7 @@ class TwistedRod:
         self._bent = np.array([[layer.natural_curvature is not None] for layer in rod.layers])
         self._natural_twist = np.array([values_at(layer.natural_twist, along) for layer in rod.layers])
         self._length, self._clamps = rod.path.length, (bool(rod.clamp_start), bool(rod.clamp_end))
-        self._eigenstrain = EdgeFigures(scene, rod).eigenstrain_range
+        self._eigenstrain = edge_figures(scene, rod).eigenstrain_range
         self._height_over_axis = self._over_axis(self._axial)
         self._whole_twist = self._twist.sum(axis=0) + self._tilt * self._tilt_arm**2
 

@@ -72,7 +72,7 @@ def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
     """All figures of a scene on which the validity of the model depends."""
     thinnest = {}
     for rod in scene.rods:
-        at_edges = EdgeFigures(scene, rod)
+        at_edges = edge_figures(scene, rod)
         thinnest[rod.name] = at_edges.thickness.min()
         yield from _of_section(rod, at_edges)
         if scene.contact is not None:
@@ -145,7 +145,7 @@ def _of_barrier(name: str, thin: float, distance: float) -> Figure:
 
 def longest_edge(scene: SceneConfig, rod: Rod) -> float:
     """Length of edges between whose nodes nothing comes that is not small beside the rod [m]."""
-    return COARSE * float(EdgeFigures(scene, rod).thickness.min() + scene.contact.barrier_distance)
+    return COARSE * float(edge_figures(scene, rod).thickness.min() + scene.contact.barrier_distance)
 
 
 def _of_edges(rod: Rod, longest: float) -> Figure:
@@ -170,6 +170,11 @@ def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[E
         least, most = np.sort(law.strain_at(np.array([channel.minimum, channel.maximum])))
         found[:, rod.driven_edges(layer, law)] += np.array([[max(abs(least), abs(most))], [least], [most]])
     return found
+
+
+def edge_figures(scene: SceneConfig, rod: Rod) -> EdgeFigures:
+    """Figures of a rod of a scene."""
+    return scene.keep("edge figures", (rod,), lambda: EdgeFigures(scene, rod))
 
 
 class EdgeFigures:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Callable, Hashable, Mapping
+from functools import cached_property
+from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
@@ -13,6 +15,7 @@ from bilayer_core.scene.units import (
     Number,
 )
 
+Derived = TypeVar("Derived")
 LONGEST_REPR = 1500
 """Characters: what a screen shows."""
 UNIT_LENGTH_TOLERANCE = 1e-14
@@ -36,10 +39,61 @@ Direction = Annotated[tuple[Number, Number, Number], AfterValidator(unit_vector)
 """Unit vector; a file may give any length."""
 
 
+class _Kept(dict[Any, tuple[tuple, Any]]):
+    """What is derived of a part; all are equal, since parts are that are derived of equal values."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Kept)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+
+def _bare(part: Derived) -> Derived:
+    """A part without what was derived of it."""
+    values, fields = vars(part), type(part).model_fields
+    if len(values) > len(fields):
+        for name in values.keys() - fields.keys():
+            del values[name]
+    return part
+
+
 class Part(BaseModel):
     """Unknown keys are faults, and nothing changes after validation."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @cached_property
+    def _kept(self) -> _Kept:
+        return _Kept()
+
+    def keep(self, what: Hashable, others: tuple, make: Callable[[], Derived]) -> Derived:
+        """What is derived of this part, and of other objects that do not change: made when first asked for.
+
+        It is no part of what is compared, written or copied.
+        """
+        key = what, *map(id, others)
+        found = self._kept.get(key)
+        if found is None:
+            found = self._kept[key] = others, make()  # the others stay alive, so that no other has their ids
+        return found[1]
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with other values, and with nothing derived of the old ones."""
+        return _bare(super().model_copy(update=update, deep=deep))
+
+    def __copy__(self) -> Self:
+        return _bare(super().__copy__())
+
+    def __deepcopy__(self, memo: dict[int, Any] | None = None) -> Self:
+        return _bare(super().__deepcopy__(memo))
+
+    def __getstate__(self) -> dict[Any, Any]:
+        state = super().__getstate__()
+        fields = type(self).model_fields
+        return state | {"__dict__": {name: value for name, value in state["__dict__"].items() if name in fields}}
 
     def __repr__(self) -> str:
         return shortened(super().__repr__(), LONGEST_REPR)

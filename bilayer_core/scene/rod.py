@@ -133,12 +133,15 @@ class Rod(Part):
         return [f"{self.name}_{index}" for index in range(self.pattern.copies)] if self.pattern else [self.name]
 
     @property
-    def copies(self) -> list[RodCopy]:
-        """The rods that this one stands for."""
+    def copies(self) -> tuple[RodCopy, ...]:
+        """The rods that this one stands for; those that differ in nothing but their places are one object."""
+        return self.keep("copies", (), self._copies)
+
+    def _copies(self) -> tuple[RodCopy, ...]:
         if self.pattern is None:
-            return [RodCopy(self.name, self, placed())]
+            return (RodCopy(self.name, self, placed()),)
         places = zip(self.copy_names, self.pattern.places(), strict=True)
-        return [RodCopy(name, self._copy(index), place) for index, (name, place) in enumerate(places)]
+        return tuple(RodCopy(name, self._copy(index), place) for index, (name, place) in enumerate(places))
 
     def _copy(self, index: int) -> Rod:
         """This rod with what the pattern has for one copy, and without the pattern."""
@@ -148,18 +151,26 @@ class Rod(Part):
             own |= {} if bodies is None else {end: bodies[index]}
         channels = {name: of_copies[index] for name, of_copies in self.pattern.stimuli.items()}
         gain = 1.0 if self.pattern.gains is None else self.pattern.gains[index]
-        if channels or gain != 1.0:
-            own["layers"] = [layer.driven_by(channels, gain) for layer in self.layers]
-        return self.model_copy(update=own)
+
+        def made() -> Rod:
+            if channels or gain != 1.0:
+                own["layers"] = [layer.driven_by(channels, gain) for layer in self.layers]
+            return self.model_copy(update=own)
+
+        alike = own.get("clamp_start"), own.get("clamp_end"), tuple(channels.values()), gain
+        return self.keep(("copy", *alike), (), made)
 
     @property
-    def variants(self) -> list[Rod]:
+    def variants(self) -> tuple[Rod, ...]:
         """The rods that this one stands for as far as their clamps and laws differ, wherever they are."""
+        return self.keep("variants", (), self._variants)
+
+    def _variants(self) -> tuple[Rod, ...]:
         found: dict[Any, Rod] = {}
-        for copy in self.copies:
-            laws = tuple(tuple(layer.eigenstrain) for layer in copy.rod.layers)
-            found.setdefault((copy.rod.clamp_start, copy.rod.clamp_end, laws), copy.rod)
-        return list(found.values())
+        for rod in {id(copy.rod): copy.rod for copy in self.copies}.values():
+            laws = tuple(tuple(layer.eigenstrain) for layer in rod.layers)
+            found.setdefault((rod.clamp_start, rod.clamp_end, laws), rod)
+        return tuple(found.values())
 
     def covered_stations(self, layer: Layer) -> tuple[int, int]:
         """First and last station of `layer`, those nearest to its interval."""
