@@ -48,7 +48,7 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
     """Add one copy of a rod: a strand with the stiffness and mass of its layers, and their drag."""
     rod, name = copy.rod, copy.name
     layers = _placed(scene, rod)
-    axis = _axis(layers)
+    axis = _axis_of(scene, rod)
     nodes = np.arange(stations_of(rod)[1] + 1)
     shape = strand_shape(rod, np.full(len(nodes), axis), 0, nodes[-1], copy.place)
     halves = [
@@ -101,6 +101,10 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
 
 def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
     return scene.keep("layers in place", (rod,), lambda: _layers_in_place(scene, rod))
+
+
+def _axis_of(scene: SceneConfig, rod: Rod) -> float:
+    return scene.keep("axis", (rod,), lambda: _axis(_placed(scene, rod)))
 
 
 def _layers_in_place(scene: SceneConfig, rod: Rod) -> list[_Placed]:
@@ -173,7 +177,8 @@ def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandAr
 
 def uneven_faces(rod: Rod, scene: SceneConfig) -> Iterator[Figure]:
     """Where contact of a rod with rods counts from a face that is not where the nearer one is."""
-    low, high = _faces(rod, _axis(_placed(scene, rod)))
+    rod = rod.copies[0].rod  # whose layers are those of all
+    low, high = _faces(rod, _axis_of(scene, rod))
     difference = np.abs(high + low)
     if np.any(difference > UNEVEN * np.maximum(high, -low)):
         near, far = np.minimum(high, -low).min(), np.maximum(high, -low).max()

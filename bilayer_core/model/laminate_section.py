@@ -171,6 +171,10 @@ class WholeSection:
         """
         axial, height, bending = half.axial[edges], half.height[edges], self.bending[edges]
         part = np.mean(axial * (1.0 - self.coupling[edges] * height / bending), axis=1) / self.axial_stiffness[edges]
-        nodes, slot = np.unique(np.stack([edges, edges + 1], axis=1), return_inverse=True)
+        pairs = np.stack([edges, edges + 1], axis=1)
+        if len(edges) and edges[-1] - edges[0] == len(edges) - 1 and np.all(np.diff(edges) == 1):
+            nodes, slot = np.arange(edges[0], edges[-1] + 2), pairs - edges[0]  # as they mostly are
+        else:
+            nodes, slot = np.unique(pairs, return_inverse=True)
         of_halves = -self._half_length[edges] * (axial * height / bending)
         return part, nodes, np.bincount(slot.ravel(), weights=of_halves.ravel(), minlength=len(nodes))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
-from ..kinematics.rest_strains import rest_strains
+from ..kinematics.rest_strains import cross, rest_strains
 from ..kinematics.rotation import rotation_matrix
 from ..scene.config import SceneConfig
 from ..scene.eigenstrain import Eigenstrain
@@ -96,10 +97,14 @@ class StrandShape:
     @property
     def curvature(self) -> Array:
         """χ at each node [1/m], shape (n_node,)."""
-        return self.strains()[:, 0] / self.voronoi
+        return self._strains[:, 0] / self.voronoi
 
     def strains(self) -> Array:
         """κ₁ κ₂ ψ [rad] at each node: between the edges at it, at the ends between path and edge, shape (n_node, 3)."""
+        return self._strains.copy()
+
+    @cached_property
+    def _strains(self) -> Array:
         tangents = np.concatenate([self.end_tangents[:1], self.tangents, self.end_tangents[1:]])
         normals = np.concatenate([self.end_normals[:1], self.normals, self.end_normals[1:]])
         return self._round(rest_strains(tangents[:-1], normals[:-1], tangents[1:], normals[1:]))
@@ -137,7 +142,7 @@ def _imperfect_frames(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
     points, tangents, normals = rod.frames_at(arc)
     (f, g), slopes = (part.T[..., None] for part in departure(rod, arc))
     along = _tangents_beside(rod, arc, tangents, normals, (f, g), slopes)
-    return points + f * normals + g * np.cross(tangents, normals), along, _across(normals, along)
+    return points + f * normals + g * cross(tangents, normals), along, _across(normals, along)
 
 
 def _tangents_beside(
@@ -150,7 +155,7 @@ def _tangents_beside(
     (f, g), (slope_f, slope_g) = offset, slopes
     towards, across, twist = rod.curvatures_at(arc).T[..., None]
     along = (1.0 - towards * f - across * g) * tangents + (slope_f - twist * g) * normals
-    along = along + (slope_g + twist * f) * np.cross(tangents, normals)
+    along = along + (slope_g + twist * f) * cross(tangents, normals)
     return along / np.linalg.norm(along, axis=1, keepdims=True)
 
 

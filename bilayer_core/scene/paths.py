@@ -45,7 +45,7 @@ class Path(Part):
     @property
     def is_closed(self) -> bool:
         """Whether it ends where it starts, and a rod on it has no ends."""
-        return bool(getattr(self, "closed", False))
+        return bool(vars(self).get("closed", False))  # a field of some paths
 
     @property
     def sharpest(self) -> Array:
