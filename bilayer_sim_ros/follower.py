@@ -13,6 +13,7 @@ from pathlib import Path
 
 from bilayer_core.errors import BilayerError, InputError
 from bilayer_sim_ros.missing import explain_missing_ros
+from bilayer_sim_ros.signals import Stop
 
 PERIOD = 0.1
 """Between two times at which what has come is shown [s]."""
@@ -30,7 +31,7 @@ STANDARD_INPUT = 0
 def main(argv: list[str] | None = None) -> int:
     """Follow until a signal comes or the window is closed; the exit code."""
     options = _parse(sys.argv[1:] if argv is None else argv)
-    stop = threading.Event()
+    stop = Stop()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     if options.beside_node:
@@ -61,14 +62,14 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def _wait_for_the_end(stop: threading.Event) -> None:
+def _wait_for_the_end(stop: Stop) -> None:
     """The node holds the other end of the standard input, which closes with it."""
     while os.read(STANDARD_INPUT, 1024):  # past Python's buffer, which would be in use where the program ends
         pass
     stop.set()
 
 
-def _follow(options: argparse.Namespace, stop: threading.Event) -> None:
+def _follow(options: argparse.Namespace, stop: Stop) -> None:
     import rclpy
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.signals import SignalHandlerOptions

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
+from queue import SimpleQueue
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # what checkers of types take for true, without an import of milliseconds
@@ -18,8 +18,11 @@ STANDARD_ERROR = 2
 """Its descriptor."""
 
 
-class Stop(threading.Event):
-    """Set when a node is to end.
+class Stop:
+    """Set when a node is to end, by any thread or by a handler of signals.
+
+    A handler may interrupt `set` and `wait` anywhere, even one that was called by another handler. A
+    `threading.Event` holds a lock in both, and would wait for itself; putting into a `SimpleQueue` is reentrant.
 
     Attributes
     ----------
@@ -28,8 +31,23 @@ class Stop(threading.Event):
     """
 
     def __init__(self) -> None:
-        super().__init__()
         self.reason = ""
+        self._asked = False
+        self._calls: SimpleQueue[None] = SimpleQueue()
+
+    def set(self) -> None:
+        """Have `wait` return, now and always."""
+        self._asked = True
+        self._calls.put(None)
+
+    def is_set(self) -> bool:
+        """Whether the node is to end."""
+        return self._asked
+
+    def wait(self) -> None:
+        """Return as soon as it is set."""
+        self._calls.get()
+        self._calls.put(None)  # for whoever waits next
 
 
 class Signals:

@@ -89,6 +89,8 @@ def read_yaml(text: str, source: str) -> Any:
         place = f":{mark.line + 1}:{mark.column + 1}" if mark else ""
         if "another document" in str(error.problem):
             raise SceneError(f"{source}{place}: begins another document; a scene is a single one") from None
+        if "nesting depth" in str(error.problem):  # of 1000, where the reader has a limit of its own
+            raise SceneError(f"{source}{place}: {TOO_DEEP}") from None
         raise SceneError(f"{source}{place}: is not readable YAML: {_problem(error)}") from None
     except yaml.reader.ReaderError as error:
         before = text[: error.position] if _Base is yaml.SafeLoader else data[: error.position].decode(errors="ignore")

@@ -99,14 +99,17 @@ def main(argv: list[str] | None = None) -> int:
     """Run the node until it is interrupted; the exit code."""
     parser = ArgumentParser("gait_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
-    rclpy.init(args=argv)
     try:
+        rclpy.init(args=argv)
         rclpy.spin(GaitController())
     except (KeyboardInterrupt, ExternalShutdownException):
-        return 0
+        pass
     except (ValueError, ParameterException) as error:
         print(f"gait_controller: {error}", file=sys.stderr)
         return 2
+    except RuntimeError:  # of rclpy, where a signal came while the node was being made
+        if rclpy.ok():
+            raise
     finally:
         rclpy.try_shutdown()
     return 0

@@ -1,9 +1,8 @@
 """Executable `goal_controller`: takes a robot to a goal, one beat after the other, by where its centre of mass is.
 
 A controller to copy: plain rclpy, and nothing of the simulator but its topics. Each beat takes one stimulus channel
-from `low` up and back, by a part of the way to `high`; then it looks at `<node>/com`. What beats of which size have
-brought is kept, and the next one is as large as what is left asks for, by interpolation. Near the goal it rests; it
-beats again when the robot is moved away. What only goes forward cannot come back: beyond the goal it rests.
+from `low` up and back, by a part of the way to `high`; then it looks at `<node>/com`. The next beat is as large as what
+is left asks for, by what earlier ones have brought. Near the goal and beyond it rests, until the robot is moved back.
 
 It answers each time on `/clock`, once, with one `sensor_msgs/JointState` on `<node>/stimulus_stamped`, so it works
 while the simulation runs freely, is paused, or waits for it in lockstep. Where time goes back it begins anew.
@@ -63,8 +62,7 @@ class GoalController(Node):
 
     def parameter(self, name: str, default, description: str):
         """Declare a parameter; its value."""
-        descriptor = ParameterDescriptor(description=description, read_only=True)
-        value = self.declare_parameter(name, default, descriptor).value
+        value = self.declare_parameter(name, default, ParameterDescriptor(description=description, read_only=True)).value
         if value is None:
             raise ValueError(f"parameter '{name}' is empty")
         return value
@@ -131,14 +129,17 @@ def main(argv: list[str] | None = None) -> int:
     """Run the node until it is interrupted; the exit code."""
     parser = ArgumentParser("goal_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
-    rclpy.init(args=argv)
     try:
+        rclpy.init(args=argv)
         rclpy.spin(GoalController())
     except (KeyboardInterrupt, ExternalShutdownException):
-        return 0
+        pass
     except (ValueError, ParameterException) as error:
         print(f"goal_controller: {error}", file=sys.stderr)
         return 2
+    except RuntimeError:  # of rclpy, where a signal came while the node was being made
+        if rclpy.ok():
+            raise
     finally:
         rclpy.try_shutdown()
     return 0

@@ -124,18 +124,21 @@ def main(argv: list[str] | None = None) -> int:
     """Run the node until its ramp has ended or it is interrupted; the exit code."""
     parser = ArgumentParser("ramp_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
     parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
-    rclpy.init(args=argv)
     try:
+        rclpy.init(args=argv)
         node = RampController()
         rclpy.spin_until_future_complete(node, node.done)
         if node.done.exception() is not None:
             raise node.done.exception()
         node.get_logger().info("done")
     except (KeyboardInterrupt, ExternalShutdownException):
-        return 0
+        pass
     except (ValueError, ParameterException, TimeoutError) as error:
         print(f"ramp_controller: {error}", file=sys.stderr)
         return 2
+    except RuntimeError:  # of rclpy, where a signal came while the node was being made
+        if rclpy.ok():
+            raise
     finally:
         rclpy.try_shutdown()
     return 0

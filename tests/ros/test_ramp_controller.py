@@ -206,4 +206,4 @@ def test_a_waiting_controller_can_be_interrupted(start, domain, number):
     controller = start("controllers.ramp_controller", domain, {"connection_timeout": 100.0})
     controller.wait_for("waiting for a subscriber")
     controller.send(number)
-    assert controller.wait(10) == 0
+    assert controller.wait(10) == 0, controller.output

@@ -57,6 +57,28 @@ WHILE_LEAVING = """
 import atexit
 atexit.register(send, 5)
 """
+WHILE_SIGNALS_ARE_HANDLED = """
+from bilayer_sim_ros.signals import Signals
+
+sent = 0
+
+def interrupt(frame, event, argument):  # before every line but those of this program
+    global sent
+    if frame.f_code.co_filename == "<string>":
+        return None
+    sent += 1
+    send()
+    return interrupt
+
+stop = Signals("sim_node").take()
+sys.settrace(interrupt)
+stop.set()
+stop.wait()
+stop.wait()
+sys.settrace(None)
+assert stop.is_set() and stop.reason == "ended by SIGINT" and sent > 3, (stop.reason, sent)
+os._exit(0)
+"""
 TAIL = "\nsys.exit(sim_node.main())\n"
 
 
@@ -102,3 +124,7 @@ def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(end
     assert code == 0, output
     info = read_info(tmp_path / "run.mcap")
     assert (info.complete, info.termination) == (False, "ended by SIGINT")
+
+
+def test_signals_may_interrupt_the_handlers_of_others_and_the_wait_for_them(ended):
+    assert ended(WHILE_SIGNALS_ARE_HANDLED, "SIGINT,SIGTERM") == (0, "")
