@@ -54,6 +54,7 @@ class GaitController(Node):
         self.refuse_nonsense()
         self.answered: int | None = None
         self.publisher = self.create_publisher(JointState, f"{self.simulator}/stimulus_stamped", 10)
+        self.create_timer(1.0, lambda: None)  # wakes it up where rclpy has slept through a signal
         self.create_subscription(Clock, "/clock", self.hear, 10)
 
     def parameter(self, name: str, default, description: str):

@@ -3,7 +3,6 @@
 A controller to copy: plain rclpy, and nothing of the simulator but its topics. Each beat takes one stimulus channel
 from `low` up and back, by a part of the way to `high`; then it looks at `<node>/com`. The next beat is as large as what
 is left asks for, by what earlier ones have brought. Near the goal and beyond it rests, until the robot is moved back.
-
 It answers each time on `/clock`, once, with one `sensor_msgs/JointState` on `<node>/stimulus_stamped`, so it works
 while the simulation runs freely, is paused, or waits for it in lockstep. Where time goes back it begins anew.
 
@@ -56,13 +55,15 @@ class GoalController(Node):
             raise ValueError("axis and goal are three numbers each, and the axis is not 0")
         self.begin_anew()
         self.publisher = self.create_publisher(JointState, f"{node}/stimulus_stamped", 10)
+        self.create_timer(1.0, lambda: None)  # wakes it up where rclpy has slept through a signal
         self.create_subscription(Clock, "/clock", self.hear, 10)
         self.create_subscription(PointStamped, f"{node}/com", self.see, 50)
         self.create_subscription(PointStamped, "~/goal", self.aim, 1)
 
     def parameter(self, name: str, default, description: str):
         """Declare a parameter; its value."""
-        value = self.declare_parameter(name, default, ParameterDescriptor(description=description, read_only=True)).value
+        about = ParameterDescriptor(description=description, read_only=True)
+        value = self.declare_parameter(name, default, about).value
         if value is None:
             raise ValueError(f"parameter '{name}' is empty")
         return value
