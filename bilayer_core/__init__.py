@@ -1,7 +1,7 @@
 """Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
 
-``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``read_log``, ``compare`` and ``__version__`` are
-loaded at their first use: importing the package costs nothing.
+``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``read_log``, ``compare``, ``sweep``, ``optimise``,
+``read_results`` and ``__version__`` are loaded at their first use: importing the package costs nothing.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ if TYPE_CHECKING:  # what checkers of types take for true, without an import of 
     from bilayer_core.record.recorder import Recorder
     from bilayer_core.scene.loader import load_scene
     from bilayer_core.simulation.simulator import Simulator
+    from bilayer_core.sweeps.optimise import optimise
+    from bilayer_core.sweeps.result import read_results
+    from bilayer_core.sweeps.run import sweep
 
     __version__: str
 
@@ -26,10 +29,24 @@ _HOME = {
     "compare": "bilayer_core.record.compare",
     "estimate_error": "bilayer_core.converge.study",
     "load_scene": "bilayer_core.scene.loader",
+    "optimise": "bilayer_core.sweeps.optimise",
     "read_log": "bilayer_core.record.log_reader",
+    "read_results": "bilayer_core.sweeps.result",
+    "sweep": "bilayer_core.sweeps.run",
 }
 
-__all__ = ["Recorder", "Simulator", "__version__", "compare", "estimate_error", "load_scene", "read_log"]
+__all__ = [
+    "Recorder",
+    "Simulator",
+    "__version__",
+    "compare",
+    "estimate_error",
+    "load_scene",
+    "optimise",
+    "read_log",
+    "read_results",
+    "sweep",
+]
 
 
 def __getattr__(name: str) -> object:

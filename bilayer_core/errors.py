@@ -35,6 +35,12 @@ class OutputError(BilayerError):
     exit_code = 3
 
 
+class EngineError(BilayerError):
+    """The processes that were to run simulations are gone, or are none that could."""
+
+    exit_code = 3
+
+
 class PenetrationError(SceneError):
     """A scene starts with a node behind a surface, or nearer to it than can be resolved."""
 

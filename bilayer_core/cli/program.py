@@ -17,6 +17,7 @@ from bilayer_core.cli.converge import converge
 from bilayer_core.cli.export import export
 from bilayer_core.cli.info import info
 from bilayer_core.cli.new import new
+from bilayer_core.cli.optimise import optimise
 from bilayer_core.cli.options import Settings, VerbGroup
 from bilayer_core.cli.plot import plot
 from bilayer_core.cli.render import render
@@ -26,6 +27,7 @@ from bilayer_core.cli.run import run
 from bilayer_core.cli.scenes import scenes, schema
 from bilayer_core.cli.signals import Signals
 from bilayer_core.cli.stress import stress
+from bilayer_core.cli.sweep import sweep
 from bilayer_core.cli.validate import validate
 from bilayer_core.cli.view import view
 from bilayer_core.errors import BilayerError
@@ -58,9 +60,10 @@ def program() -> None:
 
 
 SIMULATES = (scenes, new, schema, check, run, converge, validate, bench, stress)
+MANY = (sweep, optimise)
 OF_LOGS = (info, repair, export, compare, plot, replay, view, render)
 
-for verb in (*SIMULATES, *OF_LOGS):
+for verb in (*SIMULATES, *MANY, *OF_LOGS):
     program.add_command(verb)
 
 

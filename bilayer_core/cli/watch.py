@@ -14,6 +14,8 @@ import click
 from bilayer_core.cli.signals import WORDS
 
 COMPILING_NOTICE = "compiling kernels, once for this version on this machine (about a minute) ..."
+TELL_EVERY = 10.0
+"""Wall time between two lines about many runs, without a screen [s]."""
 REFRESH = 0.1
 """Wall time between two updates of the progress bar [s]."""
 
@@ -153,3 +155,52 @@ def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
 
         yield show
         bar.update(task, completed=total, description="done")
+
+
+@contextmanager
+def runs_bar(total: int, there: int, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """A bar on stderr over many runs: how many, how many a second, time left, how many are not done.
+
+    Without a screen a line tells now and then. Yields the function that takes the outcome of each run.
+
+    Parameters
+    ----------
+    total, there : int
+        Of the runs, and of those that are there before it begins.
+    """
+    if quiet:
+        yield lambda outcome: None
+        return
+    begun, count, failed = clock.perf_counter(), 0, 0
+
+    def state() -> tuple[float, float, int]:
+        rate = count / max(clock.perf_counter() - begun, 1e-9)
+        return rate, (total - there - count) / rate if rate else 0.0, failed
+
+    if not sys.stderr.isatty():
+        told = begun
+
+        def tell(outcome: str) -> None:
+            nonlocal count, failed, told
+            count, failed = count + 1, failed + (outcome != "done")
+            if clock.perf_counter() - told >= TELL_EVERY:
+                told = clock.perf_counter()
+                rate, left, _ = state()
+                text = f"{there + count} of {total} runs, {rate:.3g} a second, {left:.0f} s left, {failed} not done"
+                click.echo(text, err=True)
+
+        yield tell
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = BarColumn(), MofNCompleteColumn(), TextColumn("{task.description}"), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task("starting processes", total=total, completed=there)
+
+        def show(outcome: str) -> None:
+            nonlocal count, failed
+            count, failed = count + 1, failed + (outcome != "done")
+            bar.update(task, completed=there + count, description=f"{state()[0]:.3g}/s, {failed} not done, left")
+
+        yield show

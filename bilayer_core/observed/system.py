@@ -10,6 +10,11 @@ import numpy as np
 
 def versions() -> dict[str, str]:
     """Versions of this package and of what its results depend on."""
+    return dict(_versions())
+
+
+@cache
+def _versions() -> dict[str, str]:
     import numba
     import scipy
 

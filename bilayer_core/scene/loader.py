@@ -67,11 +67,25 @@ def parse_scene(text: str, source: str, overrides: Overrides = (), directory: Pa
 
 def scene_text(config: SceneConfig) -> str:
     """YAML that loads to the same configuration bit for bit: every value is written out, in SI units."""
-    return write_yaml(_content(config))
+    return write_yaml(scene_content(config))
 
 
-def _content(config: SceneConfig) -> dict[str, Any]:
+def scene_content(config: SceneConfig) -> dict[str, Any]:
+    """Content of a scene with every value written out, in SI units and with the tables of its files, as JSON has it."""
     return config.model_dump(mode="json", by_alias=True)
+
+
+def load_content(content: dict[str, Any], overrides: Overrides, source: str = "scene") -> SceneConfig:
+    """Load a scene from content that `scene_content` gave, with other values, which it takes in place.
+
+    As `load_scene`, in half the time: what is written out is validated once, with the new values.
+    """
+    changes = read_overrides(overrides)
+    for change in changes:
+        change.apply(content)
+    check_content(content, source)
+    changed = shortened(" ".join(change.text for change in changes))
+    return _validate(content, f"{source} with {changed}" if changed else source, Path())
 
 
 def find_scene(scene: str | Path) -> Path:
@@ -93,12 +107,7 @@ def _validated(data: Any, source: str, overrides: Overrides, directory: Path) ->
     config = _validate(data, source, directory)
     if not overrides:
         return config
-    data, changes = _content(config), read_overrides(overrides)
-    for change in changes:
-        change.apply(data)
-    check_content(data, source)
-    changed = shortened(" ".join(change.text for change in changes))
-    return _validate(data, f"{source} with {changed}", directory)
+    return load_content(scene_content(config), overrides, source)
 
 
 def _validate(data: dict[str, Any], source: str, directory: Path) -> SceneConfig:

@@ -37,10 +37,11 @@ ALLOWED = {
     "bench": NUMERICS | {"converge", "validate"},
     "stress": NUMERICS | {"converge", "validate", "bench"},
     "testing": NUMERICS | {"stress"},
-    "cli": NUMERICS | {"runs", "view", "converge", "validate", "bench", "stress"},
+    "sweeps": NUMERICS | {"view"},
+    "cli": NUMERICS | {"runs", "view", "converge", "validate", "bench", "stress", "sweeps"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
-FACES = {"__init__": NUMERICS | {"converge"}, "__main__": {"cli"}}
+FACES = {"__init__": NUMERICS | {"converge", "sweeps"}, "__main__": {"cli"}}
 TOP = "bilayer_core"
 
 

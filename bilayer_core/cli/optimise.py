@@ -1,0 +1,99 @@
+"""The verb ``optimise``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from bilayer_core.cli.options import Verb
+from bilayer_core.cli.sweep import refuse_both, teller, workers_option
+from bilayer_core.cli.watch import compile_kernels, runs_bar
+
+DEFAULT_DIRECTORY = "runs/optimise"
+NOT_CONFIRMED = 1
+
+
+@click.command(cls=Verb)
+@click.argument("file", metavar="SWEEP.yaml")
+@click.option("--maximise", metavar="METRIC", help="Search for its largest value.")
+@click.option("--minimise", metavar="METRIC", help="Search for its least value.")
+@click.option("--trials", type=click.IntRange(1), default=100, show_default=True, help="Runs, resumed ones included.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search.")
+@click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
+@workers_option
+@click.option("--resume", is_flag=True, help="Go on with the runs in DIR.")
+@click.option("--force", is_flag=True, help="Replace the results in DIR.")
+@click.option("--plot", "plotted", is_flag=True, help="Draw the results.")
+@click.option("--quiet", is_flag=True, help="No progress.")
+def optimise(
+    file: str,
+    maximise: str | None,
+    minimise: str | None,
+    trials: int,
+    seed: int,
+    out: str,
+    workers: int | None,
+    scheduler: str | None,
+    resume: bool,
+    force: bool,
+    plotted: bool,
+    quiet: bool,
+) -> int:
+    """Search for the values of the parameters of SWEEP.yaml with the best METRIC (docs/sweeps.md).
+
+    The best run is made again at a tenth of the tolerance: exit code 1 if its metric differs by more than 2 %. Writes
+    results as `bilayer sweep` does, and DIR/best.yaml, a scene for `bilayer run`.
+    """
+    from pathlib import Path
+
+    from bilayer_core.sweeps import optimise as search
+    from bilayer_core.sweeps.plots import check_matplotlib, draw
+    from bilayer_core.sweeps.result import read_results
+
+    refuse_both(workers, scheduler)
+    if (maximise is None) == (minimise is None):
+        raise click.UsageError("give --maximise METRIC or --minimise METRIC")
+    if plotted:
+        check_matplotlib()
+    compile_kernels(quiet)
+    with runs_bar(trials, 0, quiet) as show:
+        optimum = search.optimise(
+            file,
+            maximise or minimise or "",
+            largest=maximise is not None,
+            trials=trials,
+            seed=seed,
+            out=out,
+            workers=workers,
+            scheduler=scheduler,
+            resume=resume,
+            force=force,
+            progress=lambda row: show(row.outcome.value),
+            tell=teller(quiet),
+        )
+    for line in lines(optimum):
+        click.echo(line)
+    click.echo(f"wrote {Path(out) / search.BEST}")
+    click.echo(f"wrote {Path(out) / 'results.parquet'}")
+    if plotted:
+        for path in draw(read_results(out), Path(out)):
+            click.echo(f"wrote {path}")
+    return 0 if optimum.is_confirmed else NOT_CONFIRMED
+
+
+def lines(optimum: Any) -> list[str]:
+    """What a search found, in words."""
+    told = [f"best of {optimum.trials} runs: {optimum.metric} {optimum.value:.6g} (run {optimum.best.number})"]
+    if optimum.start is not None:
+        ratio = f", {optimum.value / optimum.start:.3g} times that" if optimum.start > 0.0 < optimum.value else ""
+        told[0] += f"; at the start {optimum.start:.6g}{ratio}"
+    for name, value in optimum.best.parameters.items():
+        shown = f"{value:.6g}" if isinstance(value, float) else f"{value}"
+        told.append(f"  {name} {shown} {optimum.units.get(name, '')}".rstrip())
+    if optimum.confirmed is None:
+        told.append("NOT confirmed: the run with finer steps could not be made")
+    else:
+        word = "confirmed" if optimum.is_confirmed else "NOT confirmed"
+        told.append(f"{word} with finer steps: {optimum.confirmed:.6g} ({100.0 * optimum.difference:+.2g} %)")
+    return told

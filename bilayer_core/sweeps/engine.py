@@ -1,0 +1,395 @@
+"""Dask's processes: those of this machine, or of a cluster that exists, and the runs that they are given.
+
+As many pieces of work as there are threads are on their way, so a process that dies costs the piece it is at and no
+other. A piece is one run, or several short ones: Dask takes 2 to 4 ms for each piece.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import os
+import signal
+import socket
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Any
+from uuid import uuid4
+
+from bilayer_core.errors import EngineError, InputError, OutputError
+from bilayer_core.sweeps.execute import LOGS, execute, prepare, row_of
+from bilayer_core.sweeps.job import Job, Outcome, Point, Row
+
+PIECE_TIME = 0.25
+"""Wall time that a piece of short runs should take [s]."""
+LARGEST_PIECE = 64
+"""Runs."""
+MOST_DEATHS = 2
+"""Of the process of one run alone; then the run is killed, in the words of its row."""
+CONNECT_TIME = 8.0
+"""To reach a scheduler [s]."""
+PREPARE_TIME = 600.0
+"""For a process to start, and to compile kernels [s]."""
+LOOK_TIME, LONELY_TIME = 2.0, 60.0
+"""Between two looks whether anybody works at all, and how long nobody may [s]."""
+KILL_FACTOR, KILL_EXTRA = 2.0, 10.0
+"""A run is killed at this multiple of the time it may take, and so many seconds more: it could not stop by itself."""
+TOPIC = "bilayer-sweep"
+CONFIG = {
+    "distributed.scheduler.allowed-failures": 0,  # who dies is counted here
+    "distributed.worker.memory.target": False,  # of what runs, nothing can be put to disk
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.gil.enabled": False,
+}
+"""Of processes of this machine."""
+
+
+def work(job: Job, points: Sequence[Point]) -> list[Row]:
+    """A piece of work, in the process that does it."""
+    rows: list[Row] = []
+    for point in points:
+        with _killed_when_late(job, point):
+            rows += execute(job, [point])
+    return rows
+
+
+@contextmanager
+def _killed_when_late(job: Job, point: Point) -> Iterator[None]:
+    if job.wall_time is None:
+        yield
+        return
+    from distributed import get_worker
+
+    worker, most = get_worker(), KILL_FACTOR * job.wall_time + KILL_EXTRA
+
+    def kill() -> None:
+        worker.log_event(TOPIC, {"key": point.key, "reason": f"it did not stop within {most:g} s, and was killed"})
+        threading.Event().wait(0.5)  # until that is sent
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    timer = threading.Timer(most, kill)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+@dataclass
+class _Piece:
+    job: Job
+    points: list[Point]
+    future: Any
+
+
+class Engine:
+    """Processes that take runs.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    job : Job
+    memory : float or None
+        At which a process is killed [bytes], for messages.
+
+    Attributes
+    ----------
+    threads : int
+        Runs side by side.
+    where : str
+        For the user.
+    dashboard : str
+        Address of Dask's dashboard; empty if there is none.
+    """
+
+    def __init__(self, client: Any, job: Job, memory: float | None):
+        self._client, self._job, self._memory = client, job, memory
+        self._name = uuid4().hex[:8]
+        self._done: SimpleQueue[int] = SimpleQueue()
+        self._pieces: dict[int, _Piece] = {}
+        self._again: deque[tuple[Job, Point]] = deque()
+        self._deaths: dict[str, int] = {}
+        self._reasons: dict[str, str] = {}
+        self._count = 0
+        self._mean: float | None = None
+        self.threads = 1
+        self.where = self.dashboard = ""
+        client.subscribe_topic(TOPIC, self._hear)
+
+    def _hear(self, event: tuple[float, Any]) -> None:
+        if isinstance(event[1], dict) and "key" in event[1]:
+            self._reasons[event[1]["key"]] = str(event[1].get("reason", ""))
+
+    @property
+    def free(self) -> int:
+        """Pieces of work that can be given now."""
+        return self.threads - len(self._pieces)
+
+    @property
+    def busy(self) -> int:
+        """Runs that are on their way."""
+        return sum(len(piece.points) for piece in self._pieces.values()) + len(self._again)
+
+    @property
+    def piece_size(self) -> int:
+        """Runs for the next piece."""
+        if self._mean is None:
+            return 1
+        return max(1, min(LARGEST_PIECE, int(PIECE_TIME / max(self._mean, 1e-6))))
+
+    def run(self, points: Iterator[Point]) -> Iterator[list[Row]]:
+        """Make runs; the rows of each piece come when it is done, in any order."""
+        left = True
+        while left or self.busy:
+            while self.free > 0 and left:
+                piece = [point for _, point in zip(range(self.piece_size), points, strict=False)]
+                left = bool(piece)
+                if piece:
+                    self.submit(piece)
+            if self.busy:
+                yield self.wait()
+
+    def submit(self, points: Sequence[Point], job: Job | None = None) -> None:
+        """Give away a piece of work; with another `job` the runs are of that."""
+        job = job or self._job
+        self._count += 1
+        number = self._count
+        key = f"bilayer-run-{self._name}-{number}"
+        future = self._client.submit(work, job, list(points), key=key, pure=False)
+        self._pieces[number] = _Piece(job, list(points), future)
+        future.add_done_callback(lambda _: self._done.put(number))
+
+    def wait(self) -> list[Row]:
+        """The rows of the next piece that is done; none of one whose process died and that is given away again.
+
+        Raises
+        ------
+        EngineError
+            If there are no processes any more.
+        OutputError
+            If a log could not be written.
+        """
+        while self._again and self.free > 0:
+            job, point = self._again.popleft()
+            self.submit([point], job)
+        lonely = 0.0
+        while True:
+            try:
+                number = self._done.get(timeout=LOOK_TIME)
+                break
+            except Empty:
+                lonely = 0.0 if self._attended() else lonely + LOOK_TIME
+                if lonely >= LONELY_TIME:
+                    raise EngineError(f"{self.where}: no process has been there for {lonely:g} s") from None
+        return self._collect(self._pieces.pop(number))
+
+    def _attended(self) -> bool:
+        """Whether there are processes."""
+        if self._client.status != "running":
+            raise EngineError(f"{self.where}: the scheduler has gone")
+        return bool(self._client.scheduler_info(n_workers=-1)["workers"])
+
+    def _collect(self, piece: _Piece) -> list[Row]:
+        from distributed import KilledWorker
+
+        try:
+            rows: list[Row] = piece.future.result()
+        except KilledWorker:
+            return self._of_dead(piece.job, piece.points)
+        except (OutputError, InputError):
+            raise
+        except Exception as error:
+            if piece.future.status in ("cancelled", "lost"):
+                raise EngineError(f"{self.where}: the scheduler has gone") from None
+            told = " ".join(f"{type(error).__name__}: {error}".split())
+            raise EngineError(f"{self.where}: a process cannot do its work: {told}") from error
+        finally:
+            piece.future.release()
+        time = sum(row.wall_time for row in rows) / len(rows)
+        self._mean = time if self._mean is None else 0.8 * self._mean + 0.2 * time
+        return rows
+
+    def _of_dead(self, job: Job, points: list[Point]) -> list[Row]:
+        """What is to be done with the runs of a process that died: each once more by itself, then it is its fault."""
+        if len(points) > 1:
+            self._again.extend((job, point) for point in points)
+            return []
+        (point,) = points
+        self._deaths[point.key] = self._deaths.get(point.key, 0) + 1
+        reason = self._reasons.get(point.key, "")
+        if self._deaths[point.key] < MOST_DEATHS and not reason:
+            self._again.append((job, point))
+            return []
+        limit = f"; processes are killed beyond {self._memory / 1e9:.3g} GB" if self._memory else ""
+        reason = reason or f"its process died {MOST_DEATHS} times{limit}"
+        row = row_of(job, point)
+        row.outcome, row.reason = Outcome.KILLED, reason
+        return [row]
+
+
+@contextmanager
+def open_engine(
+    job: Job, workers: int | None = None, scheduler: str | None = None, memory: float | None = None
+) -> Iterator[Engine]:
+    """Processes that are ready to run.
+
+    Parameters
+    ----------
+    job : Job
+    workers : int, optional
+        Processes of this machine; by default one a core.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers run instead: ``tcp://host:8786``.
+    memory : float, optional
+        At which a process of this machine is killed [bytes]; by default its share of the memory.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, the scheduler cannot be reached, or its workers have other versions or do not see the
+        directory of logs.
+    EngineError
+        If no process starts.
+    """
+    try:
+        import dask
+        import distributed  # noqa: F401
+    except ImportError:
+        raise InputError("sweeps need Dask: pip install 'bilayer_sim_ros[sweep]'") from None
+    with ExitStack() as stack:
+        if scheduler is None:
+            workers = workers or len(os.sched_getaffinity(0))
+            stack.enter_context(dask.config.set(CONFIG))
+            engine = _embedded(stack, job, workers, memory)
+        else:
+            engine = _joined(stack, job, scheduler)
+        _get_ready(engine, job, workers)
+        yield engine
+
+
+def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) -> Engine:
+    from distributed import Client, LocalCluster
+
+    has_dashboard = importlib.util.find_spec("bokeh") is not None
+    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="bilayer-sweep-", ignore_cleanup_errors=True))
+    try:
+        cluster = stack.enter_context(
+            LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0" if has_dashboard else None,
+                memory_limit=memory or "auto",
+                local_directory=folder,
+                silence_logs=logging.CRITICAL,
+            )
+        )
+    except RuntimeError as error:
+        hint = "in a program, call it below `if __name__ == '__main__':`, since processes read the program again"
+        raise EngineError(f"sweep: no process starts on this machine ({error}); {hint}") from error
+    client = stack.enter_context(Client(cluster, set_as_default=False))
+    engine = Engine(client, job, memory)
+    engine.where = f"{workers} processes of this machine" if workers > 1 else "one process of this machine"
+    engine.dashboard = client.dashboard_link if has_dashboard else ""
+    return engine
+
+
+def _joined(stack: ExitStack, job: Job, address: str) -> Engine:
+    from distributed import Client
+
+    logger = logging.getLogger("distributed")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    stack.callback(logger.setLevel, before)
+    try:
+        client = stack.enter_context(Client(address, timeout=CONNECT_TIME, set_as_default=False))
+    except (OSError, TimeoutError, ValueError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(
+            f"--scheduler: {address}: no Dask scheduler can be reached there within {CONNECT_TIME:g} s ({reason}); "
+            "`dask scheduler` prints its address when it starts, such as tcp://192.0.2.1:8786"
+        ) from None
+    engine = Engine(client, job, None)
+    engine.where, engine.dashboard = f"cluster {address}", client.dashboard_link
+    return engine
+
+
+def _get_ready(engine: Engine, job: Job, workers: int | None) -> None:
+    """Wait for processes, and have them say their versions, compile, and look for the directory of logs."""
+    client, joined = engine._client, workers is None
+    try:
+        client.wait_for_workers(1 if joined else workers, timeout=CONNECT_TIME if joined else PREPARE_TIME)
+    except TimeoutError:
+        what = "start some with `dask worker ADDRESS`" if joined else "is there enough memory?"
+        error = InputError if joined else EngineError
+        raise error(f"{engine.where}: has no workers; {what}") from None
+    present = client.scheduler_info(n_workers=-1)["workers"]
+    engine.threads = sum(worker["nthreads"] for worker in present.values())
+    with _token(job) as token:
+        by_host: dict[str, list[str]] = {}
+        for address, worker in present.items():
+            by_host.setdefault(worker["host"], []).append(address)
+        firsts = {addresses[0] for addresses in by_host.values()}
+        for group in (firsts, present.keys() - firsts):  # one of a machine compiles, the others read what it kept
+            asked = {
+                address: client.submit(
+                    prepare, job, token, workers=[address], allow_other_workers=False, pure=False, retries=1
+                )
+                for address in group
+            }
+            for address, future in asked.items():
+                _check(engine, address, job, _answer(engine, address, future))
+
+
+def _answer(engine: Engine, address: str, future: Any) -> dict[str, Any]:
+    try:
+        return future.result(timeout=PREPARE_TIME)
+    except (InputError, OutputError):
+        raise
+    except Exception as error:
+        told = " ".join(f"{type(error).__name__}: {error}".split())
+        raise InputError(
+            f"{engine.where}: worker {address} cannot run: {told}; bilayer_sim_ros must be installed there, in the "
+            "version that is here"
+        ) from error
+
+
+def _check(engine: Engine, address: str, job: Job, answer: dict[str, Any]) -> None:
+    found, here = answer["versions"], job.expected
+    if found != here:
+        others = [f"{name} {found.get(name)} (here {here[name]})" for name in here if found.get(name) != here[name]]
+        raise InputError(
+            f"{engine.where}: worker {address} on {answer['host']} has other versions: {', '.join(others)}; results "
+            "would differ in their last digits or more; install the same on both sides"
+        )
+    if not answer["sees"] or not answer["writes"]:
+        what = "cannot write there" if answer["sees"] else "does not see it"
+        raise InputError(
+            f"--out: {job.directory}: worker {address} on {answer['host']} {what}; logs need a directory that all "
+            f"workers share, by the same name (this is {socket.gethostname()})"
+        )
+
+
+@contextmanager
+def _token(job: Job) -> Iterator[str]:
+    """Name of a file that is in the directory of logs meanwhile; empty if there are none."""
+    if job.logs == "none":
+        yield ""
+        return
+    folder = Path(job.directory, LOGS)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(prefix=".shared-", dir=folder) as file:
+            yield Path(file.name).name
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error
