@@ -169,8 +169,9 @@ def _check(sweep: Sweep) -> None:
 
 def _check_metrics(sweep: Sweep, simulator: Simulator, values: Values) -> None:
     simulator.compile()
-    recording = recording_of(sweep.job, simulator)
+    recording = None
     try:
+        recording = recording_of(sweep.job, simulator)
         check_metrics(sweep.job, FinishedRun(simulator, simulator.summary(), values, recording))
     except BilayerError as error:
         raise InputError(f"{sweep.source}: {error}") from None

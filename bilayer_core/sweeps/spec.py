@@ -86,7 +86,7 @@ class Parameter(Part):
         if self.from_ is not None:
             return self.from_.unit
         found = [_bound_or_none(value) for value in self.values or ()]
-        return found[0].unit if all(of is not None and of.unit for of in found) else ""
+        return found[0].unit if found and all(of is not None and of.unit for of in found) else ""
 
     @cached_property
     def ends(self) -> tuple[float, float]:
