@@ -17,6 +17,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -279,21 +280,21 @@ def open_engine(
 def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) -> Engine:
     from distributed import Client, LocalCluster
 
-    has_dashboard = importlib.util.find_spec("bokeh") is not None
+    has_dashboard = importlib.util.find_spec("bokeh") is not None  # without it the address shows nothing
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="bilayer-sweep-", ignore_cleanup_errors=True))
     try:
-        cluster = stack.enter_context(
-            LocalCluster(
+        with _keyboard_unheard():
+            cluster = LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
                 host="127.0.0.1",
-                dashboard_address="127.0.0.1:0" if has_dashboard else None,
+                dashboard_address="127.0.0.1:0",
                 memory_limit=memory or "auto",
                 local_directory=folder,
                 silence_logs=logging.CRITICAL,
             )
-        )
+            stack.enter_context(cluster)
     except RuntimeError as error:
         hint = "in a program, call it below `if __name__ == '__main__':`, since processes read the program again"
         raise EngineError(f"sweep: no process starts on this machine ({error}); {hint}") from error
@@ -302,6 +303,20 @@ def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) ->
     engine.where = f"{workers} processes of this machine" if workers > 1 else "one process of this machine"
     engine.dashboard = client.dashboard_link if has_dashboard else ""
     return engine
+
+
+@contextmanager
+def _keyboard_unheard() -> Iterator[None]:
+    """Threads and processes that are started meanwhile have SIGINT blocked: Ctrl-C is for the thread that waits."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    get_context("spawn").Lock()  # starts Python's tracker of resources, which would unblock the signal later
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _joined(stack: ExitStack, job: Job, address: str) -> Engine:

@@ -16,6 +16,7 @@ from bilayer_core.jit.cache import fingerprint
 from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_core.observed.observer import Observer
 from bilayer_core.observed.system import versions
+from bilayer_core.record.paths import unwritable
 from bilayer_core.record.recorder import Recorder
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content
@@ -161,6 +162,10 @@ def _names(job: Job, simulator: Simulator) -> list[str]:
 def _recorder(simulator: Simulator, path: Path) -> Observer:
     from bilayer_core.record.mcap_log import McapRecorder
 
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(path.parent, error) from error
     output = simulator.scene.output
     return McapRecorder(str(path), output.rate, output.marker_rate, True)
 
