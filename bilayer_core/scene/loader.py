@@ -80,12 +80,10 @@ def load_content(content: dict[str, Any], overrides: Overrides, source: str = "s
 
     As `load_scene`, in half the time: what is written out is validated once, with the new values.
     """
-    changes = read_overrides(overrides)
-    for change in changes:
+    for change in read_overrides(overrides):
         change.apply(content)
     check_content(content, source)
-    changed = shortened(" ".join(change.text for change in changes))
-    return _validate(content, f"{source} with {changed}" if changed else source, Path())
+    return _validate(content, source, Path())
 
 
 def find_scene(scene: str | Path) -> Path:
@@ -107,7 +105,8 @@ def _validated(data: Any, source: str, overrides: Overrides, directory: Path) ->
     config = _validate(data, source, directory)
     if not overrides:
         return config
-    return load_content(scene_content(config), overrides, source)
+    changed = shortened(" ".join(change.text for change in read_overrides(overrides)))
+    return load_content(scene_content(config), overrides, f"{source} with {changed}")
 
 
 def _validate(data: dict[str, Any], source: str, directory: Path) -> SceneConfig:

@@ -6,7 +6,6 @@ other. A piece is one run, or several short ones: Dask takes 2 to 4 ms for each 
 
 from __future__ import annotations
 
-import importlib.util
 import logging
 import os
 import signal
@@ -21,6 +20,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
+from urllib.request import urlopen
 from uuid import uuid4
 
 from bilayer_core.errors import EngineError, InputError, OutputError
@@ -33,6 +33,8 @@ LARGEST_PIECE = 64
 """Runs."""
 MOST_DEATHS = 2
 """Of the process of one run alone; then the run is killed, in the words of its row."""
+DASHBOARD_TIME = 2.0
+"""For the dashboard to answer [s]."""
 CONNECT_TIME = 8.0
 """To reach a scheduler [s]."""
 PREPARE_TIME = 600.0
@@ -280,7 +282,6 @@ def open_engine(
 def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) -> Engine:
     from distributed import Client, LocalCluster
 
-    has_dashboard = importlib.util.find_spec("bokeh") is not None  # without it the address shows nothing
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="bilayer-sweep-", ignore_cleanup_errors=True))
     try:
         with _keyboard_unheard():
@@ -301,7 +302,7 @@ def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) ->
     client = stack.enter_context(Client(cluster, set_as_default=False))
     engine = Engine(client, job, memory)
     engine.where = f"{workers} processes of this machine" if workers > 1 else "one process of this machine"
-    engine.dashboard = client.dashboard_link if has_dashboard else ""
+    engine.dashboard = _dashboard(client)
     return engine
 
 
@@ -335,8 +336,18 @@ def _joined(stack: ExitStack, job: Job, address: str) -> Engine:
             "`dask scheduler` prints its address when it starts, such as tcp://192.0.2.1:8786"
         ) from None
     engine = Engine(client, job, None)
-    engine.where, engine.dashboard = f"cluster {address}", client.dashboard_link
+    engine.where, engine.dashboard = f"cluster {address}", _dashboard(client)
     return engine
+
+
+def _dashboard(client: Any) -> str:
+    """Address of a scheduler's dashboard; empty if nothing is shown there, as where bokeh is not installed."""
+    link = str(client.dashboard_link)
+    try:
+        with urlopen(link, timeout=DASHBOARD_TIME):
+            return link
+    except (OSError, ValueError):
+        return ""
 
 
 def _get_ready(engine: Engine, job: Job, workers: int | None) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +30,8 @@ CONFIRMED = 0.02
 """Largest relative difference to the run with finer steps by which a value is confirmed."""
 FINER_TOLERANCE, FINER_STEP = 0.1, 0.25
 """Of that run, over those of the others."""
+SEED_STEP = 1_000_003
+"""Between the seeds of searches that were continued after other numbers of runs."""
 MOST_CANDIDATES = 5
 """The best runs that are tried to be confirmed, one after the other."""
 BEST = "best.yaml"
@@ -89,33 +91,32 @@ class Search:
     largest : bool
     seed : int
         Of the sampler.
+    known : sequence of Row
+        Runs that were made before, as if they had been asked for.
 
     Raises
     ------
     InputError
-        If there is no such metric, or Optuna is not installed.
+        If Optuna is not installed.
     """
 
-    def __init__(self, sweep: Sweep, metric: str, largest: bool, seed: int):
+    def __init__(self, sweep: Sweep, metric: str, largest: bool, seed: int, known: Sequence[Row] = ()):
         optuna = _optuna()
-        if metric not in sweep.job.metrics:
-            there = ", ".join(sweep.job.metrics) or "none"
-            raise InputError(f"metric {metric!r}: {sweep.source} has no such metric; there are {there}")
-        if sweep.spec.repeats:
-            raise InputError(f"{sweep.source}: repeats: must be left out for a search: each run is made once")
         self.sweep, self.metric, self.largest = sweep, metric, largest
         with _quiet():
-            sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, constant_liar=True)
+            own = (seed + SEED_STEP * len(known)) % 2**32  # one that goes on does not repeat its first choices
+            sampler = optuna.samplers.TPESampler(seed=own, multivariate=True, constant_liar=True)
             self._study = optuna.create_study(direction="maximize" if largest else "minimize", sampler=sampler)
         self._space = {name: _distribution(optuna, of) for name, of in sweep.spec.parameters.items()}
         self._asked: dict[int, Any] = {}
         self.start = start_of(sweep)
         self.asked = 0
-        if self.start is not None:
+        for row in known:
+            self._know(row)
+        if self.start is not None and not known:
             self._study.enqueue_trial(self.start)
 
-    def know(self, row: Row) -> None:
-        """Take a run that was made before, as if it had been asked for."""
+    def _know(self, row: Row) -> None:
         optuna = _optuna()
         value, state = row.metrics.get(self.metric), optuna.trial.TrialState
         told = {"value": value, "state": state.COMPLETE} if _is_value(value) else {"state": state.FAIL}
@@ -239,12 +240,11 @@ def optimise(
     """
     directory = None if out is None else directory_of(Path(out))
     read = read_sweep(spec, directory)
-    search = Search(read, metric, largest, seed)
+    _refuse_unsearchable(read, metric)
     content = read.content | {"search": [metric, largest, seed]}
     with Journal(directory, content, resume=resume, force=force) as journal, ExitStack() as stack:
         rows = {row.key: row for row in journal.rows()}
-        for row in rows.values():
-            search.know(row)
+        search = Search(read, metric, largest, seed, list(rows.values()))
         ensure_compiled()
         engine = stack.enter_context(open_engine(read.job, workers, scheduler, read.spec.limits.memory))
         if tell is not None:
@@ -255,6 +255,14 @@ def optimise(
             write_table(journal, set(rows), read.about, directory)
             write_best(read, optimum.best, directory)
         return optimum
+
+
+def _refuse_unsearchable(sweep: Sweep, metric: str) -> None:
+    if metric not in sweep.job.metrics:
+        there = ", ".join(sweep.job.metrics) or "none"
+        raise InputError(f"metric {metric!r}: {sweep.source} has no such metric; there are {there}")
+    if sweep.spec.repeats:
+        raise InputError(f"{sweep.source}: repeats: must be left out for a search: each run is made once")
 
 
 def _run_trials(

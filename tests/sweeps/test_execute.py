@@ -149,10 +149,10 @@ def test_logs_are_kept_for_all_or_for_runs_that_meet_conditions(strip, tmp_path)
     assert [row.log for row in every] == [f"logs/{k:06d}.mcap" for k in range(8)]
     run = read_log(tmp_path / "all" / every[3].log)
     assert run.times[-1] == pytest.approx(0.3)
-    some = rows(strip | {"logs": {"curvature": {"above": 1.0}, "outcome": {"equals": "done"}}}, tmp_path / "some")
+    some = rows(strip | {"logs": {"curvature": {"above": 2.0}, "outcome": {"equals": "done"}}}, tmp_path / "some")
     kept = [row for row in some if row.log]
     assert 0 < len(kept) < 8
-    assert all((row.metrics["curvature"] > 1.0) == bool(row.log) for row in some)
+    assert all((row.metrics["curvature"] > 2.0) == bool(row.log) for row in some)
     assert sorted(path.name for path in (tmp_path / "some/logs").iterdir()) == sorted(row.log[5:] for row in kept)
     assert [row.metrics for row in every] == [row.metrics for row in some]  # who looks changes nothing
 

@@ -93,7 +93,7 @@ def test_what_a_sweep_file_cannot_say_is_told_with_its_key(strip, path, value, t
 )
 def test_what_the_scene_lacks_is_told_before_the_first_run(strip, path, value, told):
     if told == "must have an acceptable scene":
-        told = "none of the runs that were tried has an acceptable scene; the first: scene with"
+        told = "none of the runs that were tried has an acceptable scene; the first: scene: rods.strip.path.length"
     with pytest.raises(Exception) as error:
         read_sweep(changed(strip, path, value))
     assert type(error.value).__module__ == "bilayer_core.errors"
