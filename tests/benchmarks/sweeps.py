@@ -100,9 +100,7 @@ def many(runs: int) -> None:
 def main() -> None:
     """Print the tables."""
     print(f"{record()}; load {os.getloadavg()[0]:.1f}")
-    print(
-        "| scene | simulated [s] | runs | alone [ms] | one process [ms] | overhead [ms] | two processes [ms] | speed-up |"
-    )
+    print("| scene | simulated [s] | runs | alone [ms] | one process | overhead | two processes | speed-up |")
     for scene, duration, count in CASES:
         content = spec(scene, duration, count)
         a, one, two = (1e3 * of / count for of in (alone(content), seconds(content, 1), seconds(content, 2)))
