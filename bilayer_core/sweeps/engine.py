@@ -12,6 +12,7 @@ import signal
 import socket
 import tempfile
 import threading
+import time as clock
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -24,7 +25,7 @@ from urllib.request import urlopen
 from uuid import uuid4
 
 from bilayer_core.errors import EngineError, InputError, OutputError
-from bilayer_core.sweeps.execute import LOGS, execute, prepare, row_of
+from bilayer_core.sweeps.execute import LOGS, execute, prepare, present_versions, row_of
 from bilayer_core.sweeps.job import Job, Outcome, Point, Row
 
 PIECE_TIME = 0.25
@@ -41,6 +42,8 @@ PREPARE_TIME = 600.0
 """For a process to start, and to compile kernels [s]."""
 LOOK_TIME, LONELY_TIME = 2.0, 60.0
 """Between two looks whether anybody works at all, and how long nobody may [s]."""
+COUNT_TIME = 5.0
+"""Between two counts of the threads of a cluster [s]."""
 KILL_FACTOR, KILL_EXTRA = 2.0, 10.0
 """A run is killed at this multiple of the time it may take, and so many seconds more: it could not stop by itself."""
 TOPIC = "bilayer-sweep"
@@ -56,7 +59,16 @@ CONFIG = {
 
 
 def work(job: Job, points: Sequence[Point]) -> list[Row]:
-    """A piece of work, in the process that does it."""
+    """A piece of work, in the process that does it.
+
+    Raises
+    ------
+    InputError
+        If the process has other versions: one that came after the first run has not been asked yet.
+    """
+    from distributed import get_worker
+
+    refuse_other_versions(job, present_versions(), f"worker {get_worker().address} on {socket.gethostname()}")
     rows: list[Row] = []
     for point in points:
         with _killed_when_late(job, point):
@@ -124,7 +136,7 @@ class Engine:
         self._reasons: dict[str, str] = {}
         self._count = 0
         self._mean: float | None = None
-        self.threads = 1
+        self.threads, self._counted = 1, clock.monotonic()
         self.where = self.dashboard = ""
         client.subscribe_topic(TOPIC, self._hear)
 
@@ -184,22 +196,27 @@ class Engine:
         while self._again and self.free > 0:
             job, point = self._again.popleft()
             self.submit([point], job)
+        if clock.monotonic() - self._counted > COUNT_TIME:
+            self.count_threads()
         lonely = 0.0
         while True:
             try:
                 number = self._done.get(timeout=LOOK_TIME)
                 break
             except Empty:
-                lonely = 0.0 if self._attended() else lonely + LOOK_TIME
+                lonely = 0.0 if self.count_threads() else lonely + LOOK_TIME
                 if lonely >= LONELY_TIME:
                     raise EngineError(f"{self.where}: no process has been there for {lonely:g} s") from None
         return self._collect(self._pieces.pop(number))
 
-    def _attended(self) -> bool:
-        """Whether there are processes."""
+    def count_threads(self) -> int:
+        """Look how many threads there are now: workers of a cluster may come and go."""
         if self._client.status != "running":
             raise EngineError(f"{self.where}: the scheduler has gone")
-        return bool(self._client.scheduler_info(n_workers=-1)["workers"])
+        present = self._client.scheduler_info(n_workers=-1)["workers"].values()
+        threads = sum(worker["nthreads"] for worker in present)
+        self.threads, self._counted = threads or self.threads, clock.monotonic()
+        return threads
 
     def _collect(self, piece: _Piece) -> list[Row]:
         from distributed import KilledWorker
@@ -359,8 +376,8 @@ def _get_ready(engine: Engine, job: Job, workers: int | None) -> None:
         what = "start some with `dask worker ADDRESS`" if joined else "is there enough memory?"
         error = InputError if joined else EngineError
         raise error(f"{engine.where}: has no workers; {what}") from None
+    engine.count_threads()
     present = client.scheduler_info(n_workers=-1)["workers"]
-    engine.threads = sum(worker["nthreads"] for worker in present.values())
     with _token(job) as token:
         by_host: dict[str, list[str]] = {}
         for address, worker in present.items():
@@ -390,14 +407,19 @@ def _answer(engine: Engine, address: str, future: Any) -> dict[str, Any]:
         ) from error
 
 
-def _check(engine: Engine, address: str, job: Job, answer: dict[str, Any]) -> None:
-    found, here = answer["versions"], job.expected
+def refuse_other_versions(job: Job, found: dict[str, str], who: str) -> None:
+    """Raise InputError if a process has other versions than this program."""
+    here = job.expected
     if found != here:
         others = [f"{name} {found.get(name)} (here {here[name]})" for name in here if found.get(name) != here[name]]
         raise InputError(
-            f"{engine.where}: worker {address} on {answer['host']} has other versions: {', '.join(others)}; results "
-            "would differ in their last digits or more; install the same on both sides"
+            f"{who} has other versions: {', '.join(others)}; results would differ in their last digits or more; "
+            "install the same on both sides"
         )
+
+
+def _check(engine: Engine, address: str, job: Job, answer: dict[str, Any]) -> None:
+    refuse_other_versions(job, answer["versions"], f"{engine.where}: worker {address} on {answer['host']}")
     if not answer["sees"] or not answer["writes"]:
         what = "cannot write there" if answer["sees"] else "does not see it"
         raise InputError(

@@ -28,7 +28,7 @@ from bilayer_core.sweeps.metrics import FinishedRun, MetricError, measure, name_
 
 LOGS = "logs"
 """Folder of logs below that of results."""
-LEFT_OUT = ("versions", "terms", "reasons")
+LEFT_OUT = ("terms", "reasons")
 """Keys of the summary that all runs of a sweep have alike."""
 _local = threading.local()
 _warmed = False
