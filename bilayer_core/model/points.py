@@ -22,7 +22,8 @@ def add_point_masses(scene: SceneConfig, found: Collected) -> None:
             nodes, shares = _shares(rod, spans, point.position)
             np.add.at(node_mass, nodes, point.mass * shares)
             if height:
-                np.add.at(moment, node_edges[nodes].T, 0.5 * height * point.mass * shares)
+                for edges in node_edges[nodes].T:  # numpy 2.4 reads past the values if it is given both at once
+                    np.add.at(moment, edges, 0.5 * height * point.mass * shares)
     found.columns["node_mass"], found.columns["mass_moment"] = [node_mass], [moment]
 
 
