@@ -40,8 +40,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     found = Collected()
     body_index = {body.name: index for index, body in enumerate(scene.bodies)}
     for rod in scene.rods:
-        for copy in rod.copies:
-            ADD_ROD[model](found, scene, copy, body_index)
+        ADD_ROD[model](found, scene, rod, body_index)
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found, plane)
@@ -145,7 +144,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     )
     refuse_penetration(arrays)
     refuse_meeting_rods(arrays)
-    return replace(arrays, contact_stiffness=stiffness_for_impacts(arrays))
+    stiffness = stiffness_for_impacts(arrays)
+    return arrays if stiffness == arrays.contact_stiffness else replace(arrays, contact_stiffness=stiffness)
 
 
 def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:

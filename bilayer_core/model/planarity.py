@@ -66,8 +66,9 @@ def _plane_of(copy: RodCopy) -> Plane:
     point, p, q = (part[0] for part in _frames(copy, np.zeros(1)))
     normal = np.cross(p, q)
     axis = int(np.argmax(np.abs(normal)))
-    if np.all(np.abs(np.delete(normal, axis)) < ROUNDING):
-        axes = np.delete(np.eye(3), axis, axis=0)
+    others = [other for other in range(3) if other != axis]
+    if np.all(np.abs(normal[others]) < ROUNDING):
+        axes = np.eye(3)[others]
     else:
         q = np.cross(normal / np.linalg.norm(normal), p)
         axes = np.stack([p, q / np.linalg.norm(q)])

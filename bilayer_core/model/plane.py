@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -27,7 +28,7 @@ class Plane(ReadOnlyArrays):
     point: Array
     axes: Array
 
-    @property
+    @cached_property
     def normal(self) -> Array:
         """p × q, shape (3,)."""
         return np.cross(self.axes[0], self.axes[1])

@@ -29,6 +29,8 @@ def add_point_masses(scene: SceneConfig, found: Collected) -> None:
 
 def build_loads(scene: SceneConfig, found: Collected, bodies: Bodies, frame: str) -> PointLoads:
     """Arrays of the loads whose components are in one of the two frames."""
+    if not scene.loads:
+        return NO_LOADS
     nodes, forces, moments = [], [], []  # target, load, vector
     for index, load in enumerate(scene.loads):
         if load.frame != frame:
@@ -49,6 +51,9 @@ def _load_shares(parts: list[tuple[int, int, np.ndarray]]) -> LoadShares:
     return LoadShares(
         np.array(target, dtype=np.int64), np.array(load, dtype=np.int64), np.array(vector, dtype=float).reshape(-1, 3)
     )
+
+
+NO_LOADS = PointLoads(*(_load_shares([]) for _ in range(3)))
 
 
 def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[Rod, list[Span], float]]:
