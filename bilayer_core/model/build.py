@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..kinematics.rest_strains import cross
 from ..scene.config import SceneConfig
 from .bodies import build_bodies
 from .contact_points import build_contact, refuse_penetration
@@ -157,7 +158,7 @@ def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
         np.concatenate([found.column(name, width=3), of_clamp_edges])
         for name, of_clamp_edges in zip(("tangent", "director1"), clamp_edges, strict=True)
     )
-    return np.sign(np.einsum("ki,ki->k", director1, np.cross(plane.normal, tangent)))
+    return np.sign(np.einsum("ki,ki->k", director1, cross(np.broadcast_to(plane.normal, tangent.shape), tangent)))
 
 
 def _joints_after(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int) -> np.ndarray:

@@ -172,11 +172,9 @@ def _axis(layers: list[_Placed]) -> float:
 
 def _prevailing(present: Array) -> Array:
     """On which edges those layers are that most edges have, by which of them each has, shape (n_layer, n_edge)."""
-    if present.all():  # as most rods
-        return present[0]
-    kinds, kind, count = np.unique(present, axis=1, return_inverse=True, return_counts=True)
-    prevailing = max(range(len(count)), key=lambda k: (count[k], kinds[:, k].sum()))
-    return kind.reshape(-1) == prevailing
+    kind = (1 << np.arange(len(present))[::-1]) @ present  # a bit for each layer
+    count = np.bincount(kind).tolist()
+    return kind == max(range(len(count)), key=lambda k: (count[k], k.bit_count()))
 
 
 def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:

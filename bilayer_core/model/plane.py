@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..kinematics.rest_strains import cross
 from .layout import Layout, ReadOnlyArrays
 
 Array = np.ndarray
@@ -31,7 +32,7 @@ class Plane(ReadOnlyArrays):
     @cached_property
     def normal(self) -> Array:
         """p × q, shape (3,)."""
-        return np.cross(self.axes[0], self.axes[1])
+        return cross(self.axes[:1], self.axes[1:])[0]
 
     @property
     def motions(self) -> Array:
