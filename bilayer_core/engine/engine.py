@@ -67,7 +67,7 @@ class Engine:
         self._model, self._storage, self._control = model, Storage(model), control
         self._newton = newton_tolerance, max_iterations
         self._outcome, self.gap = self._storage.outcome, math.inf
-        methods = (method, SELF_STARTING) if method.history else (method, method)
+        methods = (method, SELF_STARTING) if method.history else (method,)
         self._methods = [used.arrays() for used in methods]
         self._configurations = [new_configuration(model) for _ in range(3)]
         self.end = self._configurations[1]
@@ -93,6 +93,13 @@ class Engine:
         self._model, self._control, self._newton = model, control, (newton_tolerance, max_iterations)
         self._storage.take_scene(model)
         self._state = self._integration = None
+
+    def load(self) -> None:
+        """Compile the kernels of steps and frames, or read them from the cache: those that records refer to are when
+        they are made, so these are the others.
+        """
+        for piece in (integrate, treat_state, add_forces, expand_to_unknowns, observe, open_account, count_shape):
+            _ = piece.address
 
     def start_over(self, height: float) -> None:
         """Forget the extrema of the run; the mass centre is at `height` [m]."""
@@ -153,7 +160,7 @@ class Engine:
                 state=arrays,
                 clock=Clock(**{name: getattr(state, name) for name in Clock.names}),
                 method=methods[0],
-                starter=methods[1],
+                starter=methods[-1],
                 inputs=self._inputs,
                 actuation=self.actuation,
                 control=self._control,

@@ -214,7 +214,7 @@ def _take_over(old: Sliding | RodContactList, new: Sliding | RodContactList, cou
 def new_configuration(model: Model) -> Configuration:
     """Arrays of a configuration, of which everything that does not move is in place."""
     sizes, surfaces = sizes_of(model), model.surfaces
-    contact_point, edges = np.zeros((sizes["contact_point"], 3)), sizes["edge+clamp"]
+    contact_point = np.zeros((sizes["contact_point"], 3))
     nodes, of_rods = model.node_count, model.node_count + sizes["point"]
     at = Configuration.zeros(
         sizes,
@@ -222,25 +222,25 @@ def new_configuration(model: Model) -> Configuration:
         position=contact_point[:nodes],
         point=contact_point[nodes:of_rods],
         rod_point=contact_point[of_rods:],
-        length=np.ones(edges),
-        rotation=np.tile(np.eye(3), (sizes["body+world"], 1, 1)),
     )
+    at.length[:], at.rotation[:] = 1.0, np.eye(3)
     if not (surfaces.body < sizes["body"]).any():
         at.surface_position[:], at.surface_arm[:] = surfaces.position, surfaces.position
         at.surface_rotation[:] = surfaces.rotation
     return at
 
 
-def new_point(sizes: dict[str, int]) -> Point:
-    """Arrays of a point."""
-    vectors, parts = zeros_in_one(shapes_of(Point, sizes, [name for name in Point.shapes if name != "rotation"]))
-    return Point.zeros(sizes, vectors=vectors, **parts)
+def new_points(sizes: dict[str, int], count: int) -> list[Point]:
+    """Arrays of so many points."""
+    shapes = shapes_of(Point, sizes, [name for name in Point.shapes if name != "rotation"])
+    in_one = [zeros_in_one(shapes) for _ in range(count)]
+    return [Point.zeros(sizes, vectors=vectors, **parts) for vectors, parts in in_one]
 
 
 def new_work(model: Model, configurations: list[Configuration], stages: int) -> Work:
     """Room for steps of so many stages."""
     sizes = sizes_of(model)
-    first = new_point(sizes)
+    first, origin, end = new_points(sizes, 3)
     stage = Stage.zeros(sizes)
     stage.origin_rotation[-1] = np.eye(3)
     return Work.zeros(
@@ -248,6 +248,6 @@ def new_work(model: Model, configurations: list[Configuration], stages: int) -> 
         configurations=np.array([at.address for at in configurations], dtype=np.int64),
         stage=stage,
         first=first,
-        origin=new_point(sizes),
-        end=new_point(sizes),
+        origin=origin,
+        end=end,
     )

@@ -22,8 +22,11 @@ Numba's `structref` counts references at every access.)
 
 from __future__ import annotations
 
+import math
 import typing
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from itertools import accumulate
 from typing import Any, dataclass_transform
 
 import numpy as np
@@ -34,6 +37,8 @@ from numba.extending import intrinsic, models, register_model
 from .unofficial import add_attributes, add_field
 
 WORD = 8
+CACHE_LINE = 64
+"""At whose multiples arrays that share a block of memory begin [bytes]."""
 if typing.TYPE_CHECKING:  # what programs that are not compiled get
     Vector = np.ndarray
     Matrix = np.ndarray
@@ -53,7 +58,14 @@ else:
     """Arrays of booleans."""
 NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean}
 DTYPES = {types.float64: np.dtype(np.float64), types.int64: np.dtype(np.int64), types.boolean: np.dtype(np.bool_)}
+_ADDRESS_WORD = 4
+"""Of the words of an array, which one its address is."""
 _WORD_TYPE, _BYTES = ir.IntType(8 * WORD), ir.IntType(8).as_pointer()
+
+
+def _word_count(kind: types.Type) -> int:
+    """Of a field."""
+    return 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
 
 
 class RecordType(types.Type):
@@ -76,7 +88,7 @@ class RecordType(types.Type):
         offset = 1
         for name, kind in fields.items():
             self.offset[name] = offset
-            offset += 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
+            offset += _word_count(kind)
         self.declared_fields = [
             (name, kind, DTYPES[kind.dtype] if isinstance(kind, types.Array) else None) for name, kind in fields.items()
         ]
@@ -108,16 +120,22 @@ class Record:
     shapes: typing.ClassVar[dict[str, tuple[int | str, ...]]] = {}
 
     def __init__(self, **values: Any):
-        kind = type(self).numba_type()
-        if values.keys() != kind.fields.keys():
-            wrong = ", ".join(sorted(values.keys() ^ kind.fields.keys()))
+        self._hold(values)
+        words = [1]
+        for name, of, dtype in self.numba_type().declared_fields:
+            words += _words(values[name], of, dtype, (type(self).__name__, name))
+        self._lie_in(np.array(words, dtype=np.int64))
+
+    def _hold(self, values: dict[str, Any]) -> None:
+        """Have the values as attributes; they are those of all fields."""
+        fields = self.numba_type().fields
+        if values.keys() != fields.keys():
+            wrong = ", ".join(sorted(values.keys() ^ fields.keys()))
             raise TypeError(f"{type(self).__name__}: these fields are missing or unknown: {wrong}")
         self.__dict__.update(values)
-        words = [1]
-        for name, of, dtype in kind.declared_fields:
-            words += _words(values[name], of, dtype, (type(self).__name__, name))
-        self._memory = np.array(words, dtype=np.int64)
-        self.address = _address(self._memory)
+
+    def _lie_in(self, memory: np.ndarray) -> None:
+        self._memory, self.address = memory, _address(memory)
 
     @property
     def exists(self) -> bool:
@@ -150,11 +168,19 @@ class Record:
             What the names in shapes stand for.
         **values
         """
-        kinds = cls.numba_type().fields
-        missing = [name for name in cls.shapes if name not in values]
-        for name, shape in shapes_of(cls, sizes, missing).items():
-            values[name] = np.zeros(shape, DTYPES[kinds[name].dtype])
-        return cls(**values)
+        missing = tuple([name for name in cls.shapes if name not in values])
+        room = _room(cls, missing, tuple([sizes[name] for name in _sizes_in(cls, missing)]))
+        base, arrays = room.arrays()
+        made = cls.__new__(cls)
+        made._hold(values | arrays)
+        memory, kind = room.words.copy(), cls.numba_type()
+        memory[room.addresses] += base
+        for name, of, dtype in kind.declared_fields if len(arrays) < len(kind.fields) else ():
+            if name not in arrays:
+                words = _words(values[name], of, dtype, (cls.__name__, name))
+                memory[kind.offset[name] : kind.offset[name] + len(words)] = words
+        made._lie_in(memory)
+        return made
 
     @classmethod
     def numba_type(cls) -> RecordType:
@@ -194,10 +220,57 @@ def shapes_of(declared: type[Record], sizes: Mapping[str, int], names: Iterable[
 
 def zeros_in_one(shapes: Mapping[str, tuple[int, ...]]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """A flat array of zeros, and consecutive views of it with the given shapes: one loop clears them all."""
-    ends = np.cumsum([0, *(int(np.prod(shape)) for shape in shapes.values())])
+    ends = list(accumulate(map(math.prod, shapes.values()), initial=0))
     flat = np.zeros(ends[-1])
     parts = zip(shapes.items(), ends[:-1], ends[1:], strict=True)
     return flat, {name: flat[begin:end].reshape(shape) for (name, shape), begin, end in parts}
+
+
+class _Room:
+    """Where arrays of a record lie in one block of memory: to ask for it once takes less than for each of them.
+
+    Attributes
+    ----------
+    words : ndarray
+        Of the whole record, with places in the block for addresses, and 0 for other fields.
+    addresses : ndarray
+        Which words are such places.
+    """
+
+    def __init__(self, declared: type[Record], shapes: Mapping[str, tuple[int, ...]]):
+        kind, self._size, addresses = declared.numba_type(), 0, []
+        self._places: list[tuple[str, tuple[int, ...], np.dtype, int]] = []
+        self.words = np.zeros(1 + sum(map(_word_count, kind.fields.values())), dtype=np.int64)
+        self.words[0] = 1
+        for name, shape in shapes.items():
+            dtype, first = DTYPES[kind.fields[name].dtype], kind.offset[name]
+            like = np.ndarray(shape, dtype, np.zeros(math.prod(shape) * dtype.itemsize, np.uint8))
+            own = [0, 0, like.size, dtype.itemsize, self._size, *shape, *like.strides]
+            self.words[first : first + len(own)] = own
+            addresses.append(first + _ADDRESS_WORD)
+            self._places.append((name, shape, dtype, self._size))
+            self._size += -(-like.nbytes // CACHE_LINE) * CACHE_LINE
+        self.addresses = np.array(addresses, dtype=np.int64)
+
+    def arrays(self) -> tuple[int, dict[str, np.ndarray]]:
+        """The address of a block of zeros, and the arrays in it."""
+        block = np.zeros(self._size, np.uint8)
+        return _address(block), {
+            name: np.ndarray(shape, dtype, block, first) for name, shape, dtype, first in self._places
+        }
+
+
+@lru_cache(maxsize=1024)  # some thirty classes of records in a model of given sizes
+def _room(declared: type[Record], names: tuple[str, ...], sizes: tuple[int, ...]) -> _Room:
+    """For fields that declare a shape, with the sizes that `_sizes_in` names."""
+    return _Room(declared, shapes_of(declared, dict(zip(_sizes_in(declared, names), sizes, strict=True)), names))
+
+
+@lru_cache(maxsize=1024)
+def _sizes_in(declared: type[Record], names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of sizes in the shapes of some fields."""
+    parts = (part for name in names for part in declared.shapes[name])
+    return tuple(dict.fromkeys(part for part in parts if isinstance(part, str)))
 
 
 def type_in_kernels(declared: Any) -> types.Type:
@@ -226,12 +299,14 @@ def _address(array: np.ndarray) -> int:
 
 def _words(value: Any, of: types.Type, dtype: np.dtype | None, name: tuple[str, str]) -> list[int]:
     """What stands in memory for a value, of an array's `dtype`."""
-    if isinstance(of, types.Array):
-        fits = isinstance(value, np.ndarray) and value.ndim == of.ndim and value.dtype == dtype
-        if not (fits and value.flags.c_contiguous and value.flags.aligned):
-            found = f"{value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
-            raise TypeError(f"{'.'.join(name)}: {found} is not a contiguous array of {of.ndim} indices, {of.dtype}")
-        return [0, 0, value.size, value.itemsize, _address(value), *value.shape, *value.strides]
+    if dtype is not None:
+        if isinstance(value, np.ndarray) and value.ndim == of.ndim and value.dtype == dtype:
+            memory = value.__array_interface__
+            address = memory["data"][0]
+            if memory["strides"] is None and address % dtype.alignment == 0:  # no strides: contiguous
+                return [0, 0, value.size, dtype.itemsize, address, *value.shape, *value.strides]
+        found = f"{value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+        raise TypeError(f"{'.'.join(name)}: {found} is not a contiguous array of {of.ndim} indices, {of.dtype}")
     if isinstance(of, RecordType):
         if not isinstance(value, of.declared):
             raise TypeError(f"{'.'.join(name)}: a {type(value).__name__} is no {of.declared.__name__}")

@@ -105,9 +105,9 @@ def _inertia_of_held(found: Collected, count: int) -> np.ndarray:
     edge = found.column("node_edges", np.int64, 2)[node, 0]
     along = 0.5 * found.column("spin_inertia")[edge]
     across = found.column("edge_mass")[edge] * found.column("rest_length")[edge] ** 2 / 24.0 + 0.5 * along
-    for k, body in enumerate(found.column("attached_body", np.int64)):
-        on_axis = np.outer(tangents[k], tangents[k])
-        inertia[body] += along[k] * on_axis + across[k] * (np.eye(3) - on_axis)
+    on_axis = tangents[:, :, None] * tangents[:, None]
+    held = along[:, None, None] * on_axis + across[:, None, None] * (np.eye(3) - on_axis)
+    np.add.at(inertia, found.column("attached_body", np.int64), held)
     return inertia
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..kinematics.rest_strains import cross
 from ..scene.config import SceneConfig
 from .bodies import build_bodies
 from .contact_points import build_contact, refuse_penetration
@@ -40,8 +41,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     found = Collected()
     body_index = {body.name: index for index, body in enumerate(scene.bodies)}
     for rod in scene.rods:
-        for copy in rod.copies:
-            ADD_ROD[model](found, scene, copy, body_index)
+        ADD_ROD[model](found, scene, rod, body_index)
     add_point_masses(scene, found)
     edge_count, bond_joints = found.edge_count, "bond_"
     bodies = build_bodies(scene, found, plane)
@@ -145,7 +145,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     )
     refuse_penetration(arrays)
     refuse_meeting_rods(arrays)
-    return replace(arrays, contact_stiffness=stiffness_for_impacts(arrays))
+    stiffness = stiffness_for_impacts(arrays)
+    return arrays if stiffness == arrays.contact_stiffness else replace(arrays, contact_stiffness=stiffness)
 
 
 def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
@@ -157,7 +158,7 @@ def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
         np.concatenate([found.column(name, width=3), of_clamp_edges])
         for name, of_clamp_edges in zip(("tangent", "director1"), clamp_edges, strict=True)
     )
-    return np.sign(np.einsum("ki,ki->k", director1, np.cross(plane.normal, tangent)))
+    return np.sign(np.einsum("ki,ki->k", director1, cross(np.broadcast_to(plane.normal, tangent.shape), tangent)))
 
 
 def _joints_after(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int) -> np.ndarray:

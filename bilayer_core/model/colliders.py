@@ -122,6 +122,10 @@ def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[ContactPair, ...
 
 def is_ribbon(rod: Rod) -> bool:
     """Whether a rod is wider than thick somewhere."""
+    return rod.keep("ribbon", (), lambda: _is_ribbon(rod))
+
+
+def _is_ribbon(rod: Rod) -> bool:
     stations = np.arange(rod.stations)
     _, thickness = outline(rod, stations)
     return bool(np.any(values_at(rod.width, rod.edge_length * stations) > thickness.sum(axis=0) * (1.0 + 1e-9)))

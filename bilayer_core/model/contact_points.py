@@ -77,7 +77,7 @@ def build_contact(
     rows = np.concatenate([of_nodes & (of_rods.node_weight > 0.0)[:, None], of_others, of_nodes[of_rods.node]])
     used = rows.any(axis=0)
     surfaces = [surface for surface, is_used in zip(surfaces, used, strict=True) if is_used]
-    groups, group = np.unique(rows[:, used], axis=0, return_inverse=True)
+    groups, group = _distinct(rows[:, used])
 
     contact_points = ContactPoints(
         weight=np.concatenate([of_rods.node_weight, [p.length for p in others], of_rods.weight]),
@@ -92,7 +92,7 @@ def build_contact(
         rod_point_arm=of_rods.arm,
         rod_point_start=of_rods.position,
         point_count=len(shown),
-        group=group.reshape(-1).astype(np.int64),
+        group=group.astype(np.int64),
     )
     return contact_points, Surfaces(
         names=tuple(s.collider.name for s in surfaces),
@@ -107,6 +107,20 @@ def build_contact(
         can_collide=np.ascontiguousarray(groups.T),
         edge_can_cross=_edges_can_cross(found, of_nodes[:, used], surfaces),
     )
+
+
+BITS = 62
+"""Of the integers by which rows of truths are told apart."""
+
+
+def _distinct(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The rows of truths that there are, in ascending order, and which of them each row is."""
+    count = rows.shape[1]
+    if count > BITS:
+        distinct, number = np.unique(rows, axis=0, return_inverse=True)
+        return distinct, number.reshape(-1)
+    _, first, number = np.unique(rows @ (1 << np.arange(count)[::-1]), return_index=True, return_inverse=True)
+    return rows[first], number
 
 
 def _grain(surface: Surface | Obstacle | None) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 from ..scene.config import SceneConfig
 
 Array = np.ndarray
+_encode = json.JSONEncoder(sort_keys=True, ensure_ascii=False).encode
 DIGITS = 12
 """Hexadecimal digits of a number: 48 bits, which a float64 holds exactly."""
 FIXED = {
@@ -47,20 +48,21 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
     """
     used = {layer.material for rod in scene.rods for layer in rod.layers}
     fluid = scene.fluid if scene.fluid is not None and scene.fluid.added_mass is not None else None
+    whole = _content(scene)
     content: dict[str, Any] = {
         "model": model,
         "history": history,
-        "materials": {name: scene.materials[name].model_dump(mode="json") for name in sorted(used)},
+        "materials": {name: whole["materials"][name] for name in used},
         "stimuli": [
             (name, c.unit, c.minimum, c.maximum, *(("light",) if c.light is not None else ()))
             for name, c in scene.stimuli.items()
         ],
-        "rods": [rod.model_dump(mode="json", exclude={"friction_axis"}) for rod in scene.rods],
-        "bodies": [body.model_dump(mode="json", exclude={"surface": {"grain"}}) for body in scene.bodies],
-        "masses": [mass.model_dump(mode="json") for mass in scene.masses],
-        "obstacles": [obstacle.model_dump(mode="json", exclude={"grain"}) for obstacle in scene.obstacles],
-        "coupling": scene.coupling.model_dump(mode="json") if model == "two_rod" else None,
-        "added_mass": fluid and (fluid.density, fluid.added_mass.model_dump(mode="json")),
+        "rods": [_without("friction_axis", rod) for rod in whole["rods"]],
+        "bodies": [body | {"surface": _without("grain", body["surface"])} for body in whole["bodies"]],
+        "masses": whole["masses"],
+        "obstacles": [_without("grain", obstacle) for obstacle in whole["obstacles"]],
+        "coupling": whole["coupling"] if model == "two_rod" else None,
+        "added_mass": fluid and (fluid.density, whole["fluid"]["added_mass"]),
     }
     return np.array([_number(content[part]) for part in FIXED], dtype=float)
 
@@ -68,12 +70,20 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
 def conditions_of(scene: SceneConfig) -> int:
     """A number of all that forces depend on and that may differ: it is another where a state's energy may be."""
     texts_and_steps = {"name", "title", "description", "duration", "solver", "output"}
-    return _number(scene.model_dump(mode="json", exclude=texts_and_steps))
+    return _number({name: part for name, part in _content(scene).items() if name not in texts_and_steps})
+
+
+def _content(scene: SceneConfig) -> dict[str, Any]:
+    """All of a scene, as JSON has it: made once, and never changed."""
+    return scene.keep("content", (), lambda: scene.model_dump(mode="json"))
+
+
+def _without(key: str, part: dict[str, Any] | None) -> dict[str, Any] | None:
+    return part and {name: value for name, value in part.items() if name != key}
 
 
 def _number(content: Any) -> int:
-    text = json.dumps(content, sort_keys=True, ensure_ascii=False)
-    return int(hashlib.sha256(text.encode("utf-8")).hexdigest()[:DIGITS], 16)
+    return int(hashlib.sha256(_encode(content).encode("utf-8")).hexdigest()[:DIGITS], 16)
 
 
 def difference(saved: Array, own: Array) -> str:

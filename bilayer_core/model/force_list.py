@@ -208,6 +208,9 @@ FORCES: tuple[Force, ...] = (
 """In the order in which their energies are added."""
 
 
+_ON_NODES = frozenset(force.name for force in FORCES if force.on_nodes)
+
+
 def planned(scene: SceneConfig, model: str, dimension: int) -> dict[str, str]:
     """What becomes of each force: ``"active"`` or ``"skipped: reason"``."""
     return dict(
@@ -228,7 +231,7 @@ def active_forces(scene: SceneConfig, model: str, dimension: int) -> tuple[str, 
 
 def on_nodes(forces: Iterable[str]) -> bool:
     """Whether any of some forces has second derivatives by positions of nodes."""
-    return any(force.on_nodes for force in FORCES if force.name in set(forces))
+    return not _ON_NODES.isdisjoint(forces)
 
 
 def kinds() -> dict[str, Kind]:

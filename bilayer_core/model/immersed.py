@@ -12,13 +12,13 @@ from .strands import Collected, Span, stations_of
 Array = np.ndarray
 
 
-def add_fluid(found: Collected, fluid: Fluid | None, rod: Rod, spans: list[Span]) -> None:
-    """Add what a fluid does to a rod with one strand for each layer, or one for all."""
+def add_fluid(found: Collected, fluid: Fluid | None, rod: Rod, copies: list[list[Span]]) -> None:
+    """Add what a fluid does to copies of a rod, each with one strand for each layer, or one for all."""
     if fluid is None:
         return
-    _add_drag(found, fluid, rod, spans)
+    _add_drag(found, fluid, rod, copies)
     if fluid.added_mass is not None:
-        _add_added_mass(found, fluid, rod, spans)
+        _add_added_mass(found, fluid, rod, copies)
 
 
 def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:
@@ -29,37 +29,37 @@ def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:
     return thickness, layers / thickness if len(spans) == len(layers) else np.ones((1, len(thickness)))
 
 
-def _add_drag(found: Collected, fluid: Fluid, rod: Rod, spans: list[Span]) -> None:
+def _add_drag(found: Collected, fluid: Fluid, rod: Rod, copies: list[list[Span]]) -> None:
     """Drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts at
     the middle.
     """
     length = np.full(stations_of(rod)[1] + 1, rod.edge_length)
     length[[0, -1]] *= 0.0 if rod.closed else 0.5
     width, layers = outline(rod, np.arange(len(length)))
-    thickness, shares = _shares(spans, layers)
+    thickness, shares = _shares(copies[0], layers)
     whole = np.stack([fluid.drag_along * width, fluid.drag_across * width, fluid.drag_across * thickness], axis=1)
-    for (first, last, first_node, first_edge), own in zip(spans, shares, strict=True):
+    parts = []  # of each strand of a copy, those of one like those of another
+    for (first, last, _, _), own in zip(copies[0], shares, strict=True):
         station = np.arange(last - first + 1)
         covered = slice(first, last + 1)
         share = fluid.density * length[covered] * own[covered]
         edges = np.stack([np.maximum(station - 1, 0), np.minimum(station, last - first - 1)], axis=1)
-        found.add(
-            drag_node=first_node + station,
-            drag_edge=first_edge + edges,
-            drag_coefficient=share[:, None] * whole[covered],
-        )
+        parts.append((station, edges, share[:, None] * whole[covered]))
+    for spans in copies:
+        for (_, _, first_node, first_edge), (station, edges, coefficient) in zip(spans, parts, strict=True):
+            found.add(drag_node=first_node + station, drag_edge=first_edge + edges, drag_coefficient=coefficient)
 
 
-def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, spans: list[Span]) -> None:
+def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, copies: list[list[Span]]) -> None:
     """Added mass of the whole section along each edge, shared by its layers in proportion to their thickness."""
     edges = stations_of(rod)[1]
     width, layers = outline(rod, np.arange(edges) + 0.5)
-    thickness, shares = _shares(spans, layers)
+    thickness, shares = _shares(copies[0], layers)
     per_area, law = 0.25 * np.pi * fluid.density * rod.edge_length, fluid.added_mass
     through, sideways = law.through * width**2, law.sideways * thickness**2
     turning = law.turning * (width**2 - thickness**2) ** 2 / 32.0
     whole = per_area * np.stack([through, sideways, turning], axis=1)
     if rod.closed:
         whole[-1] = 0.0
-    for (first, last, _, _), own in zip(spans, shares, strict=True):
-        found.add(fluid_mass=(own[:, None] * whole)[first:last])
+    of_copy = [(own[:, None] * whole)[span[0] : span[1]] for span, own in zip(copies[0], shares, strict=True)]
+    found.add(fluid_mass=np.concatenate(of_copy * len(copies)))

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
 from ..scene.config import SceneConfig
-from ..scene.pattern import placed
+from ..scene.pattern import stacked
 from ..scene.profile import values_at
-from ..scene.rod import Layer, Rod, RodCopy
+from ..scene.rod import Rod, RodCopy
 from .immersed import add_fluid
 from .laminate_section import LayerHalves, WholeSection, layer_halves, side
 from .lit import add_lit_elements, is_light
 from .section import Section, outline, sections
 from .strand_arrays import StrandArrays
-from .strands import Collected, StrandElements, add_strand, is_closed, stations_of, strand_shape, with_copies
+from .strands import (
+    Collected,
+    StrandElements,
+    StrandShape,
+    add_strands,
+    is_closed,
+    stations_of,
+    strand_lengths,
+    strand_shape,
+    with_copies,
+)
 from .validity import Figure
 
 Array = np.ndarray
@@ -44,36 +55,28 @@ class _Placed:
         return self.present * self.length * self.section.spin_inertia + self.mass * (self.height - axis) ** 2
 
 
-def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: dict[str, int]) -> None:
-    """Add one copy of a rod: a strand with the stiffness and mass of its layers, and their drag."""
-    rod, name = copy.rod, copy.name
+def add_laminate(found: Collected, scene: SceneConfig, rod: Rod, body_index: dict[str, int]) -> None:
+    """Add all copies of a rod: strands with the stiffness and mass of its layers, and their drag."""
+    lit = any(is_light(scene, law) for layer in rod.layers for law in layer.eigenstrain)
+    for _, alike in groupby(enumerate(rod.copies), lambda copy: copy[0] if lit else id(copy[1].rod)):
+        _add_copies(found, scene, [copy for _, copy in alike], body_index)
+
+
+def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], body_index: dict[str, int]) -> None:
+    """Add copies that differ in their places alone, at once."""
+    rod = copies[0].rod
     layers = _placed(scene, rod)
     axis = _axis_of(scene, rod)
     nodes = np.arange(stations_of(rod)[1] + 1)
-    shape = strand_shape(rod, np.full(len(nodes), axis), 0, nodes[-1], copy.place)
+    place = stacked(copy.place for copy in copies)
+    shape = strand_shape(rod, np.full(len(nodes), axis), 0, nodes[-1], place)
     halves = [
         layer_halves(scene, rod, slot, axis, shape, layer.length / shape.lengths, layer.present)
         for slot, layer in enumerate(layers)
     ]
     whole = WholeSection(scene, rod, halves, shape)
     low, high = _faces(rod, axis)
-    strand_name = rod.layers[0].name if len(rod.layers) == 1 else NAME
-    strand = StrandArrays(
-        name=f"{name}/{strand_name}",
-        rod=name,
-        layer=strand_name,
-        first_station=0,
-        first_node=found.node_count,
-        node_count=len(nodes),
-        first_edge=found.edge_count,
-        width=outline(rod, nodes)[0],
-        thickness=high - low,
-        offset=0.5 * (high + low),
-        curvature=shape.curvature,
-        closed=shape.closed,
-    )
-    if len(rod.layers) > 1:
-        strand = replace(strand, layers=_drawn_layers(rod, axis, strand))
+    strands = _strands(found, copies, axis, shape, (low, high))
     elements = StrandElements(
         edge_mass=sum(layer.mass for layer in layers),
         spin_inertia=sum(layer.spin_inertia(axis) for layer in layers),
@@ -86,17 +89,48 @@ def add_laminate(found: Collected, scene: SceneConfig, copy: RodCopy, body_index
         retardation_time=scene.materials[rod.layers[0].material].retardation_time,
     )
     moment = sum(layer.mass * (layer.height - axis) for layer in layers)
-    moment[-1] *= not strand.closed
-    found.add(mass_moment=moment)
-    found.rods.append([(0, int(nodes[-1]), strand.first_node, strand.first_edge)])
-    found.path_height.append(-axis)
-    joints = add_strand(found, scene, rod, strand, shape, elements, body_index)
+    moment[-1] *= not shape.closed
+    found.add(mass_moment=np.tile(moment, len(copies)))
+    found.rods += [[(0, int(nodes[-1]), strand.first_node, strand.first_edge)] for strand in strands]
+    found.path_height += [-axis] * len(copies)
+    joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
     coupling = whole.strain_coupling()
-    coupled = coupling.any(axis=1) & (joints >= 0)
+    coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
-    for layer, half in zip(rod.layers, halves, strict=True):
-        _add_eigenstrain(found, scene, rod, layer, whole, half, strand.first_edge, axis, joints)
-    add_fluid(found, scene.fluid, rod, found.rods[-1])
+    _add_eigenstrain(found, scene, rod, whole, halves, strands, axis, joints)
+    add_fluid(found, scene.fluid, rod, found.rods[-len(copies) :])
+
+
+def _strands(
+    found: Collected, copies: list[RodCopy], axis: float, shape: StrandShape, faces: tuple[Array, Array]
+) -> list[StrandArrays]:
+    """The strand of each copy; `faces` are heights of the two faces over the curve [m]."""
+    rod, (low, high) = copies[0].rod, faces
+    nodes, layer = shape.lengths.shape[1] + 1, rod.layers[0].name if len(rod.layers) == 1 else NAME
+    width, layers = outline(rod, np.arange(nodes))
+    thickness, offset = high - low, 0.5 * (high + low)
+    strands = []
+    for number, (copy, curvature) in enumerate(zip(copies, shape.curvature, strict=True)):
+        first = found.node_count + number * nodes, found.edge_count + number * (nodes - 1)
+        drawn = _drawn_layers(copy, axis, first, layers, width, curvature) if len(layers) > 1 else ()
+        strands.append(
+            StrandArrays(
+                name=f"{copy.name}/{layer}",
+                rod=copy.name,
+                layer=layer,
+                first_station=0,
+                first_node=first[0],
+                node_count=nodes,
+                first_edge=first[1],
+                width=width,
+                thickness=thickness,
+                offset=offset,
+                curvature=curvature,
+                closed=shape.closed,
+                layers=drawn,
+            )
+        )
+    return strands
 
 
 def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
@@ -111,19 +145,17 @@ def _layers_in_place(scene: SceneConfig, rod: Rod) -> list[_Placed]:
     last_node = stations_of(rod)[1]
     nodes, edges = rod.on_path(np.arange(last_node + 1)), np.arange(last_node)
     own = edges % (rod.stations - 1)
+    heights = [
+        side(rod, slot) * values_at(layer.thickness, rod.edge_length * nodes) for slot, layer in enumerate(rod.layers)
+    ]
     layers = []
-    for slot, layer in enumerate(rod.layers):
+    for slot, (layer, lengths) in enumerate(
+        zip(rod.layers, strand_lengths(rod, np.array(heights), last_node), strict=True)
+    ):
         first, last = rod.covered_stations(layer)
-        height = side(rod, slot) * values_at(layer.thickness, rod.edge_length * nodes)
         section = sections(rod, layer, scene.materials[layer.material], edges + 0.5)
-        layers.append(
-            _Placed(
-                section,
-                (first <= own) & (own < last),
-                strand_shape(rod, height, 0, last_node, placed()).lengths,
-                side(rod, slot) * section.thickness,
-            )
-        )
+        present = (first <= own) & (own < last)
+        layers.append(_Placed(section, present, lengths, side(rod, slot) * section.thickness))
     return layers
 
 
@@ -132,13 +164,17 @@ def _axis(layers: list[_Placed]) -> float:
 
     B = 0 there: Σ (EA/λ) (y − y₀) = 0 with λ in proportion to the layers' lengths, whatever y₀ is.
     """
-    present = np.array([layer.present for layer in layers])
-    kinds, kind, count = np.unique(present, axis=1, return_inverse=True, return_counts=True)
-    prevailing = max(range(len(count)), key=lambda k: (count[k], kinds[:, k].sum()))
-    there = kind.reshape(-1) == prevailing
+    there = _prevailing(np.array([layer.present for layer in layers]))
     weight = [(layer.present * layer.section.axial_stiffness / layer.length)[there] for layer in layers]
     moment = sum(np.vdot(w, layer.height[there]) for w, layer in zip(weight, layers, strict=True))
     return float(moment / np.sum(weight))
+
+
+def _prevailing(present: Array) -> Array:
+    """On which edges those layers are that most edges have, by which of them each has, shape (n_layer, n_edge)."""
+    kind = (1 << np.arange(len(present))[::-1]) @ present  # a bit for each layer
+    count = np.bincount(kind).tolist()
+    return kind == max(range(len(count)), key=lambda k: (count[k], k.bit_count()))
 
 
 def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
@@ -149,26 +185,29 @@ def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
     return -layers[0] - axis, layers[1] - axis
 
 
-def _drawn_layers(rod: Rod, axis: float, strand: StrandArrays) -> tuple[StrandArrays, ...]:
-    """Each layer on those nodes of a laminate's strand where it is."""
-    _, thickness = outline(rod, np.arange(strand.node_count))
-    layers = []
+def _drawn_layers(
+    copy: RodCopy, axis: float, at: tuple[int, int], thickness: Array, width: Array, curvature: Array
+) -> tuple[StrandArrays, ...]:
+    """Each layer on those nodes of a laminate's strand where it is: its first node and edge, thicknesses of layers
+    [m], shape (n_layer, n_node), width [m] and curvature [1/m] of the strand, shape (n_node,).
+    """
+    rod, layers = copy.rod, []
     for slot, layer in enumerate(rod.layers):
         first, last = stations_of(rod, layer)
         own = slice(first, last + 1)
         layers.append(
-            replace(
-                strand,
-                name=f"{strand.rod}/{layer.name}",
+            StrandArrays(
+                name=f"{copy.name}/{layer.name}",
+                rod=copy.name,
                 layer=layer.name,
                 first_station=first,
-                first_node=strand.first_node + first,
+                first_node=at[0] + first,
                 node_count=last - first + 1,
-                first_edge=strand.first_edge + first,
-                width=strand.width[own],
+                first_edge=at[1] + first,
+                width=width[own],
                 thickness=thickness[slot, own],
                 offset=side(rod, slot) * thickness[slot, own] - axis,
-                curvature=strand.curvature[own],
+                curvature=curvature[own],
                 closed=is_closed(rod, first, last),
             )
         )
@@ -197,32 +236,43 @@ def _add_eigenstrain(
     found: Collected,
     scene: SceneConfig,
     rod: Rod,
-    layer: Layer,
     whole: WholeSection,
-    half: LayerHalves,
-    first_edge: int,
+    halves: list[LayerHalves],
+    strands: list[StrandArrays],
     axis: float,
     joints: Array,
 ) -> None:
-    """The rest strains of edges and joints that follow the laws of a layer, or where that is a light, of each edge."""
-    for law in layer.eigenstrain:
+    """The rest strains of edges and joints that follow the laws of layers, or where that is a light, of each edge: then
+    there is one strand.
+    """
+    first_edge = np.array([[strand.first_edge] for strand in strands])
+    of_edges: list[tuple[Array, ...]] = []
+    of_joints: list[tuple[Array, ...]] = []
+    followed = [(layer, law, half) for layer, half in zip(rod.layers, halves, strict=True) for law in layer.eigenstrain]
+    for layer, law, half in followed:
         edges = np.array(rod.driven_edges(layer, law))
         if is_light(scene, law):
             heights = np.full(rod.stations - 1, axis)
-            laws = add_lit_elements(found, scene, rod, layer, law, first_edge, heights)
+            laws = add_lit_elements(found, scene, rod, layer, law, strands[0].first_edge, heights)
             groups = [
                 (number, with_copies(rod, own)) for number, own in zip(laws.tolist(), edges[:, None], strict=True)
             ]
         else:
             groups = [(found.law(scene, law), with_copies(rod, edges))]
         for number, driven in groups:
-            of_edges, nodes, of_nodes = whole.driven(half, driven)
-            bent = (of_nodes != 0.0) & (joints[nodes] >= 0)
-            found.add(
-                driven_edge=first_edge + driven,
-                driven_law=np.full(len(driven), number),
-                driven_weight=of_edges,
-                driven_joint=joints[nodes[bent]],
-                driven_joint_law=np.full(np.count_nonzero(bent), number),
-                driven_joint_weight=of_nodes[bent],
-            )
+            weight, nodes, bend = whole.driven(half, driven)
+            of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
+            of_joints.append((joints[:, nodes], np.full(bend.shape, number), bend))
+    if not of_edges:
+        return
+    edge, law_of_edge, weight = (np.concatenate(part, axis=1) for part in zip(*of_edges, strict=True))
+    joint, law_of_joint, bend = (np.concatenate(part, axis=1) for part in zip(*of_joints, strict=True))
+    bent = (bend != 0.0) & (joint >= 0)
+    found.add(
+        driven_edge=edge.ravel(),
+        driven_law=law_of_edge.ravel(),
+        driven_weight=weight.ravel(),
+        driven_joint=joint[bent],
+        driven_joint_law=law_of_joint[bent],
+        driven_joint_weight=bend[bent],
+    )

@@ -55,11 +55,11 @@ def side(rod: Rod, slot: int) -> float:
 
 @dataclass(frozen=True)
 class LayerHalves:
-    """A layer in the halves of all edges of a rod, each in the middle of its half; shapes (n_edge, 2). What the layer
-    contributes is 0 where it is not.
+    """A layer in the halves of all edges of a rod, each in the middle of its half; shapes (n_edge, 2), or (n_copy,
+    n_edge, 2) where copies of the rod differ. What the layer contributes is 0 where it is not.
     """
 
-    ratio: Array  # λ
+    ratio: Array  # λ, of both halves, shape (n_copy, n_edge, 1)
     axial: Array  # EA [N]
     stretch: Array  # EA/λ
     bend: Array  # EI₁/λ [N m²]
@@ -73,41 +73,48 @@ class LayerHalves:
 def layer_halves(
     scene: SceneConfig, rod: Rod, slot: int, axis: float, shape: StrandShape, stretch: Array, present: Array
 ) -> LayerHalves:
-    """A layer in the halves of edges; `stretch` is λ, shape (n_edge,)."""
+    """A layer in the halves of edges; `stretch` is λ, shape (n_copy, n_edge)."""
     layer = rod.layers[slot]
-    stations = (np.arange(len(shape.lengths))[:, None] + [0.25, 0.75]).ravel()
+    stations = _of_halves(len(present))
     section = sections(rod, layer, scene.materials[layer.material], stations)
     along = rod.edge_length * rod.on_path(stations)
 
     def halves(values: Array) -> Array:
         return present[:, None] * values.reshape(-1, 2)
 
-    ratio = stretch[:, None]
+    ratio = stretch[..., None]
     bend, across = (halves(stiffness) / ratio for stiffness in section.bending_stiffness)
     twist = halves(section.twisting_stiffness)
     moment = np.zeros_like(bend)
     if layer.natural_curvature is not None:
-        start = (shape.strains() - shape.imperfection)[:, 0] / shape.voronoi
+        start = (shape.strains() - shape.imperfection)[..., 0] / shape.voronoi
         natural = ratio * values_at(layer.natural_curvature, along).reshape(-1, 2)
-        moment = bend * (natural - np.stack([start[:-1], start[1:]], axis=1))
+        moment = bend * (natural - np.stack([start[..., :-1], start[..., 1:]], axis=-1))
     return LayerHalves(
-        ratio=np.repeat(ratio, 2, axis=1),
+        ratio=ratio,
         axial=halves(section.axial_stiffness),
         stretch=halves(section.axial_stiffness) / ratio,
         bend=bend,
         across=across,
         twist=twist / ratio,
-        twist_moment=shape.handedness * twist * values_at(layer.natural_twist, along).reshape(-1, 2),
+        twist_moment=np.asarray(shape.handedness)[:, None, None]
+        * twist
+        * values_at(layer.natural_twist, along).reshape(-1, 2),
         natural_moment=moment,
         height=side(rod, slot) * section.thickness.reshape(-1, 2) - axis,
     )
 
 
+def _of_halves(edges: int) -> Array:
+    """Stations in the middle of the halves of so many edges, shape (2 n_edge,)."""
+    return (np.arange(edges)[:, None] + [0.25, 0.75]).ravel()
+
+
 def _bond_twist(scene: SceneConfig, rod: Rod, halves: list[LayerHalves]) -> Array | float:
-    """k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_edge, 2)."""
+    """k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_copy, n_edge, 2)."""
     if len(halves) == 1:
         return 0.0
-    stations = (np.arange(len(halves[0].ratio))[:, None] + [0.25, 0.75]).ravel()
+    stations = _of_halves(len(halves[0].axial))
 
     def made() -> Array:
         bottom, top = (sections(rod, layer, scene.materials[layer.material], stations) for layer in rod.layers)
@@ -125,11 +132,11 @@ class WholeSection:
     Attributes
     ----------
     bending, coupling : Array
-        D [N m²] and B [N m] of halves, shape (n_edge, 2).
+        D [N m²] and B [N m] of halves, shape (n_copy, n_edge, 2).
     axial_stiffness, rest_strain : Array
-        A* [N] and N*/A* of edges, shape (n_edge,).
+        A* [N] and N*/A* of edges, shape (n_copy, n_edge).
     joint_stiffness, joint_rest : Array
-        [N m] and κ̄₁ κ̄₂ ψ̄ [rad] at all nodes, shape (n_node, 3).
+        [N m] and κ̄₁ κ̄₂ ψ̄ [rad] at all nodes, shape (n_copy, n_node, 3).
     """
 
     def __init__(self, scene: SceneConfig, rod: Rod, halves: list[LayerHalves], shape: StrandShape):
@@ -137,44 +144,48 @@ class WholeSection:
         coupling = sum(half.stretch * half.height for half in halves)
         self.bending = sum(half.bend + half.stretch * half.height**2 for half in halves)
         self.coupling = np.where(np.abs(coupling) <= ON_AXIS * np.sqrt(stretch * self.bending), 0.0, coupling)
-        self._half_length = 0.5 * shape.lengths[:, None]
+        self._half_length = 0.5 * shape.lengths[..., None]
         moment = sum(half.natural_moment for half in halves)
         twist = sum(half.twist for half in halves) + _bond_twist(scene, rod, halves)
 
-        self.axial_stiffness = np.mean(stretch - self.coupling**2 / self.bending, axis=1)
-        self.rest_strain = np.mean(self.coupling * moment / self.bending, axis=1) / self.axial_stiffness
+        self.axial_stiffness = np.mean(stretch - self.coupling**2 / self.bending, axis=-1)
+        self.rest_strain = np.mean(self.coupling * moment / self.bending, axis=-1) / self.axial_stiffness
         across = sum(half.across for half in halves)
         flexibility = [self.to_nodes(1.0 / stiffness) for stiffness in (self.bending, across, twist)]
-        self.joint_stiffness = 1.0 / np.stack(flexibility, axis=1)
+        self.joint_stiffness = 1.0 / np.stack(flexibility, axis=-1)
         self.joint_rest = shape.strains()
-        self.joint_rest[:, 0] += self.to_nodes(moment / self.bending)
-        self.joint_rest[:, 2] += self.to_nodes(sum(half.twist_moment for half in halves) / twist)
+        self.joint_rest[..., 0] += self.to_nodes(moment / self.bending)
+        self.joint_rest[..., 2] += self.to_nodes(sum(half.twist_moment for half in halves) / twist)
 
     def to_nodes(self, per_length: Array) -> Array:
-        """Integrals at nodes of what halves have per length, shape (n_node,)."""
-        of_halves = self._half_length * per_length
-        of_nodes = np.zeros(len(of_halves) + 1)
-        of_nodes[:-1] += of_halves[:, 0]
-        of_nodes[1:] += of_halves[:, 1]
-        return of_nodes
+        """Integrals at nodes of what halves have per length, shape (n_copy, n_node)."""
+        return _at_nodes(self._half_length * per_length)
 
     def strain_coupling(self) -> Array:
-        """b of the edges before and after each node [rad], shape (n_node, 2)."""
+        """b of the edges before and after each node [rad], shape (n_copy, n_node, 2)."""
         slope = self._half_length * self.coupling / self.bending
-        pairs = np.zeros((len(slope) + 1, 2))
-        pairs[1:, 0], pairs[:-1, 1] = slope[:, 1], slope[:, 0]
+        pairs = np.zeros((len(slope), slope.shape[1] + 1, 2))
+        pairs[:, 1:, 0], pairs[:, :-1, 1] = slope[..., 1], slope[..., 0]
         return pairs
 
     def driven(self, half: LayerHalves, edges: Array) -> tuple[Array, Array, Array]:
-        """Per eigenstrain of a layer on some edges: their rest strains, N*/A*, shape (n_driven,), the nodes at their
-        ends, shape (n_end,), and κ̄₁ of these nodes, −Σ ℓ M/D [rad].
+        """Per eigenstrain of a layer on some edges: their rest strains, N*/A*, shape (n_copy, n_driven), the nodes at
+        their ends, shape (n_end,), and κ̄₁ of these nodes, −Σ ℓ M/D [rad], shape (n_copy, n_end).
         """
-        axial, height, bending = half.axial[edges], half.height[edges], self.bending[edges]
-        part = np.mean(axial * (1.0 - self.coupling[edges] * height / bending), axis=1) / self.axial_stiffness[edges]
-        pairs = np.stack([edges, edges + 1], axis=1)
-        if len(edges) and edges[-1] - edges[0] == len(edges) - 1 and np.all(np.diff(edges) == 1):
-            nodes, slot = np.arange(edges[0], edges[-1] + 2), pairs - edges[0]  # as they mostly are
-        else:
-            nodes, slot = np.unique(pairs, return_inverse=True)
-        of_halves = -self._half_length[edges] * (axial * height / bending)
-        return part, nodes, np.bincount(slot.ravel(), weights=of_halves.ravel(), minlength=len(nodes))
+        axial, height = half.axial[edges], half.height[edges]
+        bending, coupling = self.bending[:, edges], self.coupling[:, edges]
+        part = np.mean(axial * (1.0 - coupling * height / bending), axis=-1) / self.axial_stiffness[:, edges]
+        of_halves = -self._half_length[:, edges] * (axial * height / bending)
+        if len(edges) and edges[-1] - edges[0] == len(edges) - 1 and np.all(edges[1:] - edges[:-1] == 1):
+            return part, np.arange(edges[0], edges[-1] + 2), _at_nodes(of_halves)  # as they mostly are
+        nodes, slot = np.unique(np.stack([edges, edges + 1], axis=1), return_inverse=True)
+        sums = [np.bincount(slot.ravel(), weights=own.ravel(), minlength=len(nodes)) for own in of_halves]
+        return part, nodes, np.array(sums)
+
+
+def _at_nodes(of_halves: Array) -> Array:
+    """What halves of successive edges have, at the nodes next to them, shape (n_copy, n_edge + 1)."""
+    of_nodes = np.zeros((len(of_halves), of_halves.shape[1] + 1))
+    of_nodes[:, :-1] += of_halves[..., 0]
+    of_nodes[:, 1:] += of_halves[..., 1]
+    return of_nodes

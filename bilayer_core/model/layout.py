@@ -31,9 +31,12 @@ class ReadOnlyArrays:
 
     def __post_init__(self):
         for value in vars(self).values():
-            for array in value if isinstance(value, tuple) else (value,):
-                if isinstance(array, np.ndarray):
-                    array.flags.writeable = False
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            elif isinstance(value, tuple):
+                for array in value:
+                    if isinstance(array, np.ndarray):
+                        array.setflags(write=False)
 
 
 def _short(value: object) -> str:
@@ -95,15 +98,20 @@ def number_unknowns(
     edge = np.full(edge_count if turns else 0, -1, dtype=np.int64)
     size = 0
     for layers in rods:
-        for station in range(min(layer[0] for layer in layers), max(layer[1] for layer in layers) + 1):
-            for first, last, first_node, _ in layers:
-                if first <= station <= last:
-                    node[first_node + station - first] = size
-                    size += dimension
-            for first, last, _, first_edge in layers if turns else ():
-                if first <= station < last:
-                    edge[first_edge + station - first] = size
-                    size += 1
+        begin, end = min(layer[0] for layer in layers), max(layer[1] for layer in layers) + 1
+        before = np.zeros((2 * len(layers) + 1, end - begin), dtype=np.int64)  # unknowns at each station, added up
+        for k, (first, last, _, _) in enumerate(layers):
+            before[1 + k, first - begin : last + 1 - begin] = dimension
+            before[1 + len(layers) + k, first - begin : last - begin] = turns
+        before = before.cumsum(axis=0)
+        before[:, 1:] += before[-1, :-1].cumsum()
+        before += size
+        for k, (first, last, first_node, first_edge) in enumerate(layers):
+            node[first_node : first_node + last + 1 - first] = before[k, first - begin : last + 1 - begin]
+            if turns:
+                own = before[len(layers) + k, first - begin : last - begin]
+                edge[first_edge : first_edge + last - first] = own
+        size = int(before[-1, -1])
     attached = node[attached_node]
     attached_of_unknown = np.full(size, -1, dtype=np.int64)
     attached_of_unknown[(attached[:, None] + np.arange(dimension)).ravel()] = np.repeat(

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..errors import SceneError
+from ..kinematics.rest_strains import cross
 from ..kinematics.rotation import rotation_matrix
 from ..scene.body import Body, Free, Guided, Prescribed
 from ..scene.config import SceneConfig
@@ -64,10 +65,11 @@ def _frames(copy: RodCopy, arc: Array) -> tuple[Array, Array, Array]:
 def _plane_of(copy: RodCopy) -> Plane:
     """Plane of the path and normal of a rod."""
     point, p, q = (part[0] for part in _frames(copy, np.zeros(1)))
-    normal = np.cross(p, q)
+    normal = cross(p[None], q[None])[0]
     axis = int(np.argmax(np.abs(normal)))
-    if np.all(np.abs(np.delete(normal, axis)) < ROUNDING):
-        axes = np.delete(np.eye(3), axis, axis=0)
+    others = [other for other in range(3) if other != axis]
+    if np.all(np.abs(normal[others]) < ROUNDING):
+        axes = np.eye(3)[others]
     else:
         q = np.cross(normal / np.linalg.norm(normal), p)
         axes = np.stack([p, q / np.linalg.norm(q)])

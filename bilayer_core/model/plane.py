@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from ..kinematics.rest_strains import cross
 from .layout import Layout, ReadOnlyArrays
 
 Array = np.ndarray
@@ -27,10 +29,10 @@ class Plane(ReadOnlyArrays):
     point: Array
     axes: Array
 
-    @property
+    @cached_property
     def normal(self) -> Array:
         """p × q, shape (3,)."""
-        return np.cross(self.axes[0], self.axes[1])
+        return cross(self.axes[:1], self.axes[1:])[0]
 
     @property
     def motions(self) -> Array:

@@ -22,12 +22,15 @@ def add_point_masses(scene: SceneConfig, found: Collected) -> None:
             nodes, shares = _shares(rod, spans, point.position)
             np.add.at(node_mass, nodes, point.mass * shares)
             if height:
-                np.add.at(moment, node_edges[nodes].T, 0.5 * height * point.mass * shares)
+                for edges in node_edges[nodes].T:  # numpy 2.4 reads past the values if it is given both at once
+                    np.add.at(moment, edges, 0.5 * height * point.mass * shares)
     found.columns["node_mass"], found.columns["mass_moment"] = [node_mass], [moment]
 
 
 def build_loads(scene: SceneConfig, found: Collected, bodies: Bodies, frame: str) -> PointLoads:
     """Arrays of the loads whose components are in one of the two frames."""
+    if not scene.loads:
+        return NO_LOADS
     nodes, forces, moments = [], [], []  # target, load, vector
     for index, load in enumerate(scene.loads):
         if load.frame != frame:
@@ -48,6 +51,9 @@ def _load_shares(parts: list[tuple[int, int, np.ndarray]]) -> LoadShares:
     return LoadShares(
         np.array(target, dtype=np.int64), np.array(load, dtype=np.int64), np.array(vector, dtype=float).reshape(-1, 3)
     )
+
+
+NO_LOADS = PointLoads(*(_load_shares([]) for _ in range(3)))
 
 
 def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[Rod, list[Span], float]]:

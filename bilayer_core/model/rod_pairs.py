@@ -103,7 +103,8 @@ def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str, float]:
     """Whether a rod can turn far enough to meet itself, the reason, and how far it can turn [rad]."""
     length, middles = rod.path.length, np.arange(rod.stations - 1) + 0.5
     figures = edge_figures(scene, rod)
-    layers = [sections(rod, layer, scene.materials[layer.material], middles) for layer in rod.layers]
+    copy = rod.copies[0].rod  # whose sections are those of all
+    layers = [sections(copy, layer, scene.materials[layer.material], middles) for layer in copy.layers]
     stiffness = sum(layer.bending_stiffness[0] for layer in layers)
     if len(layers) == 2:
         first, second = (layer.axial_stiffness for layer in layers)

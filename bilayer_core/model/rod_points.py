@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kinematics.rest_strains import cross
 from .strands import Collected
 
 Array = np.ndarray
@@ -87,5 +88,5 @@ def _at_start(found: Collected, node: Array, arm: Array) -> Array:
     """Positions of points with arms [m], shape (n_rod_point, 3)."""
     edges = found.column("node_edges", np.int64, 2)[node]
     m1, tangent = found.column("director1", width=3), found.column("tangent", width=3)
-    directions = np.stack([m1, np.cross(tangent, m1)], axis=1)[edges].mean(axis=1)
+    directions = np.stack([m1, cross(tangent, m1)], axis=1)[edges].mean(axis=1)
     return found.column("position", width=3)[node] + np.einsum("kd,kdc->kc", arm, directions)

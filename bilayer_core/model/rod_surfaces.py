@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ..scene.config import SceneConfig
 from ..scene.rod import Rod
 from .layout import ReadOnlyArrays
 from .rod_pairs import rod_pairs
+from .strand_arrays import StrandArrays
 from .strands import Collected
 from .validity import edge_figures
 
@@ -81,29 +83,32 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         for rod, thick in zip(rods, thickest, strict=True)
     ]
     parts: dict[str, list[Array]] = {}
-    for strand in found.strands:
-        number = numbers[strand.rod]
-        rod = rods[number]
-        edges = strand.shown - 1
-        length = rest_length[strand.first_edge : strand.first_edge + edges]
+    meets = can_collide.any(axis=1).tolist()
+
+    def kind(strand: StrandArrays) -> tuple[object, ...]:
+        """What strands have alike that are copies of each other; a closed one is by itself."""
+        number, edges = numbers[strand.rod], strand.shown - 1
         radius = float(node_radius[strand.first_node : strand.first_node + strand.node_count].max())
-        per_edge = max(1, math.ceil(float(length.max()) / radius * (1.0 - 1e-9)))
-        if not can_collide[number].any():
-            per_edge = 0
-        own = _strand_points(rod.edge_length, strand.first_station, length, per_edge, strand.closed)
-        order = strand.first_edge + np.arange(edges)
-        before, after = np.append(-1, order[:-1]), np.append(order[1:], -1)
-        if strand.closed:
-            before[0], after[-1] = order[[-1, 0]]
+        longest = float(rest_length[strand.first_edge : strand.first_edge + edges].max())
+        per_edge = max(1, math.ceil(longest / radius * (1.0 - 1e-9))) if meets[number] else 0
+        alone = strand.first_edge if strand.closed else -1
+        return rods[number].edge_length, strand.first_station, edges, radius, per_edge, alone
+
+    for (spacing, start, edges, radius, per_edge, _), alike in groupby(found.strands, kind):
+        strands = list(alike)
+        order = np.array([[strand.first_edge] for strand in strands]) + np.arange(edges)
+        own = _strand_points(spacing, start, rest_length[order], per_edge, strands[0].closed)
+        before, after = order - 1, order + 1
+        before[:, 0], after[:, -1] = (order[0, -1], order[0, 0]) if strands[0].closed else (-1, -1)
         own |= {
-            "edge_rod": np.full(edges, number),
-            "edge_first": np.arange(edges) == 0,
-            "edge_before": before,
-            "edge_after": after,
-            "edge_radius": np.full(edges, radius),
+            "edge_rod": np.repeat([numbers[strand.rod] for strand in strands], edges),
+            "edge_first": np.tile(np.arange(edges) == 0, len(strands)),
+            "edge_before": before.ravel(),
+            "edge_after": after.ravel(),
+            "edge_radius": np.full(order.size, radius),
             "point_edge": np.repeat(order, own["points_of_edge"]),
         }
-        if strand.closed:
+        if strands[0].closed:
             own |= _with_copy(own, len(rods))
         for name, values in own.items():
             parts.setdefault(name, []).append(values)
@@ -139,32 +144,32 @@ def _joined(scene: SceneConfig, rods: list[Rod]) -> Array:
 
 
 def _strand_points(spacing: float, start: int, length: Array, per_edge: int, closed: bool) -> dict[str, Array]:
-    """Points of a strand whose edges have the lengths `length` [m] and lie `spacing` apart on the path, from station
-    `start` on.
+    """Points of strands whose edges have the lengths `length` [m], shape (n_strand, n_edge), and lie `spacing` apart on
+    the path, from station `start` on.
     """
-    edges = len(length)
+    count, edges = length.shape
     arc = spacing * (start + np.arange(edges))
     fraction = np.concatenate([np.tile(np.arange(per_edge) / max(per_edge, 1), edges), [1.0]])
     edge = np.concatenate([np.repeat(np.arange(edges), per_edge), [edges - 1]])
     step = length / max(per_edge, 1)
-    weight = step[edge]
+    weight = step[:, edge]
     at_node = (np.arange(len(edge)) % max(per_edge, 1) == 0) & (edge > 0)
-    weight[at_node] = 0.5 * (step[edge[at_node] - 1] + step[edge[at_node]])
-    weight[0], weight[-1] = 0.5 * step[0], 0.5 * step[-1]
+    weight[:, at_node] = 0.5 * (step[:, edge[at_node] - 1] + step[:, edge[at_node]])
+    weight[:, 0], weight[:, -1] = 0.5 * step[:, 0], 0.5 * step[:, -1]
     points = np.full(edges, per_edge)
     if per_edge == 0:
-        edge, fraction, weight = edge[:0], fraction[:0], weight[:0]
+        edge, fraction, weight = edge[:0], fraction[:0], weight[:, :0]
     elif closed:
-        weight[0] += weight[-1]
-        edge, fraction, weight = edge[:-1], fraction[:-1], weight[:-1]
+        weight[:, 0] += weight[:, -1]
+        edge, fraction, weight = edge[:-1], fraction[:-1], weight[:, :-1]
     else:
         points[-1] += 1
     return {
-        "edge_arc": np.stack([arc, arc + spacing], axis=1),
-        "point_fraction": fraction,
-        "point_arc": arc[edge] + spacing * fraction,
-        "point_weight": weight,
-        "points_of_edge": points,
+        "edge_arc": np.tile(np.stack([arc, arc + spacing], axis=1), (count, 1)),
+        "point_fraction": np.tile(fraction, count),
+        "point_arc": np.tile(arc[edge] + spacing * fraction, count),
+        "point_weight": weight.ravel(),
+        "points_of_edge": np.tile(points, count),
     }
 
 

@@ -19,7 +19,7 @@ from .strands import (
     Span,
     StrandElements,
     StrandShape,
-    add_strand,
+    add_strands,
     stations_of,
     strand_shape,
     with_copies,
@@ -30,8 +30,13 @@ _OUTWARD = (-1.0, 1.0)
 """Which way along the normal the outer face of each of two layers looks."""
 
 
-def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: dict[str, int]) -> None:
-    """Add one copy of a rod: its strands, their drag, and the bond between them."""
+def add_bonded_rods(found: Collected, scene: SceneConfig, rod: Rod, body_index: dict[str, int]) -> None:
+    """Add all copies of a rod: their strands, their drag, and the bonds between them."""
+    for copy in rod.copies:
+        _add_copy(found, scene, copy, body_index)
+
+
+def _add_copy(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: dict[str, int]) -> None:
     rod, name = copy.rod, copy.name
     strands: list[_Bonded] = []
     for slot, layer in enumerate(rod.layers):
@@ -56,11 +61,11 @@ def add_bonded_rods(found: Collected, scene: SceneConfig, copy: RodCopy, body_in
         _add_eigenstrain(found, scene, rod, slot, strand)
         time = scene.materials[layer.material].retardation_time
         elements = _elements(rod, layer, at_nodes, at_edges, shape, time)
-        joints = add_strand(found, scene, rod, strand, shape, elements, body_index)
+        joints = add_strands(found, scene, rod, [strand], shape, elements, body_index)[0]
         strands.append(_Bonded(first, strand.first_node, strand.first_edge, shape, elements, joints))
     found.rods.append([strand.span for strand in strands])
     found.path_height.append(0.0)
-    add_fluid(found, scene.fluid, rod, found.rods[-1])
+    add_fluid(found, scene.fluid, rod, found.rods[-1:])
     if len(strands) == 2:
         _add_bond(found, scene, rod, *strands)
 

@@ -7,6 +7,7 @@ masses, axial stiffness and bonds take that in the middle of an edge; bending, t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,8 +30,6 @@ class Section(ReadOnlyArrays):
         EA = E w h [N].
     bending_stiffness : tuple of Array
         EI1 = E w h³/12 (curvature through the thickness) and EI2 = E h w³/12 (across the width) [N m²].
-    twisting_stiffness : Array
-        GJ of the layer by itself (see `torsion_section`) [N m²].
     shear_modulus : Array
         G [Pa].
     mass : Array
@@ -43,12 +42,18 @@ class Section(ReadOnlyArrays):
 
     axial_stiffness: Array
     bending_stiffness: tuple[Array, Array]
-    twisting_stiffness: Array
     shear_modulus: Array
     mass: Array
     spin_inertia: Array
     width: Array
     thickness: Array
+
+    @cached_property
+    def twisting_stiffness(self) -> Array:
+        """GJ of the layer by itself (see `torsion_section`) [N m²]."""
+        stiffness = rectangle_torsion(self.shear_modulus, self.width, self.thickness)
+        stiffness.setflags(write=False)
+        return stiffness
 
 
 def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Section:
@@ -83,7 +88,6 @@ def rectangle(material: Material, width: Array, thickness: Array, stiffness: Arr
     return Section(
         axial_stiffness=e * area,
         bending_stiffness=(e * width * thickness**3 / 12.0, e * thickness * width**3 / 12.0),
-        twisting_stiffness=rectangle_torsion(g, width, thickness),
         shear_modulus=g,
         mass=material.density * area,
         spin_inertia=material.density * area * (width**2 + thickness**2) / 12.0,

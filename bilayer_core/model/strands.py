@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -36,6 +36,7 @@ class Collected:
     node_count: int = 0
     edge_count: int = 0
     joint_count: int = 0
+    clamp_count: int = 0
 
     def add(self, **values) -> None:
         for name, value in values.items():
@@ -44,10 +45,8 @@ class Collected:
     def column(self, name: str, dtype=float, width: int | None = None) -> Array:
         parts = self.columns.get(name)
         if not parts:
-            array = np.zeros((0,) if width is None else (0, width), dtype)
-        else:
-            array = np.concatenate(parts).astype(dtype)
-        return np.ascontiguousarray(array)
+            return np.zeros((0,) if width is None else (0, width), dtype)
+        return np.concatenate(parts).astype(dtype, order="C", copy=False)
 
     def law(self, scene: SceneConfig, law: Eigenstrain) -> int:
         """Number of an eigenstrain law; equal laws are one."""
@@ -71,6 +70,8 @@ def _numbers_of(scene: SceneConfig, law: Eigenstrain) -> tuple[float, ...]:
 class StrandShape:
     """A strand at the start: its nodes [m], the lengths [m] and frames of its edges, the frames of the path at its two
     ends, and what an imperfection adds to the rest values of a layer that are not those of the start.
+
+    Of several copies of a rod at once, all arrays have one index more, the first.
     """
 
     positions: Array  # shape (n_node, 3)
@@ -80,24 +81,27 @@ class StrandShape:
     end_tangents: Array  # shape (2, 3)
     end_normals: Array  # likewise
     imperfection: Array  # κ₁ κ₂ ψ [rad], shape (n_node, 3)
-    handedness: float  # −1 of a mirror image, 1 of any other
+    handedness: Array | float  # −1 of a mirror image, 1 of any other
     closed: bool = False  # see `model.strand_arrays`
 
-    @property
+    @cached_property
     def voronoi(self) -> Array:
         """Half the lengths of the edges at each node [m], shape (n_node,)."""
-        return self._round(halves_to_nodes(self.lengths))
+        voronoi = halves_to_nodes(self.lengths)
+        self._close(voronoi)
+        return voronoi
 
-    def _round(self, of_nodes: Array) -> Array:
-        """What nodes have, that of a closed strand's first and last node as that of the nodes that they stand for."""
+    def _close(self, of_nodes: Array) -> None:
+        """Let the first and last node of a closed strand have what the nodes have that they stand for; of nodes is the
+        last index.
+        """
         if self.closed:
-            of_nodes[0], of_nodes[-1] = of_nodes[-2], of_nodes[1]
-        return of_nodes
+            of_nodes[..., 0], of_nodes[..., -1] = of_nodes[..., -2], of_nodes[..., 1]
 
     @property
     def curvature(self) -> Array:
         """χ at each node [1/m], shape (n_node,)."""
-        return self._strains[:, 0] / self.voronoi
+        return self._strains[..., 0] / self.voronoi
 
     def strains(self) -> Array:
         """κ₁ κ₂ ψ [rad] at each node: between the edges at it, at the ends between path and edge, shape (n_node, 3)."""
@@ -105,9 +109,14 @@ class StrandShape:
 
     @cached_property
     def _strains(self) -> Array:
-        tangents = np.concatenate([self.end_tangents[:1], self.tangents, self.end_tangents[1:]])
-        normals = np.concatenate([self.end_normals[:1], self.normals, self.end_normals[1:]])
-        return self._round(rest_strains(tangents[:-1], normals[:-1], tangents[1:], normals[1:]))
+        frames = []
+        for ends, of_edges in ((self.end_tangents, self.tangents), (self.end_normals, self.normals)):
+            all_edges = np.concatenate([ends[..., :1, :], of_edges, ends[..., 1:, :]], axis=-2)
+            frames.append([part.reshape(-1, 3) for part in (all_edges[..., :-1, :], all_edges[..., 1:, :])])
+        (tangents, next_tangents), (normals, next_normals) = frames
+        strains = rest_strains(tangents, normals, next_tangents, next_normals).reshape(self.positions.shape)
+        self._close(strains.swapaxes(-1, -2))
+        return strains
 
 
 def stations_of(rod: Rod, layer: Layer | None = None) -> tuple[int, int]:
@@ -129,12 +138,33 @@ def with_copies(rod: Rod, edges: Array) -> Array:
 
 
 def strand_shape(rod: Rod, height: Array, first: int, last: int, place: Placement) -> StrandShape:
-    """Shape of the strand that lies `height` [m] over the path at the stations from first to last."""
+    """Shape of the strand that lies `height` [m] over the path at the stations from first to last; of several places
+    at once (`scene.pattern.stacked`), that in each of them.
+    """
     shape = _shape(rod, height, first, last, place, Rod.frames_at)
     if rod.imperfection is None:
         return shape
     imperfect = _shape(rod, height, first, last, place, _imperfect_frames)
     return replace(imperfect, imperfection=imperfect.strains() - shape.strains())
+
+
+def strand_lengths(rod: Rod, heights: Array, last: int) -> Array:
+    """Lengths [m] of the edges of strands over the path from its start to a station, shape (n_strand, n_edge);
+    `heights` [m] is theirs over the path, shape (n_strand, n_node).
+    """
+    arc = rod.edge_length * rod.on_path(np.arange(last + 1))
+    points, _, normals = rod.frames_at(arc) if rod.imperfection is None else _imperfect_frames(rod, arc)
+    return _edges(points + heights[..., None] * normals, is_closed(rod, 0, last))[1]
+
+
+def _edges(positions: Array, closed: bool) -> tuple[Array, Array]:
+    """Vectors and lengths [m] of edges between nodes; of a closed strand the last two nodes become the first, to the
+    last digit.
+    """
+    if closed:
+        positions[..., -2:, :] = positions[..., :2, :]
+    edges = positions[..., 1:, :] - positions[..., :-1, :]
+    return edges, np.linalg.norm(edges, axis=-1)
 
 
 def _imperfect_frames(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
@@ -172,11 +202,10 @@ def _shape(
     _, _, middle_normals = frames_at(rod, rod.edge_length * rod.on_path(np.arange(first, last) + 0.5))
     positions = place.points(points + height[:, None] * normals)
     closed = is_closed(rod, first, last)
-    if closed:  # to the last digit
-        positions[-2:], middle_normals[-1] = positions[:2], middle_normals[0]
-    edges = np.diff(positions, axis=0)
-    lengths = np.linalg.norm(edges, axis=1)
-    edge_tangents = edges / lengths[:, None]
+    edges, lengths = _edges(positions, closed)
+    if closed:
+        middle_normals[-1] = middle_normals[0]
+    edge_tangents = edges / lengths[..., None]
     ends = [0, -1]
     away = height[ends, None]
     slopes = (height[[1, -1]] - height[[0, -2]])[:, None] / rod.edge_length  # of a layer whose thickness varies
@@ -190,21 +219,23 @@ def _shape(
         _across(place.directions(middle_normals), edge_tangents),
         end_tangents,
         _across(place.directions(normals[ends]), end_tangents),
-        np.zeros((len(positions), 3)),
+        np.zeros_like(positions),
         place.handedness,
         closed,
     )
 
 
 def _across(normals: Array, tangents: Array) -> Array:
-    """Normals made perpendicular to tangents, unit, shape (n, 3)."""
-    normals = normals - np.einsum("ij,ij->i", normals, tangents)[:, None] * tangents
-    return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    """Normals made perpendicular to tangents, unit, shape (..., n, 3)."""
+    normals = normals - np.einsum("...j,...j->...", normals, tangents)[..., None] * tangents
+    return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
 
 @dataclass(frozen=True)
 class StrandElements:
-    """Inertia and stiffness of a strand's edges, and of its joints as if there was one at every node."""
+    """Inertia and stiffness of a strand's edges, and of its joints as if there was one at every node; where copies
+    differ, with one index more, the first.
+    """
 
     edge_mass: Array  # [kg], shape (n_edge,)
     spin_inertia: Array  # [kg m²], shape (n_edge,)
@@ -217,94 +248,124 @@ class StrandElements:
     retardation_time: float  # [s]
 
 
-def add_strand(
+def add_strands(
     found: Collected,
     scene: SceneConfig,
     rod: Rod,
-    strand: StrandArrays,
+    strands: Sequence[StrandArrays],
     shape: StrandShape,
     elements: StrandElements,
     body_index: dict[str, int],
 ) -> Array:
-    """Add a strand: joints at inner nodes, and where a body holds an end of the rod that the strand reaches.
+    """Add strands that differ in their places alone: joints at inner nodes, and where a body holds an end of the rod
+    that the strand reaches.
 
     Returns
     -------
     ndarray
-        The joint of each node, −1 for free ends, shape (n_node,).
+        The joint of each node, −1 for free ends, shape (n_strand, n_node).
     """
+    strand, count = strands[0], len(strands)
     nodes, edges = strand.node_count, strand.node_count - 1
-    first_edge, first_node = strand.first_edge, strand.first_node
-    voronoi, index = shape.voronoi, np.arange(nodes)
+    first_node, first_edge = (
+        np.array([[getattr(own, name)] for own in strands]) for name in ("first_node", "first_edge")
+    )
+    index = np.arange(nodes)
     own_nodes, own_edges = np.ones(nodes), np.ones(edges)
     if strand.closed:
         own_nodes[[0, -1]] = own_edges[-1] = 0.0
         found.add(
-            joined_node=first_node + np.array([[0, nodes - 2], [1, nodes - 1]]),
-            joined_edge=np.array([[first_edge, first_edge + edges - 1]]),
+            joined_node=(first_node[..., None] + np.array([[0, nodes - 2], [1, nodes - 1]])).reshape(-1, 2),
+            joined_edge=first_edge + np.array([0, edges - 1]),
         )
-    found.strands.append(strand)
+    found.strands += strands
+
+    def of_all(values: Array) -> Array:
+        """Numbers of nodes or edges, those of each strand or the same of all, one strand after the other."""
+        return values.ravel() if values.ndim == 2 else np.concatenate([values] * count)
+
+    around = np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1)
+    forward = {"path": 0, "normal": 1}.get(rod.friction_axis, 2 * np.asarray(shape.handedness, dtype=np.int64))
     found.add(
-        position=shape.positions,
-        tangent=shape.tangents,
-        director1=shape.normals,
-        edge_mass=own_edges * elements.edge_mass,
-        node_mass=own_nodes * halves_to_nodes(elements.edge_mass),
-        node_length=own_nodes * voronoi,
-        node_radius=elements.node_radius,
-        node_edges=first_edge + np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1),
-        node_axis=np.full(nodes, {"path": 0, "normal": 1, "across": 2 * int(shape.handedness)}[rod.friction_axis]),
-        spin_inertia=own_edges * elements.spin_inertia,
-        half_width=elements.half_width,
-        edge_node=first_node + np.arange(edges),
-        rest_length=shape.lengths,
-        axial_stiffness=own_edges * elements.axial_stiffness,
-        rest_strain=elements.rest_strain,
-        edge_time=np.full(edges, elements.retardation_time),
+        position=shape.positions.reshape(-1, 3),
+        tangent=shape.tangents.reshape(-1, 3),
+        director1=shape.normals.reshape(-1, 3),
+        edge_mass=of_all(own_edges * elements.edge_mass),
+        node_mass=of_all(own_nodes * halves_to_nodes(elements.edge_mass)),
+        node_length=of_all(own_nodes * shape.voronoi),
+        node_radius=of_all(elements.node_radius),
+        node_edges=(first_edge[..., None] + around).reshape(-1, 2),
+        node_axis=np.repeat(np.resize(forward, count), nodes),
+        spin_inertia=of_all(own_edges * elements.spin_inertia),
+        half_width=of_all(elements.half_width),
+        edge_node=(first_node + index[:-1]).ravel(),
+        rest_length=of_all(shape.lengths),
+        axial_stiffness=of_all(own_edges * elements.axial_stiffness),
+        rest_strain=of_all(elements.rest_strain),
+        edge_time=np.full(count * edges, elements.retardation_time),
     )
-    joints = np.full(nodes, -1)
-    inner = np.arange(1, nodes - 1)
-
-    def add_joints(at: Array, first: Array, second: Array) -> None:
-        joints[at] = found.joint_count + np.arange(len(at))
-        found.joint_count += len(at)
-        found.add(
-            joint_a=first,
-            joint_b=second,
-            joint_stiffness=elements.joint_stiffness[at],
-            joint_rest=elements.joint_rest[at],
-            joint_time=np.full((len(at), 3), elements.retardation_time),
-            joint_node=first_node + at,
-            voronoi_length=voronoi[at],
-        )
-
-    add_joints(inner, first_edge + inner - 1, first_edge + inner)
-    last = strand.first_station + nodes - 1
-    reaches = ((rod.clamp_start, strand.first_station == 0, 0), (rod.clamp_end, last == rod.stations - 1, -1))
-    for clamp, reached, end in reaches:
-        if clamp is None or not reached:
-            continue
-        body = body_index[clamp]
-        own = rotation_matrix(np.array(scene.bodies[body].rotation))  # columns: axes of the body's frame
-        clamp_edge = -1 - len(found.columns.get("clamp_edge_tangent", []))
-        node = end % nodes
-        pair = (clamp_edge, first_edge) if end == 0 else (first_edge + edges - 1, clamp_edge)
-        found.add(
-            clamp_edge_tangent=shape.end_tangents[[end]] @ own,
-            clamp_edge_director1=shape.end_normals[[end]] @ own,
-            attached_node=first_node + node,
-            attached_body=body,
-            attached_position=(shape.positions[end] - np.array(scene.bodies[body].position))[None] @ own,
-        )
-        add_joints(np.array([node]), *(np.array([edge]) for edge in pair))
-    found.node_count += nodes
-    found.edge_count += edges
+    at = index[1:-1]
+    pairs = np.stack([first_edge + at - 1, first_edge + at])
+    clamps = _clamps(rod, strand)
+    if clamps:
+        clamp_edge = -1 - found.clamp_count - np.arange(count * len(clamps)).reshape(count, -1)
+        at = np.append(at, [end % nodes for _, end in clamps])
+        own = zip(clamp_edge.T[..., None], clamps, strict=True)
+        held = [(clamp, first_edge) if end == 0 else (first_edge + edges - 1, clamp) for clamp, (_, end) in own]
+        pairs = np.concatenate([pairs, *map(np.array, held)], axis=2)
+        _add_clamps(found, scene, [(body_index[body], end) for body, end in clamps], shape, first_node)
+    numbers = found.joint_count + np.arange(count * len(at)).reshape(count, -1)
+    joints = np.full((count, nodes), -1)
+    joints[:, at] = numbers
+    found.joint_count += numbers.size
+    stiffness, rest = (of.reshape(-1, nodes, 3) for of in (elements.joint_stiffness, elements.joint_rest))
+    found.add(
+        joint_a=pairs[0].ravel(),
+        joint_b=pairs[1].ravel(),
+        joint_stiffness=stiffness[:, at].reshape(-1, 3),
+        joint_rest=rest[:, at].reshape(-1, 3),
+        joint_time=np.full((numbers.size, 3), elements.retardation_time),
+        joint_node=(first_node + at).ravel(),
+        voronoi_length=shape.voronoi.reshape(-1, nodes)[:, at].ravel(),
+    )
+    found.node_count += count * nodes
+    found.edge_count += count * edges
     return joints
 
 
+def _clamps(rod: Rod, strand: StrandArrays) -> list[tuple[str, int]]:
+    """The bodies that hold an end of a strand, and which: 0 or −1."""
+    last = strand.first_station + strand.node_count - 1
+    ends = ((rod.clamp_start, strand.first_station == 0, 0), (rod.clamp_end, last == rod.stations - 1, -1))
+    return [(body, end) for body, reached, end in ends if body is not None and reached]
+
+
+def _add_clamps(
+    found: Collected, scene: SceneConfig, clamps: list[tuple[int, int]], shape: StrandShape, first_node: Array
+) -> None:
+    """Add what bodies hold of strands: each body by its number, with the end that it holds."""
+    parts: list[tuple[Array, Array, Array]] = []
+    tangents, normals = (of.reshape(-1, 2, 3) for of in (shape.end_tangents, shape.end_normals))
+    positions = shape.positions.reshape(len(first_node), -1, 3)
+    for body, end in clamps:
+        own = rotation_matrix(np.array(scene.bodies[body].rotation))  # columns: axes of the body's frame
+        at = positions[:, [end]] - np.array(scene.bodies[body].position)
+        parts.append((tangents[:, [end]] @ own, normals[:, [end]] @ own, at @ own))
+    tangent, normal, position = (np.concatenate(part, axis=1).reshape(-1, 3) for part in zip(*parts, strict=True))
+    found.add(
+        clamp_edge_tangent=tangent,
+        clamp_edge_director1=normal,
+        attached_node=(first_node + np.array([end % positions.shape[1] for _, end in clamps])).ravel(),
+        attached_body=np.tile([body for body, _ in clamps], len(first_node)),
+        attached_position=position,
+    )
+    found.clamp_count += len(tangent)
+
+
 def halves_to_nodes(of_edges: Array) -> Array:
-    """What edges have, half of it at each of their nodes, shape (n_edge + 1,)."""
-    of_nodes = np.zeros(len(of_edges) + 1)
-    of_nodes[:-1] += 0.5 * of_edges
-    of_nodes[1:] += 0.5 * of_edges
+    """What edges have, half of it at each of their nodes, shape (..., n_edge + 1)."""
+    of_nodes = np.zeros((*of_edges.shape[:-1], of_edges.shape[-1] + 1))
+    half = 0.5 * of_edges
+    of_nodes[..., :-1] += half
+    of_nodes[..., 1:] += half
     return of_nodes

@@ -14,12 +14,13 @@ from bilayer_core.scene.faults import suggestion
 
 _SHARED = Path("share") / bilayer_core.DISTRIBUTION / "config"
 """Below the prefix that the package is installed to."""
+SUFFIX = ".yaml"
 
 
 def _candidates() -> Iterator[Path]:
     """Directories below which scenes and templates may be, the likeliest first."""
     # A checkout, an editable install, a colcon symlink install: the package is a link into the checkout.
-    beside = Path(bilayer_core.__file__).resolve().parents[1]
+    beside = Path(os.path.realpath(bilayer_core.__file__)).parents[1]
     yield beside / "config"
     # A wheel; with ``pip install --target`` it is beside the package.
     for prefix in (sysconfig.get_path("data"), sys.prefix, beside):
@@ -53,15 +54,24 @@ def bundled_directory(kind: str) -> Path:
     for directory in (candidate / kind for candidate in _candidates()):
         if directory in looked:
             continue
-        if any(directory.glob("*.yaml")):
+        if _files(directory):
             return directory
         looked.append(directory)
     places = "".join(f"\n  {directory}" for directory in looked)
     raise SceneError(f"the bundled {kind} are not installed; looked in:{places}")
 
 
+def _files(directory: Path) -> list[str]:
+    """Names of the scene files in a directory, in alphabetical order; none if there is no such directory."""
+    try:
+        return sorted(name for name in os.listdir(directory) if name.endswith(SUFFIX))
+    except OSError:
+        return []
+
+
 def _bundled(kind: str) -> dict[str, Path]:
-    return {path.stem: path for path in sorted(bundled_directory(kind).glob("*.yaml"))}
+    directory = bundled_directory(kind)
+    return {name.removesuffix(SUFFIX): directory / name for name in _files(directory)}
 
 
 def bundled_scenes() -> dict[str, Path]:
@@ -82,10 +92,12 @@ def bundled_scene(name: str) -> Path:
     SceneError
         If there is no such scene; suggests the nearest name and lists all.
     """
-    scenes = bundled_scenes()
-    if name in scenes:
-        return scenes[name]
+    directory = bundled_directory("scenes")
+    files = _files(directory)
+    if name + SUFFIX in files:
+        return directory / (name + SUFFIX)
+    scenes = [file.removesuffix(SUFFIX) for file in files]
     raise SceneError(
         f"{name}: neither a scene file nor a bundled scene{suggestion(name, scenes)}; "
-        f"bundled are {', '.join(scenes)} (in {bundled_directory('scenes')})"
+        f"bundled are {', '.join(scenes)} (in {directory})"
     )

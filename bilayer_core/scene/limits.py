@@ -69,6 +69,10 @@ def read_text(path: Path, largest: int) -> str:
         raise ValueError(f"is not UTF-8 text: {error.reason} at byte {error.start}") from None
 
 
+NESTED = dict, list, tuple, Mapping
+"""What has values inside; the frequent ones first."""
+
+
 def check_content(data: Any, source: str) -> None:
     """Raise SceneError if the content of a scene is too deep or too large, contains itself, or has unwritable text."""
     count, level = 0, [data]
@@ -77,7 +81,7 @@ def check_content(data: Any, source: str) -> None:
         for item in level:
             entries = _entries(item)
             count += len(entries)
-            inside += [entry for entry in entries if isinstance(entry, Mapping | list | tuple)]
+            inside += [entry for entry in entries if isinstance(entry, NESTED)]
             _refuse_unwritable([entry for entry in entries if isinstance(entry, str)], source)
             if count > MOST_VALUES:
                 raise SceneError(

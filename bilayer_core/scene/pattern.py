@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Any, Literal
@@ -27,6 +27,8 @@ EXACT = 1e-15
 class Placement:
     """An isometry of space, x ↦ Q (x − c) + c + s with Q orthogonal: where a copy of a rod is.
 
+    Of several copies at once (`stacked`), arrays have one index more, the first.
+
     A reflection, det Q = −1, takes points, tangents and normals as the vectors they are; then m1 = Q m1 and, as
     m2 = t × m1, m2 = −Q m2. What is measured along m1 keeps its sign: curvature about m2, natural curvature, the order
     of layers, friction along path and normal. What is measured along m2 or about t is a pseudoscalar and changes it:
@@ -38,22 +40,28 @@ class Placement:
     shift: Array  # s [m], shape (3,)
 
     @property
-    def handedness(self) -> float:
-        """1, or −1 for a mirror image."""
-        return float(np.sign(np.linalg.det(self.matrix)))
+    def handedness(self) -> Array:
+        """1, or −1 for a mirror image, shape ()."""
+        return np.sign(np.linalg.det(self.matrix))
 
     def directions(self, vectors: Array) -> Array:
         """Directions of the rod as those of the copy, shape (..., 3)."""
-        return vectors @ self.matrix.T
+        return vectors @ self.matrix.swapaxes(-1, -2)
 
     def points(self, points: Array) -> Array:
         """Points of the rod as those of the copy [m], shape (..., 3)."""
-        return (points - self.center) @ self.matrix.T + self.center + self.shift
+        return (points - self.center) @ self.matrix.swapaxes(-1, -2) + self.center + self.shift
 
 
 def placed(matrix: Any = None, center: Any = (0.0, 0.0, 0.0), shift: Any = (0.0, 0.0, 0.0)) -> Placement:
     """A placement from what of it is not that of the rod itself."""
     return Placement(np.eye(3) if matrix is None else matrix, np.array(center, float), np.array(shift, float))
+
+
+def stacked(places: Iterable[Placement]) -> Placement:
+    """Several placements as one, of which points and directions have a copy more in front: shape (n_place, n, 3)."""
+    matrices, centers, shifts = zip(*((of.matrix, of.center, of.shift) for of in places), strict=True)
+    return Placement(np.array(matrices), np.array(centers)[:, None], np.array(shifts)[:, None])
 
 
 def _turned(vector: Array) -> Array:
@@ -90,9 +98,13 @@ class Pattern(Part):
         """Rods in all."""
         return self.count
 
-    @abstractmethod
-    def places(self) -> list[Placement]:
+    def places(self) -> tuple[Placement, ...]:
         """Of each copy."""
+        return self.keep("places", (), lambda: tuple(self._places()))
+
+    @abstractmethod
+    def _places(self) -> Iterable[Placement]:
+        """The same, made anew."""
 
     def per_copy(self) -> Iterator[tuple[Location, list]]:
         """Lists that have an entry for each copy, with their keys."""
@@ -128,8 +140,7 @@ class Rotation(Pattern):
     angle: Angle | None = None
     """Between a copy and the next; by default they are even over a full turn."""
 
-    def places(self) -> list[Placement]:
-        """Of each copy."""
+    def _places(self) -> list[Placement]:
         step = 2.0 * np.pi if self.angle is None else self.angle
         parts = self.count if self.angle is None else 1
         axis = np.array(self.axis)
@@ -149,8 +160,7 @@ class Translation(Pattern):
     count: Annotated[int, *whole(1, MOST_COPIES)]
     """Rods in all; they are called `NAME_0`, `NAME_1` and so on."""
 
-    def places(self) -> list[Placement]:
-        """Of each copy."""
+    def _places(self) -> list[Placement]:
         return [placed(shift=copy * np.array(self.step)) for copy in range(self.count)]
 
 
@@ -168,7 +178,7 @@ class Grid(Pattern):
         """Rods in all."""
         return math.prod(self.counts)
 
-    def places(self) -> list[Placement]:
+    def _places(self) -> list[Placement]:
         """Of each copy, the first step running fastest."""
         steps = np.array(self.steps)
         places = product(*(range(count) for count in reversed(self.counts)))
@@ -200,8 +210,7 @@ class Mirror(Pattern):
         """The rod and its image."""
         return 2
 
-    def places(self) -> list[Placement]:
-        """Of the rod and its image."""
+    def _places(self) -> list[Placement]:
         return [placed(), placed(np.eye(3) - 2.0 * np.outer(self.axis, self.axis), self.center)]
 
 
@@ -228,8 +237,7 @@ class Listed(Pattern):
         """As many as there are places."""
         return len(self.placements)
 
-    def places(self) -> list[Placement]:
-        """Of each copy."""
+    def _places(self) -> list[Placement]:
         return [placed(_turned(np.array(of.rotation)), of.center, of.position) for of in self.placements]
 
 

@@ -72,7 +72,9 @@ def values_at(number_or_profile: float | Profile, along: np.ndarray) -> np.ndarr
     """Values at lengths `along` the path [m], of the same shape."""
     if isinstance(number_or_profile, Profile):
         return np.interp(along, number_or_profile.at, number_or_profile.value)
-    return np.full(np.shape(along), number_or_profile)
+    values = np.empty(along.shape)
+    values.fill(number_or_profile)  # a third of the time of `np.full`
+    return values
 
 
 def extremes(number_or_profile: float | Profile) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from bilayer_core.scene.imperfection import Imperfection
 from bilayer_core.scene.limits import MOST_NODES
 from bilayer_core.scene.part import Direction, Name, Part
 from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
-from bilayer_core.scene.pattern import Patterns, Placement, placed
+from bilayer_core.scene.pattern import Patterns, Placement, placed, stacked
 from bilayer_core.scene.point_paths import PolylinePath, SplinePath
 from bilayer_core.scene.profile import Profile, extremes, values_at, varying
 from bilayer_core.scene.units import (
@@ -301,7 +301,7 @@ def _far_away(rod: Rod) -> Iterator[Fault]:
     if np.abs(points).max() > farthest:
         where: Location = ("path", "start" if "start" in type(rod.path).model_fields else "points")
         found: Any = rod.path.start
-    elif rod.pattern and any(np.abs(place.points(points)).max() > farthest for place in rod.pattern.places()):
+    elif rod.pattern and np.abs(stacked(rod.pattern.places()).points(points)).max() > farthest:
         where, found = ("pattern",), rod.pattern.type
     else:
         return
@@ -326,7 +326,7 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
         if getattr(rod, end) is not None and getattr(rod.pattern, end) is not None:
             yield (end,), getattr(rod, end), f"must be left out where `pattern.{end}` has the body of each copy"
     points = rod.frames_at(np.linspace(0.0, rod.path.length, POINTS_COMPARED))[0]
-    copies = np.array([place.points(points) for place in rod.pattern.places()])
+    copies = stacked(rod.pattern.places()).points(points)
     for second in range(1, len(copies)):
         ways = copies[second], copies[second][::-1]
         apart = np.min([np.abs(copies[:second] - way).max(axis=(1, 2)) for way in ways], axis=0)

@@ -17,6 +17,7 @@ FEW = 1000
 OPENERS = ("[", "{", "- ", "? ")
 """Without which nothing begins inside something else on one line; a deeper line is longer than its depth."""
 PLAIN = "tag:yaml.org,2002:"
+MERGE = PLAIN + "merge"
 KINDS = ("null", "bool", "int", "float", "str", "seq", "map")
 """Of values; YAML has more, such as dates and sets, which mean nothing in a scene."""
 _Base = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -56,7 +57,7 @@ class _Reader(_Base):
         """The mapping of a node; keys merged from elsewhere (``<<``) are no repetition."""
         if not isinstance(node, yaml.MappingNode):
             raise yaml.constructor.ConstructorError(None, None, "this is not a mapping", node.start_mark)
-        seen = set()
+        seen, merges = set(), False
         for key, _ in node.value:
             if not isinstance(key, yaml.ScalarNode):
                 raise yaml.constructor.ConstructorError(None, None, "a key must be plain text", key.start_mark)
@@ -64,7 +65,9 @@ class _Reader(_Base):
                 problem = f"the key {key.value!r} occurs twice"
                 raise yaml.constructor.ConstructorError(None, None, problem, key.start_mark)
             seen.add(key.value)
-        self.flatten_mapping(node)
+            merges |= key.tag == MERGE
+        if merges:
+            self.flatten_mapping(node)
         return {key.value: self.construct_object(value, deep=deep) for key, value in node.value}
 
 

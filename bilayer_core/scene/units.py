@@ -151,6 +151,8 @@ class Quantity:
         return number
 
     def _number(self, value: Any) -> float:
+        if type(value) is float:
+            return value
         if isinstance(value, str):
             try:
                 return parse_quantity(value, self.unit) if self.unit else float(value)

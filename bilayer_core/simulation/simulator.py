@@ -437,8 +437,7 @@ class Simulator:
             ensure_compiled()
             begin = clock.thread_time()
             self._compile_time = 0.0
-            self._stepper.evaluate(self._state)
-            self._stepper.compile(self._state)
+            self._stepper.engine.load()
             self._stepper.evaluate(self._state)
             self.statistics.take_shape(self._stepper, self._state)
             self._begin_budget()

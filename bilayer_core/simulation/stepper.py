@@ -188,11 +188,6 @@ class Stepper:
         state.touched[unknown] = self.engine.touching[: len(unknown)][unknown]
         self.engine.stimulus[:] = self.surroundings.stimulus_at(state, time)
 
-    def compile(self, state: State) -> None:
-        """Make a step, for its kernels; `state` stays as it is."""
-        self._integrate(state.copy(), math.inf, math.inf, 1)
-        self.observe(state)
-
     def restart(self, state: State) -> None:
         """Begin again with the first step's length: something has jumped."""
         state.next_step[0] = min(float(state.next_step[0]), self._first)

@@ -164,6 +164,17 @@ def test_mass_and_its_centre_are_those_of_two_rods_point_masses_included():
     assert one.model.unknowns < 0.7 * two.model.unknowns
 
 
+@pytest.mark.parametrize("place", [0.0, 0.013, 0.05, 0.0875, 0.1])
+def test_a_point_mass_is_on_the_path_wherever_the_curve_of_a_laminate_lies(place):
+    layers = [layer("bottom"), layer("top", thickness=3e-3)]
+    mass = {"name": "cargo", "rod": "rod", "position": place, "mass": 2e-3}
+    light, heavy = (Simulator(load_scene(scene([rod(layers)], masses=m)), model="laminate") for m in ([], [mass]))
+    own = light.model.node_mass.sum()
+    expected = (own * light.com + 2e-3 * np.array([place, 0.0, 0.0])) / (own + 2e-3)
+    assert light.com[2] == pytest.approx(1e-3, rel=1e-9)  # of layers from −1 to 3 mm
+    assert heavy.com == pytest.approx(expected, rel=1e-12, abs=1e-17)
+
+
 def test_budget_of_a_driven_laminate_off_its_axis_closes():
     content = scene(
         [rod([layer("bottom"), growing(0.02, interval=[0.02, 0.06])], stations=21, clamp_start="wall")],

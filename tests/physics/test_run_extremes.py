@@ -107,3 +107,15 @@ def test_a_run_of_large_strain_has_a_warning_and_one_of_small_strain_has_none():
         assert found["max_strain"] == pytest.approx(strain, rel=1e-6)
         told = [f"largest strain of an edge {100 * strain:.3g} % (at most 10 %): the law of the material is linear"]
         assert found["warnings"] == (told if warned else [])
+
+
+def test_a_step_that_was_never_made_is_in_no_figure():
+    ready, new = (Simulator(load_scene(strip(gain=0.2)), dt=5e-3, model="two_rod") for _ in range(2))
+    ready.compile()
+    for simulator in (ready, new):
+        simulator.set_stimulus("heat", 0.0)
+        simulator.run(0.01)
+    told, expected = ready.summary(), new.summary()
+    timed = {"cpu_time", "wall_time", "compile_time", "real_time_factor"}
+    assert {key: told[key] for key in told.keys() - timed} == {key: expected[key] for key in expected.keys() - timed}
+    assert told["max_curvature"] < 1e-3

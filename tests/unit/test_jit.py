@@ -108,6 +108,42 @@ def test_an_absent_record_has_arrays_of_length_zero():
     assert nothing.values.shape == (0,) and not nothing.exists and _outer()[0].inner.exists
 
 
+@record
+class Allocated:
+    first: Vector = ("many",)
+    given: Vector
+    marks: Flags = ("many",)
+    none: IndexTable = ("none", 2)
+    last: Indices = (2,)
+
+
+@piece(float, Allocated)
+def fill_for_a_test(a):
+    for k in range(a.first.shape[0]):
+        a.first[k] = 1.0 + k
+    for k in range(a.marks.shape[0]):
+        a.marks[k] = True
+    a.last[0], a.last[1] = a.none.shape[0], a.none.shape[1]
+    a.given[0] = 7.0
+    return 0.0
+
+
+@pytest.mark.parametrize("many", [0, 1, 5, 100])
+def test_arrays_that_a_record_makes_are_zeros_that_do_not_overlap(many):
+    made = [Allocated.zeros({"many": many, "none": 0}, given=np.zeros(1)) for _ in range(2)]
+    assert not any(getattr(made[0], name).any() for name in Allocated.names)
+    fill_for_a_test(made[0])
+    assert made[0].first.tolist() == [1.0 + k for k in range(many)] and made[0].marks.tolist() == [True] * many
+    assert made[0].last.tolist() == [0, 2] and made[0].given.tolist() == [7.0] and made[0].none.shape == (0, 2)
+    assert not any(getattr(made[1], name).any() for name in Allocated.names)
+
+
+def test_sizes_that_change_back_and_forth_make_arrays_of_the_present_ones():
+    for many in (3, 4, 3):
+        found = Allocated.zeros({"many": many, "none": many - 3}, given=np.zeros(1))
+        assert found.first.shape == (many,) and found.none.shape == (many - 3, 2)
+
+
 def test_a_record_takes_the_fields_of_its_class_with_their_types_and_nothing_else():
     with pytest.raises(TypeError, match="Inner: these fields are missing or unknown: other, scale"):
         Inner(values=np.zeros(1), other=1)
