@@ -35,6 +35,8 @@ from .dispatch import calls_of
 Array = np.ndarray
 PAIRS_PER_POINT = 8
 """Of rods near each other: for how many there is capacity at first."""
+FIRST_POINTS = 10_000
+"""Points of rods at most for which there is capacity at first: of a long thin rod, which has millions, few touch."""
 FIRST = ("node", "edge", "pair", "body", "contact_point", "contact")
 """Parts of `Sums.gradients`."""
 SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
@@ -75,11 +77,12 @@ class Storage:
         points = len(model.rod_surfaces.point_edge) if model.rod_surfaces is not None else 0
         near = self._sizes["contact_point"] if model.has_surface_contact and self._sizes["surface"] else 0
         columns = model.bodies.freedom.shape[1] + model.joined_unknowns(model.solved_layout).shape[0]
-        self._capacity = Capacity(near, points, points, columns)
+        first = min(points, FIRST_POINTS)
+        self._capacity = Capacity(near, first, first, columns)
         self._pairs: NearPairs | None = None
         if points:
             geometry = model.rod_surfaces, model.edge_node, model.start_position
-            self._pairs = NearPairs(*geometry, PAIRS_PER_POINT * points)
+            self._pairs = NearPairs(*geometry, PAIRS_PER_POINT * first)
         self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
         self._width, self._memory = np.zeros(1, dtype=np.int64), np.zeros(memory_size(model))
         self._sums, of_dimension = self._lasting_sums()
