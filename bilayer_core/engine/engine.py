@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..errors import SimulationError
 from ..forces.joints import Joints
 from ..integrators.method import Method
 from ..integrators.sdirk2 import METHOD as SELF_STARTING
@@ -20,6 +21,7 @@ from ..model.rest_strains import RestStrains
 from ..model.sizes import sizes_of
 from ..model.state import State
 from .actuation import Actuation
+from .capacity import CapacityError
 from .energy_account import open_account
 from .error_norm import ErrorNorm
 from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
@@ -137,7 +139,7 @@ class Engine:
         while True:
             run = self._parts_for(state)
             status = treat_state(run.problem, run.state, run.work, mode, length, tolerance, self._newton[1])
-            if not self.reserve(status):
+            if not self.reserve(status, state):
                 break
         counts, figures = self._outcome.counts.tolist(), self._outcome.figures
         self._take_end()
@@ -177,9 +179,18 @@ class Engine:
         self.end = self._configurations[self._outcome.counts[CONFIGURATION]]
         self.gap = float(self._outcome.figures[GAP])
 
-    def reserve(self, status: int) -> bool:
-        """Have the capacity that a step lacked; false if that is not what it lacked."""
-        return self._storage.grow(status)
+    def reserve(self, status: int, state: State) -> bool:
+        """Have the capacity that a step from a state lacked; false if that is not what it lacked.
+
+        Raises
+        ------
+        SimulationError
+            If there may not be so much.
+        """
+        try:
+            return self._storage.grow(status)
+        except CapacityError as refusal:
+            raise SimulationError(refusal.reason, float(state.time[0]), refusal.remedy) from None
 
     @property
     def sums(self) -> Sums:

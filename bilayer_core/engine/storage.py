@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..forces.friction_limit import PATH_SIZE
@@ -30,27 +28,24 @@ from .build import (
     slips_of,
     surfaces_of,
 )
+from .capacity import (
+    FIRST_POINTS,
+    PAIRS_PER_POINT,
+    Capacity,
+    columns_for,
+    contacts_for,
+    rod_pairs_for,
+    surface_pairs_for,
+)
 from .dispatch import calls_of
 
 Array = np.ndarray
-PAIRS_PER_POINT = 8
-"""Of rods near each other: for how many there is capacity at first."""
 FIRST = ("node", "edge", "pair", "body", "contact_point", "contact")
 """Parts of `Sums.gradients`."""
 SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
 """Parts of `Sums.hessians`, with those of the dimension."""
 IN_SPACE = ("first_hessian", "second_hessian")
 IN_PLANE = ("polar_hessian", "cross_hessian", "pair_hessian", "mixed_hessian")
-
-
-@dataclass
-class Capacity:
-    """For how much of what varies in number there is capacity."""
-
-    near: int  # pairs of contact points and surfaces
-    contacts: int  # of rods
-    sliding: int  # of them, at the start of a stage
-    columns: int  # of the border
 
 
 class Storage:
@@ -75,11 +70,12 @@ class Storage:
         points = len(model.rod_surfaces.point_edge) if model.rod_surfaces is not None else 0
         near = self._sizes["contact_point"] if model.has_surface_contact and self._sizes["surface"] else 0
         columns = model.bodies.freedom.shape[1] + model.joined_unknowns(model.solved_layout).shape[0]
-        self._capacity = Capacity(near, points, points, columns)
+        first = min(points, FIRST_POINTS)
+        self._capacity = Capacity(near, first, first, columns)
         self._pairs: NearPairs | None = None
         if points:
             geometry = model.rod_surfaces, model.edge_node, model.start_position
-            self._pairs = NearPairs(*geometry, PAIRS_PER_POINT * points)
+            self._pairs = NearPairs(*geometry, PAIRS_PER_POINT * first)
         self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
         self._width, self._memory = np.zeros(1, dtype=np.int64), np.zeros(memory_size(model))
         self._sums, of_dimension = self._lasting_sums()
@@ -184,19 +180,24 @@ class Storage:
         """Have the capacity that a kernel lacked; false if that is not what it lacked.
 
         Contacts of friction, and which forces are selected, stay.
+
+        Raises
+        ------
+        CapacityError
+            If there may not be so much; nothing has changed then.
         """
         capacity, before = self._capacity, self.problem
         if status == PAIR_CAPACITY_EXCEEDED:
-            capacity.near = 2 * max(1, capacity.near)
+            capacity.near = surface_pairs_for(capacity.near + 1)
         elif status == ROD_CAPACITY_EXCEEDED:
             found = int(before.rod_contact.contacts.count[0])
             if self._pairs.count > self._pairs.capacity:
-                self._pairs.reserve(2 * self._pairs.count)
+                self._pairs.reserve(rod_pairs_for(self._model, self._pairs.count))
             if found > capacity.contacts:
-                capacity.contacts = 2 * found
+                capacity.contacts = contacts_for(self._model, found)
             capacity.sliding = max(capacity.sliding, capacity.contacts)
         elif status == BORDER_CAPACITY_EXCEEDED:
-            capacity.columns = 2 * int(self._width[0])
+            capacity.columns = columns_for(int(self._width[0]), before.bordered.border.shape[1])
         else:
             return False
         self._problem = self._make()

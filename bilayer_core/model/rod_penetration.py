@@ -8,6 +8,9 @@ from ..errors import PenetrationError
 from .model import Model
 from .rod_surfaces import NearPairs
 
+MOST_SHOWN = 1_000_000
+"""Of places that overlap: among how many the deepest is looked for."""
+
 
 def refuse_meeting_rods(model: Model) -> None:
     """Refuse a scene whose rods start in each other.
@@ -22,7 +25,7 @@ def refuse_meeting_rods(model: Model) -> None:
         return
     position = model.start_position
     pairs = NearPairs(surfaces, model.edge_node, position)
-    pairs.find(position, model.scene.contact.barrier_distance, 0.0)
+    pairs.find(position, model.scene.contact.barrier_distance, 0.0, most=MOST_SHOWN)
     if pairs.count == 0:
         return
     point, edge = pairs.search.point[: pairs.count], pairs.search.edge[: pairs.count]

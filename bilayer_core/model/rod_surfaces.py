@@ -9,6 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from ..contact.broad_phase import RodSearch, near_pairs, scratch
+from ..errors import SceneError
 from ..scene.config import SceneConfig
 from ..scene.rod import Rod
 from .layout import ReadOnlyArrays
@@ -20,6 +21,10 @@ from .validity import edge_figures
 Array = np.ndarray
 WITHIN = 1.0 - 1e-9
 """Of an arc distance: nodes that are exactly as far apart see each other, whatever rounding says."""
+MOST_POINTS = 5_000_000
+"""Of all rods: 80 bytes each while they are made, as measured."""
+MOST_PAIRS = 10_000_000
+"""Points near other rods: 26 bytes each."""
 FEW_EDGES = 2  # that a point is away from the nearest edge of its own rod that it sees, at least
 
 
@@ -56,7 +61,13 @@ class RodSurfaces(ReadOnlyArrays):
 
 
 def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | None:
-    """The surfaces of rods, or None if none of them can meet."""
+    """The surfaces of rods, or None if none of them can meet.
+
+    Raises
+    ------
+    SceneError
+        If rods are so thin that they have too many points.
+    """
     decisions = [rod_pair for rod_pair in rod_pairs(scene) if rod_pair.active]
     if not decisions:
         return None
@@ -94,8 +105,12 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         alone = strand.first_edge if strand.closed else -1
         return rods[number].edge_length, strand.first_station, edges, radius, per_edge, alone
 
+    total = 0
     for (spacing, start, edges, radius, per_edge, _), alike in groupby(found.strands, kind):
         strands = list(alike)
+        total += per_edge * edges * len(strands)
+        if total > MOST_POINTS:
+            raise _too_thin(scene, strands[0], radius, total)
         order = np.array([[strand.first_edge] for strand in strands]) + np.arange(edges)
         own = _strand_points(spacing, start, rest_length[order], per_edge, strands[0].closed)
         before, after = order - 1, order + 1
@@ -124,6 +139,15 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         rod_joined=joined,
         rod_exclusion=np.array(exclusion),
         rod_length=np.array([rod.path.length if rod.closed else math.inf for rod in rods] + [math.inf] * spare),
+    )
+
+
+def _too_thin(scene: SceneConfig, strand: StrandArrays, radius: float, total: float) -> SceneError:
+    """What is told of a strand with which rods have too many points."""
+    return SceneError(
+        f"{scene.name}: rods.{strand.rod}: must be thicker or shorter for contact between rods: that is computed at "
+        f"points {radius:.3g} m apart, half of the thickness of {strand.name}, which makes {total:.3g} points; allowed "
+        f"are {MOST_POINTS} (contact.rods: false lets rods pass through each other)"
     )
 
 
@@ -222,10 +246,13 @@ class NearPairs:
             until=np.empty(capacity),
         )
 
-    def find(self, base: Array, touch: float, search_distance: float, tip: Array | None = None) -> None:
+    def find(
+        self, base: Array, touch: float, search_distance: float, tip: Array | None = None, most: int = MOST_PAIRS
+    ) -> None:
         """List the pairs with a gap below `search_distance` [m] where nodes are, or on their straight way from
-        `base` to `tip` [m], shape (n_node, 3); for `touch` see `near_pairs`.
+        `base` to `tip` [m], shape (n_node, 3), the first `most` of them; for `touch` see `near_pairs`.
         """
         self.search.base[:], self.search.tip[:] = base, base if tip is None else tip
-        while near_pairs(self.search, touch, search_distance) > self.capacity:
-            self.reserve(2 * self.count)
+        while (found := near_pairs(self.search, touch, search_distance)) > self.capacity and self.capacity < most:
+            self.reserve(min(2 * found, most))
+        self.search.count[0] = min(found, self.capacity)

@@ -244,7 +244,13 @@ class Stepper:
             self.engine.actuation = self.surroundings.actuation
             more = self.engine.integrate(state, until, due, most - (found.done if found else 0))
             found = more if found is None else found.followed_by(more)
-            if found.status != INPUTS_END and not self.engine.reserve(found.status):
+            try:
+                if found.status != INPUTS_END and not self.engine.reserve(found.status, state):
+                    return found
+            except SimulationError:
+                self.evaluate(state)  # as the next attempt finds the same, steps made before it count
+                if not found.done:
+                    raise
                 return found
 
     def _why(self, found: IntegrationReport, begin: float) -> str:

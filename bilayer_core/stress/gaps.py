@@ -35,6 +35,8 @@ MOST_PAIRS = 45_000
 """Pairs of edges that every step is checked for: those of 300 nodes."""
 MOST_EDGES = 2000
 """Of which all pairs are listed."""
+MOST_TOGETHER = 20_000
+"""Points whose distances from edges are found at a time."""
 MOST_PARTS = 24
 """Into which the way of a step is cut at most."""
 LARGEST_TURN = 0.3
@@ -168,10 +170,13 @@ class GapCheck:
     def _from_points(self, begin: Array, end: Array, a: Array, b: Array) -> Array:
         """Smallest distance of the points on each edge of `a` from the edge of `b` beside it [m]."""
         smallest = np.full(len(a), math.inf)
-        for fraction in self._fractions.T:
-            own = fraction[a][:, None]
-            points = (1.0 - own) * begin[a] + own * end[a]
-            smallest = np.fmin(smallest, from_segment(points, begin[b], end[b]))
+        together = max(1, MOST_TOGETHER // len(a))
+        for first in range(0, self._fractions.shape[1], together):
+            own = self._fractions[a, first : first + together, None]
+            points = (1.0 - own) * begin[a, None] + own * end[a, None]
+            segments = (np.repeat(nodes[b], own.shape[1], axis=0) for nodes in (begin, end))
+            distances = from_segment(points.reshape(-1, 3), *segments).reshape(len(a), -1)
+            smallest = np.fmin(smallest, np.fmin.reduce(distances, axis=1))
         return smallest
 
     def _surface_gaps(self, at: Moment) -> list[Array]:

@@ -111,12 +111,36 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     right[:25] = 0.0  # where columns of a border begin
     expected = np.linalg.solve(dense, right[:n])
     columns, scaled, corner = right.T.copy(), np.ones((6, n + b)), np.eye(6)
-    eliminate_band(band, n, b, 6, columns, scaled, corner)
+    eliminate_band(band, n, b, 6, columns, scaled, corner, np.zeros(n + 1, dtype=np.int64))
     assert corner == pytest.approx(np.eye(6) - right[:n].T @ expected, rel=1e-10, abs=1e-12)
     assert scaled[:, :n] == pytest.approx(columns[:, :n] / band[:n, 0], rel=1e-10, abs=1e-12)
     backward_band(band, n, width(b), columns[2])
     assert columns[2, :n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
     assert factor_band(indefinite, n, b, False) == 41
+
+
+@pytest.mark.parametrize("gap", [0, 1, 7, 8, 9, 30])
+def test_a_border_whose_columns_have_gaps_is_eliminated_like_a_dense_one(gap):
+    rng = np.random.default_rng(5)
+    b, strand = 4, 6
+    n, m = 3 * strand + 2 * gap, 7  # strands, and between them unknowns that nothing couples
+    blocks = [range(first, first + strand) for first in (0, strand + gap, 2 * (strand + gap))]
+    dense = 3.0 * np.eye(n)
+    for block in blocks:
+        dense[np.ix_(block, block)] += np.diag(rng.standard_normal(strand - 1), 1)
+    dense = 0.5 * (dense + dense.T)
+    band = np.zeros((n + b, b + 1))
+    for j in range(n):
+        for r in range(min(b, n - 1 - j) + 1):
+            band[j, r] = dense[j + r, j]
+    columns = np.zeros((m, n + b))
+    for a in range(m - 1):  # the last is zero
+        for block in (blocks[a % 3], blocks[a // 2]):
+            columns[a, block[a % strand]] = rng.standard_normal()
+    right, corner = columns[:, :n].copy(), np.eye(m)
+    assert factor_band(band, n, b, False) == -1
+    eliminate_band(band, n, b, m, columns, np.ones((m, n + b)), corner, np.zeros(n + 1, dtype=np.int64))
+    assert corner == pytest.approx(np.eye(m) - right @ np.linalg.solve(dense, right.T), rel=1e-12, abs=1e-14)
 
 
 @pytest.mark.parametrize("shift", [0.5, -2.0, -7.0])

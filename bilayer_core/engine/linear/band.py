@@ -79,13 +79,15 @@ def backward_band(band, n, bandwidth, right):
         right[j] = value
 
 
+SHORT_GAP = 8
+"""Zeros in a row of a border that cost less than another run of values."""
 AT_ONCE = 16
 """Columns of a border that are eliminated together: one waits for what the row before has left in it, several do not.
 More would not stay in the nearest cache."""
 
 
 @kernel
-def eliminate_band(band, n, b, m, border, scaled_out, corner):
+def eliminate_band(band, n, b, m, border, scaled_out, corner, present):
     """Eliminate the factorised band A = L D Lᵀ from a matrix with m more columns and rows,
 
         [ A   U ]
@@ -101,12 +103,14 @@ def eliminate_band(band, n, b, m, border, scaled_out, corner):
         Written: D⁻¹ L⁻¹ U, shape (≥ m, n + b).
     corner : Array
         C, shape (≥ m, ≥ m); overwritten with the Schur complement C − Uᵀ A⁻¹ U.
+    present : Array
+        Scratch: from and to which row a column is not zero, shape (≥ n + 1,).
 
     Notes
     -----
     With z = L⁻¹ r, the solution for a right-hand side (r, s) is y = S⁻¹ (s − (D⁻¹ L⁻¹ U)ᵀ z) and
-    x = (D Lᵀ)⁻¹ (z − (L⁻¹ U) y), S being the Schur complement. Most of U is zero, and so is much of L⁻¹ U: a column
-    begins where U does, and blocks of A that it does not touch stay zero.
+    x = (D Lᵀ)⁻¹ (z − (L⁻¹ U) y), S being the Schur complement. Most of U is zero, and so is most of L⁻¹ U: blocks of A
+    (strands) that a column does not touch stay zero. So the cost is m² times the rows of a few strands.
     """
     for first in range(0, m, AT_ONCE):
         last = min(first + AT_ONCE, m)
@@ -119,18 +123,46 @@ def eliminate_band(band, n, b, m, border, scaled_out, corner):
                     for r in range(1, b + 1):
                         border[a, j + r] -= band[j, r] * value
     for a in range(m):
-        begin, end = 0, n
-        while begin < n and border[a, begin] == 0.0:
-            begin += 1
-        while end > begin and border[a, end - 1] == 0.0:
-            end -= 1
-        for c in range(a + 1):
-            total = 0.0
-            for j in range(begin, end):
-                total += scaled_out[a, j] * border[c, j]
-            corner[a, c] -= total
-            if c < a:
-                corner[c, a] -= total
+        runs = _runs(border[a], n, present)
+        most = (a + 1) // 4 * 4
+        for c in range(0, most, 4):  # four at once, so that a column is read a quarter as often
+            t0, t1, t2, t3 = 0.0, 0.0, 0.0, 0.0
+            for k in range(runs):
+                for j in range(present[2 * k], present[2 * k + 1]):
+                    value = scaled_out[a, j]
+                    t0 += value * border[c, j]
+                    t1 += value * border[c + 1, j]
+                    t2 += value * border[c + 2, j]
+                    t3 += value * border[c + 3, j]
+            corner[a, c] -= t0
+            corner[a, c + 1] -= t1
+            corner[a, c + 2] -= t2
+            corner[a, c + 3] -= t3
+        for c in range(most, a + 1):
+            for k in range(runs):
+                total = 0.0
+                for j in range(present[2 * k], present[2 * k + 1]):
+                    total += scaled_out[a, j] * border[c, j]
+                corner[a, c] -= total
+        for c in range(a):
+            corner[c, a] = corner[a, c]
+
+
+@kernel
+def _runs(values, n, present_out):
+    """Write from and to where the first n values are not zero, one pair after the other; return how many there are.
+
+    Zeros between two values that are nearer than `SHORT_GAP` belong to a run.
+    """
+    count, end = 0, -SHORT_GAP
+    for j in range(n):
+        if values[j] != 0.0:
+            if j - end >= SHORT_GAP:
+                present_out[2 * count] = j
+                count += 1
+            end = j + 1
+            present_out[2 * count - 1] = end
+    return count
 
 
 @kernel

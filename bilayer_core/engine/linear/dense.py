@@ -15,18 +15,37 @@ from ...jit import kernel
 def factor_dense(matrix, n):
     """Factorise the first n rows and columns of a symmetric matrix in place; false if they are not positive
     definite.
+
+    Four rows are made together, so that those before are read a quarter as often: of a few hundred rows they would not
+    stay in the nearest cache.
     """
-    for i in range(n):
-        for j in range(i + 1):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= matrix[i, k] * matrix[j, k]
-            if j < i:
-                matrix[i, j] = total / matrix[j, j]
-            elif total > 0.0:
-                matrix[i, i] = math.sqrt(total)
-            else:
-                return False
+    for first in range(0, n, 4):
+        last = min(first + 4, n)
+        begin = 0
+        if last == first + 4:
+            begin = first
+            for j in range(first):
+                t0, t1, t2, t3 = matrix[first, j], matrix[first + 1, j], matrix[first + 2, j], matrix[first + 3, j]
+                for k in range(j):
+                    value = matrix[j, k]
+                    t0 -= matrix[first, k] * value
+                    t1 -= matrix[first + 1, k] * value
+                    t2 -= matrix[first + 2, k] * value
+                    t3 -= matrix[first + 3, k] * value
+                pivot = matrix[j, j]
+                matrix[first, j], matrix[first + 1, j] = t0 / pivot, t1 / pivot
+                matrix[first + 2, j], matrix[first + 3, j] = t2 / pivot, t3 / pivot
+        for i in range(first, last):
+            for j in range(begin, i + 1):
+                total = matrix[i, j]
+                for k in range(j):
+                    total -= matrix[i, k] * matrix[j, k]
+                if j < i:
+                    matrix[i, j] = total / matrix[j, j]
+                elif total > 0.0:
+                    matrix[i, i] = math.sqrt(total)
+                else:
+                    return False
     return True
 
 

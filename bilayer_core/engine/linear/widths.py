@@ -6,7 +6,7 @@ registers: for 200 nodes in space two to three times as fast as the set for any 
 
 from __future__ import annotations
 
-from ...jit import piece
+from ...jit import kernel, piece
 from ...jit.piece import Piece
 from ...jit.record import Matrix, Vector
 from ...model.layout import HALF_BANDWIDTH
@@ -32,6 +32,12 @@ def _declare(function, suffix: str, result: type, *arguments) -> Piece:
     return piece(result, *arguments)(function)
 
 
+@kernel
+def _eliminate(band, n, half_bandwidth, bordered):
+    columns, scaled, corner, present = bordered.border, bordered.scaled, bordered.schur, bordered.present
+    eliminate_band(band, n, half_bandwidth, bordered.width[0], columns, scaled, corner, present)
+
+
 def _of_width(half_bandwidth: int) -> dict[str, Piece]:
     """The set for a half-bandwidth."""
     bandwidth, suffix = width(half_bandwidth), str(half_bandwidth)
@@ -48,7 +54,7 @@ def _of_width(half_bandwidth: int) -> dict[str, Piece]:
         return READY
 
     def eliminate(band, n, bordered):
-        eliminate_band(band, n, half_bandwidth, bordered.width[0], bordered.border, bordered.scaled, bordered.schur)
+        _eliminate(band, n, half_bandwidth, bordered)
         return READY
 
     return _set(factor, forward, backward, eliminate, suffix)
@@ -79,7 +85,7 @@ def _of_any_width() -> dict[str, Piece]:
         return READY
 
     def eliminate(band, n, bordered):
-        eliminate_band(band, n, band.shape[1] - 1, bordered.width[0], bordered.border, bordered.scaled, bordered.schur)
+        _eliminate(band, n, band.shape[1] - 1, bordered)
         return READY
 
     return _set(factor, forward, backward, eliminate, "any")

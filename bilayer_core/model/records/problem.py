@@ -97,6 +97,7 @@ class BorderedSystem:
     scaled: Matrix = ("column", "row")  # D⁻¹ L⁻¹ U likewise
     schur: Matrix = ("column", "column")
     load: Vector = ("column",)
+    present: Indices = ("row",)  # scratch: from and to which row a column is not zero
     width: Indices  # columns in use, shape (1,)
     coupled: Indices = (1,)  # whether the border is not zero
 
