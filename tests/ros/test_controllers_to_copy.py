@@ -119,13 +119,16 @@ def test_the_swimmer_holds_a_height_also_after_a_pause_a_reset_and_another_goal(
         ("gait_controller", {"phases": [0.0, 0.5]}, "parameter 'phases' cannot be [0.0, 0.5]"),
         ("gait_controller", {"shape": "saw"}, "parameter 'shape' cannot be 'saw'"),
         ("gait_controller", {"period": 2}, "expecting type 'DOUBLE'"),
-        ("gait_controller", {"channels": []}, "parameter 'channels' is empty"),
+        ("gait_controller", {"channels": []}, "default value of type PARAMETER_NOT_SET"),
+        ("gait_controller", {"chanels": ["left"]}, "there is no parameter 'chanels'; there are channels, duty, high,"),
+        ("ramp_controller", {"end": 0.5}, "there is no parameter 'end'; there are channel, connection_timeout,"),
+        ("goal_controller", {"Goal": [1.0, 0.0, 0.0]}, "there is no parameter 'Goal'; there are axis, channel, goal,"),
         ("ramp_controller", {"duration": 0.0}, "parameter 'duration' cannot be 0.0; allowed is a finite number > 0"),
         ("ramp_controller", {"end_value": ".nan"}, "allowed are finite numbers"),
         ("ramp_controller", {"duration": 1}, "expecting type 'DOUBLE'"),
         ("goal_controller", {"width": 3.0}, "allowed are period > width >= 0"),
         ("goal_controller", {"goal": [1, 0, 0]}, "expecting type 'DOUBLE_ARRAY'"),
-        ("goal_controller", {"axis": [0.0, 0.0, 0.0]}, "the axis is not 0"),
+        ("goal_controller", {"axis": [0.0, 0.0, 0.0]}, "goal and axis of 3 numbers, axis not 0"),
     ],
 )
 def test_parameters_that_cannot_be_are_refused(start, domain, name, parameters, told):
