@@ -3,11 +3,13 @@
 import ast
 import math
 import signal
+import time
 
 import numpy as np
 import pytest
 import yaml
 from geometry_msgs.msg import PointStamped
+from std_msgs.msg import Float64MultiArray
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.record.log_reader import read_log
@@ -111,6 +113,65 @@ def test_the_swimmer_holds_a_height_also_after_a_pause_a_reset_and_another_goal(
     for process in (controller, node):
         process.send(signal.SIGINT)
         assert process.wait(30) == 0, process.output
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("ramp_controller", {"channel": "swelling", "duration": 2.0, "hold": True}),
+        ("gait_controller", {"channels": ["swelling"], "period": 4.0}),
+    ],
+)
+def test_beside_a_free_run_it_stands_still_in_a_pause_and_begins_anew_after_a_reset(
+    start, connect, domain, name, parameters
+):
+    simulation = start("sim_node", domain, {"scene": "bending", "start_paused": True, "real_time_factor": 1.0})
+    controller = start(f"controllers.{name}", domain, parameters)
+    client = connect(simulation)
+    applied = client.listen(Float64MultiArray, "/bilayer_sim/stimulus_applied")
+    for _ in range(2):
+        begun = len(applied)
+        assert client.call("resume").success
+        client.spin_until(lambda: applied[-1].data[0] > 0.4, "a part of the way")
+        values = [message.data[0] for message in applied[begun:]]
+        assert min(values) < 0.1 and max(np.diff(values)) < 0.2  # it rises from the start on
+        assert client.call("pause").success
+        client.drain()
+        still = applied[-1].data[0]
+        until = time.monotonic() + 1.2  # in which the paused time is sent once more
+        client.spin_until(lambda until=until: time.monotonic() > until, "a while")
+        assert applied[-1].data[0] == still
+        assert client.call("reset").success
+        client.spin_until(lambda: applied[-1].data[0] == 0.0, "the start")
+    assert controller.running
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("ramp_controller", {"channel": "swelling", "duration": 0.1, "hold": True}),
+        ("gait_controller", {"channels": ["swelling"], "period": 0.1}),
+        ("goal_controller", {"channel": "swelling", "period": 0.08, "tolerance": 1e-6, "goal": [1.0, 0.0, 0.0]}),
+    ],
+)
+def test_in_lockstep_a_reset_brings_the_same_values_again(start, connect, domain, name, parameters):
+    simulation = start("sim_node", domain, {"scene": "bending", "lockstep": True, "start_paused": True, "rate": 50.0})
+    controller = start(f"controllers.{name}", domain, parameters)
+    client = connect(simulation)
+    applied = client.listen(Float64MultiArray, "/bilayer_sim/stimulus_applied")
+    rounds = []
+    for _ in range(2):
+        client.drain()
+        del applied[:-1]
+        for _ in range(12):
+            assert client.call("step").success
+        client.drain()
+        values = [message.data[0] for message in applied]
+        rounds.append([value for value, before in zip(values, [None, *values], strict=False) if value != before])
+        assert client.call("reset").success
+    assert len(rounds[0]) > 4 and max(rounds[0]) > 0.5
+    assert rounds[0] == rounds[1]
+    assert controller.running
 
 
 @pytest.mark.parametrize(
