@@ -43,6 +43,12 @@ def count_steps(self, **arguments):
     return step(self, **arguments)
 Simulator.step = count_steps
 """
+IN_ANOTHER_THREAD = """
+import threading
+def send():  # to the thread that calls this, not to the one that handles signals
+    for number in NUMBERS:
+        signal.pthread_kill(threading.get_ident(), number)
+"""
 WHILE_CLOSING = """
 from bilayer_core.record.mcap_log import McapRecorder
 close = McapRecorder.close
@@ -108,6 +114,9 @@ def send():
     for number in [signal.SIGINT, signal.SIGTERM] * 2:
         os.kill(os.getpid(), number)
 
+def send_here():  # to the thread that calls this, not to the one that handles signals
+    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
+
 def send_in(owner, name):
     call = getattr(owner, name)
     def call_and_send(*arguments, **named):
@@ -127,6 +136,7 @@ MOMENTS = {
     "it begins to spin": "send_in(rclpy, 'spin_until_future_complete')",
     "it is about to wait": "send_in(SingleThreadedExecutor, 'wait_for_ready_callbacks')",
     "it waits": "threading.Timer(1.0, send).start()",
+    "another thread gets them": "threading.Timer(1.0, send_here).start()",
     "it ends": "threading.Timer(1.0, send).start()\nsend_in(rclpy, 'try_shutdown')\natexit.register(send)",
 }
 """Statements that have signals sent when something happens to a controller."""
@@ -174,6 +184,12 @@ def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(end
     assert code == 0, output
     info = read_info(tmp_path / "run.mcap")
     assert (info.complete, info.termination) == (False, "ended by SIGINT")
+
+
+def test_a_signal_that_the_system_hands_to_another_thread_ends_the_node(ended, tmp_path):
+    code, output = ended(WHILE_STEPPING + IN_ANOTHER_THREAD, "SIGTERM")
+    assert code == 0, output
+    assert read_info(tmp_path / "run.mcap").termination == "ended by SIGTERM"
 
 
 def test_signals_may_interrupt_the_handlers_of_others_and_the_wait_for_them(ended):
