@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from bilayer_core import Simulator, load_scene
 from bilayer_core.record.log_reader import read_info
 
 LIMIT = 120.0
@@ -142,6 +143,12 @@ MOMENTS = {
 """Statements that have signals sent when something happens to a controller."""
 
 
+@pytest.fixture(scope="module")
+def compiled():
+    """Kernels are there: a node steps as soon as it has started, and no limit is spent on a compiler."""
+    Simulator(load_scene("bending")).compile()
+
+
 @pytest.fixture
 def ended(tmp_path, domain):
     """Runs a node that signals reach at some moment; its exit code and what it printed."""
@@ -178,6 +185,7 @@ def test_signals_while_kernels_are_compiled_end_it_at_once_and_the_log_says_so(e
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("program", [WHILE_CLOSING, WHILE_LEAVING], ids=["closing", "leaving"])
 def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(ended, tmp_path, program):
     code, output = ended(WHILE_STEPPING + program, "SIGINT,SIGTERM")
@@ -186,6 +194,7 @@ def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(end
     assert (info.complete, info.termination) == (False, "ended by SIGINT")
 
 
+@pytest.mark.usefixtures("compiled")
 def test_a_signal_that_the_system_hands_to_another_thread_ends_the_node(ended, tmp_path):
     code, output = ended(WHILE_STEPPING + IN_ANOTHER_THREAD, "SIGTERM")
     assert code == 0, output
@@ -197,6 +206,7 @@ def test_signals_may_interrupt_the_handlers_of_others_and_the_wait_for_them(ende
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled")
 def test_a_node_ends_without_a_word_of_an_executor_that_was_about_to_wait(ended):
     code, output = ended(ABOUT_TO_WAIT, "SIGTERM")
     assert (code, "ended by SIGTERM" in output) == (0, True), output
