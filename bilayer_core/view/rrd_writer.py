@@ -126,8 +126,9 @@ class RunSender:
         self._send_strands(run, colouring)
         send_bodies(recording, run, BODIES)
         middles = middles_of(run)
-        columns = rr.Points3D.columns(positions=middles).partition([1] * len(middles))
-        recording.send_columns(MIDDLE, _time(run.shape_times), columns)
+        for part in _chunks(len(middles)):  # none while no shape has come: a viewer ends where it meets no rows
+            columns = rr.Points3D.columns(positions=middles[part]).partition([1] * len(middles[part]))
+            recording.send_columns(MIDDLE, _time(run.shape_times[part]), columns)
         self._send_joints(run)
         self._send_arrows("world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
         for name, arrows in reactions.items():

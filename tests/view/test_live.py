@@ -1,6 +1,7 @@
 """Logs that are shown while they are written."""
 
 import io
+import itertools
 import os
 import re
 import shutil
@@ -204,6 +205,20 @@ def test_parts_of_a_frame_come_back_and_a_frame_that_lacks_some_is_refused():
     for bad in [(label, data + b"6"), ("com", b""), ("com:x", b"1"), ("com:-1", b"")]:
         with pytest.raises(InputError, match="parts of a frame"):
             unpack(*bad)
+
+
+def test_looks_between_which_no_shape_has_come_add_nothing_empty(log, tmp_path):
+    with ViewServer() as server:
+        view = LiveView(server, save=tmp_path / "seen.rrd")
+        view.begin(synthetic_run.description())
+        for _, frame in itertools.groupby(GrowingLog(log).read(), lambda message: message[1]):
+            for message in frame:
+                view.add(*message)
+            view.show()
+        view.close()
+    seen, run = recordings.times_of(tmp_path / "seen.rrd"), read_log(log)
+    np.testing.assert_allclose(seen["/world/middle"], run.shape_times)
+    assert len(seen["/world/bodies/ball"]) > 1.5 * len(run.shape_times)
 
 
 def test_many_runs_leave_no_threads_behind_in_who_shows_them(log):
