@@ -10,6 +10,7 @@ from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.event_messages import encode_event
 from bilayer_core.record.events import Event, EventDetector
 from bilayer_core.record.topics import EVENTS
+from bilayer_sim_ros.outputs import create_output
 
 DEPTH = 100
 """Several things may happen in one frame, and none is to be lost."""
@@ -28,7 +29,7 @@ class EventPublisher:
         quality = QoSProfile(
             depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
         )
-        self._publisher = node.create_publisher(Log, EVENTS.full_name("~"), quality)
+        self._publisher = create_output(node, Log, EVENTS.full_name("~"), quality)
         self._detector = EventDetector(description)
 
     @property

@@ -13,6 +13,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from rclpy.utilities import remove_ros_args
 
 from bilayer_core.errors import BilayerError, InputError
@@ -130,7 +131,8 @@ def _run_node(
     except RuntimeError as error:
         raise _not_understood(error) from error
     executor = SingleThreadedExecutor()
-    thread = threading.Thread(target=_spin, args=(executor,), name="executor", daemon=True)
+    ended = Future()
+    thread = threading.Thread(target=_spin, args=(executor, ended), name="executor", daemon=True)
     try:
         node = make(given)
         executor.add_node(node)
@@ -138,9 +140,10 @@ def _run_node(
         work(node, stop)
     finally:
         signals.end()
-        rclpy.try_shutdown()
+        ended.set_result(None)
         if thread.ident is not None:
-            thread.join()
+            thread.join()  # a context that is shut down under an executor makes it raise where it is about to wait
+        rclpy.try_shutdown()
 
 
 def _not_understood(error: RuntimeError) -> InputError:
@@ -149,8 +152,8 @@ def _not_understood(error: RuntimeError) -> InputError:
     return InputError(f"ROS arguments are not understood: {reason}")
 
 
-def _spin(executor: SingleThreadedExecutor) -> None:
+def _spin(executor: SingleThreadedExecutor, ended: Future) -> None:
     try:
-        executor.spin()
+        executor.spin_until_future_complete(ended)
     except ExternalShutdownException:
         return

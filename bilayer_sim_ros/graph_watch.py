@@ -1,4 +1,4 @@
-"""Watches the graph for others who miss a node by a letter or a type, and for a second clock."""
+"""Watches the graph for others who miss a node by a letter, a type or a quality of service, and for a second clock."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 
 from bilayer_sim_ros.message_types import CLOCK_TOPIC
 from bilayer_sim_ros.near_misses import nearest, of_topics, remap_sources
@@ -30,6 +31,8 @@ class GraphWatch:
         self._prefix = node.get_fully_qualified_name() + "/"
         self._inputs = {own.topic_name: _type_name(own.msg_type) for own in node.subscriptions}
         self._outputs = {own.topic_name for own in node.publishers}
+        # The others are watched by rclpy.
+        self._watched = {own.topic_name: _type_name(own.msg_type) for own in node.publishers if not own.event_handlers}
         self._told: set[str] = set()
         steady = NodeClock(clock_type=ClockType.STEADY_TIME)
         node.create_timer(PERIOD, self.look, callback_group=MutuallyExclusiveCallbackGroup(), clock=steady)
@@ -54,9 +57,26 @@ class GraphWatch:
                     f"{CLOCK_TOPIC} is published by {others} more: who hears it hears several times. "
                     "Set publish_clock to false for all but one, or remap it"
                 )
+        for topic, sent in self._watched.items():
+            if topic not in self._told and (text := self._unheard(topic, sent)):
+                said[topic] = text
         for topic, text in said.items():
             self._told.add(topic)
             self._node.get_logger().warning(text)
+
+    def _unheard(self, topic: str, sent: str) -> str:
+        """What is to be said of those who listen to a topic, on which `sent` is sent, and can hear nothing."""
+        others = self._node.get_subscriptions_info_by_topic(topic)
+        offered = [of.qos_profile for of in self._node.get_publishers_info_by_topic(topic)] if others else []
+        for other in others:
+            if other.topic_type != sent:
+                return f"{topic} is listened to as {other.topic_type}, which is not sent: it is {sent}"
+            # As the graph has both: what a profile leaves open has been decided there.
+            checked = [qos_check_compatible(profile, other.qos_profile) for profile in offered]
+            if checked and all(compatibility == QoSCompatibility.ERROR for compatibility, _ in checked):
+                why = checked[0][1].removeprefix("ERROR: ").rstrip(";")
+                return f"{topic} is listened to by somebody who cannot hear it: {why}"
+        return ""
 
 
 def warn_of_unused_remaps(node: Node, argv: Sequence[str]) -> None:

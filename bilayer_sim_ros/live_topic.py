@@ -18,6 +18,7 @@ from bilayer_core.record.event_messages import encode_event
 from bilayer_core.record.events import Event, EventDetector
 from bilayer_core.record.packing import pack
 from bilayer_core.record.topics import DESCRIPTION, EVENTS, LIVE, DisplayGate, Rate
+from bilayer_sim_ros.outputs import create_output
 
 PERIOD = 0.01
 """Least real time between two messages: nobody sees more, however fast simulated time goes [s]."""
@@ -56,9 +57,9 @@ class LivePublisher:
         self._large = [spec for spec in encoder.topics if spec.rate is Rate.DISPLAY and spec.name not in UNSHOWN]
         self._gate = DisplayGate(rate, marker_rate)
         self._description = description
-        self._descriptions = node.create_publisher(String, DESCRIPTION.full_name("~"), KEPT)
+        self._descriptions = create_output(node, String, DESCRIPTION.full_name("~"), KEPT)
         self._descriptions.publish(String(data=to_json(description)))
-        self._publisher = node.create_publisher(UInt8MultiArray, LIVE.full_name("~"), LOSSY)
+        self._publisher = create_output(node, UInt8MultiArray, LIVE.full_name("~"), LOSSY)
         self._forget()
 
     def _forget(self) -> None:

@@ -15,6 +15,7 @@ from bilayer_sim_ros.conversions import to_time
 from bilayer_sim_ros.events import EventPublisher
 from bilayer_sim_ros.live_topic import LivePublisher
 from bilayer_sim_ros.message_types import CLOCK_TOPIC, message_class
+from bilayer_sim_ros.outputs import create_output
 
 
 def quality_of_service(spec: TopicSpec) -> QoSProfile:
@@ -43,7 +44,7 @@ class FramePublisher:
         self._encoder = FrameEncoder(description, tf)
         self._gate = DisplayGate(rate, marker_rate)
         self._topics: list[tuple[TopicSpec, Publisher]] = [
-            (spec, node.create_publisher(message_class(spec.type), spec.full_name("~"), quality_of_service(spec)))
+            (spec, create_output(node, message_class(spec.type), spec.full_name("~"), quality_of_service(spec)))
             for spec in self._encoder.topics
             if clock or spec.name != CLOCK_TOPIC
         ]
@@ -96,7 +97,7 @@ class ClockPublisher:
 
     def __init__(self, node: Node, description: Description):
         (spec,) = (spec for spec in output_topics(description) if spec.name == CLOCK_TOPIC)
-        self._publisher = node.create_publisher(Clock, spec.name, quality_of_service(spec))
+        self._publisher = create_output(node, Clock, spec.name, quality_of_service(spec))
 
     def publish(self, time: float) -> None:
         """Publish simulated time `time` [s]."""

@@ -9,6 +9,7 @@ from rclpy.node import Node
 
 from bilayer_core.record.events import Event, late_stimulus
 from bilayer_sim_ros.conversions import PATIENCE, status_without_run, to_diagnostics
+from bilayer_sim_ros.outputs import create_output
 from bilayer_sim_ros.pacing import cause_of_delay
 from bilayer_sim_ros.parameters import Value
 from bilayer_sim_ros.status import Status
@@ -44,7 +45,7 @@ class Announcer:
         tell: Callable[[Event], None],
     ):
         self._node, self._inputs, self._tell = node, inputs, tell
-        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._publisher = create_output(node, DiagnosticArray, "/diagnostics", 10)
         self._name = node.get_fully_qualified_name()
         self._timeout, self._wait = parameters["stimulus_timeout"], parameters["lockstep_timeout"]
         self._fallback = FALLBACKS[parameters["stimulus_fallback"]]

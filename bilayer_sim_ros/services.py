@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -76,18 +77,26 @@ class Services:
             node.create_service(service.type, f"~/{service.name}", answer, callback_group=group)
 
     async def _answer(self, service: Service, request: Any, response: Any) -> Any:
-        with self._all_answered:
-            self._unanswered += 1
-        future = service.ask(request)
-        await self._in_executor(future)
-        service.answer(response, future)
-        with self._all_answered:
-            self._unanswered -= 1
-            self._answered_at = time.monotonic()
-            self._all_answered.notify_all()
+        with self.answering():
+            future = service.ask(request)
+            await self.in_executor(future)
+            service.answer(response, future)
         return response
 
-    def _in_executor(self, future: Future) -> AwaitedFuture:
+    @contextmanager
+    def answering(self) -> Iterator[None]:
+        """While this lasts, `finish` waits: something is asked, and its answer has not been given."""
+        with self._all_answered:
+            self._unanswered += 1
+        try:
+            yield
+        finally:
+            with self._all_answered:
+                self._unanswered -= 1
+                self._answered_at = time.monotonic()
+                self._all_answered.notify_all()
+
+    def in_executor(self, future: Future) -> AwaitedFuture:
         """What a coroutine of the node's executor awaits until `future` is done."""
         executor = self._node.executor
         awaited = AwaitedFuture(executor=executor)

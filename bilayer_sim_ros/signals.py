@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import signal
-from queue import SimpleQueue
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # what checkers of types take for true, without an import of milliseconds
@@ -21,24 +20,33 @@ STANDARD_ERROR = 2
 class Stop:
     """Set when a node is to end, by any thread or by a handler of signals.
 
-    A handler may interrupt `set` and `wait` anywhere, even one that was called by another handler. A
-    `threading.Event` holds a lock in both, and would wait for itself; putting into a `SimpleQueue` is reentrant.
+    A handler may interrupt `set` and `wait` anywhere, even one that was called by another handler, so neither may hold
+    a lock, as those of `threading.Event` do. Nor may `wait` wait for one: the system hands a signal to any thread, but
+    Python calls handlers in the main thread alone, and then nothing wakes it from a lock. So it waits for bytes in a
+    pipe, into which Python writes one for each signal, from whichever thread; see `Signals.take`.
 
     Attributes
     ----------
     reason : str
         Why, if a signal asked for it, such as ``ended by SIGINT``; else empty.
+    wakes : int
+        Descriptor of a file, never blocking: whatever is written to it has `wait` look again.
     """
 
     def __init__(self) -> None:
         self.reason = ""
         self._asked = False
-        self._calls: SimpleQueue[None] = SimpleQueue()
+        self._woken, self.wakes = os.pipe()
+        os.set_blocking(self.wakes, False)
+
+    def __del__(self) -> None:
+        os.close(self._woken)
+        os.close(self.wakes)
 
     def set(self) -> None:
         """Have `wait` return, now and always."""
         self._asked = True
-        self._calls.put(None)
+        self._wake()
 
     def is_set(self) -> bool:
         """Whether the node is to end."""
@@ -46,8 +54,15 @@ class Stop:
 
     def wait(self) -> None:
         """Return as soon as it is set."""
-        self._calls.get()
-        self._calls.put(None)  # for whoever waits next
+        while not self._asked:
+            os.read(self._woken, 1)
+        self._wake()  # whoever else waits
+
+    def _wake(self) -> None:
+        try:
+            os.write(self.wakes, b"\0")
+        except BlockingIOError:
+            return  # the pipe is full of bytes that will wake
 
 
 class Signals:
@@ -68,12 +83,14 @@ class Signals:
     def take(self) -> Stop:
         """From now on a signal sets what is returned, and does nothing else."""
         self._stop = Stop()
+        signal.set_wakeup_fd(self._stop.wakes, warn_on_full_buffer=False)
         return self._stop
 
     def end(self) -> None:
         """Heed no more signals: the process ends by itself. Handlers in Python would be gone before it has ended."""
         for number in NUMBERS:
             signal.signal(number, signal.SIG_IGN)
+        signal.set_wakeup_fd(-1)
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
         reason = f"ended by {signal.Signals(number).name}"

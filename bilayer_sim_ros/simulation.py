@@ -25,6 +25,7 @@ from bilayer_sim_ros.recording import Recording
 from bilayer_sim_ros.saying import Announcer
 from bilayer_sim_ros.services import Services, trigger
 from bilayer_sim_ros.simulator_services import simulator_services
+from bilayer_sim_ros.steps_action import offer_steps
 from bilayer_sim_ros.stimulus import Channel, StimulusInputs
 from bilayer_sim_ros.subscriptions import (
     Rest,
@@ -156,6 +157,7 @@ def wire(
     commands.forgotten = lambda: node.executor and node.executor.create_task(live.show, as_given)
     offered = [trigger(name, getattr(worker, name)) for name in ("pause", "resume", "step", "reset")]
     services = Services(node, offered + simulator_services(node, worker, description, end))
+    offer_steps(node, worker.step, services)
     GraphWatch(node)
     state = "paused" if parameters["start_paused"] else "running"
     return Simulation(simulator, worker, frames, services, announcer, state)

@@ -30,8 +30,9 @@ STOPPED, PLAYING, PAUSED, QUITTING, LOADING_WORLD = 0, 1, 2, 3, 5
 """Of `simulation_interfaces/msg/SimulationState`."""
 SCOPE_TIME, SCOPE_STATE = 1, 2
 """Of `ResetSimulation`; no scope means all."""
-FEATURES = (10, 20, 24, 25, 26, 31, 32)
-"""Of `SimulatorFeatures`: states of entities, reset, simulation state asked for and set, pause, one and many steps."""
+FEATURES = (10, 20, 24, 25, 26, 31, 32, 33)
+"""Of `SimulatorFeatures`: states of entities, reset, state of the simulation asked for and set, pause, one and many
+steps, steps as an action."""
 NOT_STATE = "the state of {0} cannot be set at once; a body with a top_speed goes to a pose on ~/mount_pose/<body>"
 NOT_SCOPE = "time and state are reset together, and nothing is spawned: ask for both, or for scope 0"
 NOT_FILTER = "entities are filtered by their names alone"

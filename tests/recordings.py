@@ -18,6 +18,7 @@ def times_of(path) -> dict[str, np.ndarray]:
     for chunk in RrdReader(path).stream():
         if not chunk.is_static:
             assert chunk.timeline_names == ["sim_time"], chunk.entity_path
+            assert chunk.num_rows > 0, f"{chunk.entity_path}: a viewer ends where it meets a part without rows"
             column = chunk.to_record_batch().column("sim_time").cast("int64")
             found[chunk.entity_path] += column.to_pylist()
     return {entity: np.sort(np.array(times)) * 1e-9 for entity, times in found.items()}

@@ -144,9 +144,10 @@ class LogSource:
         """That attribute of `RunData`, and all others that come at the same rate."""
         if name == EVENTS.name:
             return {name: tuple(decode_event(data) for _, _, data in self._file.messages({EVENTS.full_name()}))}
-        wanted = [entry for entry in self.entries.values() if entry.of_shape == (name in _OF_SHAPES)]
         if name in _OF_SHAPES:
             return self._shapes()
+        # Of a run that goes on, shapes may have come alone.
+        wanted = [entry for entry in self.entries.values() if not entry.of_shape and entry.topic in self._topics]
         values = self._values(wanted)
         description, count = self.description, len(self.times[TIME])
         of = {

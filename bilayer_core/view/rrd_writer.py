@@ -126,13 +126,16 @@ class RunSender:
         self._send_strands(run, colouring)
         send_bodies(recording, run, BODIES)
         middles = middles_of(run)
-        columns = rr.Points3D.columns(positions=middles).partition([1] * len(middles))
-        recording.send_columns(MIDDLE, _time(run.shape_times), columns)
+        for part in _chunks(len(middles)):  # none while no shape has come: a viewer ends where it meets no rows
+            columns = rr.Points3D.columns(positions=middles[part]).partition([1] * len(middles[part]))
+            recording.send_columns(MIDDLE, _time(run.shape_times[part]), columns)
         self._send_joints(run)
         self._send_arrows("world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
         for name, arrows in reactions.items():
             self._send_arrows(f"world/{name}", REACTION_COLOURS[name], arrows, scales)
-        self._send_series(run)
+        if len(run.times):  # shapes may have come alone
+            self._send_series(run)
+        self._send_total_force(run)
         self._send_events(run)
 
     def _send_strands(self, run: RunData, colouring: Colouring) -> None:
@@ -200,6 +203,8 @@ class RunSender:
         for group, series in groups.items():
             for name, values in series.items():
                 self._send_curve(group, name, run.times, values)
+
+    def _send_total_force(self, run: RunData) -> None:
         if run.contact_forces.any() or SUMMED in self._curves.get("contact_force", ()):
             # Forces that hold a body cancel in their sum; this shows how hard it is held.
             total = np.linalg.norm(run.contact_forces, axis=2).sum(axis=1)

@@ -11,15 +11,14 @@ says depends on the time alone, so a reset needs nothing.
 from __future__ import annotations
 
 import math
+import signal
 import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
@@ -39,7 +38,8 @@ class GaitController(Node):
     """Answers each time on /clock with the gait's values."""
 
     def __init__(self) -> None:
-        super().__init__("gait_controller")
+        super().__init__("gait_controller", automatically_declare_parameters_from_overrides=True)
+        self.known = {"use_sim_time", "start_type_description_service"}
         self.simulator = self.parameter("node", "/bilayer_sim", "full name of the simulation node").rstrip("/")
         self.channels = list(self.parameter("channels", ["humidity"], "stimulus channels"))
         self.phases = list(self.parameter("phases", [0.0], "delay of each channel, in periods"))
@@ -49,21 +49,22 @@ class GaitController(Node):
         self.shape = self.parameter("shape", "sine", f"one of {', '.join(SHAPES)}")
         self.duty = self.parameter("duty", 0.5, "part of a period in which it rises, or in which a square is high")
         self.periods = self.parameter("periods", 0, "after so many periods it rests at `low`; 0 = it goes on")
+        for name in self.get_parameters_by_prefix("").keys() - self.known:
+            raise ValueError(f"there is no parameter '{name}'; there are {', '.join(sorted(self.known))}")
         if len(self.phases) == 1:
             self.phases *= len(self.channels)
         self.refuse_nonsense()
         self.answered: int | None = None
         self.publisher = self.create_publisher(JointState, f"{self.simulator}/stimulus_stamped", 10)
-        self.create_timer(1.0, lambda: None)  # wakes it up where rclpy has slept through a signal
         self.create_subscription(Clock, "/clock", self.hear, 10)
 
     def parameter(self, name: str, default, description: str):
         """Declare a parameter; its value."""
+        self.known.add(name)
+        if self.has_parameter(name):  # as it was given, with any type
+            self.undeclare_parameter(name)
         descriptor = ParameterDescriptor(description=description, read_only=True)
-        value = self.declare_parameter(name, default, descriptor).value
-        if value is None:
-            raise ValueError(f"parameter '{name}' is empty")
-        return value
+        return self.declare_parameter(name, default, descriptor).value
 
     def refuse_nonsense(self) -> None:
         """ValueError with the parameter that cannot be."""
@@ -98,20 +99,22 @@ class GaitController(Node):
 
 def main(argv: list[str] | None = None) -> int:
     """Run the node until it is interrupted; the exit code."""
+    signals: list[int] = []  # noted here, they interrupt nothing; rclpy's own handlers do, and may leave it asleep
+    signal.signal(signal.SIGINT, lambda number, _: signals.append(number))
+    signal.signal(signal.SIGTERM, lambda number, _: signals.append(number))
     parser = ArgumentParser("gait_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
+    parser.parse_args(rclpy.utilities.remove_ros_args(sys.argv if argv is None else argv)[1:])
     try:
-        rclpy.init(args=argv)
-        rclpy.spin(GaitController())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        rclpy.init(args=argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+        node, ended = GaitController(), rclpy.task.Future()
+        node.create_timer(0.1, lambda: ended.set_result(None) if signals else None)
+        rclpy.spin_until_future_complete(node, ended)
     except (ValueError, ParameterException) as error:
         print(f"gait_controller: {error}", file=sys.stderr)
         return 2
-    except RuntimeError:  # of rclpy, where a signal came while the node was being made
-        if rclpy.ok():
-            raise
     finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         rclpy.try_shutdown()
     return 0
 

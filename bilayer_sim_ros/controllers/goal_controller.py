@@ -3,6 +3,7 @@
 A controller to copy: plain rclpy, and nothing of the simulator but its topics. Each beat takes one stimulus channel
 from `low` up and back, by a part of the way to `high`; then it looks at `<node>/com`. The next beat is as large as what
 is left asks for, by what earlier ones have brought. Near the goal and beyond it rests, until the robot is moved back.
+
 It answers each time on `/clock`, once, with one `sensor_msgs/JointState` on `<node>/stimulus_stamped`, so it works
 while the simulation runs freely, is paused, or waits for it in lockstep. Where time goes back it begins anew.
 
@@ -12,6 +13,7 @@ while the simulation runs freely, is paused, or waits for it in lockstep. Where 
 from __future__ import annotations
 
 import math
+import signal
 import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections import deque
@@ -20,26 +22,22 @@ import rclpy
 from geometry_msgs.msg import PointStamped
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 SECOND = 10**9
-LOOK = 40_000_000
-"""Before the end of a beat [ns]: what was published then has come, so a run in lockstep does not depend on when."""
-SHARE = 0.8
-"""Of what is left, that one beat is to bring."""
-ALIKE = 0.05
-"""Sizes of beats that differ by less count as one."""
+LOOK = 40_000_000  # before the end of a beat [ns]: what was published then has come, each time in lockstep
+SHARE = 0.8  # of what is left, that one beat is to bring
+ALIKE = 0.05  # sizes of beats that differ by less count as one
 
 
 class GoalController(Node):
     """Answers each time on /clock with the value of the present beat."""
 
     def __init__(self) -> None:
-        super().__init__("goal_controller")
+        super().__init__("goal_controller", automatically_declare_parameters_from_overrides=True)
+        self.known = {"use_sim_time", "start_type_description_service"}
         node = self.parameter("node", "/bilayer_sim", "full name of the simulation node").rstrip("/")
         self.channel = self.parameter("channel", "humidity", "stimulus channel")
         self.period = self.parameter("period", 2.4, "of a beat [s]")
@@ -49,24 +47,24 @@ class GoalController(Node):
         self.axis = self.parameter("axis", [1.0, 0.0, 0.0], "direction in which beats move the robot")
         self.goal = self.parameter("goal", [math.nan] * 3, "of the centre of mass [m]; also by the topic ~/goal")
         self.tolerance = self.parameter("tolerance", 0.005, "distance along the axis that is good enough [m]")
-        if not (self.period > self.width >= 0.0 and self.tolerance > 0.0):
-            raise ValueError("allowed are period > width >= 0 and tolerance > 0")
-        if not (len(self.axis) == len(self.goal) == 3 and any(self.axis)):
-            raise ValueError("axis and goal are three numbers each, and the axis is not 0")
+        for name in self.get_parameters_by_prefix("").keys() - self.known:
+            raise ValueError(f"there is no parameter '{name}'; there are {', '.join(sorted(self.known))}")
+        vectors = len(self.axis) == len(self.goal) == 3 and any(self.axis)
+        if not (vectors and self.period > self.width >= 0.0 and self.tolerance > 0.0):
+            raise ValueError("allowed are period > width >= 0, tolerance > 0, goal and axis of 3 numbers, axis not 0")
         self.begin_anew()
         self.publisher = self.create_publisher(JointState, f"{node}/stimulus_stamped", 10)
-        self.create_timer(1.0, lambda: None)  # wakes it up where rclpy has slept through a signal
         self.create_subscription(Clock, "/clock", self.hear, 10)
         self.create_subscription(PointStamped, f"{node}/com", self.see, 50)
         self.create_subscription(PointStamped, "~/goal", self.aim, 1)
 
     def parameter(self, name: str, default, description: str):
         """Declare a parameter; its value."""
-        about = ParameterDescriptor(description=description, read_only=True)
-        value = self.declare_parameter(name, default, about).value
-        if value is None:
-            raise ValueError(f"parameter '{name}' is empty")
-        return value
+        self.known.add(name)
+        if self.has_parameter(name):  # as it was given, with any type
+            self.undeclare_parameter(name)
+        descriptor = ParameterDescriptor(description=description, read_only=True)
+        return self.declare_parameter(name, default, descriptor).value
 
     def begin_anew(self) -> None:
         """Forget time, places and beats."""
@@ -84,8 +82,7 @@ class GoalController(Node):
         self.seen.append((now, self.along((message.point.x, message.point.y, message.point.z))))
 
     def along(self, point) -> float:
-        """[m]"""
-        return sum(a * p for a, p in zip(self.axis, point, strict=True)) / math.hypot(*self.axis)
+        return sum(a * p for a, p in zip(self.axis, point, strict=True)) / math.hypot(*self.axis)  # [m]
 
     def hear(self, message: Clock) -> None:
         """Answer a time; one that stands still is repeated, and needs no other answer."""
@@ -128,20 +125,22 @@ class GoalController(Node):
 
 def main(argv: list[str] | None = None) -> int:
     """Run the node until it is interrupted; the exit code."""
+    signals: list[int] = []  # noted here, they interrupt nothing; rclpy's own handlers do, and may leave it asleep
+    signal.signal(signal.SIGINT, lambda number, _: signals.append(number))
+    signal.signal(signal.SIGTERM, lambda number, _: signals.append(number))
     parser = ArgumentParser("goal_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
+    parser.parse_args(rclpy.utilities.remove_ros_args(sys.argv if argv is None else argv)[1:])
     try:
-        rclpy.init(args=argv)
-        rclpy.spin(GoalController())
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        rclpy.init(args=argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
+        node, ended = GoalController(), rclpy.task.Future()
+        node.create_timer(0.1, lambda: ended.set_result(None) if signals else None)
+        rclpy.spin_until_future_complete(node, ended)
     except (ValueError, ParameterException) as error:
         print(f"goal_controller: {error}", file=sys.stderr)
         return 2
-    except RuntimeError:  # of rclpy, where a signal came while the node was being made
-        if rclpy.ok():
-            raise
     finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         rclpy.try_shutdown()
     return 0
 

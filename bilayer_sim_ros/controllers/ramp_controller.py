@@ -12,6 +12,7 @@ value has been sent a few times; with `hold` it goes on answering, as a simulati
 from __future__ import annotations
 
 import math
+import signal
 import sys
 import time
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
@@ -20,19 +21,16 @@ import rclpy
 from builtin_interfaces.msg import Time
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 SECOND = 10**9
 LOOK_PERIOD = 0.05
-"""Real time between two looks at whether all is connected [s]."""
-FINAL_MESSAGES = 5
-"""How often the end value is sent."""
+"""Real time between two looks for signals, and whether all is connected [s]."""
+FINAL_MESSAGES = 5  # how often the end value is sent
 
 
 def ramp(elapsed: float, duration: float, start_value: float, end_value: float) -> float:
@@ -45,7 +43,8 @@ class RampController(Node):
     """Answers each time with the ramp's value; `done` ends it, with an exception if it cannot be connected."""
 
     def __init__(self) -> None:
-        super().__init__("ramp_controller")
+        super().__init__("ramp_controller", automatically_declare_parameters_from_overrides=True)
+        self.known = {"use_sim_time", "start_type_description_service"}
         node = self.parameter("node", "/bilayer_sim", "full name of the simulation node").rstrip("/")
         self.channel = self.parameter("channel", "humidity", "stimulus channel")
         self.values = [
@@ -58,6 +57,8 @@ class RampController(Node):
         self.hold = self.parameter("hold", False, "go on sending the end value until interrupted")
         self.wants_resume = self.parameter("resume", False, "call the simulation's service ~/resume once connected")
         self.limit = self.parameter("connection_timeout", 180.0, "longest wait for the simulation node [s]")
+        for name in self.get_parameters_by_prefix("").keys() - self.known:
+            raise ValueError(f"there is no parameter '{name}'; there are {', '.join(sorted(self.known))}")
         for name, value in {"duration": self.duration, "rate": rate, "connection_timeout": self.limit}.items():
             if not 0.0 < value < math.inf:
                 raise ValueError(f"parameter '{name}' cannot be {value!r}; allowed is a finite number > 0")
@@ -77,11 +78,11 @@ class RampController(Node):
 
     def parameter(self, name: str, default, description: str):
         """Declare a parameter; its value."""
+        self.known.add(name)
+        if self.has_parameter(name):  # as it was given, with any type
+            self.undeclare_parameter(name)
         descriptor = ParameterDescriptor(description=description, read_only=True)
-        value = self.declare_parameter(name, default, descriptor).value
-        if value is None:
-            raise ValueError(f"parameter '{name}' is empty")
-        return value
+        return self.declare_parameter(name, default, descriptor).value
 
     @property
     def connected(self) -> bool:
@@ -122,24 +123,24 @@ class RampController(Node):
 
 def main(argv: list[str] | None = None) -> int:
     """Run the node until its ramp has ended or it is interrupted; the exit code."""
+    signals: list[int] = []  # noted here, they interrupt nothing; rclpy's own handlers do, and may leave it asleep
+    signal.signal(signal.SIGINT, lambda number, _: signals.append(number))
+    signal.signal(signal.SIGTERM, lambda number, _: signals.append(number))
     parser = ArgumentParser("ramp_controller", description=__doc__, formatter_class=RawDescriptionHelpFormatter)
-    parser.parse_args(remove_ros_args(sys.argv if argv is None else argv)[1:])
+    parser.parse_args(rclpy.utilities.remove_ros_args(sys.argv if argv is None else argv)[1:])
     try:
-        rclpy.init(args=argv)
+        rclpy.init(args=argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
         node = RampController()
+        node.create_timer(LOOK_PERIOD, lambda: node.done.set_result(signals[0]) if signals else None)
         rclpy.spin_until_future_complete(node, node.done)
-        if node.done.exception() is not None:
-            raise node.done.exception()
-        node.get_logger().info("done")
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        if node.done.result() is None:  # no signal
+            node.get_logger().info("done")
     except (ValueError, ParameterException, TimeoutError) as error:
         print(f"ramp_controller: {error}", file=sys.stderr)
         return 2
-    except RuntimeError:  # of rclpy, where a signal came while the node was being made
-        if rclpy.ok():
-            raise
     finally:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
         rclpy.try_shutdown()
     return 0
 

@@ -3,11 +3,13 @@
 import ast
 import math
 import signal
+import time
 
 import numpy as np
 import pytest
 import yaml
 from geometry_msgs.msg import PointStamped
+from std_msgs.msg import Float64MultiArray
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.record.log_reader import read_log
@@ -114,18 +116,80 @@ def test_the_swimmer_holds_a_height_also_after_a_pause_a_reset_and_another_goal(
 
 
 @pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("ramp_controller", {"channel": "swelling", "duration": 2.0, "hold": True}),
+        ("gait_controller", {"channels": ["swelling"], "period": 4.0}),
+    ],
+)
+def test_beside_a_free_run_it_stands_still_in_a_pause_and_begins_anew_after_a_reset(
+    start, connect, domain, name, parameters
+):
+    simulation = start("sim_node", domain, {"scene": "bending", "start_paused": True, "real_time_factor": 1.0})
+    controller = start(f"controllers.{name}", domain, parameters)
+    client = connect(simulation)
+    applied = client.listen(Float64MultiArray, "/bilayer_sim/stimulus_applied")
+    for _ in range(2):
+        begun = len(applied)
+        assert client.call("resume").success
+        client.spin_until(lambda: applied[-1].data[0] > 0.4, "a part of the way")
+        values = [message.data[0] for message in applied[begun:]]
+        assert min(values) < 0.1 and max(np.diff(values)) < 0.2  # it rises from the start on
+        assert client.call("pause").success
+        client.drain()
+        still = applied[-1].data[0]
+        until = time.monotonic() + 1.2  # in which the paused time is sent once more
+        client.spin_until(lambda until=until: time.monotonic() > until, "a while")
+        assert applied[-1].data[0] == still
+        assert client.call("reset").success
+        client.spin_until(lambda: applied[-1].data[0] == 0.0, "the start")
+    assert controller.running
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("ramp_controller", {"channel": "swelling", "duration": 0.1, "hold": True}),
+        ("gait_controller", {"channels": ["swelling"], "period": 0.1}),
+        ("goal_controller", {"channel": "swelling", "period": 0.08, "tolerance": 1e-6, "goal": [1.0, 0.0, 0.0]}),
+    ],
+)
+def test_in_lockstep_a_reset_brings_the_same_values_again(start, connect, domain, name, parameters):
+    simulation = start("sim_node", domain, {"scene": "bending", "lockstep": True, "start_paused": True, "rate": 50.0})
+    controller = start(f"controllers.{name}", domain, parameters)
+    client = connect(simulation)
+    applied = client.listen(Float64MultiArray, "/bilayer_sim/stimulus_applied")
+    rounds = []
+    for _ in range(2):
+        client.drain()
+        del applied[:-1]
+        for _ in range(12):
+            assert client.call("step").success
+        client.drain()
+        values = [message.data[0] for message in applied]
+        rounds.append([value for value, before in zip(values, [None, *values], strict=False) if value != before])
+        assert client.call("reset").success
+    assert len(rounds[0]) > 4 and max(rounds[0]) > 0.5
+    assert rounds[0] == rounds[1]
+    assert controller.running
+
+
+@pytest.mark.parametrize(
     ("name", "parameters", "told"),
     [
         ("gait_controller", {"phases": [0.0, 0.5]}, "parameter 'phases' cannot be [0.0, 0.5]"),
         ("gait_controller", {"shape": "saw"}, "parameter 'shape' cannot be 'saw'"),
         ("gait_controller", {"period": 2}, "expecting type 'DOUBLE'"),
-        ("gait_controller", {"channels": []}, "parameter 'channels' is empty"),
+        ("gait_controller", {"channels": []}, "default value of type PARAMETER_NOT_SET"),
+        ("gait_controller", {"chanels": ["left"]}, "there is no parameter 'chanels'; there are channels, duty, high,"),
+        ("ramp_controller", {"end": 0.5}, "there is no parameter 'end'; there are channel, connection_timeout,"),
+        ("goal_controller", {"Goal": [1.0, 0.0, 0.0]}, "there is no parameter 'Goal'; there are axis, channel, goal,"),
         ("ramp_controller", {"duration": 0.0}, "parameter 'duration' cannot be 0.0; allowed is a finite number > 0"),
         ("ramp_controller", {"end_value": ".nan"}, "allowed are finite numbers"),
         ("ramp_controller", {"duration": 1}, "expecting type 'DOUBLE'"),
         ("goal_controller", {"width": 3.0}, "allowed are period > width >= 0"),
         ("goal_controller", {"goal": [1, 0, 0]}, "expecting type 'DOUBLE_ARRAY'"),
-        ("goal_controller", {"axis": [0.0, 0.0, 0.0]}, "the axis is not 0"),
+        ("goal_controller", {"axis": [0.0, 0.0, 0.0]}, "goal and axis of 3 numbers, axis not 0"),
     ],
 )
 def test_parameters_that_cannot_be_are_refused(start, domain, name, parameters, told):

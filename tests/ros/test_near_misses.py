@@ -8,7 +8,8 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from std_msgs.msg import Float32, Float64
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Float32, Float64, Float64MultiArray
 
 from bilayer_sim_ros import graph_watch
 from bilayer_sim_ros.near_misses import of_topics, remap_sources
@@ -116,6 +117,28 @@ def test_a_near_miss_in_the_graph_is_warned_of_once(node, context, contexts):
         "/bilayer_sim/stimulus/humidty is published, but not heard: did you mean /bilayer_sim/stimulus/humidity?",
         "/everything is published as std_msgs/msg/Float32, which is not heard: it is std_msgs/msg/Float64MultiArray",
     ]
+
+
+def test_those_who_listen_and_can_hear_nothing_are_warned_of_once(node, context, contexts):
+    client = Node("client", context=contexts[1])
+    kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    client.create_subscription(Float64MultiArray, "/bilayer_sim/energy", print, kept)
+    client.create_subscription(Float64, "/bilayer_sim/com", print, 10)
+    client.create_subscription(Float64MultiArray, "/bilayer_sim/solver", print, lossy)
+    watch, deadline = graph_watch.GraphWatch(node), time.monotonic() + 20.0
+    while len(node.lines) < 2 and time.monotonic() < deadline:
+        watch.look()
+    watch.look()
+    type_missed, quality_missed = sorted(node.lines)
+    assert type_missed == (
+        "/bilayer_sim/com is listened to as std_msgs/msg/Float64, which is not sent: "
+        "it is geometry_msgs/msg/PointStamped"
+    )
+    assert quality_missed == (
+        "/bilayer_sim/energy is listened to by somebody who cannot hear it: "
+        "Volatile publisher and transient local subscription"
+    )
 
 
 def test_a_second_clock_is_warned_of(node, context):

@@ -1,4 +1,4 @@
-"""Signals at chosen moments of the node's life, sent by the process to itself: each ends it with 0 and a reason."""
+"""Signals at chosen moments of the life of a node, sent by the process to itself: each ends it with 0 and a reason."""
 
 import os
 import subprocess
@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from bilayer_core import Simulator, load_scene
 from bilayer_core.record.log_reader import read_info
 
 LIMIT = 120.0
@@ -43,6 +44,12 @@ def count_steps(self, **arguments):
     return step(self, **arguments)
 Simulator.step = count_steps
 """
+IN_ANOTHER_THREAD = """
+import threading
+def send():  # to the thread that calls this, not to the one that handles signals
+    for number in NUMBERS:
+        signal.pthread_kill(threading.get_ident(), number)
+"""
 WHILE_CLOSING = """
 from bilayer_core.record.mcap_log import McapRecorder
 close = McapRecorder.close
@@ -56,6 +63,21 @@ McapRecorder.close = close_slowly
 WHILE_LEAVING = """
 import atexit
 atexit.register(send, 5)
+"""
+ABOUT_TO_WAIT = """
+from bilayer_core import Simulator
+from rclpy.executors import SingleThreadedExecutor
+step, wait, steps, sent = Simulator.step, SingleThreadedExecutor.wait_for_ready_callbacks, [], []
+def count_steps(self, **arguments):
+    steps.append(self.time)
+    return step(self, **arguments)
+def send_and_wait(self, *arguments, **named):
+    if steps and not sent:
+        sent.append(True)
+        send()
+        time.sleep(1.0)  # the node ends meanwhile
+    return wait(self, *arguments, **named)
+Simulator.step, SingleThreadedExecutor.wait_for_ready_callbacks = count_steps, send_and_wait
 """
 WHILE_SIGNALS_ARE_HANDLED = """
 from bilayer_sim_ros.signals import Signals
@@ -80,6 +102,51 @@ assert stop.is_set() and stop.reason == "ended by SIGINT" and sent > 3, (stop.re
 os._exit(0)
 """
 TAIL = "\nsys.exit(sim_node.main())\n"
+
+CONTROLLERS = ("ramp_controller", "gait_controller", "goal_controller")
+CONTROLLER = """
+import atexit, os, signal, sys, threading, time
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from bilayer_sim_ros.controllers import {name}
+
+def send():
+    for number in [signal.SIGINT, signal.SIGTERM] * 2:
+        os.kill(os.getpid(), number)
+
+def send_here():  # to the thread that calls this, not to the one that handles signals
+    signal.pthread_kill(threading.get_ident(), signal.SIGTERM)
+
+def send_in(owner, name):
+    call = getattr(owner, name)
+    def call_and_send(*arguments, **named):
+        send()
+        result = call(*arguments, **named)
+        send()
+        return result
+    setattr(owner, name, call_and_send)
+
+{moment}
+sys.exit({name}.main())
+"""
+MOMENTS = {
+    "rclpy is initialised": "send_in(rclpy, 'init')",
+    "the node is made": "send_in(Node, '__init__')",
+    "its publisher is made": "send_in(Node, 'create_publisher')",
+    "it begins to spin": "send_in(rclpy, 'spin_until_future_complete')",
+    "it is about to wait": "send_in(SingleThreadedExecutor, 'wait_for_ready_callbacks')",
+    "it waits": "threading.Timer(1.0, send).start()",
+    "another thread gets them": "threading.Timer(1.0, send_here).start()",
+    "it ends": "threading.Timer(1.0, send).start()\nsend_in(rclpy, 'try_shutdown')\natexit.register(send)",
+}
+"""Statements that have signals sent when something happens to a controller."""
+
+
+@pytest.fixture(scope="module")
+def compiled():
+    """Kernels are there: a node steps as soon as it has started, and no limit is spent on a compiler."""
+    Simulator(load_scene("bending")).compile()
 
 
 @pytest.fixture
@@ -118,6 +185,7 @@ def test_signals_while_kernels_are_compiled_end_it_at_once_and_the_log_says_so(e
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize("program", [WHILE_CLOSING, WHILE_LEAVING], ids=["closing", "leaving"])
 def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(ended, tmp_path, program):
     code, output = ended(WHILE_STEPPING + program, "SIGINT,SIGTERM")
@@ -126,5 +194,41 @@ def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(end
     assert (info.complete, info.termination) == (False, "ended by SIGINT")
 
 
+@pytest.mark.usefixtures("compiled")
+def test_a_signal_that_the_system_hands_to_another_thread_ends_the_node(ended, tmp_path):
+    code, output = ended(WHILE_STEPPING + IN_ANOTHER_THREAD, "SIGTERM")
+    assert code == 0, output
+    assert read_info(tmp_path / "run.mcap").termination == "ended by SIGTERM"
+
+
 def test_signals_may_interrupt_the_handlers_of_others_and_the_wait_for_them(ended):
     assert ended(WHILE_SIGNALS_ARE_HANDLED, "SIGINT,SIGTERM") == (0, "")
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("compiled")
+def test_a_node_ends_without_a_word_of_an_executor_that_was_about_to_wait(ended):
+    code, output = ended(ABOUT_TO_WAIT, "SIGTERM")
+    assert (code, "ended by SIGTERM" in output) == (0, True), output
+
+
+@pytest.mark.parametrize("moment", MOMENTS.values(), ids=MOMENTS)
+def test_signals_end_controllers_with_0_and_no_traceback_when(domain, tmp_path, moment):
+    running = {
+        name: subprocess.Popen(
+            [sys.executable, "-c", CONTROLLER.format(name=name, moment=moment)],
+            cwd=tmp_path,
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        for name in CONTROLLERS
+    }
+    for name, process in running.items():
+        with process:
+            try:
+                output, _ = process.communicate(timeout=LIMIT)
+            finally:
+                process.kill()
+        assert process.returncode == 0 and "Traceback" not in output, (name, process.returncode, output)

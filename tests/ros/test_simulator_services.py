@@ -1,18 +1,22 @@
-"""The standard services of simulators; their types have no wheel, so that ones with their fields stand for them."""
+"""The standard services and action of simulators; their types have no wheel: ones with their fields stand for them."""
 
+import asyncio
 import math
 import sys
 from concurrent.futures import Future
+from contextlib import nullcontext
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import Accel, Pose, Twist
+from rclpy.action import CancelResponse
 from std_msgs.msg import Header
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
 from bilayer_sim_ros import simulator_services as module
+from bilayer_sim_ros import steps_action
 from bilayer_sim_ros.requests import Requests
 
 MESSAGES = {
@@ -225,4 +229,97 @@ def test_what_cannot_be_is_answered_with_a_reason(call):
 
 def test_features_say_what_is_offered(call):
     features = set(call("GetSimulatorFeatures").features.features)
-    assert {10, 20, 24, 25, 26, 31, 32} == features
+    assert {10, 20, 24, 25, 26, 31, 32, 33} == features
+
+
+GOAL, RESULT, FEEDBACK = {"steps": int}, {"result": "Result"}, {"completed_steps": int, "remaining_steps": int}
+
+
+class Goal:
+    """A goal of the action, and what becomes of it."""
+
+    def __init__(self, steps, cancelled_after=None):
+        self.request, self.told, self.end = Fields(GOAL), [], None
+        self.request.steps, self._cancelled_after = steps, cancelled_after
+
+    @property
+    def is_cancel_requested(self):
+        return len(self.told) == self._cancelled_after
+
+    def publish_feedback(self, feedback):
+        self.told.append((feedback.completed_steps, feedback.remaining_steps))
+
+    def succeed(self):
+        self.end = "succeeded"
+
+    def abort(self):
+        self.end = "aborted"
+
+    def canceled(self):  # rclpy's spelling
+        self.end = "cancelled"
+
+
+@pytest.fixture
+def execute(worker, monkeypatch):
+    """Has the action do a goal; code and text of its result."""
+
+    def feedback(**values):
+        message = Fields(FEEDBACK)
+        for name, value in values.items():
+            setattr(message, name, value)
+        return message
+
+    async def in_executor(future):
+        assert future.done()
+
+    made = []
+    package = ModuleType("simulation_interfaces")
+    package.action = ModuleType("simulation_interfaces.action")
+    package.action.SimulateSteps = SimpleNamespace(Result=lambda: Fields(RESULT), Feedback=feedback)
+    monkeypatch.setitem(sys.modules, "simulation_interfaces", package)
+    monkeypatch.setitem(sys.modules, "simulation_interfaces.action", package.action)
+    monkeypatch.setattr(steps_action, "ActionServer", lambda *arguments, **named: made.append((arguments, named)))
+    lines = []
+    node = SimpleNamespace(get_logger=lambda: SimpleNamespace(info=lines.append))
+    services = SimpleNamespace(answering=nullcontext, in_executor=in_executor)
+    assert steps_action.offer_steps(node, worker.step, services)
+    assert lines == ["action of simulation_interfaces: ~/simulate_steps"]
+    ((server_node, kind, name, execute), named) = made[0]
+    assert (server_node, kind, name) == (node, package.action.SimulateSteps, "~/simulate_steps")
+    assert named["cancel_callback"](None) == CancelResponse.ACCEPT
+
+    def run(goal):
+        result = asyncio.run(execute(goal)).result
+        return result.result, result.error_message
+
+    return run
+
+
+def test_the_action_tells_each_step_and_succeeds_after_the_last(execute, worker):
+    goal = Goal(3)
+    assert execute(goal) == (module.OK, "")
+    assert (goal.end, goal.told) == ("succeeded", [(1, 2), (2, 1), (3, 0)])
+    assert worker.simulator.time == pytest.approx(0.06)
+
+
+def test_a_cancelled_action_ends_between_two_steps(execute, worker):
+    goal = Goal(1000, cancelled_after=2)
+    assert execute(goal) == (module.FAILED, "cancelled after 2 of 1000 steps")
+    assert (goal.end, goal.told[-1], worker.steps) == ("cancelled", (2, 998), 2)
+
+
+def test_the_action_is_aborted_with_the_reason_while_the_simulation_runs(execute, worker):
+    worker.paused, goal = False, Goal(2)
+    code, text = execute(goal)
+    assert (code, goal.end, goal.told) == (module.FAILED, "aborted", []) and "call pause first" in text
+
+
+def test_the_action_is_not_offered_where_its_type_is_not_installed_or_not_usable(worker, monkeypatch):
+    monkeypatch.setitem(sys.modules, "simulation_interfaces", None)
+    assert not steps_action.offer_steps(SimpleNamespace(), worker.step, None)
+    package, lines = ModuleType("simulation_interfaces"), []
+    package.action = SimpleNamespace()  # of a release without the action
+    monkeypatch.setitem(sys.modules, "simulation_interfaces", package)
+    node = SimpleNamespace(get_logger=lambda: SimpleNamespace(warning=lines.append))
+    assert not steps_action.offer_steps(node, worker.step, None)
+    assert "simulate_steps of simulation_interfaces is not offered" in lines[0]

@@ -22,7 +22,7 @@ class FakeNode:
     def get_fully_qualified_name(self):
         return self._name
 
-    def create_publisher(self, kind, topic, quality):
+    def create_publisher(self, kind, topic, quality, **_):
         sent = self.sent[topic] = SimpleNamespace(kind=kind, quality=quality, messages=[])
         return SimpleNamespace(publish=sent.messages.append, get_subscription_count=lambda: 1)
 

@@ -1,6 +1,7 @@
 """Logs that are shown while they are written."""
 
 import io
+import itertools
 import os
 import re
 import shutil
@@ -204,6 +205,26 @@ def test_parts_of_a_frame_come_back_and_a_frame_that_lacks_some_is_refused():
     for bad in [(label, data + b"6"), ("com", b""), ("com:x", b"1"), ("com:-1", b"")]:
         with pytest.raises(InputError, match="parts of a frame"):
             unpack(*bad)
+
+
+@pytest.mark.parametrize("lost", ["com", "points"])
+def test_a_look_may_find_shapes_without_figures_or_figures_without_shapes(log, tmp_path, lost):
+    with ViewServer() as server:
+        view, kept = LiveView(server, save=tmp_path / "seen.rrd"), []
+        view.begin(synthetic_run.description())
+        for number, (stamp, frame) in enumerate(itertools.groupby(GrowingLog(log).read(), lambda message: message[1])):
+            kept.append(number < 2 or number % 3 == 0)
+            for topic, _, data in frame:
+                if kept[-1] or not topic.endswith(lost):
+                    view.add(topic, stamp, data)
+            view.show()
+        view.close()
+    seen, run = recordings.times_of(tmp_path / "seen.rrd"), read_log(log)
+    times = {"com": ("/world/bodies/ball", run.times), "points": ("/world/middle", run.shape_times)}
+    whole = run.times[np.array(kept)]
+    for topic, (entity, all_times) in times.items():
+        expected = np.intersect1d(all_times, whole) if topic == lost else all_times
+        np.testing.assert_allclose(seen[entity], expected)
 
 
 def test_many_runs_leave_no_threads_behind_in_who_shows_them(log):
