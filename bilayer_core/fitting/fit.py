@@ -36,6 +36,8 @@ AT_BOUND = 1e-4
 """Part of the way between bounds within which a parameter that the data draw to a bound is at it."""
 DOUBTFUL = 0.01
 """Probability of the residuals below which the fit warns that the model or the noise is not what it was taken for."""
+ROUGH = "runs change roughly with parameters"
+SMOOTHER = "fixed steps (--dt) or a smaller solver.tolerance may help, or data of times before bodies bounce"
 NOISY, RESOLVED = 0.3, 1e-6
 """Numerical noise, in that of the data and in their spread, from which on the fit warns of it."""
 
@@ -139,7 +141,9 @@ class _Search:
         self._progress(f"start: {self._agreement(self._residuals(started))}")
         self._steps = choose_steps(self._runs, start, self._weights)
         self._progress(f"numerical noise measured in {self._runs.count} runs")
-        self._refuse_unseen(_Point(start, self._residuals(started), self._jacobian(start)), "at the start")
+        matrix = self._jacobian(start)
+        refuse_without_influence(self._parameters, matrix)
+        self._refuse_unseen(start, matrix, list(range(start.size)), "at the start")
         found = least_squares(
             self._objective,
             start,
@@ -183,10 +187,10 @@ class _Search:
     def _errors(self, free: Sequence[int]) -> Array:
         return shares([self._steps[k] for k in free], self._observed.size)
 
-    def _refuse_unseen(self, at: _Point, where: str) -> None:
-        all_of_them = range(len(self._parameters))
-        refuse_without_influence(self._parameters, at.matrix, self._errors(all_of_them))
-        refuse_unseen(self._parameters, at.parts, at.matrix, self._errors(all_of_them), where)
+    def _refuse_unseen(self, parts: Array, matrix: Array, free: Sequence[int], where: str) -> None:
+        own = [self._parameters[k] for k in free]
+        rough = f"; {ROUGH}: {SMOOTHER}" if self._noise > RESOLVED else ""
+        refuse_unseen(own, parts[free], matrix[:, free], self._errors(free), where, rough)
 
     def _concluded(self, found: OptimizeResult, started: Array) -> FitResult:
         parts = found.x
@@ -196,7 +200,7 @@ class _Search:
         spread, correlations = None, np.full((parts.size, parts.size), np.nan)
         if free:
             own, matrix = [self._parameters[k] for k in free], at.matrix[:, free]
-            refuse_unseen(own, parts[free], matrix, self._errors(free), "at the solution")
+            self._refuse_unseen(parts, at.matrix, free, "at the solution")
             spread = spread_of(matrix, at.residuals, self._data.sigma is not None, self._noise)
             refuse_undetermined(own, parts[free], spread.covariance, spread.wide, "at the solution")
             correlations[np.ix_(free, free)] = spread.correlations
@@ -249,10 +253,7 @@ class _Search:
             if bound:
                 yield f"{parameter.path} ends at its {bound} bound: no interval; widen the bounds if it may be beyond"
         if self._noise > NOISY * noise and self._noise > RESOLVED:
-            yield (
-                f"runs are rough in the parameters: their numerical noise is {self._noise / noise:.2g} of the data's; "
-                "--dt or a smaller solver.tolerance makes them smoother"
-            )
+            yield f"{ROUGH}, their numerical noise is {self._noise / noise:.2g} of the data's: {SMOOTHER}"
         if probability is not None and probability < DOUBTFUL:
             yield (
                 f"residuals are larger than the noise that was given: chance has them so with a probability of "

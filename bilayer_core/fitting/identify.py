@@ -23,6 +23,8 @@ from bilayer_core.fitting.parameters import Parameter
 Array = np.ndarray
 SEEN = 4.0
 """Singular values, in sizes of the numerical error, from which on a direction was seen."""
+NOTHING = 1e-9
+"""Change of a weighted value from bound to bound, below which a parameter has no influence on it."""
 PART = 0.02
 """Smallest part of a direction, of its largest, whose parameter is named."""
 UNSEEN = "what they change is within the numerical error of the derivatives"
@@ -51,7 +53,7 @@ class Direction:
             return f"{names[0]}: the data tell nothing of it"
         if len(names) == 2 and self.relative:
             power = -1.0 / self.changes[names[1]]
-            return f"{names[0]} and {names[1]}: the data tell {names[0]} · {names[1]}^{power:.3g} alone"
+            return f"{names[0]} and {names[1]}: the data tell only {names[0]} · {names[1]}^{power:.3g}"
         unit = " %" if self.relative else ""
         together = ", ".join(f"{name} by {change:+.3g}{unit}" for name, change in self.changes.items())
         return f"{', '.join(names)}: the data are the same when they change together, {together}"
@@ -69,18 +71,18 @@ class NotIdentifiable(BilayerError):
 
     exit_code = 1
 
-    def __init__(self, directions: tuple[Direction, ...], where: str, reason: str):
+    def __init__(self, directions: tuple[Direction, ...], where: str, reason: str, note: str = ""):
         lines = "\n".join(f"  {direction}" for direction in directions)
         told = f"nothing was fitted: the data cannot tell parameters apart {where} ({reason}):"
-        super().__init__(f"{told}\n{lines}\n  {REMEDY}")
-        self.directions, self.where, self.reason = directions, where, reason
+        super().__init__(f"{told}\n{lines}\n  {REMEDY}{note}")
+        self.directions, self.where, self.reason, self.note = directions, where, reason, note
 
     def __reduce__(self) -> tuple[object, ...]:
         """For its way between processes."""
-        return type(self), (self.directions, self.where, self.reason)
+        return type(self), (self.directions, self.where, self.reason, self.note)
 
 
-def refuse_without_influence(parameters: Sequence[Parameter], matrix: Array, errors: Array) -> None:
+def refuse_without_influence(parameters: Sequence[Parameter], matrix: Array) -> None:
     """Refuse parameters on which nothing depends.
 
     Parameters
@@ -88,27 +90,37 @@ def refuse_without_influence(parameters: Sequence[Parameter], matrix: Array, err
     parameters : sequence of Parameter
     matrix : ndarray
         Jacobian of weighted residuals, shape (residuals, parameters).
-    errors : ndarray
-        Size of the numerical error of each of its columns, shape (parameters,).
 
     Raises
     ------
     InputError
         Names them.
     """
-    sizes = np.linalg.norm(matrix, axis=0)
-    without = [p.path for p, size, error in zip(parameters, sizes, errors, strict=True) if size <= SEEN * error]
-    exact = [p.path for p, size in zip(parameters, sizes, strict=True) if size == 0.0]
+    sizes, nothing = np.linalg.norm(matrix, axis=0), NOTHING * np.sqrt(len(matrix))
+    without = [p.path for p, size in zip(parameters, sizes, strict=True) if size <= nothing]
     if without:
-        why = "" if set(without) == set(exact) else ", beyond the numerical noise of the runs,"
         raise InputError(
-            f"parameter {', '.join(without)}: has no influence{why} on any value of the data; leave it out, or add "
-            "data that depend on it"
+            f"parameter {', '.join(without)}: has no influence on any value of the data; leave it out, or add data "
+            "that depend on it"
         )
 
 
-def refuse_unseen(parameters: Sequence[Parameter], parts: Array, matrix: Array, errors: Array, where: str) -> None:
-    """Refuse parameters that cannot be told apart whatever the noise of the data; parameters as above.
+def refuse_unseen(
+    parameters: Sequence[Parameter], parts: Array, matrix: Array, errors: Array, where: str, note: str = ""
+) -> None:
+    """Refuse parameters that cannot be told apart whatever the noise of the data.
+
+    Parameters
+    ----------
+    parameters : sequence of Parameter
+    parts : ndarray
+        Where, in parts of the way between bounds, shape (parameters,).
+    matrix : ndarray
+        Jacobian of weighted residuals there, shape (residuals, parameters).
+    errors : ndarray
+        Size of the numerical error of each of its columns, shape (parameters,).
+    where, note : str
+        For the message; the note where a parameter by itself is not seen.
 
     Raises
     ------
@@ -120,7 +132,9 @@ def refuse_unseen(parameters: Sequence[Parameter], parts: Array, matrix: Array, 
     values = np.append(values, np.zeros(len(rows) - values.size))
     unseen = rows[values < SEEN].T / scale[:, None]
     if unseen.size:
-        raise NotIdentifiable(_directions(parameters, parts, unseen), where, UNSEEN)
+        directions = _directions(parameters, parts, unseen)
+        alone = any(len(direction.changes) == 1 for direction in directions)
+        raise NotIdentifiable(directions, where, UNSEEN, note if alone else "")
 
 
 def refuse_undetermined(
@@ -158,10 +172,9 @@ def _directions(parameters: Sequence[Parameter], parts: Array, space: Array) -> 
     own = order[: space.shape[1]]
     basis = space @ np.linalg.inv(space[own])
     found = []
-    for own_one, vector in zip(own, basis.T, strict=True):
+    for vector in basis.T:
         largest = np.abs(vector).max()
-        others = [k for k in range(len(parameters)) if k != own_one and abs(vector[k]) > PART * largest]
-        named = (int(own_one), *others)
+        named = [k for k in range(len(parameters)) if abs(vector[k]) > PART * largest]
         nonzero = all(parameters[k].value(float(parts[k])) != 0.0 for k in named)
-        found.append(Direction({parameters[k].path: float(vector[k]) for k in named}, nonzero))
+        found.append(Direction({parameters[k].path: float(vector[k] / vector[named[0]]) for k in named}, nonzero))
     return tuple(found)
