@@ -115,6 +115,6 @@ def _print(found: FitResult) -> None:
         click.echo(f"  chi squared {found.chi_squared:.4g} of {found.freedom} degrees of freedom")
     if found.refused:
         count = len(found.refused)
-        click.echo(f"  runs that could not be made, from which the fit went back: {count}; first {found.refused[0]}")
+        click.echo(f"  {count} runs could not be made on the way; the first: {found.refused[0]}")
     for warning in found.warnings:
         click.echo(f"  WARNING {warning}")

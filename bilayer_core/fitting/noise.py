@@ -142,10 +142,11 @@ def _with_third(runs: Runs, start: Array, k: int, found: _Roughness, weights: Ar
         if len(values) < len(outcomes):
             break
         outer_left, left, right, outer_right = _weighted(np.array(values), weights)
-        third = _root_mean_square(outer_right - 2.0 * right + 2.0 * left - outer_left) / (2.0 * spacing**3)
+        twice = _root_mean_square(outer_right - 2.0 * right + 2.0 * left - outer_left)
+        third = twice / (2.0 * spacing**3)
         if third >= found.third:
             break
-        found = replace(found, third=third)
+        found = replace(found, third=third, resolved=twice > SEEN * sqrt(10.0) * found.noise)
     return found
 
 

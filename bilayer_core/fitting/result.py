@@ -82,7 +82,7 @@ class FitResult:
         Why the fit ended.
     iterations, runs : int
     refused : tuple of str
-        Runs that could not be made on the way, from which the fit went back, and why.
+        Runs that could not be made on the way, each with why; the fit goes back from them.
     warnings : tuple of str
     """
 

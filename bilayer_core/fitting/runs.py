@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -44,16 +44,14 @@ def value_of(column: Column, frame: Frame) -> float:
 class Runs:
     """Makes runs and remembers what they came to.
 
-    `evaluate_many` is the one place where runs are made, one after the other; what has several processes may take its
-    place.
+    `make_many` is the one place where they are made, one after the other: what makes them in several processes replaces
+    that alone.
 
     Parameters
     ----------
     scene : SceneConfig
     parameters : sequence of Parameter
     data : Data
-    each : callable, optional
-        Called after each run.
 
     Attributes
     ----------
@@ -63,10 +61,8 @@ class Runs:
         Parts at which no run could be made, and why.
     """
 
-    def __init__(
-        self, scene: SceneConfig, parameters: Sequence[Parameter], data: Data, each: Callable[[], None] | None = None
-    ):
-        self._content, self._parameters, self._data, self._each = content_of(scene), parameters, data, each
+    def __init__(self, scene: SceneConfig, parameters: Sequence[Parameter], data: Data):
+        self._content, self._parameters, self._data = content_of(scene), parameters, data
         self._simulator: Simulator | None = None
         self._outcomes: dict[bytes, Outcome] = {}
         self.count = 0
@@ -85,7 +81,22 @@ class Runs:
         list
             The values of each, or the error that kept it from its end.
         """
-        return [self._remembered(point) for point in points]
+        keys = [np.ascontiguousarray(point, dtype=float).tobytes() for point in points]
+        missing = {key: point for key, point in zip(keys, points, strict=True) if key not in self._outcomes}
+        if len(self._outcomes) + len(missing) > KEPT:
+            missing = dict(zip(keys, points, strict=True))
+            self._outcomes.clear()
+        made = self.make_many(list(missing.values()))
+        self.count += len(missing)
+        for (key, point), outcome in zip(missing.items(), made, strict=True):
+            self._outcomes[key] = outcome
+            if isinstance(outcome, BilayerError):
+                self.refused.append((point.copy(), outcome))
+        return [self._outcomes[key] for key in keys]
+
+    def make_many(self, points: Sequence[Array]) -> list[Outcome]:
+        """Make a run for each of some points, all of them different."""
+        return [self._made(point) for point in points]
 
     def evaluate(self, point: Array) -> Array:
         """What one run comes to.
@@ -120,25 +131,12 @@ class Runs:
             Override(tuple(parameter.path.split(".")), value, f"{parameter.path}={value}").apply(self._content)
         return load_scene(self._content)
 
-    def _remembered(self, point: Array) -> Outcome:
-        key = np.ascontiguousarray(point, dtype=float).tobytes()
-        if key not in self._outcomes:
-            if len(self._outcomes) >= KEPT:
-                self._outcomes.clear()
-            self._outcomes[key] = self._made(point)
-        return self._outcomes[key]
-
     def _made(self, point: Array) -> Outcome:
-        self.count += 1
         try:
-            outcome: Outcome = self._run(self._simulator_of(self.scene_at(point)))
+            return self._run(self._simulator_of(self.scene_at(point)))
         except (SceneError, SimulationError) as error:
             self._simulator = None
-            self.refused.append((point.copy(), error))
-            outcome = error
-        if self._each is not None:
-            self._each()
-        return outcome
+            return error
 
     def _simulator_of(self, scene: SceneConfig) -> Simulator:
         """One at the start of a scene: that of the run before, where only what it can be reset to differs."""
