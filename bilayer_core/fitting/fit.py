@@ -143,7 +143,7 @@ class _Search:
         self._progress(f"numerical noise measured in {self._runs.count} runs")
         matrix = self._jacobian(start)
         refuse_without_influence(self._parameters, matrix)
-        self._refuse_unseen(start, matrix, list(range(start.size)), "at the start")
+        self._refuse_unseen(start, matrix, "at the start")
         found = least_squares(
             self._objective,
             start,
@@ -184,25 +184,22 @@ class _Search:
         unit = "times the noise" if self._data.sigma is not None else "of the data's spread"
         return f"residuals {root:.4g} {unit} (root mean square), {self._runs.count} runs"
 
-    def _errors(self, free: Sequence[int]) -> Array:
-        return shares([self._steps[k] for k in free], self._observed.size)
-
-    def _refuse_unseen(self, parts: Array, matrix: Array, free: Sequence[int], where: str) -> None:
-        own = [self._parameters[k] for k in free]
+    def _refuse_unseen(self, parts: Array, matrix: Array, where: str) -> None:
         rough = f"; {ROUGH}: {SMOOTHER}" if self._noise > RESOLVED else ""
-        refuse_unseen(own, parts[free], matrix[:, free], self._errors(free), where, rough)
+        refuse_unseen(self._parameters, parts, matrix, shares(self._steps, self._observed.size), where, rough)
 
     def _concluded(self, found: OptimizeResult, started: Array) -> FitResult:
         parts = found.x
         at = _Point(parts, self._objective(parts), self._jacobian(parts))
+        self._refuse_unseen(parts, at.matrix, "at the solution")
+        known = self._data.sigma is not None
+        whole = spread_of(at.matrix, at.residuals, known, self._noise)  # what is at a bound may be so by chance
+        refuse_undetermined(self._parameters, parts, whole.covariance, whole.wide, "at the solution")
         bounds = _bounds_at(at)
         free = [k for k, bound in enumerate(bounds) if not bound]
         spread, correlations = None, np.full((parts.size, parts.size), np.nan)
         if free:
-            own, matrix = [self._parameters[k] for k in free], at.matrix[:, free]
-            self._refuse_unseen(parts, at.matrix, free, "at the solution")
-            spread = spread_of(matrix, at.residuals, self._data.sigma is not None, self._noise)
-            refuse_undetermined(own, parts[free], spread.covariance, spread.wide, "at the solution")
+            spread = spread_of(at.matrix[:, free], at.residuals, known, self._noise)
             correlations[np.ix_(free, free)] = spread.correlations
         return self._result(found, at, bounds, free, spread, correlations, started)
 
@@ -280,7 +277,7 @@ class _Search:
 
 
 _TERMINATIONS = {
-    0: f"not converged after {MOST_EVALUATIONS} evaluations",
+    0: "not converged after as many evaluations as a fit may make",
     1: "the gradient is 0",
     2: "the sum of squares changes no more",
     3: "the parameters change no more",

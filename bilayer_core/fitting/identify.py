@@ -1,9 +1,10 @@
 """Which parameters the data can tell apart.
 
-Each column of the Jacobian of weighted residuals is divided by the size of its own numerical error. A singular value
-of that matrix below a few then belongs to a direction along which nothing was seen but error: the data do not tell
-parameters along it from each other. Where the noise of the data is known, or found from a fit, a direction along which
-the 95 % interval is as wide as the bounds are is not told by the data either.
+Each column of the Jacobian of weighted residuals is divided by the size of its own numerical error, which is taken for
+a millionth of the column at least. A singular value of that matrix below a few then belongs to a direction along which
+nothing was seen but error: the data do not tell parameters along it from each other. Where the noise of the data is
+known, or found from a fit, a direction along which the 95 % interval is as wide as the bounds are is not told by the
+data either.
 
 The directions that are not determined span a space; its basis is made such that each vector has a parameter of its own
 and few others, and each is told as parts by which parameters may change together without any difference to be seen.
@@ -23,6 +24,8 @@ from bilayer_core.fitting.parameters import Parameter
 Array = np.ndarray
 SEEN = 4.0
 """Singular values, in sizes of the numerical error, from which on a direction was seen."""
+MODEL = 1e-6
+"""Smallest error of a derivative, relative: nothing that is measured follows a scene more closely."""
 NOTHING = 1e-9
 """Change of a weighted value from bound to bound, below which a parameter has no influence on it."""
 PART = 0.02
@@ -126,8 +129,8 @@ def refuse_unseen(
     ------
     NotIdentifiable
     """
-    smallest = 1e-12 * float(np.linalg.norm(matrix))
-    scale = np.maximum(errors, smallest)
+    smallest = np.finfo(float).tiny
+    scale = np.maximum(np.maximum(errors, MODEL * np.linalg.norm(matrix, axis=0)), smallest)
     _, values, rows = np.linalg.svd(matrix / scale, full_matrices=True)
     values = np.append(values, np.zeros(len(rows) - values.size))
     unseen = rows[values < SEEN].T / scale[:, None]
