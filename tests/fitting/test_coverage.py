@@ -11,6 +11,7 @@ BY_CHANCE = 1e-3
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_intervals_of_forty_fits_cover_the_truth_and_are_as_wide_as_fits_scatter():
     found = study(FITS, SEED + 1)
     assert np.isfinite(found.values).all()
