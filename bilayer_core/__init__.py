@@ -1,7 +1,7 @@
 """Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
 
-``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``read_log``, ``compare``, ``sweep``, ``optimise``,
-``read_results`` and ``__version__`` are loaded at their first use: importing the package costs nothing.
+``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``fit``, ``read_log``, ``compare``, ``sweep``,
+``optimise``, ``read_results`` and ``__version__`` are loaded at their first use: importing the package costs nothing.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from importlib import import_module
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # what checkers of types take for true, without an import of milliseconds
     from bilayer_core.converge.study import estimate_error
+    from bilayer_core.fitting.fit import fit
     from bilayer_core.record.compare import compare
     from bilayer_core.record.log_reader import read_log
     from bilayer_core.record.recorder import Recorder
@@ -28,6 +29,7 @@ _HOME = {
     "Simulator": "bilayer_core.simulation.simulator",
     "compare": "bilayer_core.record.compare",
     "estimate_error": "bilayer_core.converge.study",
+    "fit": "bilayer_core.fitting.fit",
     "load_scene": "bilayer_core.scene.loader",
     "optimise": "bilayer_core.sweeps.optimise",
     "read_log": "bilayer_core.record.log_reader",
@@ -41,6 +43,7 @@ __all__ = [
     "__version__",
     "compare",
     "estimate_error",
+    "fit",
     "load_scene",
     "optimise",
     "read_log",

@@ -15,6 +15,7 @@ from bilayer_core.cli.check import check
 from bilayer_core.cli.compare import compare
 from bilayer_core.cli.converge import converge
 from bilayer_core.cli.export import export
+from bilayer_core.cli.fit import fit
 from bilayer_core.cli.info import info
 from bilayer_core.cli.new import new
 from bilayer_core.cli.optimise import optimise
@@ -60,7 +61,7 @@ def program() -> None:
 
 
 SIMULATES = (scenes, new, schema, check, run, converge, validate, bench, stress)
-MANY = (sweep, optimise)
+MANY = (sweep, fit, optimise)
 OF_LOGS = (info, repair, export, compare, plot, replay, view, render)
 
 for verb in (*SIMULATES, *MANY, *OF_LOGS):

@@ -33,7 +33,7 @@ def options(name):
 
 def test_json_is_standard_output_in_check_and_info_and_a_file_or_a_dash_elsewhere():
     found = options("--json")
-    assert found.keys() == TO_STANDARD_OUTPUT | {"compare", "converge", "replay", "stress", "validate"}
+    assert found.keys() == TO_STANDARD_OUTPUT | {"compare", "converge", "fit", "replay", "stress", "validate"}
     for verb, option in found.items():
         assert option.is_flag == (verb in TO_STANDARD_OUTPUT), verb
         assert verb in TO_STANDARD_OUTPUT or option.metavar == "FILE.json|-", verb

@@ -32,16 +32,17 @@ ALLOWED = {
     "runs": NUMERICS,
     "view": NUMERICS | {"runs"},
     "converge": NUMERICS,
+    "fitting": NUMERICS,
     "beam2d": {"errors", "scene", "model"},
     "validate": NUMERICS | {"beam2d"},
     "bench": NUMERICS | {"converge", "validate"},
     "stress": NUMERICS | {"converge", "validate", "bench"},
     "testing": NUMERICS | {"stress"},
     "sweeps": NUMERICS | {"view"},
-    "cli": NUMERICS | {"runs", "view", "converge", "validate", "bench", "stress", "sweeps"},
+    "cli": NUMERICS | {"runs", "view", "converge", "fitting", "validate", "bench", "stress", "sweeps"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
-FACES = {"__init__": NUMERICS | {"converge", "sweeps"}, "__main__": {"cli"}}
+FACES = {"__init__": NUMERICS | {"converge", "fitting", "sweeps"}, "__main__": {"cli"}}
 TOP = "bilayer_core"
 
 
