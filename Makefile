@@ -38,7 +38,7 @@ lint: $(STAMP)  ## Check the code's style, and the types of what programs call.
 install: $(STAMP) kernels  ## Install into .venv, and compile the kernels.
 
 bounds: $(STAMP)  ## Run tests of all kernels with the bounds of arrays checked.
-	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest $(BOUNDS)
+	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n $(JOBS) $(BOUNDS)
 
 stress: $(STAMP)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick

@@ -76,9 +76,19 @@ def pytest_sessionstart(session):
         assert PIECES
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node, error):
+    """Take over what a worker has entered: the process that started the workers runs no tests itself."""
+    ENTERED.update(getattr(node, "workeroutput", {}).get("entered", ()))
+
+
 def pytest_sessionfinish(session):
     """Where the bounds of arrays are checked, no piece of the engine may be left out."""
-    if CHECKS_BOUNDS and session.testscollected > 1:
+    if not CHECKS_BOUNDS:
+        return
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        session.config.workeroutput["entered"] = sorted(ENTERED)
+    elif session.testscollected > 1 or getattr(session.config.option, "numprocesses", None):
         from bilayer_core.jit.piece import PIECES
 
         pieces = {name for name in PIECES if "test" not in name}
