@@ -136,7 +136,7 @@ def test_beside_a_free_run_it_stands_still_in_a_pause_and_begins_anew_after_a_re
         values = [message.data[0] for message in applied[begun:]]
         assert min(values) < 0.1 and max(np.diff(values)) < 0.2  # it rises from the start on
         assert client.call("pause").success
-        client.drain()
+        client.spin_until(lambda: applied[-1].data == applied[-2].data, "the first repetition of the paused time")
         still = applied[-1].data[0]
         until = time.monotonic() + 1.2  # in which the paused time is sent once more
         client.spin_until(lambda until=until: time.monotonic() > until, "a while")
