@@ -129,6 +129,10 @@ def test_beside_a_free_run_it_stands_still_in_a_pause_and_begins_anew_after_a_re
     controller = start(f"controllers.{name}", domain, parameters)
     client = connect(simulation)
     applied = client.listen(Float64MultiArray, "/bilayer_sim/stimulus_applied")
+    answers = "/bilayer_sim/stimulus_stamped"
+    client.spin_until(lambda: client.node.count_publishers(answers) and client.node.count_subscribers("/clock"), name)
+    heard = time.monotonic() + 1.2  # a tick is repeated once a second while paused: controller and node know each other
+    client.spin_until(lambda: time.monotonic() > heard, "a tick that it hears")
     for _ in range(2):
         begun = len(applied)
         assert client.call("resume").success
