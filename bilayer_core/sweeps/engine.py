@@ -6,26 +6,21 @@ other. A piece is one run, or several short ones: Dask takes 2 to 4 ms for each 
 
 from __future__ import annotations
 
-import logging
 import os
 import signal
 import socket
-import tempfile
 import threading
 import time as clock
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
-from urllib.request import urlopen
 from uuid import uuid4
 
 from bilayer_core.errors import EngineError, InputError, OutputError
-from bilayer_core.sweeps.execute import LOGS, execute, prepare, present_versions, row_of
+from bilayer_core.sweeps.execute import execute, present_versions, row_of
 from bilayer_core.sweeps.job import Job, Outcome, Point, Row
 
 PIECE_TIME = 0.25
@@ -34,12 +29,6 @@ LARGEST_PIECE = 64
 """Runs."""
 MOST_DEATHS = 2
 """Of the process of one run alone; then the run is killed, in the words of its row."""
-DASHBOARD_TIME = 2.0
-"""For the dashboard to answer [s]."""
-CONNECT_TIME = 8.0
-"""To reach a scheduler [s]."""
-PREPARE_TIME = 600.0
-"""For a process to start, and to compile kernels [s]."""
 LOOK_TIME, LONELY_TIME = 2.0, 60.0
 """Between two looks whether anybody works at all, and how long nobody may [s]."""
 COUNT_TIME = 5.0
@@ -47,15 +36,6 @@ COUNT_TIME = 5.0
 KILL_FACTOR, KILL_EXTRA = 2.0, 10.0
 """A run is killed at this multiple of the time it may take, and so many seconds more: it could not stop by itself."""
 TOPIC = "bilayer-sweep"
-CONFIG = {
-    "distributed.scheduler.allowed-failures": 0,  # who dies is counted here
-    "distributed.worker.memory.target": False,  # of what runs, nothing can be put to disk
-    "distributed.worker.memory.spill": False,
-    "distributed.worker.memory.pause": False,
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.system-monitor.gil.enabled": False,
-}
-"""Of processes of this machine."""
 
 
 def work(job: Job, points: Sequence[Point]) -> list[Row]:
@@ -118,6 +98,7 @@ class Engine:
 
     Attributes
     ----------
+    client : distributed.Client
     threads : int
         Runs side by side.
     where : str
@@ -127,7 +108,7 @@ class Engine:
     """
 
     def __init__(self, client: Any, job: Job, memory: float | None):
-        self._client, self._job, self._memory = client, job, memory
+        self.client, self._job, self._memory = client, job, memory
         self._name = uuid4().hex[:8]
         self._done: SimpleQueue[int] = SimpleQueue()
         self._pieces: dict[int, _Piece] = {}
@@ -179,7 +160,7 @@ class Engine:
         self._count += 1
         number = self._count
         key = f"bilayer-run-{self._name}-{number}"
-        future = self._client.submit(work, job, list(points), key=key, pure=False)
+        future = self.client.submit(work, job, list(points), key=key, pure=False)
         self._pieces[number] = _Piece(job, list(points), future)
         future.add_done_callback(lambda _: self._done.put(number))
 
@@ -211,9 +192,9 @@ class Engine:
 
     def count_threads(self) -> int:
         """Look how many threads there are now: workers of a cluster may come and go."""
-        if self._client.status != "running":
+        if self.client.status != "running":
             raise EngineError(f"{self.where}: the scheduler has gone")
-        present = self._client.scheduler_info(n_workers=-1)["workers"].values()
+        present = self.client.scheduler_info(n_workers=-1)["workers"].values()
         threads = sum(worker["nthreads"] for worker in present)
         self.threads, self._counted = threads or self.threads, clock.monotonic()
         return threads
@@ -256,157 +237,6 @@ class Engine:
         return [row]
 
 
-@contextmanager
-def open_engine(
-    job: Job, workers: int | None = None, scheduler: str | None = None, memory: float | None = None
-) -> Iterator[Engine]:
-    """Processes that are ready to run.
-
-    Parameters
-    ----------
-    job : Job
-    workers : int, optional
-        Processes of this machine; by default one a core.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers run instead: ``tcp://host:8786``.
-    memory : float, optional
-        At which a process of this machine is killed [bytes]; by default its share of the memory.
-
-    Raises
-    ------
-    InputError
-        If Dask is not installed, the scheduler cannot be reached, or its workers have other versions or do not see the
-        directory of logs.
-    EngineError
-        If no process starts.
-    """
-    try:
-        import dask
-        import distributed  # noqa: F401
-    except ImportError:
-        raise InputError("sweeps need Dask: pip install 'bilayer_sim_ros[sweep]'") from None
-    with ExitStack() as stack:
-        if scheduler is None:
-            workers = workers or len(os.sched_getaffinity(0))
-            stack.enter_context(dask.config.set(CONFIG))
-            engine = _embedded(stack, job, workers, memory)
-        else:
-            engine = _joined(stack, job, scheduler)
-        _get_ready(engine, job, workers)
-        yield engine
-
-
-def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) -> Engine:
-    from distributed import Client, LocalCluster
-
-    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="bilayer-sweep-", ignore_cleanup_errors=True))
-    try:
-        with _keyboard_unheard():
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                memory_limit=memory or "auto",
-                local_directory=folder,
-                silence_logs=logging.CRITICAL,
-            )
-            stack.enter_context(cluster)
-    except RuntimeError as error:
-        hint = "in a program, call it below `if __name__ == '__main__':`, since processes read the program again"
-        raise EngineError(f"sweep: no process starts on this machine ({error}); {hint}") from error
-    client = stack.enter_context(Client(cluster, set_as_default=False))
-    engine = Engine(client, job, memory)
-    engine.where = f"{workers} processes of this machine" if workers > 1 else "one process of this machine"
-    engine.dashboard = _dashboard(client)
-    return engine
-
-
-@contextmanager
-def _keyboard_unheard() -> Iterator[None]:
-    """Threads and processes that are started meanwhile have SIGINT blocked: Ctrl-C is for the thread that waits."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    get_context("spawn").Lock()  # starts Python's tracker of resources, which would unblock the signal later
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _joined(stack: ExitStack, job: Job, address: str) -> Engine:
-    from distributed import Client
-
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
-    stack.callback(logger.setLevel, before)
-    try:
-        client = stack.enter_context(Client(address, timeout=CONNECT_TIME, set_as_default=False))
-    except (OSError, TimeoutError, ValueError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(
-            f"--scheduler: {address}: no Dask scheduler can be reached there within {CONNECT_TIME:g} s ({reason}); "
-            "`dask scheduler` prints its address when it starts, such as tcp://192.0.2.1:8786"
-        ) from None
-    engine = Engine(client, job, None)
-    engine.where, engine.dashboard = f"cluster {address}", _dashboard(client)
-    return engine
-
-
-def _dashboard(client: Any) -> str:
-    """Address of a scheduler's dashboard; empty if nothing is shown there, as where bokeh is not installed."""
-    link = str(client.dashboard_link)
-    try:
-        with urlopen(link, timeout=DASHBOARD_TIME):
-            return link
-    except (OSError, ValueError):
-        return ""
-
-
-def _get_ready(engine: Engine, job: Job, workers: int | None) -> None:
-    """Wait for processes, and have them say their versions, compile, and look for the directory of logs."""
-    client, joined = engine._client, workers is None
-    try:
-        client.wait_for_workers(1 if joined else workers, timeout=CONNECT_TIME if joined else PREPARE_TIME)
-    except TimeoutError:
-        what = "start some with `dask worker ADDRESS`" if joined else "is there enough memory?"
-        error = InputError if joined else EngineError
-        raise error(f"{engine.where}: has no workers; {what}") from None
-    engine.count_threads()
-    present = client.scheduler_info(n_workers=-1)["workers"]
-    with _token(job) as token:
-        by_host: dict[str, list[str]] = {}
-        for address, worker in present.items():
-            by_host.setdefault(worker["host"], []).append(address)
-        firsts = {addresses[0] for addresses in by_host.values()}
-        for group in (firsts, present.keys() - firsts):  # one of a machine compiles, the others read what it kept
-            asked = {
-                address: client.submit(
-                    prepare, job, token, workers=[address], allow_other_workers=False, pure=False, retries=1
-                )
-                for address in group
-            }
-            for address, future in asked.items():
-                _check(engine, address, job, _answer(engine, address, future))
-
-
-def _answer(engine: Engine, address: str, future: Any) -> dict[str, Any]:
-    try:
-        return future.result(timeout=PREPARE_TIME)
-    except (InputError, OutputError):
-        raise
-    except Exception as error:
-        told = " ".join(f"{type(error).__name__}: {error}".split())
-        raise InputError(
-            f"{engine.where}: worker {address} cannot run: {told}; bilayer_sim_ros must be installed there, in the "
-            "version that is here"
-        ) from error
-
-
 def refuse_other_versions(job: Job, found: dict[str, str], who: str) -> None:
     """Raise InputError if a process has other versions than this program."""
     here = job.expected
@@ -416,28 +246,3 @@ def refuse_other_versions(job: Job, found: dict[str, str], who: str) -> None:
             f"{who} has other versions: {', '.join(others)}; results would differ in their last digits or more; "
             "install the same on both sides"
         )
-
-
-def _check(engine: Engine, address: str, job: Job, answer: dict[str, Any]) -> None:
-    refuse_other_versions(job, answer["versions"], f"{engine.where}: worker {address} on {answer['host']}")
-    if not answer["sees"] or not answer["writes"]:
-        what = "cannot write there" if answer["sees"] else "does not see it"
-        raise InputError(
-            f"--out: {job.directory}: worker {address} on {answer['host']} {what}; logs need a directory that all "
-            f"workers share, by the same name (this is {socket.gethostname()})"
-        )
-
-
-@contextmanager
-def _token(job: Job) -> Iterator[str]:
-    """Name of a file that is in the directory of logs meanwhile; empty if there are none."""
-    if job.logs == "none":
-        yield ""
-        return
-    folder = Path(job.directory, LOGS)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(prefix=".shared-", dir=folder) as file:
-            yield Path(file.name).name
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error

@@ -16,10 +16,11 @@ from bilayer_core.record.paths import write_text
 from bilayer_core.scene.loader import load_content, scene_content, scene_text
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.sweeps.design import Values
-from bilayer_core.sweeps.engine import Engine, open_engine
+from bilayer_core.sweeps.engine import Engine
 from bilayer_core.sweeps.execute import scene_of
 from bilayer_core.sweeps.job import Job, Outcome, Point, Row
 from bilayer_core.sweeps.journal import Journal
+from bilayer_core.sweeps.opening import open_engine
 from bilayer_core.sweeps.result import write_table
 from bilayer_core.sweeps.run import Sweep, directory_of, read_sweep
 from bilayer_core.sweeps.spec import Parameter

@@ -15,11 +15,12 @@ from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.sweeps.code import find_code
 from bilayer_core.sweeps.design import Values, count_of, runs_of
-from bilayer_core.sweeps.engine import Engine, open_engine
+from bilayer_core.sweeps.engine import Engine
 from bilayer_core.sweeps.execute import present_versions, recording_of, scene_of
 from bilayer_core.sweeps.job import Job, Point, Row, digest
 from bilayer_core.sweeps.journal import Journal
 from bilayer_core.sweeps.metrics import FinishedRun, MetricError, check_metrics
+from bilayer_core.sweeps.opening import open_engine
 from bilayer_core.sweeps.result import Columns, SweepResult, rows_of
 from bilayer_core.sweeps.spec import OfFunction, SweepSpec, read_spec
 

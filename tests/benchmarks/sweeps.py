@@ -16,8 +16,8 @@ from itertools import islice
 import psutil
 
 from bilayer_core.bench.machine import record
-from bilayer_core.sweeps.engine import open_engine
 from bilayer_core.sweeps.execute import execute
+from bilayer_core.sweeps.opening import open_engine
 from bilayer_core.sweeps.run import read_sweep, sweep
 
 GAIN = {

@@ -77,7 +77,7 @@ def test_the_result_is_that_of_the_nearest_run_to_the_data(noisy, found):
             assert sum(np.sum((noisy[name] - other[name]) ** 2) for name in (f"{TIP}.x", f"{TIP}.z")) > best
 
 
-def test_intervals_with_estimated_and_with_given_noise_agree_where_that_is_what_residuals_have(noisy, found):
+def test_intervals_with_estimated_and_with_given_noise_agree_where_both_are_right(noisy, found):
     given = fit(SCENE, noisy, PARAMETERS, sigma={"rod/*": found.sigma[f"{TIP}.x"]})
     assert given.values == pytest.approx(found.values, rel=1e-5)
     assert given.chi_squared == pytest.approx(given.freedom, rel=1e-4) and 0.3 < given.probability < 0.6

@@ -145,7 +145,7 @@ def slap():
     return parameters, columns, Runs(scene, parameters, read_data(columns, known, nodes, 1.0))
 
 
-def test_the_step_from_the_measured_noise_has_the_slope_of_impacts_and_a_naive_one_has_not(slap):
+def test_a_step_from_measured_noise_has_the_slope_of_impacts_and_a_naive_one_not(slap):
     (parameter,), columns, runs = slap
     here = np.array([parameter.part(1e6)])
     offsets = np.linspace(-0.03, 0.03, 21)
@@ -159,7 +159,7 @@ def test_the_step_from_the_measured_noise_has_the_slope_of_impacts_and_a_naive_o
     assert np.abs(naive - trend).max() > 100.0 * size
 
 
-def test_a_fit_with_naive_steps_misses_the_truth_and_one_with_measured_steps_finds_it(slap, monkeypatch):
+def test_a_fit_with_naive_steps_misses_the_truth_and_measured_steps_find_it(slap, monkeypatch):
     _, columns, _ = slap
     asked = {MODULUS: (*BOUNDS, "0.8 MPa")}
     found = fit(STRIP, columns, asked)

@@ -14,8 +14,8 @@ import yaml
 from sweep_programs import address_in, dask, end, start_scheduler, wait_until
 
 from bilayer_core.errors import EngineError, InputError
-from bilayer_core.sweeps.engine import open_engine
 from bilayer_core.sweeps.job import Outcome
+from bilayer_core.sweeps.opening import open_engine
 from bilayer_core.sweeps.run import read_sweep, sweep
 
 COMMAND = [sys.executable, "-m", "bilayer_core"]
@@ -163,7 +163,7 @@ def test_logs_need_a_directory_that_workers_see(strip, cluster, tmp_path, monkey
     found = sweep(strip | {"logs": "all"}, scheduler=cluster, out=tmp_path / "here")
     assert sorted(row.log for row in found.rows) == [f"logs/{k:06d}.mcap" for k in range(8)]
     read = read_sweep(strip | {"logs": "all"}, tmp_path / "here")
-    monkeypatch.setattr("bilayer_core.sweeps.engine.LOGS", "only_here")  # which workers look for elsewhere
+    monkeypatch.setattr("bilayer_core.sweeps.opening.LOGS", "only_here")  # which workers look for elsewhere
     with pytest.raises(InputError, match="does not see it; logs need a directory that all workers share"):
         with open_engine(read.job, scheduler=cluster):
             pass
@@ -197,7 +197,7 @@ MOMENTS = int(os.environ.get("SWEEP_KILLS", "5"))
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_a_sweep_that_is_killed_at_random_moments_is_completed_and_nothing_is_made_twice(strip, tmp_path):
+def test_a_sweep_killed_at_random_moments_is_completed_and_nothing_is_made_twice(strip, tmp_path):
     rng = random.Random(int(os.environ.get("SWEEP_KILLS_SEED", "7")))
     strip["parameters"]["gain"]["count"] = 15
     strip["set"]["duration"] = "40 s"
