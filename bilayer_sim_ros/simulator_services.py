@@ -242,7 +242,7 @@ def _then(first: Future, following: Callable[[Any], Future]) -> Future:
     """The future of what follows; an error of the first is its own."""
     whole: Future = Future()
 
-    def hand_on(last: Future) -> None:
+    def take_result(last: Future) -> None:
         error = last.exception()
         if error is not None:
             whole.set_exception(error)
@@ -251,9 +251,9 @@ def _then(first: Future, following: Callable[[Any], Future]) -> Future:
 
     def go_on(ended: Future) -> None:
         if ended.exception() is not None:
-            hand_on(ended)
+            take_result(ended)
         else:
-            following(ended.result()).add_done_callback(hand_on)
+            following(ended.result()).add_done_callback(take_result)
 
     first.add_done_callback(go_on)
     return whole

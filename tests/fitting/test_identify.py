@@ -30,7 +30,7 @@ def named(matrix, errors, count, **bounds):
 
 
 def test_independent_columns_are_told_apart():
-    refuse_unseen(parameters(4), np.full(4, 0.5), COLUMNS, np.full(4, 1e-3), "at the start")
+    assert refuse_unseen(parameters(4), np.full(4, 0.5), COLUMNS, np.full(4, 1e-3), "at the start") is None
 
 
 @pytest.mark.parametrize("power", [1.0, 3.0, -0.5])
