@@ -126,7 +126,7 @@ def _lines(
         axes.axvline(x, color=MISSING, linewidth=0.5, zorder=0)
     axes.set(xlabel=_label(result, along), ylabel=_label(result, metric), xscale=_scale(result, along))
     if len(groups) > 1:
-        axes.legend()
+        figure.legend(loc="outside right upper")
 
 
 def _short(value: str) -> str:
@@ -143,7 +143,8 @@ def _map(figure: Any, result: SweepResult, names: list[str], metric: str) -> Non
     if len(levels[0]) * len(levels[1]) == len({*zip(x.tolist(), y.tolist(), strict=True)}):
         grid = np.full((len(levels[1]), len(levels[0])), np.nan)
         grid[np.searchsorted(levels[1], y), np.searchsorted(levels[0], x)] = z
-        drawn = axes.pcolormesh(*levels, grid, cmap=MAP, shading="nearest")
+        borders = [cell_borders(of, _scale(result, name) == "log") for of, name in zip(levels, names, strict=True)]
+        drawn = axes.pcolormesh(*borders, grid, cmap=MAP)
         axes.grid(False)
     else:
         known = np.isfinite(z)
@@ -155,6 +156,26 @@ def _map(figure: Any, result: SweepResult, names: list[str], metric: str) -> Non
     axes.set(xlabel=_label(result, names[0]), ylabel=_label(result, names[1]))
     axes.set(xscale=_scale(result, names[0]), yscale=_scale(result, names[1]))
     figure.colorbar(drawn, label=_label(result, metric))
+
+
+def cell_borders(levels: Column, logarithmic: bool) -> Column:
+    """Borders half way between values, by their ratios if the axis is logarithmic; the outer cells are symmetric.
+
+    Parameters
+    ----------
+    levels : ndarray
+        At least two values, ascending, shape (n,).
+    logarithmic : bool
+
+    Returns
+    -------
+    ndarray
+        Shape (n + 1,).
+    """
+    places = np.log(levels) if logarithmic else levels
+    middles = 0.5 * (places[:-1] + places[1:])
+    borders = np.array([2.0 * places[0] - middles[0], *middles, 2.0 * places[-1] - middles[-1]])
+    return np.exp(borders) if logarithmic else borders
 
 
 def _parallel(figure: Any, result: SweepResult, done: list[Row], numeric: list[str], measured: list[str]) -> None:

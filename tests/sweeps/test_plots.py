@@ -7,7 +7,7 @@ from bilayer_core import read_results
 from bilayer_core.errors import InputError
 from bilayer_core.sweeps.job import Outcome, Row
 from bilayer_core.sweeps.journal import Journal
-from bilayer_core.sweeps.plots import draw, front
+from bilayer_core.sweeps.plots import cell_borders, draw, front
 from bilayer_core.sweeps.result import Columns, SweepResult, write_table
 
 
@@ -70,6 +70,23 @@ def test_a_map_has_the_colour_of_each_value_at_its_place(tmp_path):
 
     assert place(image, low)[0] > place(image, high)[0] and place(image, low)[1] < place(image, high)[1]
     assert place(other, low) == pytest.approx(place(image, high), abs=40.0)  # labels move the field a little
+
+
+def test_cells_of_a_map_are_centred_on_their_values_on_both_kinds_of_axes():
+    values = np.array([0.1, 1.0, 10.0])
+    ratios = cell_borders(values, logarithmic=True)
+    assert np.sqrt(ratios[:-1] * ratios[1:]) == pytest.approx(values)
+    even = cell_borders(np.array([2.0, 4.0, 6.0]), logarithmic=False)
+    assert even.tolist() == [1.0, 3.0, 5.0, 7.0]
+
+
+def test_the_legend_of_lines_stands_beside_them(tmp_path):
+    points = [{"a": float(k), "b": b} for k in range(6) for b in (1.0, 2.0, 3.0)]
+    image = pixels(draw(result(points, about("a", "b"), lambda a, b: b), tmp_path)[0])
+    coloured = np.nonzero(image.max(axis=2) - image.min(axis=2) > 60)
+    lines = coloured[1][(coloured[0] > 0.5 * image.shape[0])]
+    # level lines end with the field; what is coloured to the right of it is the legend
+    assert coloured[1].max() > lines.max() + 20
 
 
 def test_runs_that_are_not_done_are_marked_on_the_map(tmp_path):
