@@ -20,8 +20,7 @@ from bilayer_core.sweeps.execute import present_versions, recording_of, scene_of
 from bilayer_core.sweeps.job import Job, Point, Row, digest
 from bilayer_core.sweeps.journal import Journal
 from bilayer_core.sweeps.metrics import FinishedRun, MetricError, check_metrics
-from bilayer_core.sweeps.opening import open_engine
-from bilayer_core.sweeps.result import Columns, SweepResult, rows_of
+from bilayer_core.sweeps.result import Columns, SweepResult, rows_of, write_table
 from bilayer_core.sweeps.spec import OfFunction, SweepSpec, read_spec
 
 TRIED = 16
@@ -232,11 +231,15 @@ def sweep(
     directory = None if out is None else directory_of(Path(out))
     read = read_sweep(spec, directory, functions)
     with Journal(directory, read.content, resume=resume, force=force) as journal:
-        with ExitStack() as stack:
-            for rows in run_missing(read, journal, stack, workers, scheduler):
-                for row in rows:
-                    if progress is not None:
-                        progress(row)
+        try:
+            with ExitStack() as stack:
+                for rows in run_missing(read, journal, stack, workers, scheduler):
+                    for row in rows:
+                        if progress is not None:
+                            progress(row)
+        finally:
+            if directory is not None:
+                write_table(journal, read.keys(), read.about, directory)
         return read.result(journal)
 
 

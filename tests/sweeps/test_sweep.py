@@ -13,6 +13,7 @@ import pytest
 import yaml
 from sweep_programs import address_in, dask, end, start_scheduler, wait_until
 
+from bilayer_core import read_results
 from bilayer_core.errors import EngineError, InputError
 from bilayer_core.sweeps.job import Outcome
 from bilayer_core.sweeps.opening import open_engine
@@ -162,6 +163,7 @@ def test_workers_with_another_version_are_refused_before_the_first_run(strip, tm
 def test_logs_need_a_directory_that_workers_see(strip, cluster, tmp_path, monkeypatch):
     found = sweep(strip | {"logs": "all"}, scheduler=cluster, out=tmp_path / "here")
     assert sorted(row.log for row in found.rows) == [f"logs/{k:06d}.mcap" for k in range(8)]
+    assert results(read_results(tmp_path / "here")) == results(found)  # the table is there as well
     read = read_sweep(strip | {"logs": "all"}, tmp_path / "here")
     monkeypatch.setattr("bilayer_core.sweeps.opening.LOGS", "only_here")  # which workers look for elsewhere
     with pytest.raises(InputError, match="does not see it; logs need a directory that all workers share"):
