@@ -61,7 +61,7 @@ def sweep(
     listed: bool,
     quiet: bool,
 ) -> None:
-    """Make many runs of a scene with other values, as SWEEP says: a file, or a bundled one by its name (docs/sweeps.md).
+    """Make many runs of a scene with other values, as SWEEP says: a file, or the name of a bundled one.
 
     Writes DIR/results.sqlite as results come, then DIR/results.parquet: a row for each run, also for one that could
     not go on, with its reason. Killed at any moment, --resume makes what is missing.

@@ -1,4 +1,4 @@
-"""Where bundled scenes, templates and sweeps are: one lookup for a checkout, a wheel, an editable and both colcon installs."""
+"""Where bundled scenes, templates and sweeps are: one lookup for a checkout, a wheel, and installs by links."""
 
 from __future__ import annotations
 

@@ -103,10 +103,11 @@ def test_a_file_in_the_present_directory_is_preferred_to_a_bundled_scene(tmp_pat
     assert load_scene("gripping").name == "cantilever"
 
 
-@pytest.mark.parametrize("name, found", [("walker_gait", True), ("walker_gait.yaml", False), ("./walker_gait", False)])
-def test_a_name_without_suffix_and_folder_means_something_bundled(name, found, monkeypatch, tmp_path):
+@pytest.mark.parametrize("name", ["walker_gait.yaml", "walker_gait.yml", "here/walker_gait", Path("walker_gait")])
+def test_a_suffix_a_folder_or_a_path_means_a_file(name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    assert is_file_name(name) is not found
+    assert is_file_name(name)
+    assert not is_file_name("walker_gait")
 
 
 def test_a_file_beside_is_taken_before_a_bundled_one_of_its_name(monkeypatch, tmp_path):
