@@ -20,6 +20,7 @@ from bilayer_core.sweeps.execute import present_versions, recording_of, scene_of
 from bilayer_core.sweeps.job import Job, Point, Row, digest
 from bilayer_core.sweeps.journal import Journal
 from bilayer_core.sweeps.metrics import FinishedRun, MetricError, check_metrics
+from bilayer_core.sweeps.opening import open_engine
 from bilayer_core.sweeps.result import Columns, SweepResult, rows_of, write_table
 from bilayer_core.sweeps.spec import OfFunction, SweepSpec, read_spec
 
