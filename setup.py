@@ -44,6 +44,7 @@ data_files = [
     (f"share/{NAME}", ["package.xml"]),
     (f"share/{NAME}/config", glob("config/*.yaml") + glob("config/*.rviz")),
     (f"share/{NAME}/config/scenes", glob("config/scenes/*.yaml")),
+    (f"share/{NAME}/config/sweeps", glob("config/sweeps/*.yaml") + glob("config/sweeps/*.py")),
     (f"share/{NAME}/config/templates", glob("config/templates/*.yaml")),
     (f"share/{NAME}/config/torture", glob("config/torture/*.yaml")),
     (f"share/{NAME}/launch", glob("bilayer_sim_ros/launch/*.launch.py")),

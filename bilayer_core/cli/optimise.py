@@ -15,7 +15,7 @@ NOT_CONFIRMED = 1
 
 
 @click.command(cls=Verb)
-@click.argument("file", metavar="SWEEP.yaml")
+@click.argument("file", metavar="SWEEP")
 @click.option("--maximise", metavar="METRIC", help="Search for its largest value.")
 @click.option("--minimise", metavar="METRIC", help="Search for its least value.")
 @click.option("--trials", type=click.IntRange(1), default=100, show_default=True, help="Runs, resumed ones included.")
@@ -40,7 +40,9 @@ def optimise(
     plotted: bool,
     quiet: bool,
 ) -> int:
-    """Search for the values of the parameters of SWEEP.yaml with the best METRIC (docs/sweeps.md).
+    """Search for the values of the parameters of SWEEP with the best METRIC (docs/sweeps.md).
+
+    SWEEP is a file, or the name of a bundled one: `bilayer sweep --bundled` lists them.
 
     The best run is made again at a tenth of the tolerance: exit code 1 if its metric differs by more than 2 %. Writes
     results as `bilayer sweep` does, and DIR/best.yaml, a scene for `bilayer run`.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import click
 
@@ -13,13 +14,17 @@ from bilayer_core.cli.options import Verb
 def scenes() -> None:
     """List the bundled scenes."""
     from bilayer_core.scene.bundled import bundled_scenes
+
+    click.echo(titles(bundled_scenes()))
+
+
+def titles(files: dict[str, Path]) -> str:
+    """A line for each file of scenes or sweeps: its name and its title."""
     from bilayer_core.scene.text import read_yaml
 
-    found = bundled_scenes()
-    width = max(map(len, found))
-    for name, path in found.items():
-        title = read_yaml(path.read_text(encoding="utf-8"), str(path))["title"]
-        click.echo(f"{name:{width}}  {title}")
+    width = max(map(len, files))
+    found = {name: read_yaml(path.read_text(encoding="utf-8"), str(path))["title"] for name, path in files.items()}
+    return "\n".join(f"{name:{width}}  {title}" for name, title in found.items())
 
 
 @click.command(cls=Verb)

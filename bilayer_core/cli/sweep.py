@@ -23,14 +23,32 @@ def workers_option(function: Any) -> Any:
     )
 
 
+def _list_bundled(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if not wanted:
+        return
+    from bilayer_core.cli.scenes import titles
+    from bilayer_core.scene.bundled import bundled_sweeps
+
+    click.echo(titles(bundled_sweeps()))
+    context.exit()
+
+
 @click.command(cls=Verb)
-@click.argument("file", metavar="SWEEP.yaml")
+@click.argument("file", metavar="SWEEP")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
 @workers_option
 @click.option("--resume", is_flag=True, help="Make the runs that are missing in DIR, and none twice.")
 @click.option("--force", is_flag=True, help="Replace the results in DIR.")
 @click.option("--plot", "plotted", is_flag=True, help="Draw the results, as well as those that are there already.")
 @click.option("--list", "listed", is_flag=True, help="Show the runs, and make none.")
+@click.option(
+    "--bundled",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_list_bundled,
+    help="List the sweeps that come with the simulator.",
+)
 @click.option("--quiet", is_flag=True, help="No progress.")
 def sweep(
     file: str,
@@ -43,7 +61,7 @@ def sweep(
     listed: bool,
     quiet: bool,
 ) -> None:
-    """Make many runs of a scene with other values, as SWEEP.yaml says (docs/sweeps.md).
+    """Make many runs of a scene with other values, as SWEEP says: a file, or the name of a bundled one.
 
     Writes DIR/results.sqlite as results come, then DIR/results.parquet: a row for each run, also for one that could
     not go on, with its reason. Killed at any moment, --resume makes what is missing.

@@ -1,4 +1,4 @@
-"""Where bundled scenes and templates are: one lookup for a checkout, a wheel, an editable and both colcon installs."""
+"""Where bundled scenes, templates and sweeps are: one lookup for a checkout, a wheel, and installs by links."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from bilayer_core.scene.faults import suggestion
 _SHARED = Path("share") / bilayer_core.DISTRIBUTION / "config"
 """Below the prefix that the package is installed to."""
 SUFFIX = ".yaml"
+SUFFIXES = (SUFFIX, ".yml")
+"""Of files; a text that ends so is no name of something bundled."""
 
 
 def _candidates() -> Iterator[Path]:
@@ -43,7 +45,7 @@ def _recorded() -> Iterator[Path]:
 
 
 def bundled_directory(kind: str) -> Path:
-    """The directory of the bundled ``scenes`` or ``templates``.
+    """The directory of the bundled ``scenes``, ``templates`` or ``sweeps``.
 
     Raises
     ------
@@ -84,6 +86,11 @@ def bundled_templates() -> dict[str, Path]:
     return _bundled("templates")
 
 
+def bundled_sweeps() -> dict[str, Path]:
+    """File of each bundled sweep by its name, in alphabetical order."""
+    return _bundled("sweeps")
+
+
 def bundled_scene(name: str) -> Path:
     """File of a bundled scene.
 
@@ -92,12 +99,33 @@ def bundled_scene(name: str) -> Path:
     SceneError
         If there is no such scene; suggests the nearest name and lists all.
     """
-    directory = bundled_directory("scenes")
+    return _of_name(name, "scene")
+
+
+def bundled_sweep(name: str) -> Path:
+    """File of a bundled sweep.
+
+    Raises
+    ------
+    SceneError
+        If there is no such sweep; suggests the nearest name and lists all.
+    """
+    return _of_name(name, "sweep")
+
+
+def _of_name(name: str, word: str) -> Path:
+    directory = bundled_directory(f"{word}s")
     files = _files(directory)
     if name + SUFFIX in files:
         return directory / (name + SUFFIX)
-    scenes = [file.removesuffix(SUFFIX) for file in files]
+    names = [file.removesuffix(SUFFIX) for file in files]
     raise SceneError(
-        f"{name}: neither a scene file nor a bundled scene{suggestion(name, scenes)}; "
-        f"bundled are {', '.join(scenes)} (in {directory})"
+        f"{name}: neither a {word} file nor a bundled {word}{suggestion(name, names)}; "
+        f"bundled are {', '.join(names)} (in {directory})"
     )
+
+
+def is_file_name(given: str | Path) -> bool:
+    """Whether it is meant as a file, not as the name of something bundled."""
+    path = Path(given)
+    return isinstance(given, Path) or path.suffix in SUFFIXES or len(path.parts) > 1 or path.is_file()

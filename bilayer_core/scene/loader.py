@@ -9,14 +9,12 @@ from typing import Any
 from pydantic import ValidationError
 
 from bilayer_core.errors import SceneError
-from bilayer_core.scene.bundled import bundled_scene
+from bilayer_core.scene.bundled import bundled_scene, is_file_name
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.faults import shortened, tell
 from bilayer_core.scene.limits import LARGEST_FILE, check_content, read_text
 from bilayer_core.scene.overrides import Overrides, read_overrides
 from bilayer_core.scene.text import read_yaml, write_yaml
-
-SUFFIXES = (".yaml", ".yml")
 
 
 def load_scene(scene: str | Path | Mapping[str, Any], overrides: Overrides = ()) -> SceneConfig:
@@ -88,10 +86,7 @@ def load_content(content: dict[str, Any], overrides: Overrides, source: str = "s
 
 def find_scene(scene: str | Path) -> Path:
     """A path if it is one or looks like one, else that of the bundled scene of this name."""
-    path = Path(scene)
-    if isinstance(scene, Path) or path.suffix in SUFFIXES or len(path.parts) > 1 or path.is_file():
-        return path
-    return bundled_scene(scene)
+    return Path(scene) if is_file_name(scene) else bundled_scene(str(scene))
 
 
 def _validated(data: Any, source: str, overrides: Overrides, directory: Path) -> SceneConfig:

@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 
 from bilayer_core.errors import SceneError
-from bilayer_core.scene.bundled import bundled_templates
+from bilayer_core.scene.bundled import SUFFIXES, bundled_templates
 from bilayer_core.scene.faults import suggestion
-from bilayer_core.scene.loader import SUFFIXES, find_scene, parse_scene, read_scene_file
+from bilayer_core.scene.loader import find_scene, parse_scene, read_scene_file
 from bilayer_core.scene.text import read_yaml
 
 DEFAULT_TEMPLATE = "strip"

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from bilayer_core.errors import InputError, SceneError
+from bilayer_core.scene.bundled import bundled_sweep, is_file_name
 from bilayer_core.scene.faults import Fault, one_of, refuse, refuse_all, tell
 from bilayer_core.scene.limits import LARGEST_FILE, read_text
 from bilayer_core.scene.part import Name, Part
@@ -315,7 +316,7 @@ def read_spec(spec: str | Path | Mapping[str, Any]) -> tuple[SweepSpec, Path, st
     Parameters
     ----------
     spec : str, Path or mapping
-        A file, or its content; files that content names are relative to the working directory.
+        A file, the name of a bundled sweep, or content; files that content names are relative to the working directory.
 
     Returns
     -------
@@ -332,9 +333,9 @@ def read_spec(spec: str | Path | Mapping[str, Any]) -> tuple[SweepSpec, Path, st
     """
     directory, source, content = Path(), "sweep", spec
     if isinstance(spec, str | Path):
-        path = Path(spec)
-        directory, source = path.parent, str(path)
         try:
+            path = Path(spec) if is_file_name(spec) else bundled_sweep(str(spec))
+            directory, source = path.parent, str(path)
             content = read_yaml(read_text(path, LARGEST_FILE), source)
         except ValueError as error:
             raise InputError(f"{source!r}: {error}" if "\0" in source else f"{source}: {error}") from None

@@ -91,6 +91,7 @@ def test_the_bundled_scenes_are_found(prefix, run):
 def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
     assert (prefix / "share/ament_index/resource_index/packages/bilayer_sim_ros").is_file()
     configuration = ("config/sim_node.yaml", "config/scenes/gripping.yaml", "config/templates/strip.yaml")
+    configuration += ("config/sweeps/walker_gait.yaml", "config/sweeps/walker_gait.py")
     for name in ("package.xml", *configuration, "launch/simulation.launch.py", "launch/replay.launch.py"):
         assert (prefix / "share/bilayer_sim_ros" / name).is_file()
 

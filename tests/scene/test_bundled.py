@@ -7,7 +7,14 @@ import bilayer_core
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.scene import bundled
-from bilayer_core.scene.bundled import bundled_directory, bundled_scenes, bundled_templates
+from bilayer_core.scene.bundled import (
+    bundled_directory,
+    bundled_scenes,
+    bundled_sweep,
+    bundled_sweeps,
+    bundled_templates,
+    is_file_name,
+)
 
 SHARED = "share/bilayer_sim_ros/config/scenes"
 
@@ -94,3 +101,23 @@ def test_a_file_in_the_present_directory_is_preferred_to_a_bundled_scene(tmp_pat
     (tmp_path / "gripping").write_text(text)
     monkeypatch.chdir(tmp_path)
     assert load_scene("gripping").name == "cantilever"
+
+
+@pytest.mark.parametrize("name", ["walker_gait.yaml", "walker_gait.yml", "here/walker_gait", Path("walker_gait")])
+def test_a_suffix_a_folder_or_a_path_means_a_file(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert is_file_name(name)
+    assert not is_file_name("walker_gait")
+
+
+def test_a_file_beside_is_taken_before_a_bundled_one_of_its_name(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walker_gait").write_text("")
+    assert is_file_name("walker_gait")
+
+
+def test_an_unknown_sweep_is_refused_with_the_nearest_name_and_all_of_them():
+    with pytest.raises(SceneError) as refusal:
+        bundled_sweep("walker_gate")
+    assert "neither a sweep file nor a bundled sweep, did you mean walker_gait?" in str(refusal.value)
+    assert all(name in str(refusal.value) for name in bundled_sweeps())
