@@ -3,10 +3,11 @@
     python tests/benchmarks/closed_loop.py [--only sine] [--scene NAME] [--set PATH=VALUE] [--duration S]
 
 The node, with its log, has processor 0, the controller processor 1. The controller follows /clock and sends a signal at
-a rate in simulated time, so that the same acts on a slow machine. The node is asked for the real-time factor that is
-its goal; what it can is simulated time over the CPU time of the stepping thread and of the whole process, which hold on
-a busy machine too; what it reached is simulated over real time. The error is the largest distance of a node from the
-same run at a tenth of the tolerance, with the same commands at the same times, over the longest rod.
+a rate in simulated time, so that the same acts on a slow machine. The node goes as fast as it can (`--factor 0`), or is
+asked for a real-time factor. What it reached is simulated over real time, from where it is ready and resumed to its
+end; simulated time over the CPU time of the stepping thread and of the whole process holds on a busy machine too. The
+error is the largest distance of a node from the same run at a tenth of the tolerance, with the same commands at the
+same times, over the longest rod.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -47,24 +49,28 @@ def noise(part: float) -> Callable[[float, random.Random], float]:
 
 
 SIGNALS = {
-    "sine": (sine, 100.0, 5.0),
-    "square": (square, 2.0, 1.0),
-    "noise 5 %": (noise(0.05), 1000.0, 1.0),
-    "noise 20 %": (noise(0.2), 1000.0, 1.0),
+    "sine": (sine, 100.0),
+    "square": (square, 2.0),
+    "noise 5 %": (noise(0.05), 1000.0),
+    "noise 20 %": (noise(0.2), 1000.0),
 }
-"""Name to law, messages per simulated second, and the real-time factor that is asked for."""
+"""Name to law, and messages per simulated second."""
 
 
 def control(name: str, channel: str) -> None:
-    """Send a signal as simulated time goes on, until nobody listens any more; runs in a process of its own."""
+    """Send a signal as simulated time goes on, until nobody listens any more; runs in a process of its own.
+
+    Prints when it has the node go on [s].
+    """
     import rclpy
+    from rclpy.executors import ExternalShutdownException
     from rclpy.node import Node
     from rclpy.qos import QoSProfile, ReliabilityPolicy
     from rosgraph_msgs.msg import Clock
     from std_msgs.msg import Float64
     from std_srvs.srv import Trigger
 
-    law, rate, _ = SIGNALS[name]
+    law, rate = SIGNALS[name]
     chance, sent = random.Random(1), 0
     rclpy.init()
     node = Node("signal")
@@ -84,9 +90,13 @@ def control(name: str, channel: str) -> None:
         rclpy.spin_once(node, timeout_sec=0.05)
         if time.monotonic() > deadline:
             raise SystemExit("there is no node")
+    print(time.monotonic(), flush=True)
     resume.call_async(Trigger.Request())
-    while publisher.get_subscription_count() > 0:
-        rclpy.spin_once(node, timeout_sec=0.5)
+    try:
+        while publisher.get_subscription_count() > 0:
+            rclpy.spin_once(node, timeout_sec=0.5)
+    except ExternalShutdownException:  # the node has come to its end
+        pass
 
 
 def cpu_time(pid: int) -> float:
@@ -113,28 +123,31 @@ def measure(name: str, log: Path, options: argparse.Namespace) -> dict[str, floa
 
     channel = next(iter(load_scene(options.scene).stimuli))
     parameters = {"scene": options.scene, "log": log, "duration": options.duration, "start_paused": "true"}
-    parameters |= {"real_time_factor": SIGNALS[name][2], "stimulus_interpolation": options.interpolation}
+    parameters |= {"real_time_factor": options.factor, "stimulus_interpolation": options.interpolation}
     parameters |= {"tolerance": options.tolerance}
     command = ["taskset", "-c", str(NODE_CORE), sys.executable, "-m", "bilayer_sim_ros.sim_node", "--ros-args"]
     for key, value in parameters.items():
         command += ["-p", f"{key}:={value}"]
     driver = ["taskset", "-c", str(CONTROLLER_CORE), sys.executable, __file__, "--control", name, "--channel", channel]
-    output, begin, begun, ended, cpu = "", 0.0, 0.0, 0.0, 0.0  # it resumes the node about a second after "ready"
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as node, subprocess.Popen(driver) as controller:
+    output, ready, begun, ended, cpu = "", 0.0, 0.0, 0.0, 0.0
+    with ExitStack() as stack:
+        node = stack.enter_context(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
+        controller = stack.enter_context(subprocess.Popen(driver, stdout=subprocess.PIPE, text=True))
         for line in node.stderr:
             output += line
             if "is ready" in line:
-                begin, begun = time.monotonic(), cpu_time(node.pid)
+                ready, begun = time.monotonic(), cpu_time(node.pid)
             elif "ended at" in line:
                 ended, cpu = time.monotonic(), cpu_time(node.pid) - begun
         controller.terminate()
+        resumed = float(controller.stdout.readline())
     steps = re.search(r"CPU time of the steps: ([\d.]+) s", output)
     if steps is None:
         raise SystemExit(f"the node did not reach its end:\n{output}")
     behind = re.findall(r"behind: .*", output)
     if behind:
         print(f"    {name}: {behind[-1]}")
-    return {"cpu": float(steps[1]), "process": cpu, "real": ended - begin, "warnings": len(behind)}
+    return {"cpu": float(steps[1]), "process": cpu, "real": ended - max(ready, resumed), "warnings": len(behind)}
 
 
 def error_of(log: Path, part: float) -> tuple[float, float]:
@@ -159,6 +172,7 @@ def main() -> None:
     parser.add_argument("--only", choices=SIGNALS)
     parser.add_argument("--scene", default="gripping")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="of the scene")
+    parser.add_argument("--factor", type=float, default=0.0, help="real-time factor asked for; 0 = as fast as possible")
     parser.add_argument("--duration", type=float, default=10.0, help="simulated time [s]")
     parser.add_argument("--interpolation", default="linear", choices=["linear", "hold"])
     parser.add_argument("--tolerance", type=float, default=0.0, help="of steps; 0 = as the scene says")
@@ -176,8 +190,8 @@ def main() -> None:
     figures = {}
     what = " ".join([options.scene, *options.set])
     print(f"{what}, {options.interpolation}, {options.duration:g} s; load average {os.getloadavg()[0]:.1f}")
-    print("| signal | messages/s | asked | reached | by CPU of steps | by CPU of node | largest error | last error |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| signal | messages/s | reached | by CPU of steps | by CPU of node | largest error | last error |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as directory:
         options.scene = scene_with(options.set, options.scene, Path(directory))
         for name in [options.only] if options.only else SIGNALS:
@@ -185,9 +199,8 @@ def main() -> None:
             found = measure(name, log, options)
             worst, last = (math.nan, math.nan) if options.no_error else error_of(log, options.part)
             figures[name] = found | {"largest_error": worst, "last_error": last}
-            _, rate, asked = SIGNALS[name]
             factors = " | ".join(f"{options.duration / found[time]:.2f}" for time in ("real", "cpu", "process"))
-            print(f"| {name} | {rate:g} | {asked:g} | {factors} | {worst:.2%} | {last:.2%} |", flush=True)
+            print(f"| {name} | {SIGNALS[name][1]:g} | {factors} | {worst:.2%} | {last:.2%} |", flush=True)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1))
 
