@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Any
 
 import click
 
-from bilayer_core.cli.options import Verb, output_directory
+from bilayer_core.cli.options import Verb
 from bilayer_core.cli.watch import compile_kernels, runs_bar
 
 DEFAULT_DIRECTORY = "runs/sweep"
@@ -72,8 +73,7 @@ def sweep(
     from bilayer_core.sweeps.run import read_sweep, run_missing
 
     refuse_both(workers, scheduler)
-    directory = output_directory(out)
-    compile_kernels(quiet)
+    directory = Path(out)
     read = read_sweep(file, directory)
     if listed:
         _list(read)
@@ -82,6 +82,7 @@ def sweep(
         from bilayer_core.sweeps.plots import check_matplotlib
 
         check_matplotlib()
+    compile_kernels(quiet)
     with Journal(directory, read.content, resume=resume, force=force) as journal:
         keys = read.keys()
         there = len(journal.keys() & keys)

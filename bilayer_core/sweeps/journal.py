@@ -30,7 +30,7 @@ class Journal:
     Parameters
     ----------
     directory : Path or None
-        That exists; None keeps results in memory.
+        Made if it is not there; None keeps results in memory.
     content : dict
         The sweep file, to which results belong.
     resume : bool
@@ -42,11 +42,13 @@ class Journal:
     ------
     InputError
         If results are there that are neither to be continued nor replaced, there is nothing to resume, the sweep file
-        has changed since, or another program writes there.
+        has changed since, another program writes there, or the directory cannot be made.
     """
 
     def __init__(self, directory: Path | None, content: dict[str, Any], *, resume: bool = False, force: bool = False):
         self.path = None if directory is None else directory / FILE
+        if resume:
+            self._refuse_missing()
         self._lock = None if directory is None else _locked(directory)
         try:
             self._refuse_others(resume, force)
@@ -80,13 +82,12 @@ class Journal:
         if self._lock is not None:
             self._lock.close()
 
-    def _refuse_others(self, resume: bool, force: bool) -> None:
-        if self.path is None:
-            return
-        there = self.path.exists()
-        if resume and not there:
+    def _refuse_missing(self) -> None:
+        if self.path is not None and not self.path.exists():
             raise InputError(f"--resume: {self.path}: no results are there to go on with")
-        if there and not resume and not force:
+
+    def _refuse_others(self, resume: bool, force: bool) -> None:
+        if self.path is not None and self.path.exists() and not resume and not force:
             raise InputError(
                 f"{self.path}: results are there already; go on with them (--resume), replace them (--force), or "
                 "choose another directory (--out)"
@@ -141,6 +142,11 @@ class Journal:
 
 
 def _locked(directory: Path) -> Any:
+    """The lock of a directory, which is made if it is not there."""
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"out: {directory}: cannot be made a directory: {error.strerror or error}") from error
     try:
         return open_alone(directory / LOCK, force=True)
     except OSError as error:

@@ -22,7 +22,7 @@ from bilayer_core.sweeps.job import Job, Outcome, Point, Row
 from bilayer_core.sweeps.journal import Journal
 from bilayer_core.sweeps.opening import open_engine
 from bilayer_core.sweeps.result import write_table
-from bilayer_core.sweeps.run import Sweep, directory_of, read_sweep
+from bilayer_core.sweeps.run import Sweep, read_sweep
 from bilayer_core.sweeps.spec import Parameter
 
 TRIALS = 100
@@ -239,7 +239,7 @@ def optimise(
     InputError
         If anything that is asked for cannot be, or no run has a value of the metric.
     """
-    directory = None if out is None else directory_of(Path(out))
+    directory = None if out is None else Path(out)
     read = read_sweep(spec, directory)
     _refuse_unsearchable(read, metric)
     content = read.content | {"search": [metric, largest, seed]}

@@ -229,7 +229,7 @@ def sweep(
     >>> result = sweep({"schema": 1, "scene": "bending", "parameters": {"gain": {...}}})  # doctest: +SKIP
     >>> result.to_dataframe()  # doctest: +SKIP
     """
-    directory = None if out is None else directory_of(Path(out))
+    directory = None if out is None else Path(out)
     read = read_sweep(spec, directory, functions)
     with Journal(directory, read.content, resume=resume, force=force) as journal:
         try:
@@ -273,12 +273,3 @@ def run_missing(
 def _with_first(first: Point, rest: Iterator[Point]) -> Iterator[Point]:
     yield first
     yield from rest
-
-
-def directory_of(out: Path) -> Path:
-    """The directory of results, made if it is not there. InputError if it cannot be."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"out: {out}: cannot be made a directory: {error.strerror or error}") from error
-    return out

@@ -41,7 +41,12 @@ def test_runs_can_be_listed_without_making_any(call, tmp_path):
     code, out, _ = call("--list")
     assert code == 0
     assert out.splitlines()[:3] == ["number\tgain [%]\tlength [mm]", "0\t0.5\t80.0", "1\t0.5\t100.0"]
-    assert not list((tmp_path / "out").glob("results*"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_makes_no_run_leaves_no_directory_behind(call, tmp_path):
+    assert call(content="")[0] == call("--resume")[0] == 2
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
