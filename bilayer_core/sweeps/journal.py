@@ -98,7 +98,9 @@ class Journal:
             found = self._base.execute("SELECT value FROM head WHERE name = 'sweep'").fetchone()
         except sqlite3.DatabaseError as error:
             raise InputError(f"--resume: {self.path}: is damaged or no journal of a sweep: {error}") from None
-        before, now = json.loads(found[0]) if found else {}, json.loads(_text(content))
+        if found is None:  # killed between the first two writes, before any row
+            return
+        before, now = json.loads(found[0]), json.loads(_text(content))
         changed = [key for key in {**before, **now} if before.get(key) != now.get(key)]
         if changed:
             more = f" and {len(changed) - MOST_SHOWN} more" if len(changed) > MOST_SHOWN else ""

@@ -8,7 +8,7 @@ import pytest
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.sweeps.job import Outcome, Row
-from bilayer_core.sweeps.journal import FILE, Journal
+from bilayer_core.sweeps.journal import FILE, SCHEMA, Journal
 
 CONTENT = {"scene": "bending", "parameters": {"gain": {"values": [1, 2]}}, "design": "grid"}
 
@@ -39,6 +39,19 @@ def test_results_that_are_there_are_not_replaced_unless_asked(tmp_path):
         assert not journal.keys()
 
 
+@pytest.mark.parametrize("statements", [[], ["PRAGMA journal_mode=WAL"], ["PRAGMA journal_mode=WAL", SCHEMA]])
+def test_a_sweep_killed_before_its_first_row_is_resumed(tmp_path, statements):
+    (tmp_path / FILE).touch()
+    with sqlite3.connect(tmp_path / FILE) as base:
+        for statement in statements:
+            base.executescript(statement)
+    base.close()
+    with Journal(tmp_path, CONTENT, resume=True) as journal:
+        journal.add([row(0)])
+    with pytest.raises(InputError, match="the sweep has changed since its results were begun, in design"):
+        Journal(tmp_path, CONTENT | {"design": "list"}, resume=True)
+
+
 def test_nothing_to_resume_is_said(tmp_path):
     with pytest.raises(InputError, match="no results are there to go on with"):
         Journal(tmp_path, CONTENT, resume=True)
@@ -59,15 +72,11 @@ def test_a_second_program_cannot_write_the_same_results(tmp_path):
                 Journal(tmp_path, CONTENT, **options)
 
 
-@pytest.mark.parametrize("content", [b"", b"no database", b"SQLite format 3\0" + b"\xff" * 5000])
+@pytest.mark.parametrize("content", [b"no database", b"SQLite format 3\0" + b"\xff" * 5000])
 def test_a_damaged_journal_is_named(tmp_path, content):
     (tmp_path / FILE).write_bytes(content)
-    if content:
-        with pytest.raises(InputError, match="is damaged or no journal of a sweep"):
-            Journal(tmp_path, CONTENT, resume=True)
-    else:  # as a program that was killed at once leaves it
-        with pytest.raises(InputError, match="has changed since"):
-            Journal(tmp_path, CONTENT, resume=True)
+    with pytest.raises(InputError, match="is damaged or no journal of a sweep"):
+        Journal(tmp_path, CONTENT, resume=True)
     Journal(tmp_path, CONTENT, force=True).close()
 
 

@@ -201,7 +201,7 @@ MOMENTS = int(os.environ.get("SWEEP_KILLS", "5"))
 @pytest.mark.timeout(1800)
 def test_a_sweep_killed_at_random_moments_is_completed_and_nothing_is_made_twice(strip, tmp_path):
     rng = random.Random(int(os.environ.get("SWEEP_KILLS_SEED", "7")))
-    strip["parameters"]["gain"]["count"] = 15
+    strip["parameters"]["gain"]["count"] = 10 + MOMENTS
     strip["set"]["duration"] = "40 s"
     strip["logs"] = "all"
     (tmp_path / "sweep.yaml").write_text(yaml.safe_dump(strip))
@@ -210,29 +210,36 @@ def test_a_sweep_killed_at_random_moments_is_completed_and_nothing_is_made_twice
     made: dict[str, str] = {}
 
     def rows():
-        with sqlite3.connect(out / "results.sqlite") as base:
-            return dict(base.execute("SELECT key, row FROM rows").fetchall())
-
-    for _ in range(MOMENTS):
-        resume = ["--resume"] if (out / "results.sqlite").exists() else []
-        program = subprocess.Popen([*command, *resume], cwd=tmp_path, start_new_session=True)
         try:
-            program.wait(rng.uniform(0.5, 8.0))
+            with sqlite3.connect(f"file:{out / 'results.sqlite'}?mode=rw", uri=True) as base:
+                return dict(base.execute("SELECT key, row FROM rows").fetchall())
+        except sqlite3.OperationalError:  # not there yet
+            return {}
+
+    def start():
+        resume = ["--resume"] if (out / "results.sqlite").exists() else []
+        return subprocess.Popen([*command, *resume], cwd=tmp_path, start_new_session=True)
+
+    for moment in range(MOMENTS):
+        program = start()
+        deadline = time.monotonic() + 60.0
+        while moment % 2 and program.poll() is None and len(rows()) == len(made) and time.monotonic() < deadline:
+            time.sleep(0.02)  # every second kill comes while rows do, the others at any time from the start
+        try:
+            program.wait(rng.uniform(0.0, 2.0) if moment % 2 else rng.uniform(0.3, 8.0))
         except subprocess.TimeoutExpired:
             program.kill()
             program.wait()
-        if (out / "results.sqlite").exists():
-            now = rows()
-            assert made.items() <= now.items()  # what was there is the same text, with its times: it was not made again
-            made = now
+        now = rows()
+        assert made.items() <= now.items()  # what was there is the same text, with its times: it was not made again
+        made = now
         counts.append(len(made))
-    resume = ["--resume"] if (out / "results.sqlite").exists() else []
-    assert subprocess.run([*command, *resume], cwd=tmp_path).returncode == 0
-    assert made.items() <= rows().items() and len(rows()) == 30
+    assert start().wait() == 0
+    assert made.items() <= rows().items() and len(rows()) == 2 * (10 + MOMENTS)
     from bilayer_core import read_log, read_results
 
     found = read_results(out)
-    assert found.outcomes == {"done": 30}
+    assert found.outcomes == {"done": len(rows())}
     assert all(read_log(out / row.log).times[-1] == pytest.approx(40.0) for row in found.rows[::7])
     print(f"{MOMENTS} kills; rows after each: {counts}")
 
