@@ -33,6 +33,7 @@ test: $(STAMP)  ## Run every test, the slow ones as well.
 
 lint: $(STAMP)  ## Check the code's style, and the types of what programs call.
 	$(BIN)/ruff check .
+	$(BIN)/ruff format --check --quiet bilayer_core bilayer_sim_ros tests setup.py
 	$(BIN)/mypy
 
 install: $(STAMP) kernels  ## Install into .venv, and compile the kernels.

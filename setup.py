@@ -84,7 +84,8 @@ setup(
     package_data={
         "bilayer_core": ["py.typed"],
         "bilayer_sim_ros": ["py.typed"],
-        "bilayer_core.bench": ["references.json"], "bilayer_core.stress": ["mutants.toml"],
+        "bilayer_core.bench": ["references.json"],
+        "bilayer_core.stress": ["mutants.toml"],
     },
     data_files=data_files,
     zip_safe=False,

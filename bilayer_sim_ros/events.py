@@ -26,9 +26,7 @@ class EventPublisher:
     """
 
     def __init__(self, node: Node, description: Description):
-        quality = QoSProfile(
-            depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
-        )
+        quality = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
         self._publisher = create_output(node, Log, EVENTS.full_name("~"), quality)
         self._detector = EventDetector(description)
 

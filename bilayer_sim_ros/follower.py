@@ -81,9 +81,7 @@ def _follow(options: argparse.Namespace, stop: Stop) -> None:
     from bilayer_core.view.live import LiveView
     from bilayer_core.view.server import ViewServer
 
-    serving = Serving(
-        options.bind, options.port, not options.serve, options.web, options.save, options.colour
-    )
+    serving = Serving(options.bind, options.port, not options.serve, options.web, options.save, options.colour)
     with ExitStack() as ending:
         server = ending.enter_context(ViewServer(serving.bind, serving.port))
         view = LiveView(server, serving.colour, serving.save)
@@ -109,7 +107,10 @@ def _follow(options: argparse.Namespace, stop: Stop) -> None:
                 _say(what if there else f"{what}; what it showed is served until Ctrl-C")
             if not there and not told and now - begun > PATIENCE:
                 told = True
-                _say(f"no node {options.node} publishes {listener.topic} yet; waiting for it until Ctrl-C")
+                _say(
+                    f"no node {options.node} publishes {listener.topic} yet (replay_node never does: view its log); "
+                    "waiting for it until Ctrl-C"
+                )
         view.show()
 
 

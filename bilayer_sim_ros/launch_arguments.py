@@ -73,4 +73,3 @@ def near_misses(declared: Collection[str], given: Iterable[str]) -> list[str]:
     """What is to be said of arguments that nobody has declared, but almost. Other files of a launch have theirs."""
     meant = {name: nearest(name, declared) for name in given if name not in declared}
     return [f"launch argument '{name}' is not read: did you mean '{close}'?" for name, close in meant.items() if close]
-

@@ -33,9 +33,7 @@ KEPT = QoSProfile(
     depth=DESCRIPTION.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 """Of the description."""
-LOSSY = QoSProfile(
-    depth=LIVE.depth, reliability=ReliabilityPolicy.BEST_EFFORT, durability=DurabilityPolicy.VOLATILE
-)
+LOSSY = QoSProfile(depth=LIVE.depth, reliability=ReliabilityPolicy.BEST_EFFORT, durability=DurabilityPolicy.VOLATILE)
 """Of frames: nobody who is slow, or has stopped, is waited for."""
 
 
@@ -116,7 +114,5 @@ class LivePublisher:
         self._events.clear()
         label, data = pack(parts)
         dimension = MultiArrayDimension(label=label, size=len(data), stride=len(data))
-        self._publisher.publish(
-            UInt8MultiArray(layout=MultiArrayLayout(dim=[dimension]), data=array.array("B", data))
-        )
+        self._publisher.publish(UInt8MultiArray(layout=MultiArrayLayout(dim=[dimension]), data=array.array("B", data)))
         self._sent_at, self._held = now, None

@@ -35,9 +35,7 @@ def play(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> 
 def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: threading.Event) -> None:
     playback = playback_of(log, parameters)
     logger = node.get_logger()
-    topics = ReplayTopics(
-        node, log.channels, playback.clock_rate > 0.0 or playback.clock_on_publish, logger.warning
-    )
+    topics = ReplayTopics(node, log.channels, playback.clock_rate > 0.0 or playback.clock_on_publish, logger.warning)
     if not topics.channels:
         raise InputError(f"{log.path}: holds no topic that can be published")
 

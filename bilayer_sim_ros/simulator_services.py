@@ -257,4 +257,3 @@ def _then(first: Future, following: Callable[[Any], Future]) -> Future:
 
     first.add_done_callback(go_on)
     return whole
-

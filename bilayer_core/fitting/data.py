@@ -368,4 +368,3 @@ def _sigma(name: str, value: float | str, column: Column) -> float:
     if not (math.isfinite(number) and number > 0.0):
         raise InputError(f"sigma {name}: found {value}; {allowed}")
     return number
-

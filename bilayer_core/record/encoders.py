@@ -139,9 +139,7 @@ class FrameEncoder:
         self._energy: tuple[tuple[str, ...], SmallMessage] = ((), SmallMessage(multi_array_template(())))
         self._encoders: dict[str, Callable[[Frame], bytes]] = {
             "/clock": SmallMessage(clock_template()),
-            "stimulus_applied": SmallMessage(
-                multi_array_template(description.channels), lambda frame: frame.stimulus
-            ),
+            "stimulus_applied": SmallMessage(multi_array_template(description.channels), lambda frame: frame.stimulus),
             "com": SmallMessage(stamped_template(3), lambda frame: frame.com),
             "energy": self._encode_energy,
             "solver": SmallMessage(

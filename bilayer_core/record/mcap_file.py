@@ -92,9 +92,7 @@ class McapFile:
 
     def add_schema(self, name: str, text: str) -> int:
         """Announce a message type; its number."""
-        schema = self._records.Schema(
-            id=len(self._schemas) + 1, name=name, encoding="ros2msg", data=text.encode()
-        )
+        schema = self._records.Schema(id=len(self._schemas) + 1, name=name, encoding="ros2msg", data=text.encode())
         self._schemas.append(schema)
         self._chunk += self._bytes_of(schema)
         return schema.id
@@ -174,9 +172,7 @@ class McapFile:
         footer = _FOOTER.pack(self._opcodes.FOOTER, _FOOTER_SIZE, begin, offset_begin)
         checksum = zlib.crc32(footer, zlib.crc32(summary))
         self._put(summary)
-        self._write(
-            self._records.Footer(summary_start=begin, summary_offset_start=offset_begin, summary_crc=checksum)
-        )
+        self._write(self._records.Footer(summary_start=begin, summary_offset_start=offset_begin, summary_crc=checksum))
         self._put(self._magic)
         self._file.flush()
 

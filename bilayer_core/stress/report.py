@@ -128,9 +128,7 @@ def _outcomes(records: Sequence[Record]) -> Iterator[str]:
     counted = counts(records)
     for record in records:
         counted.setdefault(f"`{record.name.split('/')[0]}`", Counter())[record.outcome] += 1
-    rows = [
-        (name, outcomes.total(), *(outcomes[outcome] for outcome in Outcome)) for name, outcomes in counted.items()
-    ]
+    rows = [(name, outcomes.total(), *(outcomes[outcome] for outcome in Outcome)) for name, outcomes in counted.items()]
     yield from _table(("", "cases", *Outcome), rows)
     refused, worked = remedies(records)
     yield f"{refused} cases were refused; what the message says to change was done, and works in {worked} of them."
@@ -200,7 +198,7 @@ def _mutated_scenes() -> Iterator[str]:
     if MUTATED_SCENES.exists():
         yield from MUTATED_SCENES.read_text(encoding="utf-8").splitlines()
     else:
-        yield "`FUZZ_SCENES=10000 pytest -m \"\" tests/fuzz` has not been run."
+        yield '`FUZZ_SCENES=10000 pytest -m "" tests/fuzz` has not been run.'
     yield ""
 
 

@@ -45,9 +45,7 @@ class MeetingPoints:
         beyond = np.maximum(half_width - self.node_radius, 0.0) if model.plane is None else np.zeros(nodes)
         self._sides = [np.zeros(nodes), -beyond, beyond] if beyond.any() else [np.zeros(nodes)]
         self._balls = [
-            index
-            for index, shape in enumerate(model.bodies.shapes)
-            if shape is not None and shape.kind == "sphere"
+            index for index, shape in enumerate(model.bodies.shapes) if shape is not None and shape.kind == "sphere"
         ]
         contact = model.contact_points
         shown = np.arange(nodes, nodes + contact.point_count)

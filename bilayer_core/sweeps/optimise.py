@@ -338,5 +338,3 @@ def write_best(sweep: Sweep, row: Row, directory: Path) -> Path:
     path = directory / BEST
     write_text(path, scene_text(scene_of(sweep.job, row.parameters)), force=True)
     return path
-
-

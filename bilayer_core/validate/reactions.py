@@ -76,8 +76,13 @@ def _held_tip(model: str, dimension: int, stations: int) -> float:
 
 
 SMALL, LENGTH = 1e-4, 0.06
-CURVATURE = 6.0 * SMALL * THICK * THIN * (THICK + THIN) / (
-    THICK**4 + THIN**4 + 4.0 * THICK**3 * THIN + 4.0 * THICK * THIN**3 + 6.0 * THICK**2 * THIN**2
+CURVATURE = (
+    6.0
+    * SMALL
+    * THICK
+    * THIN
+    * (THICK + THIN)
+    / (THICK**4 + THIN**4 + 4.0 * THICK**3 * THIN + 4.0 * THICK * THIN**3 + 6.0 * THICK**2 * THIN**2)
 )
 """Of the free bilayer, of one modulus (Timoshenko 1925) [1/m]."""
 BENDING_STIFFNESS = SOFT["youngs_modulus"] * WIDTH * (THICK + THIN) ** 3 / 12.0

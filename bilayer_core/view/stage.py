@@ -31,7 +31,9 @@ from bilayer_core.view.window import FINER, Part, Window, lay_over, part_around
 if TYPE_CHECKING:
     from PIL import Image
 
-_MARK, _LIGHT = "//VTK::Light::Impl", """
+_MARK, _LIGHT = (
+    "//VTK::Light::Impl",
+    """
 float near = max(normalVCVSOutput.z, 0.0), over = max(dot(normalVCVSOutput, vec3(-0.4657, 0.6985, 0.5433)), 0.0);
 float first = near * near, second = max(dot(normalVCVSOutput, vec3(-0.2651, 0.3976, 0.8784)), 0.0);
 second *= second;
@@ -39,7 +41,8 @@ first *= first; first *= first; first *= first; first *= first;
 second *= second; second *= second; second *= second; second *= second;
 vec3 shine = (0.55 * first + 0.6 * second) * specularIntensity * specularColorUniform;
 fragOutput0 = vec4(ambientColor + (0.55 * near + 0.6 * over) * diffuseColor + shine, opacity);
-"""
+""",
+)
 """Light from the eye and from over its left shoulder: diffuse, and the 32nd power of the cosine between the normal and
 what halves the angle to the eye. VTK's own loop over lights takes one and a half times as long."""
 WORTH_KEEPING = 0.7  # of the size of the part that was drawn last: other sizes cost new buffers

@@ -194,9 +194,7 @@ def _both(lanes: np.ndarray) -> np.ndarray:
     return ((lanes + (lanes >> 32)) & 0xFFFFFFFF) + 0x20002
 
 
-def part_around(
-    shot: Shot, points: np.ndarray, size: tuple[int, int], least: tuple[int, int] = (1, 1)
-) -> Part | None:
+def part_around(shot: Shot, points: np.ndarray, size: tuple[int, int], least: tuple[int, int] = (1, 1)) -> Part | None:
     """The part of a picture that shows points, with some room; all of it if one is beside the eye or behind it.
 
     Parameters

@@ -25,9 +25,7 @@ def test_the_programs_and_commands_of_the_page_about_logs_do_what_it_says(root, 
     script += "\n".join(block.text for block in told if block.info == "sh")
     outputs = []
     for command in ([sys.executable, "-c", program], ["bash", "-e", "-c", script]):
-        done = subprocess.run(
-            command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=TIMEOUT
-        )
+        done = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=TIMEOUT)
         assert done.returncode == 0, done.stdout + done.stderr
         outputs.append(done.stdout)
     assert "RunData(bending: t = 0 to 0.4 s, 21 frames" in outputs[0] and "(9, " in outputs[0]

@@ -58,9 +58,7 @@ def test_what_is_sent_and_asked_for_while_it_compiles_acts_when_it_is_ready(node
 
     monkeypatch.setattr(simulation_run, "ensure_compiled", compile_slowly)
     log = tmp_path / "run.mcap"
-    node = nodes(
-        SimulationNode, scene="bending", log=str(log), start_paused=True, real_time_factor=0.0, duration=0.2
-    )
+    node = nodes(SimulationNode, scene="bending", log=str(log), start_paused=True, real_time_factor=0.0, duration=0.2)
     node.start()
     client = nodes(Node, "client")
 

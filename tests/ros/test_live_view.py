@@ -24,7 +24,8 @@ some tenths of a second."""
 def followers(node):
     """The processes that show a node: its follower, and the follower's server."""
     (follower,) = (
-        of for of in psutil.process_iter(["cmdline", "ppid"])
+        of
+        for of in psutil.process_iter(["cmdline", "ppid"])
         if of.info["ppid"] == node.pid and "bilayer_sim_ros.follower" in (of.info["cmdline"] or ())
     )
     return [follower, *follower.children()]

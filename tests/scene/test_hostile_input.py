@@ -173,7 +173,7 @@ def test_as_many_copies_as_there_may_be_are_compared_in_time():
 
 @pytest.mark.parametrize(
     ("turns", "reason"),
-    [(100, "found \"0 m between"), (1e6, "must be at most 200000 times the thickness of the rod, 0.001 m")],
+    [(100, 'found "0 m between'), (1e6, "must be at most 200000 times the thickness of the rod, 0.001 m")],
 )
 def test_a_path_of_many_turns_on_each_other_is_refused_in_time_and_memory(turns, reason):
     arc = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.05, "angle": f"{turns} turns"}
@@ -218,7 +218,7 @@ def test_too_many_nodes_are_refused_with_the_memory_that_they_would_take():
     text = refusal(scene(rods))
     assert "rods.left.stations: found 60000; must be fewer" in text and "240000 nodes, and take about 1.2 GB" in text
     rods = [rod([layer()], stations=3) | {"name": f"r_{k}", "pattern": {"count": 750}} for k in range(2)]
-    assert "found \"1500 rods\"; must be at most 1000" in refusal(scene(rods))
+    assert 'found "1500 rods"; must be at most 1000' in refusal(scene(rods))
 
 
 def test_as_many_nodes_as_are_allowed_are_built_in_time_and_memory():
