@@ -249,3 +249,38 @@ def _with_type(value: Any) -> Any:
 Patterns = Annotated[
     Rotation | Translation | Grid | Mirror | Listed, Field(discriminator="type"), BeforeValidator(_with_type)
 ]
+
+
+NO_AXIS = np.array([0.2971, 0.3793, 0.3236])
+"""A direction that patterns do not have. Its parts sum to 1: points that differ by less than a tolerance in each
+coordinate do so along it."""
+
+
+def pair_at_one_place(copies: Array, tolerance: float) -> tuple[int, int] | None:
+    """Two copies that lie on each other, or None if there are none.
+
+    Those whose points agree, in either direction, agree in their middle. Where copies are in the order of their middles
+    along a direction, only a few others can be between them: what is compared grows as their number, not its square.
+
+    Parameters
+    ----------
+    copies : ndarray, shape (n_copy, n_point, 3)
+        Points [m] at equal distances along each; an odd number.
+    tolerance : float
+        By which coordinates may differ [m].
+    """
+    along = copies[:, copies.shape[1] // 2] @ NO_AXIS
+    order = np.argsort(along, kind="stable")
+    reach = tolerance + EXACT * np.abs(along).max(initial=0.0)
+    for places in range(1, len(copies)):
+        near = np.flatnonzero(along[order[places:]] - along[order[:-places]] <= reach)
+        if not len(near):
+            return None
+        one, other = copies[order[near]], copies[order[near + places]]
+        apart = np.min([np.abs(one - way).max(axis=(1, 2)) for way in (other, other[:, ::-1])], axis=0)
+        found = near[apart <= tolerance]
+        if len(found):
+            pairs = np.sort(np.column_stack([order[found], order[found + places]]), axis=1)
+            first, second = pairs[np.lexsort(pairs.T)[0]]
+            return int(first), int(second)
+    return None

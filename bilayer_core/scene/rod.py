@@ -17,7 +17,7 @@ from bilayer_core.scene.imperfection import Imperfection
 from bilayer_core.scene.limits import MOST_NODES
 from bilayer_core.scene.part import Direction, Name, Part
 from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
-from bilayer_core.scene.pattern import Patterns, Placement, placed, stacked
+from bilayer_core.scene.pattern import Patterns, Placement, pair_at_one_place, placed, stacked
 from bilayer_core.scene.point_paths import PolylinePath, SplinePath
 from bilayer_core.scene.profile import Profile, extremes, values_at, varying
 from bilayer_core.scene.units import (
@@ -310,7 +310,7 @@ def _far_away(rod: Rod) -> Iterator[Fault]:
 
 
 POINTS_COMPARED = 9
-"""Along two copies of a rod that may lie on each other, in either direction."""
+"""Along two copies of a rod that may lie on each other."""
 
 
 def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
@@ -326,15 +326,11 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
         if getattr(rod, end) is not None and getattr(rod.pattern, end) is not None:
             yield (end,), getattr(rod, end), f"must be left out where `pattern.{end}` has the body of each copy"
     points = rod.frames_at(np.linspace(0.0, rod.path.length, POINTS_COMPARED))[0]
-    copies = stacked(rod.pattern.places()).points(points)
-    for second in range(1, len(copies)):
-        ways = copies[second], copies[second][::-1]
-        apart = np.min([np.abs(copies[:second] - way).max(axis=(1, 2)) for way in ways], axis=0)
-        if apart.min() <= ROUNDING * rod.path.length:
-            first = rod.copy_names[int(apart.argmin())]
-            demand = f"must leave no copy where another is: {rod.copy_names[second]} lies on {first}"
-            yield ("pattern",), rod.pattern.type, demand
-            return
+    pair = pair_at_one_place(stacked(rod.pattern.places()).points(points), ROUNDING * rod.path.length)
+    if pair is not None:
+        first, second = (rod.copy_names[copy] for copy in pair)
+        demand = f"must leave no copy where another is: {second} lies on {first}"
+        yield ("pattern",), rod.pattern.type, demand
 
 
 def _sharp_bends(rod: Rod) -> Iterator[Fault]:

@@ -10,6 +10,7 @@ from bilayer_core.errors import SceneError
 from bilayer_core.model.plan import best_dimension, make_plan
 from bilayer_core.model.validity import EdgeFigures
 from bilayer_core.scene.loader import scene_text
+from bilayer_core.scene.pattern import pair_at_one_place
 from bilayer_core.scene.text import read_yaml
 
 CHANNELS = {name: {"schedule": {"type": "hold", "value": 0.5}} for name in ("heat", "left", "right")}
@@ -133,6 +134,28 @@ def test_a_fault_of_a_pattern_is_told_with_its_place_the_value_found_and_what_is
     with pytest.raises(SceneError) as refused:
         load_scene(content(pattern))
     assert f"scene: rods.arm.pattern{fault}" in str(refused.value), refused.value
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_copies_that_lie_on_each_other_are_found_as_by_comparing_all(seed):
+    rng = np.random.default_rng(seed)
+    copies = rng.normal(size=(rng.integers(1, 12), 5, 3)) + 1e6 * rng.integers(-1, 2)
+    copies -= copies[:, 2:3] * rng.integers(0, 2)  # of half the cases the middles are all at one place
+    for _ in range(rng.integers(0, 3)):
+        one, other = rng.integers(len(copies), size=2)
+        copies[other] = copies[one][:: rng.choice([-1, 1])] + rng.uniform(-0.9e-3, 0.9e-3, 3)
+
+    def on_each_other(one, other):
+        return min(np.abs(one - other).max(), np.abs(one - other[::-1]).max()) <= 1e-3
+
+    pairs = {
+        (first, second)
+        for second in range(len(copies))
+        for first in range(second)
+        if on_each_other(copies[first], copies[second])
+    }
+    found = pair_at_one_place(copies, 1e-3)
+    assert found in pairs if pairs else found is None
 
 
 def test_a_clamp_of_all_copies_and_one_of_each_contradict():
