@@ -18,7 +18,6 @@ from ..model.records.parts import Mechanisms
 from ..model.records.problem import Sums
 from ..model.records.step import RunExtrema, StageInputs, StateArrays
 from ..model.rest_strains import RestStrains
-from ..model.sizes import sizes_of
 from ..model.state import State
 from .actuation import Actuation
 from .capacity import CapacityError
@@ -67,14 +66,15 @@ class Engine:
         self, model: Model, method: Method, control: StepControl, newton_tolerance: float, max_iterations: int
     ):
         self._model, self._storage, self._control = model, Storage(model), control
+        sizes = self._storage.sizes
         self._newton = newton_tolerance, max_iterations
         self._outcome, self.gap = self._storage.outcome, math.inf
         methods = (method, SELF_STARTING) if method.history else (method,)
         self._methods = [used.arrays() for used in methods]
-        self._configurations = [new_configuration(model) for _ in range(3)]
+        self._configurations = [new_configuration(model, sizes) for _ in range(3)]
         self.end = self._configurations[1]
-        self._work = new_work(model, self._configurations, max(len(used.nodes) for used in methods))
-        self._inputs = new_inputs(model, max(len(used.points) for used in methods))
+        self._work = new_work(sizes, self._configurations, max(len(used.nodes) for used in methods))
+        self._inputs = new_inputs(model, sizes, max(len(used.points) for used in methods))
         self.stimulus = self._inputs.applied
         self.actuation: Actuation | None = None
         self._error_norm, self._counts = error_norm_of(model), empty_counts()
@@ -83,7 +83,7 @@ class Engine:
         self._no_joints = Joints.absent()
         self._evaluated = True  # whether forces are those of `end`
         self.extrema = RunExtrema.zeros(
-            sizes_of(model),
+            sizes,
             mass_moment=model.mass_moment,
             mass=float(model.node_mass.sum()),
             voronoi_length=model.voronoi_length,
@@ -275,9 +275,9 @@ class Engine:
         count_shape(run.problem, run.state, self.end, self._work.stage, self.extrema)
 
 
-def new_inputs(model: Model, ends: int) -> StageInputs:
+def new_inputs(model: Model, sizes: dict[str, int], ends: int) -> StageInputs:
     """Arrays for what acts at so many ends of stages, with prescribed bodies at the start of their paths."""
-    inputs = StageInputs.zeros(sizes_of(model) | {"stage end": ends})
+    inputs = StageInputs.zeros(sizes | {"stage end": ends})
     for b in np.flatnonzero(model.bodies.free_index[:-1] < 0):
         inputs.position[:, b], inputs.rotation[:, b] = model.bodies.start_position[b], model.bodies.start_rotation[b]
     return inputs

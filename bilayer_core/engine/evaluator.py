@@ -68,7 +68,8 @@ class Evaluator:
         self._storage = Storage(model)
         self._state = initial_state(model, memory=memory_size(model))
         self._arrays = StateArrays(**{name: getattr(self._state, name) for name in StateArrays.names})
-        self._work, self._inputs = new_work(model, [], 1), new_inputs(model, 1)
+        sizes = self._storage.sizes
+        self._work, self._inputs = new_work(sizes, [], 1), new_inputs(model, sizes, 1)
         self.stage: Stage = self._work.stage
         self.point: Point = self._work.origin
 
@@ -90,7 +91,7 @@ class Evaluator:
 
     def new(self) -> Configuration:
         """A configuration, of which only what does not move is in place."""
-        return new_configuration(self.model)
+        return new_configuration(self.model, self._storage.sizes)
 
     def take_state(self, state: State, at: Configuration) -> None:
         """Make a configuration that of a state."""

@@ -57,6 +57,8 @@ class Storage:
         Another object after `grow`.
     outcome : Outcome
         What pieces leave beside the number that they return.
+    sizes : dict of str to int
+        As in `model.sizes`.
 
     Raises
     ------
@@ -66,9 +68,9 @@ class Storage:
 
     def __init__(self, model: Model):
         require_computed(model.forces)
-        self._model, self._sizes = model, sizes_of(model)
+        self._model, self.sizes = model, sizes_of(model)
         points = len(model.rod_surfaces.point_edge) if model.rod_surfaces is not None else 0
-        near = self._sizes["contact_point"] if model.has_surface_contact and self._sizes["surface"] else 0
+        near = self.sizes["contact_point"] if model.has_surface_contact and self.sizes["surface"] else 0
         columns = model.bodies.freedom.shape[1] + model.joined_unknowns(model.solved_layout).shape[0]
         first = min(points, FIRST_POINTS)
         self._capacity = Capacity(near, first, first, columns)
@@ -79,13 +81,13 @@ class Storage:
         self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
         self._width, self._memory = np.zeros(1, dtype=np.int64), np.zeros(memory_size(model))
         self._sums, of_dimension = self._lasting_sums()
-        self._groups = lasting_groups(model, self._sizes) | of_dimension
+        self._groups = lasting_groups(model, self.sizes) | of_dimension
         self._problem: Problem | None = None
         self._friction = none_given()  # as in `State.friction`
 
     def _lasting_sums(self) -> tuple[dict[str, Array], dict[str, Space | Plane]]:
         """The parts of `Sums` that have no capacity, and the record of the dimension, whose hessians are among them."""
-        model, sizes = self._model, self._sizes
+        model, sizes = self._model, self.sizes
         declared, names = (Space, IN_SPACE) if model.plane is None else (Plane, IN_PLANE)
         own = shapes_of(declared, sizes, names)
         first, sums = zeros_in_one(shapes_of(Sums, sizes, FIRST))
@@ -96,7 +98,7 @@ class Storage:
         of_dimension = {name: parts["own", name] for name in names}
         if model.plane is None:
             return sums, {"space": Space(**of_dimension), "plane": Plane.absent()}
-        return sums, {"space": Space.absent(), "plane": plane_of(model, self._sizes, of_dimension)}
+        return sums, {"space": Space.absent(), "plane": plane_of(model, self.sizes, of_dimension)}
 
     @property
     def problem(self) -> Problem:
@@ -108,7 +110,7 @@ class Storage:
     def _make(self) -> Problem:
         model, capacity, before = self._model, self._capacity, self._problem
         surfaces, rods = model.has_surface_contact, self._pairs is not None
-        sizes = self._sizes | {
+        sizes = self.sizes | {
             "near": capacity.near,
             "link": 2 * capacity.near,
             "arm": 2 * capacity.near + 1,
@@ -152,9 +154,9 @@ class Storage:
             _take_over(before.rod_contact.sliding, of_stage, int(before.rod_contact.sliding.count[0]))
         now = RodContactList.zeros({"contact": capacity.contacts})
         ways = np.array([0.0, -1.0, 0.0, -np.inf]) if before is None else before.rod_contact.ways
-        last = np.zeros((self._sizes["node"], 3)) if before is None else before.rod_contact.last
+        last = np.zeros((self.sizes["node"], 3)) if before is None else before.rod_contact.last
         law = friction_law(self._model.scene, self._model.forces, self._friction)
-        return rod_contact_of(self._model, self._sizes, self._pairs.search, now, of_stage, law, ways=ways, last=last)
+        return rod_contact_of(self._model, self.sizes, self._pairs.search, now, of_stage, law, ways=ways, last=last)
 
     def take_scene(self, model: Model) -> None:
         """Have the same model with another scene, whose coefficients of friction may be others."""
@@ -212,9 +214,9 @@ def _take_over(old: Sliding | RodContactList, new: Sliding | RodContactList, cou
         target[used] = source[used]
 
 
-def new_configuration(model: Model) -> Configuration:
-    """Arrays of a configuration, of which everything that does not move is in place."""
-    sizes, surfaces = sizes_of(model), model.surfaces
+def new_configuration(model: Model, sizes: dict[str, int]) -> Configuration:
+    """Arrays of a configuration, of which everything that does not move is in place; `sizes` as in `model.sizes`."""
+    surfaces = model.surfaces
     contact_point = np.zeros((sizes["contact_point"], 3))
     nodes, of_rods = model.node_count, model.node_count + sizes["point"]
     at = Configuration.zeros(
@@ -238,9 +240,8 @@ def new_points(sizes: dict[str, int], count: int) -> list[Point]:
     return [Point.zeros(sizes, vectors=vectors, **parts) for vectors, parts in in_one]
 
 
-def new_work(model: Model, configurations: list[Configuration], stages: int) -> Work:
-    """Room for steps of so many stages."""
-    sizes = sizes_of(model)
+def new_work(sizes: dict[str, int], configurations: list[Configuration], stages: int) -> Work:
+    """Room for steps of so many stages; `sizes` as in `model.sizes`."""
     first, origin, end = new_points(sizes, 3)
     stage = Stage.zeros(sizes)
     stage.origin_rotation[-1] = np.eye(3)
