@@ -27,7 +27,7 @@ GAIN = {
     "crawling_inchworm": "stimuli.humidity.schedule.period",
 }
 REPEATS = 3
-CASES = (("bending", 0.05, 400), ("bending", 2.0, 400), ("crawling_inchworm", 1.0, 120), ("gripping", 1.0, 60))
+CASES = (("bending", 0.05, 400), ("bending", 2.0, 400), ("crawling_inchworm", 1.0, 600), ("gripping", 1.0, 60))
 
 
 def spec(scene: str, duration: float, count: int) -> dict:

@@ -124,6 +124,23 @@ def test_a_run_over_its_limits_is_killed_alone_and_is_a_row(strip, monkeypatch, 
     assert found.outcomes == {"done": 7, "killed": 1}
 
 
+def die(run):
+    """Kills the process, always, for one gain in the middle of many."""
+    if run.parameters["gain"] == 1.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_of_pieces_given_ahead_nothing_is_lost_with_the_process_they_wait_for(strip, workers):
+    gains = {"path": "rods.strip.layers.active.eigenstrain.gain", "from": "0 %", "to": "2 %", "count": 201}
+    many = strip | {"parameters": {"gain": gains}, "set": {"duration": "0.05 s"}}
+    found = sweep(many, workers=workers, functions={"there": die})
+    assert found.outcomes == {"done": 200, "killed": 1}
+    assert [row.parameters for row in found.rows if row.outcome is not Outcome.DONE] == [{"gain": 1.0}]
+
+
 def test_a_scheduler_that_is_not_there_is_told_within_ten_seconds(strip):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
