@@ -132,8 +132,8 @@ class Engine:
 
     @property
     def _room(self) -> int:
-        """Pieces that `run` may give: one ahead for each process, which then need not wait for it. None of long runs, for
-        which that makes no difference, nor while runs are made again alone because their process has died.
+        """Pieces that `run` may give, one ahead for each process, which then need not wait for it. None of long runs,
+        for which that makes no difference, nor while runs are made again alone because their process has died.
         """
         ahead = self.threads if self.piece_size > 1 and not self._again else 0
         return self.free + ahead
