@@ -169,7 +169,8 @@ def demonstrate(directory: Path) -> None:
         f"\nfirst contact      {result.first_contact:.1f} s after the start\n"
         f"contact nodes      {result.contact_nodes} of the arms at the end\n"
         f"ball lifted by     {1e3 * result.lift:.1f} mm\n"
-        f"simulated          {run.times[-1]:.2f} s in {wall:.0f} s, real-time factor {result.real_time_factor:.2f}\n"
+        f"simulated          {run.times[-1]:.2f} s, {result.real_time_factor:.1f} times as fast as real time; "
+        f"{wall:.0f} s with the start of both nodes\n"
         f"\nlog                {log}\nrerun recording    {recording}    (look at it: bilayer view {recording})\n"
         f"picture            {picture}",
         highlight=False,
