@@ -169,12 +169,12 @@ class Record:
         **values
         """
         missing = tuple([name for name in cls.shapes if name not in values])
-        room = _room(cls, missing, tuple([sizes[name] for name in _sizes_in(cls, missing)]))
-        base, arrays = room.arrays()
+        block = _block(cls, missing, tuple([sizes[name] for name in _sizes_in(cls, missing)]))
+        base, arrays = block.arrays()
         made = cls.__new__(cls)
         made._hold(values | arrays)
-        memory, kind = room.words.copy(), cls.numba_type()
-        memory[room.addresses] += base
+        memory, kind = block.words.copy(), cls.numba_type()
+        memory[block.addresses] += base
         for name, of, dtype in kind.declared_fields if len(arrays) < len(kind.fields) else ():
             if name not in arrays:
                 words = _words(values[name], of, dtype, (cls.__name__, name))
@@ -226,7 +226,7 @@ def zeros_in_one(shapes: Mapping[str, tuple[int, ...]]) -> tuple[np.ndarray, dic
     return flat, {name: flat[begin:end].reshape(shape) for (name, shape), begin, end in parts}
 
 
-class _Room:
+class _Block:
     """Where arrays of a record lie in one block of memory: to ask for it once takes less than for each of them.
 
     Attributes
@@ -261,9 +261,9 @@ class _Room:
 
 
 @lru_cache(maxsize=1024)  # some thirty classes of records in a model of given sizes
-def _room(declared: type[Record], names: tuple[str, ...], sizes: tuple[int, ...]) -> _Room:
+def _block(declared: type[Record], names: tuple[str, ...], sizes: tuple[int, ...]) -> _Block:
     """For fields that declare a shape, with the sizes that `_sizes_in` names."""
-    return _Room(declared, shapes_of(declared, dict(zip(_sizes_in(declared, names), sizes, strict=True)), names))
+    return _Block(declared, shapes_of(declared, dict(zip(_sizes_in(declared, names), sizes, strict=True)), names))
 
 
 @lru_cache(maxsize=1024)

@@ -13,7 +13,7 @@ def _on_stack(context, builder, array_type, shape):
     size = 1
     for n in shape:
         size *= n
-    room = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), size))
+    slot = cgutils.alloca_once(builder, ir.ArrayType(ir.DoubleType(), size))
     strides = [8]
     for n in shape[:0:-1]:
         strides.insert(0, strides[0] * n)
@@ -24,7 +24,7 @@ def _on_stack(context, builder, array_type, shape):
     array = context.make_array(array_type)(context, builder)
     context.populate_array(
         array,
-        data=builder.bitcast(room, ir.DoubleType().as_pointer()),
+        data=builder.bitcast(slot, ir.DoubleType().as_pointer()),
         shape=words(shape),
         strides=words(strides),
         itemsize=ir.Constant(ir.IntType(64), 8),

@@ -124,7 +124,7 @@ def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[Fig
 def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     """The model with the fewest unknowns that computes what a scene asks for, and why it is that one."""
     if scene.coupling != Coupling():
-        return "two_rod", "`coupling` is set: only two rods have a bond that gives"
+        return "two_rod", "`coupling` is set: only the two-rod model has a bond that gives"
     for rod in scene.rods:
         if len(_retardation_times(rod, scene)) > 1:
             return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"

@@ -205,7 +205,7 @@ class Solver(Part):
 
     model: Literal["auto", "two_rod", "laminate"] = "auto"
     """`two_rod`: each layer a rod of its own, bonded to the other; `laminate`: one curve for both, bonded exactly;
-    `auto`: the laminate, unless the scene asks for what only two rods have."""
+    `auto`: the laminate, unless the scene needs a feature of the two-rod model."""
     dimension: Literal["auto", 2, 3] = "auto"
     """Of space; `auto`: 2 where all stays in a plane, which is faster, otherwise 3."""
     integrator: Literal["auto", "implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"] = (

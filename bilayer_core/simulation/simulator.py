@@ -18,43 +18,30 @@ from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
 from ..model.build import build_model
 from ..model.fingerprint import conditions_of, fingerprint_of
-from ..model.impacts import reason_of_stiffness
 from ..model.model import Model
-from ..model.override import acts, jump_to, ramp_to
 from ..model.plan import make_plan
 from ..model.state import State, initial_state, refuse_out_of_plane
-from ..observed.frame import Description, Frame
-from ..observed.inputs import FRICTION, LOAD, POSE, RESET, STIMULUS, UNTIL, Input, values_of_pose
+from ..observed.inputs import RESET, UNTIL, Input
 from ..observed.observer import Observer
-from ..observed.system import versions
 from ..scene.config import SceneConfig
-from ..scene.loader import load_scene, scene_text
-from . import observation as observe
-from .capture import make_frame
+from ..scene.loader import load_scene
+from .controls import Controls
 from .energy_budget import EnergyLedger
 from .equilibrium import StaticReport, solve_static
-from .friction import change_friction, coefficients
 from .observers import Schedule, first_failure
-from .parts import Parts
 from .plane_watch import PlaneWatch
-from .poses import LEAST_TIME, new_goal
 from .result import RunResult, Termination
 from .run_loop import Callbacks, advance_to, time_left
 from .same_model import differing
-from .statistics import RunStatistics, center_of_mass
+from .statistics import RunStatistics
 from .step_choice import choose_steps
 from .stepper import Stepper, StepReport
 from .summary import summarise
-from .views.body import BodyView, body_views
-from .views.clamp import ClampView, clamp_views
-from .views.joint import JointView, joint_views
-from .views.present import ByName, Present
-from .views.rod import RodView, rod_views
 
 Array = np.ndarray
 
 
-class Simulator:
+class Simulator(Controls):
     """A scene in motion.
 
     Parameters
@@ -147,286 +134,6 @@ class Simulator:
             rest = surroundings.rest_strains_of(self._state.transduction)
             self._ledger.begin(self._state, rest, surroundings.load_factor(self._state))
             self._stepper.ledger = self._ledger
-
-    @property
-    def reasons(self) -> dict[str, str]:
-        """Why `model`, `dimension`, `integrator` and `stepping` are what they are, and `contact_stiffness` if that is
-        not the scene's.
-        """
-        return {**self.plan.reasons, "stepping": self.steps.reason, **reason_of_stiffness(self.model)}
-
-    # what the scene looks like now
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return float(self._state.time[0])
-
-    @property
-    def positions(self) -> Array:
-        """Positions of nodes, layer by layer, then of contact points of bodies [m], shape (nodes, 3)."""
-        return observe.positions_with_points(self.model, self._state)
-
-    @property
-    def velocities(self) -> Array:
-        """Their velocities [m/s], shape (nodes, 3)."""
-        return observe.velocities_with_points(self.model, self._state)
-
-    @property
-    def contact_forces(self) -> Array:
-        """Barrier and friction force on each of them [N], shape (nodes, 3)."""
-        return self._seen().contact_force
-
-    @property
-    def com(self) -> Array:
-        """Mass centre of the rods [m], shape (3,)."""
-        return center_of_mass(self.model, self._state)
-
-    @property
-    def stimulus(self) -> dict[str, float]:
-        """Value of each channel over the last step, in its unit."""
-        self.compile()
-        return dict(zip(self.scene.stimuli, self._stepper.stimulus.tolist(), strict=True))
-
-    @property
-    def friction(self) -> dict[str, float]:
-        """Coefficients of friction that act, by their keys in `contact.friction`; empty where there is none."""
-        return coefficients(self.model, self._state)
-
-    @property
-    def rods(self) -> ByName[RodView]:
-        """Every rod by name: positions, strain, curvature, directors and contact forces of its nodes, and its layers.
-
-        Copies of a pattern have names of their own, such as ``arm_0``.
-        """
-        return rod_views(self._present)
-
-    @property
-    def bodies(self) -> ByName[BodyView]:
-        """Every body by name: its pose, and the force and moment of contact and of the rods that it holds."""
-        return body_views(self._present)
-
-    @property
-    def clamps(self) -> ByName[ClampView]:
-        """Every end of a rod that a body holds, by ``ROD.start`` or ``ROD.end``: the force and moment that it bears."""
-        return clamp_views(self._present)
-
-    @property
-    def joints(self) -> ByName[JointView]:
-        """Every joint between bodies by name: the force and moment that it bears, and how far it gives way."""
-        return joint_views(self._present)
-
-    @property
-    def _present(self) -> Present:
-        return Present(self.model, self._state, self._evaluated, self._seen)
-
-    def _evaluated(self) -> Stepper:
-        """The stepper, with forces of the present state."""
-        self.compile()
-        self._stepper.engine.evaluate_end()
-        return self._stepper
-
-    def _seen(self) -> Parts:
-        """What there is to see of the present state."""
-        self.compile()
-        return self._stepper.observe(self._state)[0]
-
-    @property
-    def curvatures(self) -> Array:
-        """Curvature χ through the thickness at every node [1/m], shape (nodes,)."""
-        return self._seen().curvature
-
-    def energy(self) -> dict[str, float]:
-        """Energy of each term [J]."""
-        return observe.energies(self.model, self._seen())
-
-    @property
-    def energy_account(self) -> Array:
-        """What steps supplied, lost and made of energy; slots in `engine.energy_account`."""
-        return self._state.account.copy()
-
-    def budget(self) -> dict[str, Any]:
-        """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
-
-        Raises
-        ------
-        InputError
-            If it is not kept.
-        """
-        if self._ledger is None:
-            raise InputError("budget: is not kept; make the simulator with budget=True")
-        self.compile()
-        return self._ledger.budget()
-
-    @property
-    def description(self) -> Description:
-        """What does not change during the run."""
-        settings = {
-            "model": self.plan.model,
-            "dimension": str(self.plan.dimension),
-            "integrator": self.plan.integrator,
-            "dt": repr(self.dt),
-            "tolerance": "none" if self.tolerance is None else repr(self.tolerance),
-            "newton_tolerance": repr(self.steps.newton_tolerance),
-            **versions(),
-        }
-        return observe.describe(self.model, self._state, settings, scene_text(self.scene))
-
-    def frame(self) -> Frame:
-        """A snapshot."""
-        self.compile()
-        return make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
-
-    # what changes it
-
-    def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0) -> None:
-        """Set a channel from the next step on, in its unit.
-
-        Parameters
-        ----------
-        channel : str
-        value : float or None
-            None gives it back to the scene's schedule.
-        over : float
-            Simulated time in which it gets there, linearly, from what it is now [s]; 0 is a jump. Steps follow a ramp
-            without beginning again, also one that is replaced by another on its way: what comes often is cheaper so.
-
-        Raises
-        ------
-        InputError
-            If there is no such channel, the value is not finite or out of the channel's range, or `over` is no time, or
-            given without a value; nothing is changed then.
-        """
-        if channel not in self.scene.stimuli:
-            known = ", ".join(self.scene.stimuli) or "none"
-            raise InputError(f"stimulus {channel!r}: no such channel; the scene {self.scene.name!r} has: {known}")
-        allowed = self.scene.stimuli[channel]
-        if value is not None and not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
-            raise InputError(
-                f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
-                f"to {allowed.maximum:g} (unit {allowed.unit})"
-            )
-        self._override(list(self.scene.stimuli).index(channel), f"stimulus {channel!r}", value, over)
-        self._note(STIMULUS, channel, math.nan if value is None else float(value), float(over))
-
-    def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
-        """Multiply force and moment of a load by a factor from the next step on.
-
-        Parameters
-        ----------
-        name : str
-        factor : float or None
-            None gives it back to its schedule.
-        over : float
-            As in `set_stimulus`.
-
-        Raises
-        ------
-        InputError
-            If there is no such load, the factor is not finite, or `over` is no time, or given without a factor; nothing
-            is changed then.
-        """
-        names = [load.name for load in self.scene.loads]
-        if name not in names:
-            known = ", ".join(names) or "none"
-            raise InputError(f"load {name!r}: no such load; the scene {self.scene.name!r} has: {known}")
-        if factor is not None and not math.isfinite(factor):
-            raise InputError(f"load {name!r}: a factor of {factor} is not allowed; it must be finite")
-        if self._override(len(self.scene.stimuli) + names.index(name), f"load {name!r}", factor, over):
-            self._state.has_history.fill(0.0)  # accelerations jump with a load
-        self._note(LOAD, name, math.nan if factor is None else float(factor), float(over))
-
-    def set_friction(self, value: float | None, key: str = "coefficient") -> None:
-        """Have a coefficient of friction jump to a value, from the next step on.
-
-        Parameters
-        ----------
-        value : float or None
-            None gives it back to the scene.
-        key : str
-            Of `contact.friction`: ``coefficient``, ``forward``, ``backward`` or ``sideways``. Those that the scene does
-            not give, and that are not set, go with ``coefficient``.
-
-        Raises
-        ------
-        InputError
-            If nothing slides against friction in the scene, there is no such coefficient, or the value is not finite or
-            below 0; nothing is changed then.
-        """
-        if change_friction(self.model, self._state, value, key):
-            self._stepper.restart(self._state)
-            self._state.has_history.fill(0.0)  # accelerations jump
-        self._note(FRICTION, key, math.nan if value is None else float(value))
-
-    def set_pose(
-        self,
-        name: str,
-        position: Sequence[float] | None = None,
-        quaternion: Sequence[float] | None = None,
-        *,
-        over: float = LEAST_TIME,
-    ) -> None:
-        """Have a prescribed body go to a pose from the next step on, and rest there; see `simulation.poses`.
-
-        It gets there in the time `over`, or in the time that its `top_speed` and `top_angular_speed` demand if that is
-        longer, with a continuous velocity from where and however fast it moves now. Its schedule acts no more, until
-        `reset`.
-
-        Parameters
-        ----------
-        name : str
-            A prescribed body with a `top_speed` or a `top_angular_speed`.
-        position : sequence of float, optional
-            Of its mass centre, in the world [m]; without one that of its present goal, or the present one.
-        quaternion : sequence of float, optional
-            Orientation x y z w, of any length above 0, likewise; reached by at most half a turn.
-        over : float
-            The least time until it is there [s].
-
-        Raises
-        ------
-        InputError
-            If there is no such body, or it may not move or turn, or not in this way; nothing is changed then.
-        """
-        goal = new_goal(self.model, self._state, name, position, quaternion, over)
-        if goal is not None:
-            self._state.pose_goal[goal[0]] = goal[1]
-            self._state.has_history.fill(0.0)  # accelerations jump
-        self._note(POSE, name, *values_of_pose(position, quaternion, over))
-
-    def _override(self, index: int, what: str, value: float | None, over: float) -> bool:
-        """Set a row of `State.override`; whether anything jumps."""
-        if not (math.isfinite(over) and over >= 0.0):
-            raise InputError(f"{what}: over = {over} is not allowed; it must be a number of seconds from 0 up")
-        if over > 0.0 and value is None:
-            raise InputError(f"{what}: over = {over:g} s needs a value to get to; a schedule acts at once")
-        row, present = self._state.override[index], self._stepper.surroundings.present(self._state, index)
-        if value is not None and over > self._stepper.same_time:
-            row[:] = ramp_to(value, present, self.time, over)
-            return False
-        jumps = acts(row) if value is None else value != present
-        if jumps:
-            self._stepper.restart(self._state)
-        row[:] = jump_to(value)
-        return jumps
-
-    def listen(self, note: Callable[[Input], None]) -> Callable[[], None]:
-        """Have all that acts from outside told from now on; returns what ends that.
-
-        Parameters
-        ----------
-        note : callable
-            Called with each `observed.inputs.Input`, before the step from which on it acts.
-        """
-        self._listeners.append(note)
-        self._until = math.nan  # who begins to listen hears where steps end
-        return lambda: self._listeners.remove(note)
-
-    def _note(self, kind: str, name: str, *values: float) -> None:
-        if self._listeners:
-            told = Input(int(self._state.step[0]), self.time, kind, name, values)
-            for listener in self._listeners:
-                listener(told)
 
     def compile(self) -> float:
         """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took.

@@ -131,7 +131,7 @@ class Engine:
         return self.threads - len(self._pieces)
 
     @property
-    def _room(self) -> int:
+    def _capacity(self) -> int:
         """Pieces that `run` may give, one ahead for each process, which then need not wait for it. None of long runs,
         for which that makes no difference, nor while runs are made again alone because their process has died.
         """
@@ -154,7 +154,7 @@ class Engine:
         """Make runs; the rows of each piece come when it is done, in any order."""
         left = True
         while left or self.busy:
-            while self._room > 0 and left:
+            while self._capacity > 0 and left:
                 piece = [point for _, point in zip(range(self.piece_size), points, strict=False)]
                 left = bool(piece)
                 if piece:

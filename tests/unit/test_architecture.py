@@ -92,8 +92,9 @@ def _modules_with_names(node, path):
 
 
 def imports_of_modules():
-    """Every module of the core, and those that it imports anywhere: late, or for the type checker alone, too."""
-    paths = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in modules()}
+    """Every module of both packages, and those that it imports anywhere: late, or for the type checker alone, too."""
+    everything = [*modules(), *sorted((ROOT / "bilayer_sim_ros").rglob("*.py"))]
+    paths = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in everything}
     files = {name.removesuffix(".__init__"): path for path, name in paths.items()}
     return {
         name: {

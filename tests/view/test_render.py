@@ -1,11 +1,11 @@
 """Pictures and films without a screen, and a look at their pixels."""
 
 import dataclasses
-import subprocess
 
 import numpy as np
 import pytest
 import synthetic_run
+from pictures import is_ball, is_blue, is_red, pixels
 from PIL import Image
 
 from bilayer_core.cli import main
@@ -13,24 +13,16 @@ from bilayer_core.errors import InputError
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.run_data import RunData
-from bilayer_core.view import sheet, stage, window
+from bilayer_core.view import stage, window
 from bilayer_core.view.arrows import reaction_arrows
 from bilayer_core.view.camera import HALF_SLOPE, Shot
 from bilayer_core.view.colouring import choose_colouring, contact_pressure
 from bilayer_core.view.overlay import round_length
 from bilayer_core.view.render import Look, Studio
 from bilayer_core.view.scales import ARROW_SHARE, choose_scales, seen_from
-from bilayer_core.view.theme import BACKGROUND, BALL_COLOURS
+from bilayer_core.view.theme import BACKGROUND
 
-TIMES = np.arange(0, 101) * 0.04
 SIZE = (480, 360)
-
-
-@pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    path = tmp_path_factory.mktemp("render") / "run.mcap"
-    synthetic_run.run(McapRecorder(path, rate=25.0, marker_rate=25.0), TIMES)
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -49,22 +41,6 @@ def drawn(log, tmp_path_factory):
     return draw
 
 
-def pixels(path):
-    return np.asarray(Image.open(path).convert("RGB")).astype(int)
-
-
-def is_red(image):
-    r, g, b = np.moveaxis(image[..., :3], -1, 0)
-    return (r > 110) & (r > 2 * g) & (r > 2 * b)
-
-
-def is_ball(image):
-    """The stronger of the ball's colours, in any light."""
-    r, g, b = np.moveaxis(image[..., :3], -1, 0)
-    red, green, blue = BALL_COLOURS[0]
-    return (r > 80) & (np.abs(g - r * green / red) < 25) & (np.abs(b - r * blue / red) < 40)
-
-
 def is_arrow(image):
     r, g, b = np.moveaxis(image[..., :3], -1, 0)
     return (g > 100) & (g > 1.5 * r) & (g > 1.2 * b)
@@ -78,21 +54,6 @@ def box(mask):
 
 ROBOT = slice(0, int(0.85 * SIZE[1]))  # rows above the bars
 BARS = slice(int(0.85 * SIZE[1]), SIZE[1])
-
-
-@pytest.mark.parametrize(
-    ("count", "width", "height", "columns"),
-    [(6, 400, 300, 3), (6, 300, 600, 6), (6, 900, 300, 2), (6, 2600, 300, 1), (1, 400, 300, 1), (7, 300, 500, 7)],
-)
-def test_a_sheet_has_no_empty_place_and_a_sensible_shape(count, width, height, columns):
-    assert sheet.columns_for(count, width, height) == columns
-
-
-@pytest.mark.parametrize(
-    ("times", "decimals"), [([0.0, 3.5, 7.0], 1), ([0.0, 0.04, 0.08], 2), ([0.001, 0.002], 3), ([1.0], 1)]
-)
-def test_times_are_written_with_decimals_that_tell_them_apart(times, decimals):
-    assert sheet.decimals_for(times) == decimals
 
 
 def test_what_is_looked_at_is_in_the_middle_and_slopes_are_those_of_perspective():
@@ -315,30 +276,6 @@ def test_the_part_of_a_picture_round_points_holds_them_all(half_height):
     assert (behind == (0, 0, 400, 200)) == (half_height is None)
 
 
-def test_a_sheet_shows_the_robot_in_each_part_with_its_time_over_one_colour_bar(log, tmp_path):
-    studio = Studio(log, Look.of())
-    studio.sheet(tmp_path / "sheet.png", studio.spread(4))
-    whole = pixels(tmp_path / "sheet.png")
-    assert whole.shape[1] <= sheet.SHEET_WIDTH
-    body = whole[: -sheet.FOOTER_HEIGHT - sheet.GAP]
-    gaps = np.nonzero((body == BACKGROUND).all(axis=(0, 2)))[0]
-    columns = 1 + len([g for g in gaps if g - 1 not in gaps and 0 < g < whole.shape[1] - sheet.GAP])
-    assert columns in (2, 4)
-    width, height = (whole.shape[1] + sheet.GAP) // columns - sheet.GAP, (len(body) + sheet.GAP) * columns // 4
-    for k in range(4):
-        top, left = k // columns * height, k % columns * (width + sheet.GAP)
-        cell = body[top : top + height - sheet.GAP, left : left + width]
-        assert is_ball(cell).mean() > 0.005
-        assert (cell[5:30, 5:70].min(axis=2) > 180).sum() > 20  # time, in white
-    footer = whole[-sheet.FOOTER_HEIGHT :]
-    assert is_red(footer).sum() > 100 and is_blue(footer).sum() > 100
-
-
-def is_blue(image):
-    r, g, b = np.moveaxis(image[..., :3], -1, 0)
-    return (b > r + 40) & (b > g + 20)
-
-
 def test_reactions_are_drawn_where_they_are_asked_for(drawn):
     assert not is_blue(drawn(background="white")[ROBOT]).any()
     assert is_blue(drawn(background="white", reactions=True)[ROBOT]).sum() > 30
@@ -360,51 +297,9 @@ def test_arrows_of_forces_and_moments_have_scales_of_their_own(log):
     assert reaction_arrows(dataclasses.replace(run, clamp_wrenches=0.0 * wrenches), scales) == {}
 
 
-def test_an_animation_has_a_picture_for_each_time(log, tmp_path):
-    studio = Studio(log, Look.of())
-    studio.gif(tmp_path / "run.gif", studio.spread(3), 20.0)
-    animation = Image.open(tmp_path / "run.gif")
-    assert animation.n_frames == 3 and max(animation.size) <= sheet.GIF_SIZE
-    assert animation.info["duration"] == 50
-    shares = []
-    for index in range(3):
-        animation.seek(index)
-        shares.append(is_red(np.asarray(animation.convert("RGB")).astype(int))[: int(0.8 * animation.height)].mean())
-    assert shares[0] == 0.0 and shares[2] > 0.005
-
-
-def frames_of(path, size):
-    """The pictures of a film, shape (n, height, width, 3)."""
-    import imageio_ffmpeg
-
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24"]
-    data = subprocess.run([*command, "-"], capture_output=True, check=True).stdout
-    return np.frombuffer(data, np.uint8).reshape(-1, size[1], size[0], 3)
-
-
-def test_a_film_lasts_as_long_as_the_run_at_least_five_seconds_and_moves(log, tmp_path, capsys):
-    path, size = tmp_path / "run.mp4", (320, 180)
-    assert main(["render", str(log), "--mp4", str(path), "--size", "320x180", "--fps", "5"]) == 0
-    assert capsys.readouterr().out == f"film       {path}: 25 pictures, 5 s, 1.25x slower\n"
-    frames = frames_of(path, size).astype(int)
-    assert len(frames) == 25
-    robot = [is_red(frame)[: int(0.8 * size[1])].sum() for frame in frames]
-    assert robot[0] < 30 < 300 < robot[-1]
-    changes = np.abs(np.diff(frames, axis=0)).max(axis=(1, 2, 3))
-    assert np.count_nonzero(changes > 30) >= 20
-    assert path.stat().st_size < 300_000
-
-
-def test_shapes_between_those_in_the_log_are_on_the_way_from_one_to_the_next(log):
-    studio = Studio(log, Look.of())
-    before, between, after = (studio._moments.at(time) for time in (1.0, 1.01, 1.04))
-    assert between.positions == pytest.approx(0.75 * before.positions + 0.25 * after.positions, abs=1e-12)
-    assert np.linalg.norm(between.material_frames, axis=1) == pytest.approx(np.ones(len(between.material_frames)))
-
-
 def test_a_run_whose_shapes_end_long_before_it_is_warned_of(tmp_path, capsys):
     path = tmp_path / "short.mcap"
-    synthetic_run.run(McapRecorder(path, rate=25.0, marker_rate=1.0), TIMES[:21])
+    synthetic_run.run(McapRecorder(path, rate=25.0, marker_rate=1.0), 0.04 * np.arange(21))
     assert main(["render", str(path), "--png", str(tmp_path / "x.png"), "--size", "160x160"]) == 0
     told = capsys.readouterr().err
     assert "the run ends at t = 0.8 s, but its last shape is of t = 0 s" in told and "output.marker_rate" in told

@@ -14,7 +14,6 @@ import synthetic_run
 from PIL import Image
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.view import rerun_view, viewer_process
 from bilayer_core.view.theme import BALL_COLOURS
 
@@ -22,13 +21,6 @@ TIMES = np.arange(0, 101) * 0.04
 ROBOT = (slice(70, 860), slice(0, 1195))  # rows and columns of the view of the robot in a picture
 LEGEND = (slice(900, 1040), slice(0, 450))
 PLOTS = (slice(60, 1040), slice(1200, 1920))
-
-
-@pytest.fixture(scope="module")
-def log(tmp_path_factory):
-    path = tmp_path_factory.mktemp("view") / "run.mcap"
-    synthetic_run.run(McapRecorder(path, rate=25.0, marker_rate=25.0), TIMES)
-    return path
 
 
 @pytest.fixture(scope="module")
