@@ -42,6 +42,7 @@ from bilayer_core.record.log_records import (
     unpacked,
     walk,
 )
+from bilayer_core.record.mcap_log import CHUNK_SIZE
 from bilayer_core.record.opening import open_log
 from bilayer_core.record.paths import check_output_path, draft_of
 
@@ -127,8 +128,6 @@ class _Repair:
 
     def __init__(self, file: BinaryIO, output: BinaryIO):
         from mcap.writer import CompressionType, Writer
-
-        from bilayer_core.record.mcap_log import CHUNK_SIZE
 
         self._file, self._size = file, file.seek(0, 2)
         self._writer = Writer(output, chunk_size=16 * CHUNK_SIZE, compression=CompressionType.LZ4)  # as they were

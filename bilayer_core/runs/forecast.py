@@ -15,6 +15,7 @@ import numpy as np
 
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.mcap_log import SUFFIX, McapRecorder
+from bilayer_core.scene.profile import extremes
 from bilayer_core.simulation.simulator import Simulator
 
 Array = np.ndarray
@@ -264,6 +265,4 @@ class _Frames:
 
 def _values(profile) -> Array:
     """All numbers of a quantity that may vary along a rod."""
-    from bilayer_core.scene.profile import extremes
-
     return np.array(extremes(profile))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.scene.units import parse_quantity
 from bilayer_core.view.scales import VIEW_DIRECTION
 
 AUTO, FOLLOW = "auto", "follow"
@@ -119,8 +120,6 @@ def _iso(kind: str) -> Camera:
 
 
 def _number(text: str, unit: str, whole: str) -> float:
-    from bilayer_core.scene.units import parse_quantity
-
     try:
         found = parse_quantity(text, unit)
     except ValueError:

@@ -15,7 +15,7 @@ from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view import stage, window
 from bilayer_core.view.arrows import reaction_arrows
-from bilayer_core.view.camera import HALF_SLOPE, Shot
+from bilayer_core.view.camera import HALF_SLOPE, Insets, Shot
 from bilayer_core.view.colouring import choose_colouring, contact_pressure
 from bilayer_core.view.overlay import round_length
 from bilayer_core.view.render import Look, Studio
@@ -170,19 +170,13 @@ def test_the_scale_bar_is_as_long_as_it_says(log, drawn, camera):
     image = drawn(4.0, camera=camera, background="white")
     dark = (image[BARS, SIZE[0] // 2 + 40 :].max(axis=2) < 80).sum(axis=1)
     length = dark[-25:-10].max()
-    setting = Studio(log, Look.of(camera, size=SIZE))._set([4.0], render_insets(), 0.0)
+    setting = Studio(log, Look.of(camera, size=SIZE))._set([4.0], Insets(), 0.0)
     metres, _ = round_length(0.16 * SIZE[0] * setting.metres_per_pixel)
     ball = is_ball(image)[ROBOT]
     top, bottom, _, _ = box(ball)
     if camera != "iso":  # hidden in part, so that its height is that of the sphere from the front alone
         assert (bottom - top) * metres / length <= 2.02 * synthetic_run.RADIUS
     assert metres / length == pytest.approx(setting.metres_per_pixel, rel=0.05)
-
-
-def render_insets():
-    from bilayer_core.view.camera import Insets
-
-    return Insets()
 
 
 @pytest.mark.parametrize(("text", "length"), [("20 mm", 0.03), ("1 m", 1.0), ("5 um", 9.9e-6), ("2 km", 4e3)])
