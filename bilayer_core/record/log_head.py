@@ -4,16 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
+from bilayer_core.printable import shortened
 from bilayer_core.record.description_text import from_text
-from bilayer_core.record.log_records import ATTACHMENT, METADATA, content, parse, walk
+from bilayer_core.record.log_records import (
+    ATTACHMENT,
+    METADATA,
+    DamagedChunk,
+    Place,
+    content,
+    parse,
+    read_metadata,
+    walk,
+)
 from bilayer_core.record.opening import open_log
 
+SCENE_ATTACHMENT = "scene.yaml"
+LARGEST_SCENE = 5_000_000
+"""Text of a scene in a log, whose tables of values are written out in it [bytes]."""
 _HEAD = ("description", "versions", "settings")
 """Metadata that every log has before its first chunk."""
+
+_READ = (*_HEAD, "machine")
 
 
 @dataclass(frozen=True)
@@ -28,17 +44,15 @@ class Head:
 
 def read_head(path: Path) -> Head:
     """Scene, description, versions and settings: all that comes before the first chunk."""
-    from mcap.records import Attachment, Metadata
-
     metadata: dict[str, dict[str, str]] = {}
     scene = None
     with open_log(path) as file:
         for place in walk(file):
-            if place.opcode == ATTACHMENT:
-                scene = parse(Attachment, content(file, place)).data.decode()
+            if place.opcode == ATTACHMENT and scene is None:
+                scene = _scene(file, place)
             elif place.opcode == METADATA:
-                record = parse(Metadata, content(file, place))
-                metadata[record.name] = record.metadata
+                name, values = read_metadata(content(file, place), _READ)
+                metadata |= {name: values} if name in _READ else {}
             if scene is not None and "description" in metadata:
                 break
     missing = [name for name in _HEAD if name not in metadata] + ([] if scene is not None else ["scene"])
@@ -48,10 +62,23 @@ def read_head(path: Path) -> Head:
     versions = metadata["versions"]
     try:
         description = from_text(metadata["description"], scene)
-    except (KeyError, TypeError, ValueError):
-        writer = versions.get(DISTRIBUTION, "unknown")
+    except InputError as error:
+        writer = shortened(versions.get(DISTRIBUTION, "unknown"))
         raise InputError(
-            f"{path}: describes its run in another way than this version reads (it was written by {DISTRIBUTION} "
-            f"{writer}); run its scene again"
+            f"{path}: describes its run in another way than this version reads, or is damaged: {error} (it was written "
+            f"by {DISTRIBUTION} {writer}); run its scene again"
         ) from None
     return Head(description, versions, metadata["settings"], metadata.get("machine", {}))
+
+
+def _scene(file: BinaryIO, place: Place) -> str | None:
+    """Text of the scene, if this attachment is it."""
+    from mcap.records import Attachment
+
+    if place.length > LARGEST_SCENE:
+        return None
+    attachment = parse(Attachment, content(file, place))
+    try:
+        return attachment.data.decode() if attachment.name == SCENE_ATTACHMENT else None
+    except UnicodeDecodeError as error:
+        raise DamagedChunk(f"the scene at byte {place.begin} is not UTF-8 text") from error

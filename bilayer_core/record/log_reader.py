@@ -13,10 +13,10 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
+from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
-from bilayer_core.record.log_records import METADATA, content, parse, walk
+from bilayer_core.record.log_records import METADATA, content, read_metadata, walk
 from bilayer_core.record.log_source import LogSource
 from bilayer_core.record.logged_run import LoggedRun
 from bilayer_core.record.opening import open_log
@@ -39,6 +39,8 @@ __all__ = [
 CUT_OFF = "cut off"
 REPAIRED = "repair"
 """Metadata record of a log that `repair` has made: what it kept and lost."""
+LATE = ("run", REPAIRED)
+"""Metadata records that stand after the messages."""
 STATE = f"{LOG_NAMESPACE}/state"
 
 
@@ -86,9 +88,8 @@ def read_info(path: str | Path) -> LogInfo:
     """What a log holds, from its index or, when it was cut off, by reading it through. InputError if it is no log."""
     path = Path(path)
     head, file = read_head(path), LogFile(path)
-    stamps = {topic: file.times(topic) for topic in sorted(file.topics)}
-    filled = [of for of in stamps.values() if len(of)]
-    times = [int(min(of.min() for of in filled)), int(max(of.max() for of in filled))] if filled else []
+    spans = file.spans()
+    times = [min(first for _, first, _ in spans.values()), max(last for _, _, last in spans.values())] if spans else []
     metadata = _read_metadata(path)
     ending = metadata.get("run", {})
     start, last = (time / NANOSECONDS for time in times) if times else (0.0, 0.0)
@@ -102,7 +103,10 @@ def read_info(path: str | Path) -> LogInfo:
         last_time=last,
         duration=last - start,
         channels=head.description.channels,
-        topics={topic: {"type": file.topics[topic], "count": len(of)} for topic, of in stamps.items()},
+        topics={
+            topic: {"type": file.topics[topic], "count": spans[topic][0] if topic in spans else 0}
+            for topic in sorted(file.topics)
+        },
         complete=ending.get("complete") == "true",
         termination=ending.get("termination", CUT_OFF),
         size=path.stat().st_size,
@@ -141,7 +145,12 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
         if stamp > last:
             break
         found = data if stamp == last else found
-    return read_float64_multi_array(found)[1].copy(), last / NANOSECONDS
+    if found is None:
+        raise InputError(
+            f"{path}: is damaged: its index has a state at t = {last / NANOSECONDS:.9g} s, its chunks none"
+        )
+    values = decoded(path, STATE, last, found, read_float64_multi_array)[1]
+    return values.copy(), last / NANOSECONDS
 
 
 def read_log(path: str | Path) -> RunData:
@@ -173,12 +182,10 @@ def read_messages(path: str | Path, topics: set[str] | None = None) -> Iterator[
 
 
 def _read_metadata(path: Path) -> dict[str, dict[str, str]]:
-    """All metadata records by name, those after the messages as well."""
-    from mcap.records import Metadata
-
+    """Metadata records by name that stand after the messages."""
     with open_log(path) as file:
-        records = [parse(Metadata, content(file, place)) for place in walk(file) if place.opcode == METADATA]
-    return {record.name: record.metadata for record in records}
+        records = (read_metadata(content(file, place), LATE) for place in walk(file) if place.opcode == METADATA)
+        return {name: values for name, values in records if name in LATE}
 
 
 def _lacks(head: Head, file: LogFile, metadata: dict[str, dict[str, str]]) -> tuple[str, ...]:
