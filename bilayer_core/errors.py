@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -33,6 +35,17 @@ class InputError(BilayerError):
 
 class UnknownName(InputError, KeyError):
     """There is nothing of this name; the message has the nearest names. As a KeyError it is what mappings raise."""
+
+
+@contextmanager
+def naming(source: object) -> Iterator[None]:
+    """Let errors about what a file holds begin with its name; `source` is its path."""
+    try:
+        yield
+    except BilayerError as error:
+        if error.exit_code != BilayerError.exit_code or str(error).startswith(printable(f"{source}: ")):
+            raise
+        raise InputError(f"{source}: {error}") from error
 
 
 class OutputError(BilayerError):

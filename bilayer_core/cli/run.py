@@ -17,7 +17,7 @@ from bilayer_core.cli.report import summary_lines
 from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
-from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError
+from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError, naming
 
 if TYPE_CHECKING:
     from bilayer_core.converge.study import Study
@@ -170,10 +170,8 @@ def _make_simulator(
         from bilayer_core.record.state_file import read_saved_state
 
         state = read_saved_state(from_state, simulator.description, at)
-        try:
+        with naming(from_state):
             simulator.load_state(state)
-        except InputError as error:
-            raise InputError(f"{from_state}: {error}") from error
     compile_kernels(quiet)
     simulator.compile()
     return simulator
