@@ -33,21 +33,18 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Code:
-    """A Python function that travels: by its text, if it is that of a file, or by its name in a module.
+    """A Python function of a file, which travels as the text of that file.
 
     Attributes
     ----------
     name : str
-    module : str
-        Empty for a file.
     file, text : str
-        Of the file, for messages, and what is in it.
+        Path of the file, for messages, and its content.
     """
 
     name: str
-    module: str = ""
-    file: str = ""
-    text: str = ""
+    file: str
+    text: str
 
 
 @dataclass(frozen=True)

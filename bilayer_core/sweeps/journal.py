@@ -57,6 +57,7 @@ class Journal:
                     Path(f"{self.path}{suffix}").unlink(missing_ok=True)
             with self._writing():
                 self._base = sqlite3.connect(self.path or ":memory:")
+                self._base.execute("PRAGMA trusted_schema=OFF")  # the file may be somebody else's
                 self._base.execute("PRAGMA journal_mode=WAL")
                 self._base.execute("PRAGMA synchronous=NORMAL")
                 self._base.executescript(SCHEMA)

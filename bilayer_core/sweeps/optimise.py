@@ -20,7 +20,7 @@ from bilayer_core.sweeps.engine import Engine
 from bilayer_core.sweeps.execute import scene_of
 from bilayer_core.sweeps.job import Job, Outcome, Point, Row
 from bilayer_core.sweeps.journal import Journal
-from bilayer_core.sweeps.opening import open_engine
+from bilayer_core.sweeps.opening import Processes, open_engine
 from bilayer_core.sweeps.result import write_table
 from bilayer_core.sweeps.run import Sweep, read_sweep
 from bilayer_core.sweeps.spec import Parameter
@@ -208,6 +208,8 @@ def optimise(
     out: str | Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    security: Any = None,
+    dashboard: bool = False,
     resume: bool = False,
     force: bool = False,
     progress: Callable[[Row], None] | None = None,
@@ -225,7 +227,7 @@ def optimise(
         Runs, those that are resumed included.
     seed : int
         Of the search. With one worker the same search is made again.
-    out, workers, scheduler, resume, force, progress
+    out, workers, scheduler, security, dashboard, resume, force, progress
         As of `sweeps.run.sweep`.
     tell : callable, optional
         Called with the engine before the first run.
@@ -242,12 +244,13 @@ def optimise(
     directory = None if out is None else Path(out)
     read = read_sweep(spec, directory)
     _refuse_unsearchable(read, metric)
+    processes = Processes(workers, scheduler, security, dashboard)
     content = read.content | {"search": [metric, largest, seed]}
     with Journal(directory, content, resume=resume, force=force) as journal, ExitStack() as stack:
         rows = {row.key: row for row in journal.rows()}
         search = Search(read, metric, largest, seed, list(rows.values()))
         ensure_compiled()
-        engine = stack.enter_context(open_engine(read.job, workers, scheduler, read.spec.limits.memory))
+        engine = stack.enter_context(open_engine(read.job, processes, read.spec.limits.memory))
         if tell is not None:
             tell(engine)
         _run_trials(search, engine, journal, rows, trials, progress)
