@@ -135,7 +135,7 @@ def _joined(stack: ExitStack, job: Job, address: str, security: Security | None)
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
             f"--scheduler: {address}: no Dask scheduler can be reached there within {CONNECT_TIME:g} s ({reason}); "
-            "`dask scheduler` prints its address when it starts, such as tcp://192.0.2.1:8786"
+            "`dask scheduler` prints its address when it starts, such as tls://192.0.2.1:8786"
         ) from None
     engine = Engine(client, job, None)
     engine.where, engine.dashboard = f"cluster {address}", _dashboard(client)
@@ -145,7 +145,7 @@ def _joined(stack: ExitStack, job: Job, address: str, security: Security | None)
 
 
 def _dashboard(client: Any) -> str:
-    """Return the address of a scheduler's dashboard; empty if it has none, or nothing is shown there without Bokeh."""
+    """Return the address of a scheduler's dashboard; empty if nothing answers there."""
     try:
         link = str(client.dashboard_link)
         with urlopen(link, timeout=DASHBOARD_TIME):

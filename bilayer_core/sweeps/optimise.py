@@ -121,8 +121,11 @@ class Search:
         optuna = _optuna()
         value, state = row.metrics.get(self.metric), optuna.trial.TrialState
         told = {"value": value, "state": state.COMPLETE} if _is_value(value) else {"state": state.FAIL}
-        trial = optuna.trial.create_trial(params=row.parameters, distributions=self._space, **told)
-        self._study.add_trial(trial)
+        try:
+            trial = optuna.trial.create_trial(params=row.parameters, distributions=self._space, **told)
+            self._study.add_trial(trial)
+        except ValueError as error:
+            raise InputError(f"--resume: run {row.number} in the results is none of this search: {error}") from None
         self.asked = max(self.asked, row.number + 1)
 
     def ask(self) -> Point:
