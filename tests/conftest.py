@@ -14,7 +14,6 @@ CACHES = ROOT / ".pytest_cache" / "kernels"
 
 def _use_own_kernel_cache() -> None:
     """Kernels of the tests, in a folder of their own: those of other states of the sources are deleted."""
-    CACHES.mkdir(parents=True, exist_ok=True)
     os.environ["NUMBA_CACHE_DIR"] = str(CACHES)
     if "PYTEST_XDIST_WORKER" not in os.environ:
         from bilayer_core.jit.cache import cache_folder

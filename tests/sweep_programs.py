@@ -45,9 +45,10 @@ def end(processes):
         process.wait(20)
 
 
-def start_scheduler(file):
+def start_scheduler(file, *options):
     """A scheduler that writes its address into a file."""
-    return dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
+    quiet = "--port", "0", "--no-dashboard", "--scheduler-file", str(file)
+    return dask("scheduler", "--host", "127.0.0.1", *quiet, *options)
 
 
 def address_in(file):

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from bilayer_core.cli.options import Verb
-from bilayer_core.cli.sweep import refuse_both, teller, workers_option
+from bilayer_core.cli.sweep import processes_options, teller
 from bilayer_core.cli.watch import compile_kernels, runs_bar
 
 DEFAULT_DIRECTORY = "runs/optimise"
@@ -21,7 +21,7 @@ NOT_CONFIRMED = 1
 @click.option("--trials", type=click.IntRange(1), default=100, show_default=True, help="Runs, resumed ones included.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search.")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
-@workers_option
+@processes_options
 @click.option("--resume", is_flag=True, help="Go on with the runs in DIR.")
 @click.option("--force", is_flag=True, help="Replace the results in DIR.")
 @click.option("--plot", "plotted", is_flag=True, help="Draw the results.")
@@ -33,8 +33,7 @@ def optimise(
     trials: int,
     seed: int,
     out: str,
-    workers: int | None,
-    scheduler: str | None,
+    processes: dict[str, Any],
     resume: bool,
     force: bool,
     plotted: bool,
@@ -42,7 +41,8 @@ def optimise(
 ) -> int:
     """Search for the values of the parameters of SWEEP with the best METRIC (docs/sweeps.md).
 
-    SWEEP is a file, or the name of a bundled one: `bilayer sweep --bundled` lists them.
+    SWEEP is a file, or the name of a bundled one: `bilayer sweep --bundled` lists them. SWEEP is a program: this
+    runs the Python files that it names. Look at those of others first; `bilayer sweep SWEEP --list` runs none.
 
     The best run is made again at a tenth of the tolerance: exit code 1 if its metric differs by more than 2 %. Writes
     results as `bilayer sweep` does, and DIR/best.yaml, a scene for `bilayer run`.
@@ -53,7 +53,6 @@ def optimise(
     from bilayer_core.sweeps.plots import check_matplotlib, draw
     from bilayer_core.sweeps.result import read_results
 
-    refuse_both(workers, scheduler)
     if (maximise is None) == (minimise is None):
         raise click.UsageError("give --maximise METRIC or --minimise METRIC")
     if plotted:
@@ -67,8 +66,7 @@ def optimise(
             trials=trials,
             seed=seed,
             out=out,
-            workers=workers,
-            scheduler=scheduler,
+            **processes,
             resume=resume,
             force=force,
             progress=lambda row: show(row.outcome.value),

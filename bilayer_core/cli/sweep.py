@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import ExitStack
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +16,60 @@ from bilayer_core.cli.watch import compile_kernels, runs_bar
 DEFAULT_DIRECTORY = "runs/sweep"
 
 
-def workers_option(function: Any) -> Any:
-    """The options ``--workers`` and ``--scheduler``."""
-    function = click.option(
-        "--scheduler", metavar="ADDRESS", help="Run on the workers of a Dask cluster: tcp://host:8786."
-    )(function)
-    return click.option("--workers", type=click.IntRange(1), help="Processes of this machine; default: one a core.")(
-        function
-    )
+PROCESSES = (
+    click.option("--workers", type=click.IntRange(1), help="Processes of this machine; default: one a core."),
+    click.option("--dashboard", is_flag=True, help="Serve Dask's dashboard on 127.0.0.1, to any user of this machine."),
+    click.option("--scheduler", metavar="ADDRESS", help="Run on the workers of a Dask cluster: tls://host:8786."),
+    click.option("--tls-ca-file", metavar="FILE", help="Certificate of the authority that the cluster trusts (PEM)."),
+    click.option("--tls-cert", metavar="FILE", help="Own certificate for the cluster (PEM)."),
+    click.option("--tls-key", metavar="FILE", help="Its private key (PEM), unless the file of --tls-cert has it."),
+)
+
+
+def processes_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options that say where runs are made; the function gets them as the mapping `processes`.
+
+    Its keys are those arguments of `bilayer_core.sweep` that say where runs are made.
+    """
+
+    @wraps(function)
+    def wrapper(
+        *,
+        workers: int | None,
+        dashboard: bool,
+        scheduler: str | None,
+        tls_ca_file: str | None,
+        tls_cert: str | None,
+        tls_key: str | None,
+        **others: Any,
+    ) -> Any:
+        certificates = tls_ca_file, tls_cert, tls_key
+        _refuse_contradictions(workers, dashboard, scheduler, certificates)
+        processes = {"workers": workers, "scheduler": scheduler, "dashboard": dashboard}
+        if any(certificates):
+            processes["security"] = _security_of(*certificates)
+        return function(processes=processes, **others)
+
+    for option in reversed(PROCESSES):
+        wrapper = option(wrapper)
+    return wrapper
+
+
+def _refuse_contradictions(
+    workers: int | None, dashboard: bool, scheduler: str | None, certificates: tuple[str | None, ...]
+) -> None:
+    if workers is not None and scheduler is not None:
+        raise click.UsageError("--workers counts processes of this machine; a cluster (--scheduler) has its own")
+    if dashboard and scheduler is not None:
+        raise click.UsageError("--dashboard is for processes of this machine; a cluster (--scheduler) has its own")
+    if any(certificates) and scheduler is None:
+        raise click.UsageError("--tls-ca-file, --tls-cert and --tls-key are for a cluster (--scheduler)")
+
+
+def _security_of(*certificates: str | None) -> Any:
+    from bilayer_core.sweeps.certificates import security_of
+
+    return security_of(*certificates)
 
 
 def _list_bundled(context: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -37,11 +85,11 @@ def _list_bundled(context: click.Context, _: click.Parameter, wanted: bool) -> N
 @click.command(cls=Verb)
 @click.argument("file", metavar="SWEEP")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
-@workers_option
+@processes_options
 @click.option("--resume", is_flag=True, help="Make the runs that are missing in DIR, and none twice.")
 @click.option("--force", is_flag=True, help="Replace the results in DIR.")
 @click.option("--plot", "plotted", is_flag=True, help="Draw the results, as well as those that are there already.")
-@click.option("--list", "listed", is_flag=True, help="Show the runs, and make none.")
+@click.option("--list", "listed", is_flag=True, help="Show the runs, and make none; runs no Python code.")
 @click.option(
     "--bundled",
     is_flag=True,
@@ -54,8 +102,7 @@ def _list_bundled(context: click.Context, _: click.Parameter, wanted: bool) -> N
 def sweep(
     file: str,
     out: str,
-    workers: int | None,
-    scheduler: str | None,
+    processes: dict[str, Any],
     resume: bool,
     force: bool,
     plotted: bool,
@@ -64,17 +111,19 @@ def sweep(
 ) -> None:
     """Make many runs of a scene with other values, as SWEEP says: a file, or the name of a bundled one.
 
+    SWEEP is a program: this runs the Python files that it names. Look at those of others first; --list runs none.
+
     Writes DIR/results.sqlite as results come, then DIR/results.parquet: a row for each run, also for one that could
     not go on, with its reason. Killed at any moment, --resume makes what is missing.
     """
     from bilayer_core.sweeps.design import count_of
     from bilayer_core.sweeps.journal import Journal
+    from bilayer_core.sweeps.opening import Processes
     from bilayer_core.sweeps.result import write_table
     from bilayer_core.sweeps.run import read_sweep, run_missing
 
-    refuse_both(workers, scheduler)
     directory = Path(out)
-    read = read_sweep(file, directory)
+    read = read_sweep(file, directory, run_code=not listed)
     if listed:
         _list(read)
         return
@@ -90,7 +139,7 @@ def sweep(
             click.echo(f"{there} of {len(keys)} runs are there", err=True)
         try:
             with ExitStack() as stack, runs_bar(count_of(read.spec), there, quiet) as show:
-                for rows in run_missing(read, journal, stack, workers, scheduler, teller(quiet)):
+                for rows in run_missing(read, journal, stack, Processes(**processes), teller(quiet)):
                     for row in rows:
                         show(row.outcome.value)
         finally:
@@ -107,19 +156,15 @@ def sweep(
                 click.echo(f"wrote {path}")
 
 
-def refuse_both(workers: int | None, scheduler: str | None) -> None:
-    """Raise UsageError if processes of this machine and those of a cluster are asked for."""
-    if workers is not None and scheduler is not None:
-        raise click.UsageError("--workers counts processes of this machine; a cluster (--scheduler) has its own")
-
-
 def teller(quiet: bool) -> Any:
-    """What tells the user where runs are made."""
+    """Return what tells the user where runs are made, and who else can get there."""
 
     def tell(engine: Any) -> None:
         if not quiet:
             dashboard = f"; dashboard {engine.dashboard}" if engine.dashboard else ""
             click.echo(f"{engine.where}, {engine.threads} runs side by side{dashboard}", err=True)
+        for notice in engine.notices:
+            click.echo(notice, err=True)
 
     return tell
 

@@ -5,7 +5,8 @@ name is a fingerprint of every source that holds kernels, of numba, llvmlite, nu
 of the processor: after an edit or an update the folder is another, and nothing of yesterday's code runs.
 
 The folders are in ``NUMBA_CACHE_DIR`` or else in the user's cache directory; those that no process has used for
-`DAYS_KEPT` days are deleted. ``BILAYER_JIT_CACHE=0`` keeps nothing.
+`DAYS_KEPT` days are deleted. A folder that other users could put files into is neither read nor written.
+``BILAYER_JIT_CACHE=0`` keeps nothing.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ import numpy as np
 from platformdirs import user_cache_path
 
 from ..errors import OutputError
+from .private_folder import exposure, make_private
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("jit", "kinematics", "contact", "scene", "model", "forces", "engine")
@@ -59,13 +61,20 @@ def fingerprint() -> str:
 
 @cache
 def cache_folder() -> Path | None:
-    """The folder for what this process compiles; None if nothing can be or is to be kept."""
+    """Return the folder for what this process compiles; None if nothing is kept, with a warning that says why."""
     if os.environ.get("BILAYER_JIT_CACHE", "1") == "0":
         return None
     root = Path(os.environ.get(CACHE_DIR) or user_cache_path("bilayer_core", appauthor=False))
-    folder = root / f"kernels-{fingerprint()}"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = make_private(root / f"kernels-{fingerprint()}")
+        if reason := exposure(folder, PACKAGE):
+            _log.warning(
+                "every process compiles its kernels again, since their cache is not safe to read: %s, and who writes "
+                "there can run programs as you; set %s to a folder that only you can write to",
+                reason,
+                CACHE_DIR,
+            )
+            return None
         (folder / USED).touch()
     except OSError as error:
         _log.warning(
@@ -74,7 +83,7 @@ def cache_folder() -> Path | None:
             error,
         )
         return None
-    _delete_unused(root)
+    _delete_unused(folder.parent)
     return folder
 
 
@@ -82,8 +91,11 @@ def _delete_unused(root: Path) -> None:
     """Delete folders of other fingerprints that nobody has used for long."""
     oldest = time.time() - DAYS_KEPT * DAY
     for other in root.glob("kernels-*"):
-        used = other / USED
-        if used.exists() and used.stat().st_mtime < oldest:
+        try:
+            unused = (other / USED).stat().st_mtime < oldest
+        except OSError:  # in use by another version, or of another user
+            continue
+        if unused:
             shutil.rmtree(other, ignore_errors=True)
 
 

@@ -104,7 +104,9 @@ class Engine:
     where : str
         For the user.
     dashboard : str
-        Address of Dask's dashboard; empty if there is none.
+        Address of a cluster's dashboard; empty if there is none.
+    notices : list of str
+        Lines that the user has to see: who else can reach or read something.
     """
 
     def __init__(self, client: Any, job: Job, memory: float | None):
@@ -119,6 +121,7 @@ class Engine:
         self._mean: float | None = None
         self.threads, self._counted = 1, clock.monotonic()
         self.where = self.dashboard = ""
+        self.notices: list[str] = []
         client.subscribe_topic(TOPIC, self._hear)
 
     def _hear(self, event: tuple[float, Any]) -> None:

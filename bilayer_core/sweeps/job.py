@@ -9,6 +9,8 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
+from pydantic import TypeAdapter
+
 from bilayer_core.sweeps.spec import Condition, Metric
 
 DIGITS = 20
@@ -33,21 +35,18 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Code:
-    """A Python function that travels: by its text, if it is that of a file, or by its name in a module.
+    """A Python function of a file, which travels as the text of that file.
 
     Attributes
     ----------
     name : str
-    module : str
-        Empty for a file.
     file, text : str
-        Of the file, for messages, and what is in it.
+        Path of the file, for messages, and its content.
     """
 
     name: str
-    module: str = ""
-    file: str = ""
-    text: str = ""
+    file: str
+    text: str
 
 
 @dataclass(frozen=True)
@@ -170,10 +169,26 @@ class Row:
         return json.dumps(asdict(self), allow_nan=True)
 
     @classmethod
+    def from_content(cls, content: Any) -> Row:
+        """Return the row that a mapping describes.
+
+        Raises
+        ------
+        ValueError
+            If it describes none: results may have come from somebody else, or be damaged.
+        """
+        return _ROWS.validate_python(content)
+
+    @classmethod
     def from_text(cls, text: str) -> Row:
-        """The row of a line."""
-        content = json.loads(text)
-        return cls(**content | {"outcome": Outcome(content["outcome"])})
+        """Return the row of a line of JSON; ValueError if there is none."""
+        try:
+            return cls.from_content(json.loads(text))
+        except RecursionError:
+            raise ValueError("is nested too deeply") from None
+
+
+_ROWS = TypeAdapter(Row)
 
 
 def digest(text: str) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.record.lock import open_alone
+from bilayer_core.scene.faults import shortened
 from bilayer_core.sweeps.job import Row
 
 FILE, LOCK = "results.sqlite", ".lock"
@@ -57,6 +58,7 @@ class Journal:
                     Path(f"{self.path}{suffix}").unlink(missing_ok=True)
             with self._writing():
                 self._base = sqlite3.connect(self.path or ":memory:")
+                self._base.execute("PRAGMA trusted_schema=OFF")  # the file may be somebody else's
                 self._base.execute("PRAGMA journal_mode=WAL")
                 self._base.execute("PRAGMA synchronous=NORMAL")
                 self._base.executescript(SCHEMA)
@@ -96,11 +98,11 @@ class Journal:
     def _refuse_changed(self, content: dict[str, Any]) -> None:
         try:
             found = self._base.execute("SELECT value FROM head WHERE name = 'sweep'").fetchone()
-        except sqlite3.DatabaseError as error:
+            if found is None:  # killed between the first two writes, before any row
+                return
+            before, now = dict(json.loads(found[0])), json.loads(_text(content))
+        except (sqlite3.DatabaseError, ValueError, TypeError, RecursionError) as error:
             raise InputError(f"--resume: {self.path}: is damaged or no journal of a sweep: {error}") from None
-        if found is None:  # killed between the first two writes, before any row
-            return
-        before, now = json.loads(found[0]), json.loads(_text(content))
         changed = [key for key in {**before, **now} if before.get(key) != now.get(key)]
         if changed:
             more = f" and {len(changed) - MOST_SHOWN} more" if len(changed) > MOST_SHOWN else ""
@@ -128,10 +130,21 @@ class Journal:
             self._base.commit()
 
     def rows(self, keys: set[str] | None = None) -> Iterator[Row]:
-        """All rows in the order of their runs, read as they are asked for; with `keys` those alone."""
+        """Yield all rows in the order of their runs, read as they are asked for; with `keys` those alone.
+
+        Raises
+        ------
+        InputError
+            If one is damaged.
+        """
         for key, text in self._base.execute("SELECT key, row FROM rows ORDER BY number"):
-            if keys is None or key in keys:
+            if keys is not None and key not in keys:
+                continue
+            try:
                 yield Row.from_text(text)
+            except (ValueError, TypeError) as error:
+                told = shortened(str(error))
+                raise InputError(f"{self.path}: the row with the key {key!r} is damaged: {told}") from None
 
     @contextmanager
     def _writing(self) -> Iterator[None]:

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
 import socket
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from multiprocessing import get_context
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from urllib.request import urlopen
 
 from bilayer_core.errors import EngineError, InputError, OutputError
+from bilayer_core.sweeps.certificates import NEEDS_DASK, check_certificates, is_encrypted, security_of
 from bilayer_core.sweeps.engine import Engine, refuse_other_versions
 from bilayer_core.sweeps.execute import LOGS, prepare
 from bilayer_core.sweeps.job import Job
+
+if TYPE_CHECKING:
+    from distributed import Security
 
 DASHBOARD_TIME = 2.0
 """For the dashboard to answer [s]."""
@@ -25,6 +28,10 @@ CONNECT_TIME = 8.0
 """To reach a scheduler [s]."""
 PREPARE_TIME = 600.0
 """For a process to start, and to compile kernels [s]."""
+OPEN_CLUSTER = (
+    "warning: whoever reaches the port of this scheduler can run programs as the users of scheduler and workers; "
+    "docs/sweeps.md says how certificates prevent that"
+)
 CONFIG = {
     "distributed.scheduler.allowed-failures": 0,  # who dies is counted here
     "distributed.worker.memory.target": False,  # of what runs, nothing can be put to disk
@@ -36,27 +43,44 @@ CONFIG = {
 """Of processes of this machine."""
 
 
+@dataclass(frozen=True)
+class Processes:
+    """The processes that a user asks for.
+
+    Attributes
+    ----------
+    workers : int or None
+        Processes of this machine; by default one a core.
+    scheduler : str or None
+        Address of a Dask scheduler whose workers run instead: ``tls://host:8786``.
+    security : distributed.Security or None
+        Certificates for that scheduler; by default those that Dask's configuration names.
+    dashboard : bool
+        Whether the processes of this machine serve Dask's dashboard.
+    """
+
+    workers: int | None = None
+    scheduler: str | None = None
+    security: Security | None = None
+    dashboard: bool = False
+
+
 @contextmanager
-def open_engine(
-    job: Job, workers: int | None = None, scheduler: str | None = None, memory: float | None = None
-) -> Iterator[Engine]:
-    """Processes that are ready to run.
+def open_engine(job: Job, processes: Processes, memory: float | None = None) -> Iterator[Engine]:
+    """Yield processes that are ready to run.
 
     Parameters
     ----------
     job : Job
-    workers : int, optional
-        Processes of this machine; by default one a core.
-    scheduler : str, optional
-        Address of a Dask scheduler whose workers run instead: ``tcp://host:8786``.
+    processes : Processes
     memory : float, optional
         At which a process of this machine is killed [bytes]; by default its share of the memory.
 
     Raises
     ------
     InputError
-        If Dask is not installed, the scheduler cannot be reached, or its workers have other versions or do not see the
-        directory of logs.
+        If a package is not installed, the scheduler cannot be reached with these certificates, or its workers have
+        other versions or do not see the directory of logs.
     EngineError
         If no process starts.
     """
@@ -64,86 +88,69 @@ def open_engine(
         import dask
         import distributed  # noqa: F401
     except ImportError:
-        raise InputError("sweeps need Dask: pip install 'bilayer_sim_ros[sweep]'") from None
+        raise InputError(NEEDS_DASK) from None
     with ExitStack() as stack:
-        if scheduler is None:
-            workers = workers or len(os.sched_getaffinity(0))
+        if processes.scheduler is None:
+            workers = processes.workers or len(os.sched_getaffinity(0))
             stack.enter_context(dask.config.set(CONFIG))
-            engine = _embedded(stack, job, workers, memory)
+            engine = _embedded(stack, job, workers, memory, processes.dashboard)
+            _get_ready(engine, job, workers)
         else:
-            engine = _joined(stack, job, scheduler)
-        _get_ready(engine, job, workers)
+            engine = _joined(stack, job, processes.scheduler, processes.security)
+            _get_ready(engine, job, None)
         yield engine
 
 
-def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) -> Engine:
-    from distributed import Client, LocalCluster
+def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None, dashboard: bool) -> Engine:
+    from distributed import Client
+
+    from bilayer_core.sweeps.local_cluster import start_cluster
 
     folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="bilayer-sweep-", ignore_cleanup_errors=True))
     try:
-        with _keyboard_unheard():
-            cluster = LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                memory_limit=memory or "auto",
-                local_directory=folder,
-                silence_logs=logging.CRITICAL,
-            )
-            stack.enter_context(cluster)
+        cluster = stack.enter_context(start_cluster(workers, memory, folder, dashboard))
     except RuntimeError as error:
         hint = "in a program, call it below `if __name__ == '__main__':`, since processes read the program again"
         raise EngineError(f"sweep: no process starts on this machine ({error}); {hint}") from error
     client = stack.enter_context(Client(cluster, set_as_default=False))
     engine = Engine(client, job, memory)
     engine.where = f"{workers} processes of this machine" if workers > 1 else "one process of this machine"
-    engine.dashboard = _dashboard(client)
+    if dashboard:
+        engine.notices.append(f"dashboard {client.dashboard_link}: any user of this machine can read it")
     return engine
 
 
-@contextmanager
-def _keyboard_unheard() -> Iterator[None]:
-    """Threads and processes that are started meanwhile have SIGINT blocked: Ctrl-C is for the thread that waits."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    get_context("spawn").Lock()  # starts Python's tracker of resources, which would unblock the signal later
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _joined(stack: ExitStack, job: Job, address: str) -> Engine:
+def _joined(stack: ExitStack, job: Job, address: str, security: Security | None) -> Engine:
     from distributed import Client
 
+    security = security or security_of(None, None, None)
+    check_certificates(address, security)
     logger = logging.getLogger("distributed")
     before = logger.level
     logger.setLevel(logging.CRITICAL)
     stack.callback(logger.setLevel, before)
     try:
-        client = stack.enter_context(Client(address, timeout=CONNECT_TIME, set_as_default=False))
+        client = stack.enter_context(Client(address, timeout=CONNECT_TIME, set_as_default=False, security=security))
     except (OSError, TimeoutError, ValueError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(
             f"--scheduler: {address}: no Dask scheduler can be reached there within {CONNECT_TIME:g} s ({reason}); "
-            "`dask scheduler` prints its address when it starts, such as tcp://192.0.2.1:8786"
+            "`dask scheduler` prints its address when it starts, such as tls://192.0.2.1:8786"
         ) from None
     engine = Engine(client, job, None)
     engine.where, engine.dashboard = f"cluster {address}", _dashboard(client)
+    if not is_encrypted(address):
+        engine.notices.append(OPEN_CLUSTER)
     return engine
 
 
 def _dashboard(client: Any) -> str:
-    """Address of a scheduler's dashboard; empty if nothing is shown there, as where bokeh is not installed."""
-    link = str(client.dashboard_link)
+    """Return the address of a scheduler's dashboard; empty if nothing answers there."""
     try:
+        link = str(client.dashboard_link)
         with urlopen(link, timeout=DASHBOARD_TIME):
             return link
-    except (OSError, ValueError):
+    except (KeyError, OSError, ValueError):
         return ""
 
 

@@ -20,7 +20,7 @@ from bilayer_core.sweeps.engine import Engine
 from bilayer_core.sweeps.execute import scene_of
 from bilayer_core.sweeps.job import Job, Outcome, Point, Row
 from bilayer_core.sweeps.journal import Journal
-from bilayer_core.sweeps.opening import open_engine
+from bilayer_core.sweeps.opening import Processes, open_engine
 from bilayer_core.sweeps.result import write_table
 from bilayer_core.sweeps.run import Sweep, read_sweep
 from bilayer_core.sweeps.spec import Parameter
@@ -121,8 +121,11 @@ class Search:
         optuna = _optuna()
         value, state = row.metrics.get(self.metric), optuna.trial.TrialState
         told = {"value": value, "state": state.COMPLETE} if _is_value(value) else {"state": state.FAIL}
-        trial = optuna.trial.create_trial(params=row.parameters, distributions=self._space, **told)
-        self._study.add_trial(trial)
+        try:
+            trial = optuna.trial.create_trial(params=row.parameters, distributions=self._space, **told)
+            self._study.add_trial(trial)
+        except ValueError as error:
+            raise InputError(f"--resume: run {row.number} in the results is none of this search: {error}") from None
         self.asked = max(self.asked, row.number + 1)
 
     def ask(self) -> Point:
@@ -208,6 +211,8 @@ def optimise(
     out: str | Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    security: Any = None,
+    dashboard: bool = False,
     resume: bool = False,
     force: bool = False,
     progress: Callable[[Row], None] | None = None,
@@ -225,7 +230,7 @@ def optimise(
         Runs, those that are resumed included.
     seed : int
         Of the search. With one worker the same search is made again.
-    out, workers, scheduler, resume, force, progress
+    out, workers, scheduler, security, dashboard, resume, force, progress
         As of `sweeps.run.sweep`.
     tell : callable, optional
         Called with the engine before the first run.
@@ -242,12 +247,13 @@ def optimise(
     directory = None if out is None else Path(out)
     read = read_sweep(spec, directory)
     _refuse_unsearchable(read, metric)
+    processes = Processes(workers, scheduler, security, dashboard)
     content = read.content | {"search": [metric, largest, seed]}
     with Journal(directory, content, resume=resume, force=force) as journal, ExitStack() as stack:
         rows = {row.key: row for row in journal.rows()}
         search = Search(read, metric, largest, seed, list(rows.values()))
         ensure_compiled()
-        engine = stack.enter_context(open_engine(read.job, workers, scheduler, read.spec.limits.memory))
+        engine = stack.enter_context(open_engine(read.job, processes, read.spec.limits.memory))
         if tell is not None:
             tell(engine)
         _run_trials(search, engine, journal, rows, trials, progress)

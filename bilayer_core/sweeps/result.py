@@ -152,16 +152,17 @@ def read_results(path: str | Path) -> SweepResult:
     try:
         table = parquet.read_table(path)
         about = Columns.from_text(table.schema.metadata[ABOUT])
+        rows = [_row(content, about) for content in table.drop_columns(["summary"]).to_pylist()]
     except (OSError, ValueError, KeyError, TypeError) as error:
         told = " ".join(str(error).split())[:200]
         raise InputError(f"{path}: is no table of a sweep that can be read: {told}") from None
-    return SweepResult((_row(content, about) for content in table.drop_columns(["summary"]).to_pylist()), about)
+    return SweepResult(rows, about)
 
 
 def _row(content: dict[str, Any], about: Columns) -> Row:
     parameters = {name: content.pop(name) for name in about.parameters}
     metrics = {name: content.pop(name) for name in about.metrics}
-    return Row(parameters=parameters, metrics=metrics, **content | {"outcome": Outcome(content["outcome"])})
+    return Row.from_content(content | {"parameters": parameters, "metrics": metrics})
 
 
 def write_table(journal: Journal, keys: set[str], about: Columns, directory: Path) -> Path:

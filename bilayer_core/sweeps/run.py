@@ -13,14 +13,14 @@ from bilayer_core.errors import BilayerError, InputError, SceneError
 from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.sweeps.code import find_code
+from bilayer_core.sweeps.code import find_code, refuse_broken
 from bilayer_core.sweeps.design import Values, count_of, runs_of
 from bilayer_core.sweeps.engine import Engine
 from bilayer_core.sweeps.execute import present_versions, recording_of, scene_of
 from bilayer_core.sweeps.job import Job, Point, Row, digest
 from bilayer_core.sweeps.journal import Journal
 from bilayer_core.sweeps.metrics import FinishedRun, MetricError, check_metrics
-from bilayer_core.sweeps.opening import open_engine
+from bilayer_core.sweeps.opening import Processes, open_engine
 from bilayer_core.sweeps.result import Columns, SweepResult, rows_of, write_table
 from bilayer_core.sweeps.spec import OfFunction, SweepSpec, read_spec
 
@@ -73,7 +73,9 @@ class Sweep:
         return Point(number, self.job.key_of(values), values)
 
 
-def read_sweep(spec: str | Path | Mapping[str, Any], out: Path | None = None, functions: Any = None) -> Sweep:
+def read_sweep(
+    spec: str | Path | Mapping[str, Any], out: Path | None = None, functions: Any = None, run_code: bool = True
+) -> Sweep:
     """Read and check a sweep: the scene, key paths, metrics, functions.
 
     Parameters
@@ -84,6 +86,8 @@ def read_sweep(spec: str | Path | Mapping[str, Any], out: Path | None = None, fu
         Directory of results, for logs.
     functions : mapping, optional
         Further metrics that are Python functions, by name.
+    run_code : bool
+        Whether the Python files that the sweep file names may run; if not, less is checked.
 
     Raises
     ------
@@ -98,13 +102,7 @@ def read_sweep(spec: str | Path | Mapping[str, Any], out: Path | None = None, fu
     if read.logs != "none" and out is None:
         raise InputError(f"{source}: logs: found {_shown(read.logs)}; a directory for results must be given too (out)")
     scene = load_scene(_scene_of(read, directory), _fixed(read))
-    codes: dict[str, Any] = {
-        metric.function: find_code(metric.function, directory, f"{source}: metrics.{name}")
-        for name, metric in read.metrics.items()
-        if isinstance(metric, OfFunction)
-    }
-    if read.change:
-        codes[read.change] = find_code(read.change, directory, f"{source}: change")
+    codes = _find_codes(read, directory, source, run_code)
     metrics = dict(read.metrics)
     for name, function in functions.items():
         metrics[name] = OfFunction(function=f"python:{name}")
@@ -129,8 +127,22 @@ def read_sweep(spec: str | Path | Mapping[str, Any], out: Path | None = None, fu
     content = read.model_dump(mode="json", by_alias=True, exclude={"title"})
     content |= {"the scene": job.scene_hash, "functions": digest(repr(sorted(codes.items(), key=str)))}
     found = Sweep(read, job, source, content)
-    _check(found)
+    if run_code or not read.change:
+        _check(found)
     return found
+
+
+def _find_codes(read: SweepSpec, directory: Path, source: str, run_code: bool) -> dict[str, Any]:
+    """Return the code of all functions that a sweep file names, by how it names them."""
+    named = {f"metrics.{name}": of.function for name, of in read.metrics.items() if isinstance(of, OfFunction)}
+    if read.change:
+        named["change"] = read.change
+    codes: dict[str, Any] = {}
+    for key, function in named.items():
+        codes[function] = find_code(function, directory, f"{source}: {key}")
+        if run_code:
+            refuse_broken(codes[function], function, f"{source}: {key}")
+    return codes
 
 
 def _shown(logs: Any) -> str:
@@ -187,6 +199,8 @@ def sweep(
     out: str | Path | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
+    security: Any = None,
+    dashboard: bool = False,
     resume: bool = False,
     force: bool = False,
     functions: Mapping[str, Callable[[FinishedRun], Any]] | None = None,
@@ -204,6 +218,11 @@ def sweep(
         Processes of this machine; by default one a core.
     scheduler : str, optional
         Address of a Dask scheduler, whose workers run instead.
+    security : distributed.Security, optional
+        Certificates for a scheduler whose address begins with ``tls://``; by default those that Dask's configuration
+        names.
+    dashboard : bool
+        Whether the processes of this machine serve Dask's dashboard, to any user of the machine.
     resume : bool
         Make the runs that are missing in `out`, and none twice.
     force : bool
@@ -231,10 +250,11 @@ def sweep(
     """
     directory = None if out is None else Path(out)
     read = read_sweep(spec, directory, functions)
+    processes = Processes(workers, scheduler, security, dashboard)
     with Journal(directory, read.content, resume=resume, force=force) as journal:
         try:
             with ExitStack() as stack:
-                for rows in run_missing(read, journal, stack, workers, scheduler):
+                for rows in run_missing(read, journal, stack, processes):
                     for row in rows:
                         if progress is not None:
                             progress(row)
@@ -245,7 +265,7 @@ def sweep(
 
 
 def run_missing(
-    sweep: Sweep, journal: Journal, stack: ExitStack, workers: int | None, scheduler: str | None, tell: Any = None
+    sweep: Sweep, journal: Journal, stack: ExitStack, processes: Processes, tell: Any = None
 ) -> Iterator[list[Row]]:
     """Make the runs of a sweep that a journal lacks; what comes is in the journal when it is handed on.
 
@@ -262,7 +282,7 @@ def run_missing(
     if first is None:
         return
     ensure_compiled()
-    engine: Engine = stack.enter_context(open_engine(sweep.job, workers, scheduler, sweep.spec.limits.memory))
+    engine: Engine = stack.enter_context(open_engine(sweep.job, processes, sweep.spec.limits.memory))
     if tell is not None:
         tell(engine)
     for rows in engine.run(_with_first(first, missing)):

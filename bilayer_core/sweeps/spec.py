@@ -52,7 +52,7 @@ def _bound_or_none(value: Any) -> Bound | None:
 
 Limit = Annotated[Bound, BeforeValidator(_read_bound)]
 Function = Annotated[str, Field(pattern=r"^[^:]+:[A-Za-z_][A-Za-z0-9_]*$", max_length=500)]
-"""``FILE.py:NAME``, the file beside the sweep file, or ``package.module:NAME``."""
+"""``FILE.py:NAME``, the file beside the sweep file."""
 MemorySize = Annotated[float, *real("a memory size", "byte", "2 GB", above=0.0)]
 
 
@@ -335,7 +335,8 @@ def read_spec(spec: str | Path | Mapping[str, Any]) -> tuple[SweepSpec, Path, st
     if isinstance(spec, str | Path):
         try:
             path = Path(spec) if is_file_name(spec) else bundled_sweep(str(spec))
-            directory, source = path.parent, str(path)
+            # A link stands for the file that it leads to: colcon's symlink install links each file by itself.
+            directory, source = (path.resolve() if path.is_symlink() else path).parent, str(path)
             content = read_yaml(read_text(path, LARGEST_FILE), source)
         except ValueError as error:
             raise InputError(f"{source!r}: {error}" if "\0" in source else f"{source}: {error}") from None

@@ -18,7 +18,7 @@ import psutil
 
 from bilayer_core.bench.machine import record
 from bilayer_core.sweeps.execute import execute
-from bilayer_core.sweeps.opening import open_engine
+from bilayer_core.sweeps.opening import Processes, open_engine
 from bilayer_core.sweeps.run import read_sweep, sweep
 
 GAIN = {
@@ -46,7 +46,7 @@ def spec(scene: str, duration: float, count: int) -> dict:
 def seconds(content: dict, workers: int) -> float:
     """Wall time of all runs of a sweep, from the first to the last, processes being ready."""
     read = read_sweep(content)
-    with open_engine(read.job, workers) as engine:
+    with open_engine(read.job, Processes(workers)) as engine:
         points = list(read.points())
         for _ in engine.run(iter(points[: 4 * workers])):  # kernels are loaded
             pass

@@ -23,7 +23,7 @@ def test_a_sweep_tells_where_it_runs_how_runs_ended_and_what_was_written(call, s
     strip["parameters"]["length"]["values"] = ["80 mm", "-1 mm"]
     code, out, err = call("--scheduler", cluster, "--plot")
     assert code == 0
-    assert err.startswith(f"cluster {cluster}, 2 runs side by side\n")
+    assert err.startswith(f"cluster {cluster}, 2 runs side by side\nwarning: whoever reaches the port of")
     lines = out.splitlines()
     assert lines[0] == "4 done, 4 refused"
     assert lines[1].startswith('  4 times, first run 1: refused: scene: rods.strip.path.length: found "-1.0 mm"')

@@ -119,14 +119,15 @@ def test_metrics_of_quantities_take_what_they_say(strip):
     assert found["mean"] == pytest.approx(z.mean()) and found["largest_magnitude"] == abs(z).max() > 0.0
 
 
-def test_a_function_may_change_the_scene_in_ways_that_no_key_path_says(strip, tmp_path):
+def test_a_function_may_change_the_scene_in_ways_that_no_key_path_says(strip, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(
         "def double(content, parameters):\n"
         "    content['rods'][0]['path']['length'] = 2.0 * parameters['half']\n"
         "    return content\n"
     )
     strip["parameters"] = {"half": {"values": [0.04, 0.05]}}
-    strip["change"] = str(tmp_path / "own.py") + ":double"
+    strip["change"] = "own.py:double"
     found = rows(strip)
     assert [row.metrics["height"] for row in found] == [row.metrics["height"] for row in rows_of_lengths(strip)]
 
@@ -137,9 +138,10 @@ def rows_of_lengths(strip):
 
 
 @pytest.mark.parametrize(("body", "told"), [("return None", "must return the content"), ("1 / 0", "ZeroDivisionError")])
-def test_a_change_that_fails_is_told(strip, tmp_path, body, told):
+def test_a_change_that_fails_is_told(strip, tmp_path, monkeypatch, body, told):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(f"def change(content, parameters):\n    {body}\n")
-    strip["change"] = str(tmp_path / "own.py") + ":change"
+    strip["change"] = "own.py:change"
     with pytest.raises(Exception, match=told):
         read_sweep(strip)
 

@@ -103,3 +103,26 @@ def test_a_full_disk_is_named_and_keeps_what_there_is(tmp_path):
         with pytest.raises(OutputError, match=f"{FILE}: cannot be written: database or disk is full"):
             journal.add([row(k, reason="long " * 1000) for k in range(1, 100)])
     assert sqlite3.connect(tmp_path / FILE).execute("SELECT count(*) FROM rows").fetchone() == (1,)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", "{}", "[" * 100_000, '{"key": "key0", "number": "many"}', "cos\nsystem\n(S'true'\ntR."],
+    ids=["nothing", "list", "mapping", "deep", "kind", "pickle"],
+)
+def test_rows_of_somebody_else_that_are_none_are_told_as_damage(tmp_path, text):
+    with Journal(tmp_path, CONTENT) as journal:
+        journal.add([row(0)])
+    with sqlite3.connect(tmp_path / FILE) as base:
+        base.execute("UPDATE rows SET row = ?", (text,))
+    with Journal(tmp_path, CONTENT, resume=True) as journal, pytest.raises(InputError, match="'key0' is damaged"):
+        list(journal.rows())
+
+
+@pytest.mark.parametrize("text", ["", "[1]", "{", "3"])
+def test_a_head_that_is_none_is_told_as_damage(tmp_path, text):
+    Journal(tmp_path, CONTENT).close()
+    with sqlite3.connect(tmp_path / FILE) as base:
+        base.execute("UPDATE head SET value = ?", (text,))
+    with pytest.raises(InputError, match="is damaged or no journal of a sweep"):
+        Journal(tmp_path, CONTENT, resume=True)

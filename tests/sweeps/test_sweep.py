@@ -16,7 +16,7 @@ from sweep_programs import address_in, dask, end, start_scheduler, wait_until
 from bilayer_core import read_results
 from bilayer_core.errors import EngineError, InputError
 from bilayer_core.sweeps.job import Outcome
-from bilayer_core.sweeps.opening import open_engine
+from bilayer_core.sweeps.opening import Processes, open_engine
 from bilayer_core.sweeps.run import read_sweep, sweep
 
 COMMAND = [sys.executable, "-m", "bilayer_core"]
@@ -184,7 +184,7 @@ def test_logs_need_a_directory_that_workers_see(strip, cluster, tmp_path, monkey
     read = read_sweep(strip | {"logs": "all"}, tmp_path / "here")
     monkeypatch.setattr("bilayer_core.sweeps.opening.LOGS", "only_here")  # which workers look for elsewhere
     with pytest.raises(InputError, match="does not see it; logs need a directory that all workers share"):
-        with open_engine(read.job, scheduler=cluster):
+        with open_engine(read.job, Processes(scheduler=cluster)):
             pass
 
 

@@ -1,0 +1,99 @@
+"""Processes of this machine for a sweep, which nobody else can reach.
+
+Dask runs whatever code arrives at its ports. So scheduler, workers and client share a certificate that is made for
+this one cluster and is kept in their memory; who does not have it is refused. Dask's nodes also serve HTTP, to any
+user of the machine; they do not here, but for the dashboard if it is asked for.
+"""
+
+from __future__ import annotations
+
+import logging
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from multiprocessing import get_context
+from typing import Any
+
+from distributed import Nanny, Scheduler, Security, SpecCluster, Worker
+
+from bilayer_core.errors import InputError
+
+HOST = "127.0.0.1"
+
+
+class WithoutHttp:
+    """A node of Dask's that serves no HTTP."""
+
+    def start_http_server(self, *_: Any, **__: Any) -> None:
+        """Start none."""
+
+
+class QuietScheduler(WithoutHttp, Scheduler):
+    """A scheduler that listens for workers and clients only."""
+
+
+class QuietWorker(WithoutHttp, Worker):
+    """A worker that listens for scheduler, workers and clients only."""
+
+
+def start_cluster(workers: int, memory: float | None, folder: str, dashboard: bool) -> SpecCluster:
+    """Start a scheduler in this process, and worker processes.
+
+    Parameters
+    ----------
+    workers : int
+    memory : float or None
+        At which a worker is killed [bytes]; None for its share of the memory.
+    folder : str
+        For files of the workers.
+    dashboard : bool
+        Whether the scheduler serves Dask's dashboard, to all users of this machine.
+
+    Raises
+    ------
+    InputError
+        If a package is missing.
+    RuntimeError
+        If no process starts.
+    """
+    if dashboard and find_spec("bokeh") is None:
+        raise InputError("--dashboard: Dask's dashboard needs Bokeh: pip install bokeh")
+    common = {"host": HOST, "protocol": "tls://", "security": _temporary_security()}
+    served = {"dashboard": dashboard, "dashboard_address": f"{HOST}:0"}
+    options = common | {
+        "nthreads": 1,
+        "memory_limit": memory or "auto",
+        "local_directory": folder,
+        "silence_logs": logging.CRITICAL,
+        "worker_class": QuietWorker,
+    }
+    with _keyboard_unheard():
+        return SpecCluster(
+            scheduler={"cls": Scheduler if dashboard else QuietScheduler, "options": common | served},
+            workers={number: {"cls": Nanny, "options": options} for number in range(workers)},
+            security=common["security"],
+            silence_logs=logging.CRITICAL,
+        )
+
+
+def _temporary_security() -> Security:
+    """Return a key and a certificate that were made just now, and are kept in memory."""
+    try:
+        return Security.temporary()
+    except ImportError:
+        raise InputError("sweeps need cryptography: pip install 'bilayer_sim_ros[sweep]'") from None
+
+
+@contextmanager
+def _keyboard_unheard() -> Iterator[None]:
+    """Block SIGINT in threads and processes that are started meanwhile: Ctrl-C is for the thread that waits."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    get_context("spawn").Lock()  # starts Python's tracker of resources, which would unblock the signal later
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

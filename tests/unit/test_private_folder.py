@@ -1,0 +1,141 @@
+"""The cache of kernels is a pickle: only a folder that other users cannot write to is read."""
+
+import os
+import pickle
+import subprocess
+import sys
+
+import pytest
+
+from bilayer_core.jit import cache
+from bilayer_core.jit.private_folder import exposure, make_private
+
+NOBODY = 65534
+IS_ROOT = os.geteuid() == 0
+"""Only root can give files to somebody else."""
+PROGRAM = """
+from bilayer_core.jit.kernel import entry
+
+
+@entry
+def double(x):
+    return 2.0 * x
+
+
+print(double(3.0))
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder of a cache as it is made, with a file of kernels in it."""
+    made = make_private(tmp_path / "above" / "root" / "kernels-1")
+    (made / "engine").mkdir()
+    (made / "engine" / "kernels.nbi").touch()
+    return made
+
+
+def found(folder):
+    return exposure(folder, cache.PACKAGE)
+
+
+@pytest.mark.parametrize("umask", [0o000, 0o002, 0o022, 0o077])
+def test_folders_of_the_cache_are_made_for_the_user_alone_whatever_the_umask(tmp_path, umask):
+    before = os.umask(umask)
+    try:
+        made = make_private(tmp_path / "above" / "root" / "kernels-1")
+        (made / "kernels.nbi").touch()
+    finally:
+        os.umask(before)
+    assert [path.stat().st_mode & 0o7777 for path in (made, made.parent, made.parents[1])] == [0o700] * 3
+    assert found(made) == ""
+
+
+@pytest.mark.parametrize(
+    ("place", "mode"),
+    [(".", 0o770), (".", 0o702), (".", 0o1777), ("..", 0o770), ("..", 0o702), ("../..", 0o702)],
+)
+def test_a_folder_that_others_can_write_to_is_named(folder, place, mode):
+    path = (folder / place).resolve()
+    path.chmod(mode)
+    assert found(folder) == f"other users can write to {path}"
+
+
+@pytest.mark.parametrize("mode", [0o620, 0o602])
+def test_files_that_others_can_reach_and_write_to_are_named(folder, mode):
+    file = folder / "engine" / "kernels.nbi"
+    file.chmod(mode)
+    assert found(folder) == ""  # nobody else comes as far
+    folder.chmod(0o755)
+    assert found(folder) == f"other users can write to {file}"
+
+
+@pytest.mark.parametrize("place", [".", "engine", "engine/kernels.nbi", "..", "../.."] if IS_ROOT else [])
+def test_what_belongs_to_another_user_is_named_with_that_user(folder, place):
+    path = (folder / place).resolve()
+    os.chown(path, NOBODY, NOBODY)
+    assert found(folder) == f"{path} belongs to the user nobody"
+
+
+def test_a_root_like_tmp_is_safe_since_nobody_can_rename_folders_of_others(folder):
+    folder.parent.chmod(0o1777)
+    assert found(folder) == ""
+
+
+def test_folders_above_the_package_itself_are_not_looked_at(folder):
+    folder.parents[1].chmod(0o777)
+    assert exposure(folder, folder.parents[1] / "package") == ""
+    assert exposure(folder, folder.parent / "package") == ""
+    assert exposure(folder, folder.parents[1] / "package" / "below") == ""
+
+
+def test_a_link_is_followed_to_a_folder_that_is_looked_at_itself(tmp_path):
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o777)
+    (tmp_path / "link").symlink_to(tmp_path / "open")
+    made = make_private(tmp_path / "link" / "kernels-1")
+    assert made == tmp_path / "open" / "kernels-1"
+    assert found(made) == f"other users can write to {tmp_path / 'open'}"
+
+
+def _give_away(path):
+    os.chown(path, NOBODY, NOBODY)
+
+
+def _open(path):
+    path.chmod(0o777)
+
+
+@pytest.mark.parametrize("expose", [_open, _give_away] if IS_ROOT else [_open])
+def test_an_index_that_another_user_planted_is_not_unpickled(tmp_path, expose):
+    (tmp_path / "program.py").write_text(PROGRAM)
+    root, mark = tmp_path / "cache", tmp_path / "ran"
+
+    def run():
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(root), "PYTHONPATH": str(cache.PACKAGE.parent)}
+        command = [sys.executable, "program.py"]
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+
+    assert run().stdout == "6.0\n"
+    (index,) = root.rglob("*.nbi")
+    index.write_bytes(pickle.dumps(_Planted(str(mark))))
+    expose(index.parents[1])
+    again = run()
+    assert again.stdout == "6.0\n" and not mark.exists()
+    (line,) = again.stderr.splitlines()
+    assert str(index.parents[1]) in line
+    assert "can run programs as you; set NUMBA_CACHE_DIR to a folder that only you can write to" in line
+    index.parents[1].chmod(0o700)
+    os.chown(index.parents[1], os.geteuid(), os.getegid())
+    run()
+    assert mark.exists()  # numba does run what such an index says
+
+
+class _Planted:
+    """An object that, when it is unpickled, makes a file."""
+
+    def __init__(self, path):
+        self.path = path
+
+    def __reduce__(self):
+        return os.mkdir, (self.path,)
