@@ -51,7 +51,8 @@ def test_a_served_node_says_where_at_this_machine_and_its_viewers_end_with_it(st
     assert shapes[0] == frames[0] == 0.0
     assert frames[-1] > 0.5 and len(frames) > 0.5 * 50 * frames[-1] and len(shapes) > 0.5 * 20 * shapes[-1]
     below = process.children(recursive=True)
-    assert len(below) == 2 and all(of.nice() == 10 for of in below)
+    lower = min(process.nice() + 10, 19)
+    assert len(below) == 2 and all(of.nice() == lower for of in below)
     node.send(signal.SIGINT)
     assert node.wait() == 0, node.output
     psutil.wait_procs(below, 10)
