@@ -4,6 +4,8 @@ import ast
 import math
 import signal
 import time
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -176,6 +178,29 @@ def test_in_lockstep_a_reset_brings_the_same_values_again(start, connect, domain
     assert [time for time, _ in first] == pytest.approx(np.arange(12) * 0.02)
     assert max(value for _, value in first) > 0.5 and len({value for _, value in first}) > 3
     assert first == second
+
+
+def catches(process, number):
+    """Whether a process has a handler of its own for a signal."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    caught = next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt"))
+    return bool(int(caught, 16) >> (number - 1) & 1)
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["before discovery", "after discovery"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_on_simulated_time_that_nobody_publishes_a_signal_ends_it(start, connect, domain, number, known):
+    running = [start(f"controllers.{name}", domain, {"use_sim_time": True}) for name in CONTROLLERS]
+    client = connect(running[0])
+    count = partial(client.node.count_publishers, "/bilayer_sim/stimulus_stamped")
+    if known:
+        client.spin_until(lambda: count() == len(running), "publishers of all")
+    else:
+        client.spin_until(lambda: all(catches(of, signal.SIGTERM) for of in running), "handlers of all")
+    for of in running:
+        of.send(number)
+    for of in running:
+        assert of.wait(30) == 0 and "Traceback" not in of.output, of.output
 
 
 @pytest.mark.parametrize(
