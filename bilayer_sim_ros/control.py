@@ -107,6 +107,10 @@ class Control:
         """Where adaptive steps from `time` [s] on end at the latest [s]."""
         return self._ticks.next_end(time) if self._commanded or self._lockstep is not None else math.inf
 
+    def opens_tick(self, time: float) -> bool:
+        """Return whether `advance_to(time)` opens a tick for which time waits: controllers need the frame of `time`."""
+        return self._lockstep is not None and self._ticks.complete(time) > self._count
+
     def advance_to(self, time: float) -> None:
         """A step has ended at `time` [s]: open a tick if it has reached one."""
         count = self._ticks.complete(time)

@@ -17,6 +17,11 @@ from bilayer_sim_ros.stimulus import StimulusInputs
 
 FALLBACKS = {"hold": "the last value stays", "zero": "zero acts", "schedule": "the scene's schedule acts"}
 """What is said of each `stimulus_fallback`."""
+TIMERS = (
+    "; a timer on simulated time does not fire at t = 0. Answer in the callback of /clock, "
+    "or set the parameter 'lockstep_timeout'"
+)
+"""Follows the warning that nobody answers the start."""
 COMPILATION_PERIOD = 5.0
 """Real time between two messages about compilation [s]."""
 WARNING_PERIOD = 10.0
@@ -87,9 +92,10 @@ class Announcer:
 
     def _say_waiting(self, status: Status) -> None:
         if status.waited >= PATIENCE and not self._missed:
+            timers = "" if status.time else TIMERS
             self._node.get_logger().warning(
-                f"lockstep: simulated time stands still at t = {status.time:.6g} s, as no stimulus has come for "
-                f"{status.waited:.0f} s; a controller has to answer each time on /clock"
+                f"lockstep: simulated time stands still at t = {status.time:.6g} s: no controller has answered this "
+                f"tick for {status.waited:.0f} s. Controllers must answer each time on /clock{timers}"
             )
             text = f"no answer for {status.waited:.0f} s"
             self._tell(late_stimulus(status.time, text, "simulated time stands still"))

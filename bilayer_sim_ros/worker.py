@@ -283,6 +283,8 @@ class SimulationWorker:
         frame_is_due = self._frames.complete(now) > self._frames.complete(start)
         if frame_is_due:
             self._hand_out()
+        elif self._control.opens_tick(now):
+            self._publish(self._paused)
         self._control.advance_to(now)
         if self._single_steps and (frame_is_due or self._is_over()):
             self._single_steps.popleft().set_result(f"paused at t = {now:.6g} s")
@@ -295,25 +297,29 @@ class SimulationWorker:
         return due if due < self._duration - TIME_ROUNDING * self._simulator.dt else self._duration
 
     def _hand_out(self) -> None:
-        """Show the present frame to all who look."""
+        """Publish and record the present frame."""
         self._frame_is_out = True
-        self._shown_at = time.monotonic()
-        publish = self._publisher.wanted
-        if publish or self._recording.wanted:
-            frame = self._simulator.frame()
-            if publish:
-                with self._reporter.spending(SUBSCRIBERS):
-                    self._publisher.publish(frame, everything=self._paused)
+        frame = self._publish(self._paused)
+        if self._recording.wanted:
+            frame = frame or self._simulator.frame()
             with self._reporter.spending(LOG):
                 self._recording.observe(frame)
 
+    def _publish(self, everything: bool) -> Frame | None:
+        """Publish the present frame if anybody subscribes to it; the frame."""
+        self._shown_at = time.monotonic()
+        if not self._publisher.wanted:
+            return None
+        frame = self._simulator.frame()
+        with self._reporter.spending(SUBSCRIBERS):
+            self._publisher.publish(frame, everything=everything)
+        return frame
+
     def _show_again_when_due(self) -> None:
-        """Show what stands still to those who came late."""
+        """Repeat the frame, and the tick, of a time that stands still, for subscribers that come late."""
         stands_still = self._paused or self._control.waiting
         if stands_still and time.monotonic() - self._shown_at >= SHOWING_PERIOD:
-            self._shown_at = time.monotonic()
-            if self._paused and self._publisher.wanted:
-                self._publisher.publish(self._simulator.frame(), everything=True)
+            self._publish(everything=True)
             self._control.repeat(self._simulator.time)
 
     def _do_pause(self, answer: Future) -> None:

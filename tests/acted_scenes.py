@@ -1,4 +1,4 @@
-"""A scene on which much may act from outside: a channel, a load, and a body that goes to poses."""
+"""Scenes on which much may act from outside."""
 
 from sample_scenes import GEL, GROUND, contact, layer, rod, scene
 
@@ -22,3 +22,28 @@ def pushed(dimension=2, **solver):
         "solver": {"dimension": dimension, **solver},
         "duration": 0.2,
     }
+
+
+TWO_CHANNELS = """
+schema: 1
+name: two_channels
+title: A strip whose layers are driven by two channels
+duration: 10
+materials:
+  soft: {youngs_modulus: 1e6, density: 1000, poisson_ratio: 0.5, retardation_time: 10 ms}
+stimuli:
+  heat: {minimum: 0, maximum: 1, schedule: {type: hold, value: 0}}
+  light: {minimum: 0, maximum: 1, schedule: {type: hold, value: 0.5}}
+rods:
+  - name: strip
+    width: 10 mm
+    stations: 11
+    path: {shape: straight, start: [0, 0, 0], direction: [1, 0, 0], length: 60 mm}
+    normal: [0, 0, 1]
+    clamp_start: wall
+    layers:
+      - {name: lower, material: soft, thickness: 1 mm, eigenstrain: {stimulus: heat, gain: 3 %}}
+      - {name: upper, material: soft, thickness: 1 mm, eigenstrain: {stimulus: light, gain: 3 %}}
+bodies:
+  - {name: wall, position: [0, 0, 0], motion: {type: prescribed}}
+"""

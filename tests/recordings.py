@@ -9,6 +9,11 @@ from collections import defaultdict
 import numpy as np
 import psutil
 
+LIMIT = 60.0
+"""Longest wait for a viewer to start, or to end [s]."""
+EMPTY = 1000
+"""A recording without data is smaller [B]."""
+
 
 def times_of(path) -> dict[str, np.ndarray]:
     """Times of the rows of each entity that changes [s], in order."""
@@ -25,7 +30,9 @@ def times_of(path) -> dict[str, np.ndarray]:
 
 
 def seen_late(address, path, seconds) -> dict[str, np.ndarray]:
-    """The same of what a viewer gets that connects now and stays for some time, in a file that it writes."""
+    """The same of what a viewer gets that connects now and stays for some time from the first data on, in a file that
+    it writes.
+    """
     from bilayer_core.view.viewer_process import viewer_environment, viewer_executable
 
     command = [viewer_executable(), address, "--save", path, "--bind", "127.0.0.1", "--port", "auto"]
@@ -37,10 +44,14 @@ def seen_late(address, path, seconds) -> dict[str, np.ndarray]:
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # ignored in what shells run in the background
     )
     try:
+        deadline = time.monotonic() + LIMIT
+        while not (path.exists() and path.stat().st_size > EMPTY):
+            assert viewer.poll() is None and time.monotonic() < deadline, "the viewer gets nothing"
+            time.sleep(0.05)
         time.sleep(seconds)
     finally:
         viewer.send_signal(signal.SIGINT)
-        viewer.wait(10)
+        viewer.wait(LIMIT)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # it has no index
         return times_of(path)

@@ -107,7 +107,8 @@ def main(argv: list[str] | None = None) -> int:
     try:
         rclpy.init(args=argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
         node, ended = GaitController(), rclpy.task.Future()
-        node.create_timer(0.1, lambda: ended.set_result(None) if signals else None)
+        steady = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME)  # with use_sim_time others may stand
+        node.create_timer(0.1, lambda: ended.set_result(None) if signals else None, clock=steady)
         rclpy.spin_until_future_complete(node, ended)
     except (ValueError, ParameterException) as error:
         print(f"gait_controller: {error}", file=sys.stderr)

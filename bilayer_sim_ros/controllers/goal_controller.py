@@ -1,11 +1,14 @@
-"""Executable `goal_controller`: takes a robot to a goal, one beat after the other, by where its centre of mass is.
+"""Executable `goal_controller`: moves a robot to a goal, one beat after another, with feedback from its centre of mass.
 
-A controller to copy: plain rclpy, and nothing of the simulator but its topics. Each beat takes one stimulus channel
-from `low` up and back, by a part of the way to `high`; then it looks at `<node>/com`. The next beat is as large as what
-is left asks for, by what earlier ones have brought. Near the goal and beyond it rests, until the robot is moved back.
+A feedback controller to copy: plain rclpy, and nothing of the simulator but its topics. Each beat raises one stimulus
+channel from `low` part of the way to `high` and lowers it again. At the start of a beat the controller reads
+`<node>/com`: the size of the beat depends on the distance that is left and on what earlier beats achieved. Near the
+goal and beyond it the channel rests, until the robot moves back.
 
-It answers each time on `/clock`, once, with one `sensor_msgs/JointState` on `<node>/stimulus_stamped`, so it works
-while the simulation runs freely, is paused, or waits for it in lockstep. Where time goes back it begins anew.
+Topics have no order among each other: the frame of a time T may arrive before or after T on `/clock`. So the controller
+waits until it has both, and answers T exactly once, with one `sensor_msgs/JointState` on `<node>/stimulus_stamped` that
+has the stamp T. In lockstep the simulator waits for that answer, and the run is the same each time, bit for bit. The
+controller also works while the simulation runs freely or is paused. It starts again when time goes back (`~/reset`).
 
     goal_controller --ros-args -p channel:=humidity -p period:=2.4 -p goal:="[0.1, 0.0, 0.0]"
 """
@@ -16,9 +19,9 @@ import math
 import signal
 import sys
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
-from collections import deque
 
 import rclpy
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PointStamped
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
@@ -27,13 +30,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 SECOND = 10**9
-LOOK = 40_000_000  # before the end of a beat [ns]: what was published then has come, each time in lockstep
-SHARE = 0.8  # of what is left, that one beat is to bring
-ALIKE = 0.05  # sizes of beats that differ by less count as one
+SHARE = 0.8  # part of the distance to the goal that one beat should cover
+ALIKE = 0.05  # beats whose sizes differ by less are treated as one
 
 
 class GoalController(Node):
-    """Answers each time on /clock with the value of the present beat."""
+    """Answers each time on /clock once, with the value of the present beat."""
 
     def __init__(self) -> None:
         super().__init__("goal_controller", automatically_declare_parameters_from_overrides=True)
@@ -52,10 +54,11 @@ class GoalController(Node):
         vectors = len(self.axis) == len(self.goal) == 3 and any(self.axis)
         if not (vectors and self.period > self.width >= 0.0 and self.tolerance > 0.0):
             raise ValueError("allowed are period > width >= 0, tolerance > 0, goal and axis of 3 numbers, axis not 0")
+        self.now, self.seen, self.place = -1, -1, math.nan
         self.begin_anew()
         self.publisher = self.create_publisher(JointState, f"{node}/stimulus_stamped", 10)
         self.create_subscription(Clock, "/clock", self.hear, 10)
-        self.create_subscription(PointStamped, f"{node}/com", self.see, 50)
+        self.create_subscription(PointStamped, f"{node}/com", self.see, 10)
         self.create_subscription(PointStamped, "~/goal", self.aim, 1)
 
     def parameter(self, name: str, default, description: str):
@@ -67,55 +70,60 @@ class GoalController(Node):
         return self.declare_parameter(name, default, descriptor).value
 
     def begin_anew(self) -> None:
-        """Forget time, places and beats."""
-        self.answered, self.start, self.size, self.before, self.rests = -1, None, 0.0, None, False
-        self.seen: deque[tuple[int, float]] = deque(maxlen=200)
+        """Forget all answers and beats."""
+        self.answered, self.start, self.size, self.before, self.rests = -1, None, 0.0, math.nan, False
         self.brought = {0.0: 0.0}
 
     def aim(self, message: PointStamped) -> None:
-        """Take another goal; the present beat goes on to its end."""
+        """Take another goal for the beats after the present one."""
         self.goal, self.rests = [message.point.x, message.point.y, message.point.z], False
-
-    def see(self, message: PointStamped) -> None:
-        """Remember how far along the axis the centre of mass is."""
-        now = message.header.stamp.sec * SECOND + message.header.stamp.nanosec
-        self.seen.append((now, self.along((message.point.x, message.point.y, message.point.z))))
 
     def along(self, point) -> float:
         return sum(a * p for a, p in zip(self.axis, point, strict=True)) / math.hypot(*self.axis)  # [m]
 
     def hear(self, message: Clock) -> None:
-        """Answer a time; one that stands still is repeated, and needs no other answer."""
-        now = message.clock.sec * SECOND + message.clock.nanosec
-        if now == self.answered or self.publisher.get_subscription_count() == 0:
-            return
-        if now < self.answered:
+        """Take a simulated time, and answer it if its frame is there."""
+        before, self.now = self.now, message.clock.sec * SECOND + message.clock.nanosec
+        if self.now < before:
             self.begin_anew()
-        self.answered = now
-        if self.start is None or now >= self.start + self.period * SECOND:
-            self.begin_beat(now)
-        elapsed = 1e-9 * (now - self.start)
+        self.answer(message.clock)
+
+    def see(self, message: PointStamped) -> None:
+        """Take a frame, and answer its time if that is the time on /clock."""
+        before, self.seen = self.seen, message.header.stamp.sec * SECOND + message.header.stamp.nanosec
+        self.place = self.along((message.point.x, message.point.y, message.point.z))
+        if self.seen < before:
+            self.begin_anew()
+        self.answer(message.header.stamp)
+
+    def answer(self, stamp: Time) -> None:
+        """Answer a time once; the simulator repeats clock and frame while it waits, for controllers that start late."""
+        if self.now != self.seen or self.now == self.answered or self.publisher.get_subscription_count() == 0:
+            return
+        self.answered = self.now
+        if self.start is None or self.now >= self.start + self.period * SECOND:
+            self.begin_beat()
+        elapsed = 1e-9 * (self.now - self.start)
         sine = 0.5 - 0.5 * math.cos(2.0 * math.pi * elapsed / self.period)
         part = sine if self.width == 0.0 else float(elapsed < self.width)
         answer = JointState(name=[self.channel], position=[self.low + self.size * part * (self.high - self.low)])
-        answer.header.stamp = message.clock
+        answer.header.stamp = stamp
         self.publisher.publish(answer)
 
-    def begin_beat(self, now: int) -> None:
-        """Choose the size of the next beat by where the robot is."""
-        here = next((place for time, place in reversed(self.seen) if time <= now - LOOK), None)
-        if here is not None and self.before is not None and self.size > 0.0:
+    def begin_beat(self) -> None:
+        """Choose the size of the next beat by the distance that is left."""
+        if self.size > 0.0:
             others = {size: way for size, way in self.brought.items() if size == 0.0 or abs(size - self.size) > ALIKE}
-            self.brought = others | {self.size: here - self.before}
-        self.start, self.before = now, here
-        left = math.nan if here is None else self.along(self.goal) - here
-        self.size = 0.0 if math.isnan(left) or left <= 0.5 * self.tolerance else self.size_for(SHARE * left)
-        rested, self.rests = self.rests, not math.isnan(left) and self.size == 0.0
+            self.brought = others | {self.size: self.place - self.before}
+        self.start, self.before = self.now, self.place
+        left = self.along(self.goal) - self.place  # NaN without a goal
+        self.size = self.size_for(SHARE * left) if left > 0.5 * self.tolerance else 0.0
+        rested, self.rests = self.rests, left <= 0.5 * self.tolerance
         if self.rests and not rested:
-            self.get_logger().info(f"rests at t = {1e-9 * now:g} s, {1e3 * left:.2f} mm before the goal")
+            self.get_logger().info(f"rests at t = {1e-9 * self.now:g} s, {1e3 * left:.2f} mm before the goal")
 
     def size_for(self, way: float) -> float:
-        """Part of the largest beat that is to bring a way [m]."""
+        """Return the size, as a part of the largest beat, that covers a distance [m]."""
         known = sorted(self.brought.items())
         for (small, less), (large, more) in zip(known[:-1], known[1:], strict=True):
             if less <= way < more:
@@ -133,7 +141,8 @@ def main(argv: list[str] | None = None) -> int:
     try:
         rclpy.init(args=argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
         node, ended = GoalController(), rclpy.task.Future()
-        node.create_timer(0.1, lambda: ended.set_result(None) if signals else None)
+        steady = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME)  # with use_sim_time others may stand
+        node.create_timer(0.1, lambda: ended.set_result(None) if signals else None, clock=steady)
         rclpy.spin_until_future_complete(node, ended)
     except (ValueError, ParameterException) as error:
         print(f"goal_controller: {error}", file=sys.stderr)

@@ -70,11 +70,13 @@ class RampController(Node):
         self.topic, self.service = f"{node}/stimulus/{self.channel}", self.create_client(Trigger, f"{node}/resume")
         self.publisher = self.create_publisher(JointState, f"{node}/stimulus_stamped", 10)
         self.get_logger().info(f"waiting for a subscriber of {self.topic}")
-        self.looks = self.create_timer(LOOK_PERIOD, self.look)
+        # Not the node's clock: with use_sim_time that stands still until somebody publishes /clock.
+        self.steady, real = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME), rclpy.clock.Clock()
+        self.looks = self.create_timer(LOOK_PERIOD, self.look, clock=self.steady)
         if self.simulated:
             self.create_subscription(Clock, "/clock", lambda message: self.hear(message.clock), 10)
         else:
-            self.create_timer(1.0 / rate, lambda: self.hear(self.get_clock().now().to_msg()))
+            self.create_timer(1.0 / rate, lambda: self.hear(real.now().to_msg()), clock=self.steady)
 
     def parameter(self, name: str, default, description: str):
         """Declare a parameter; its value."""
@@ -131,7 +133,7 @@ def main(argv: list[str] | None = None) -> int:
     try:
         rclpy.init(args=argv, signal_handler_options=rclpy.signals.SignalHandlerOptions.NO)
         node = RampController()
-        node.create_timer(LOOK_PERIOD, lambda: node.done.set_result(signals[0]) if signals else None)
+        node.create_timer(LOOK_PERIOD, lambda: node.done.set_result(signals[0]) if signals else None, clock=node.steady)
         rclpy.spin_until_future_complete(node, node.done)
         if node.done.result() is None:  # no signal
             node.get_logger().info("done")

@@ -1,13 +1,18 @@
 """How fast the node goes while a controller drives it, and how far off it is (Linux, two processors).
 
-    python tests/benchmarks/closed_loop.py [--only sine] [--scene NAME] [--set PATH=VALUE] [--duration S]
+    python tests/benchmarks/closed_loop.py [--only sine] [--mode topics] [--seeds 1 2 3] [--scene NAME]
+                                           [--set PATH=VALUE] [--duration S]
 
 The node, with its log, has processor 0, the controller processor 1. The controller follows /clock and sends a signal at
-a rate in simulated time, so that the same acts on a slow machine. The node goes as fast as it can (`--factor 0`), or is
-asked for a real-time factor. What it reached is simulated over real time, from where it is ready and resumed to its
-end; simulated time over the CPU time of the stepping thread and of the whole process holds on a busy machine too. The
-error is the largest distance of a node from the same run at a tenth of the tolerance, with the same commands at the
-same times, over the longest rod.
+a rate in simulated time. Over topics the node does not wait for it; in lockstep it does, and the controller answers
+each tick with the latest value of the signal. Each signal runs once for each seed: the noise differs, and over topics
+the ticks at which commands act. The table has the smallest and the largest figure of the runs.
+
+The node goes as fast as it can (`--factor 0`), or is asked for a real-time factor. "Reached" is simulated over real
+time, from where the node is ready and resumed to its end; the other factors are simulated time over the CPU time of
+the stepping thread and of the whole process. On a busy machine all of them are smaller: late commands act as jumps, and
+steps after a jump are short. The error is the largest distance of a node from the same run at a tenth of the tolerance,
+with the same commands at the same times, over the longest rod.
 """
 
 from __future__ import annotations
@@ -29,6 +34,9 @@ from pathlib import Path
 import numpy as np
 
 NODE_CORE, CONTROLLER_CORE = 0, 1
+FACTORS = {"reached": "real", "factor, steps": "cpu", "factor, node": "process"}
+"""Column of the table to time of a run."""
+ERRORS = ("largest error", "error at the end")
 COMPILATION = 600.0
 """Longest wait for a node that compiles [s]."""
 
@@ -57,10 +65,14 @@ SIGNALS = {
 """Name to law, and messages per simulated second."""
 
 
-def control(name: str, channel: str) -> None:
+TOPICS, LOCKSTEP = "topics", "lockstep"
+MODES = (TOPICS, LOCKSTEP)
+
+
+def control(name: str, channel: str, seed: int, mode: str) -> None:
     """Send a signal as simulated time goes on, until nobody listens any more; runs in a process of its own.
 
-    Prints when it has the node go on [s].
+    Prints when it resumes the node [s].
     """
     import rclpy
     from rclpy.executors import ExternalShutdownException
@@ -71,18 +83,23 @@ def control(name: str, channel: str) -> None:
     from std_srvs.srv import Trigger
 
     law, rate = SIGNALS[name]
-    chance, sent = random.Random(1), 0
+    chance, sent, answered, value = random.Random(seed), 0, -1.0, 0.0
     rclpy.init()
     node = Node("signal")
     publisher = node.create_publisher(Float64, f"/bilayer_sim/stimulus/{channel}", 10)
     resume = node.create_client(Trigger, "/bilayer_sim/resume")
 
     def hear(message: Clock) -> None:
-        nonlocal sent
+        nonlocal sent, answered, value
         now = message.clock.sec + 1e-9 * message.clock.nanosec
         while sent / rate <= now:
-            publisher.publish(Float64(data=law(sent / rate, chance)))
+            value = law(sent / rate, chance)
             sent += 1
+            if mode == TOPICS:
+                publisher.publish(Float64(data=value))
+        if mode == LOCKSTEP and now != answered:
+            answered = now
+            publisher.publish(Float64(data=value))
 
     node.create_subscription(Clock, "/clock", hear, QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE))
     deadline = time.monotonic() + COMPILATION
@@ -117,18 +134,19 @@ def scene_with(overrides: list[str], scene: str, directory: Path) -> str:
     return str(path)
 
 
-def measure(name: str, log: Path, options: argparse.Namespace) -> dict[str, float]:
+def measure(name: str, mode: str, seed: int, log: Path, options: argparse.Namespace) -> dict[str, float]:
     """Run a node with a controller: CPU time of its steps and of all of it, real time [s], and how often it warned."""
     from bilayer_core import load_scene
 
     channel = next(iter(load_scene(options.scene).stimuli))
     parameters = {"scene": options.scene, "log": log, "duration": options.duration, "start_paused": "true"}
     parameters |= {"real_time_factor": options.factor, "stimulus_interpolation": options.interpolation}
-    parameters |= {"tolerance": options.tolerance}
+    parameters |= {"tolerance": options.tolerance, "lockstep": str(mode == LOCKSTEP).lower()}
     command = ["taskset", "-c", str(NODE_CORE), sys.executable, "-m", "bilayer_sim_ros.sim_node", "--ros-args"]
     for key, value in parameters.items():
         command += ["-p", f"{key}:={value}"]
     driver = ["taskset", "-c", str(CONTROLLER_CORE), sys.executable, __file__, "--control", name, "--channel", channel]
+    driver += ["--mode", mode, "--seeds", str(seed)]
     output, ready, begun, ended, cpu = "", 0.0, 0.0, 0.0, 0.0
     with ExitStack() as stack:
         node = stack.enter_context(subprocess.Popen(command, stderr=subprocess.PIPE, text=True))
@@ -146,7 +164,7 @@ def measure(name: str, log: Path, options: argparse.Namespace) -> dict[str, floa
         raise SystemExit(f"the node did not reach its end:\n{output}")
     behind = re.findall(r"behind: .*", output)
     if behind:
-        print(f"    {name}: {behind[-1]}")
+        print(f"    {name}, {mode}: {behind[-1]}", file=sys.stderr)
     return {"cpu": float(steps[1]), "process": cpu, "real": ended - max(ready, resumed), "warnings": len(behind)}
 
 
@@ -167,9 +185,29 @@ def error_of(log: Path, part: float) -> tuple[float, float]:
     return float(found.max() / longest), float(found[-1] / longest)
 
 
+def figures_of(name: str, mode: str, seed: int, log: Path, options: argparse.Namespace) -> dict[str, float]:
+    """Run a node with a controller: factors of real time, and errors over the longest rod."""
+    found = measure(name, mode, seed, log, options)
+    worst, last = (math.nan, math.nan) if options.no_error else error_of(log, options.part)
+    factors = {key: options.duration / found[time] for key, time in FACTORS.items()}
+    return {"seed": seed} | found | factors | {"largest error": worst, "error at the end": last}
+
+
+def row(name: str, mode: str, runs: list[dict[str, float]]) -> str:
+    """The row of a table: from the smallest to the largest figure of some runs."""
+    cells = [name, f"{SIGNALS[name][1]:g}", mode]
+    for key in (*FACTORS, *ERRORS):
+        low, high = min(run[key] for run in runs), max(run[key] for run in runs)
+        form = ".2%" if key in ERRORS else ".2f"
+        cells.append(f"{low:{form}} to {high:{form}}")
+    return f"| {' | '.join(cells)} |"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", choices=SIGNALS)
+    parser.add_argument("--mode", choices=MODES, help="one mode alone")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="one run for each")
     parser.add_argument("--scene", default="gripping")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="of the scene")
     parser.add_argument("--factor", type=float, default=0.0, help="real-time factor asked for; 0 = as fast as possible")
@@ -184,23 +222,25 @@ def main() -> None:
     parser.add_argument("--channel", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.control:
-        control(options.control, options.channel)
+        control(options.control, options.channel, options.seeds[0], options.mode)
         return
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-    figures = {}
+    figures: dict[str, list[dict[str, float]]] = {}
     what = " ".join([options.scene, *options.set])
     print(f"{what}, {options.interpolation}, {options.duration:g} s; load average {os.getloadavg()[0]:.1f}")
-    print("| signal | messages/s | reached | by CPU of steps | by CPU of node | largest error | last error |")
-    print("| --- | --- | --- | --- | --- | --- | --- |")
+    columns = ["signal", "messages/s", "mode", *FACTORS, *ERRORS]
+    print(f"| {' | '.join(columns)} |\n|{' --- |' * len(columns)}")
     with tempfile.TemporaryDirectory() as directory:
         options.scene = scene_with(options.set, options.scene, Path(directory))
         for name in [options.only] if options.only else SIGNALS:
-            log = (options.keep or Path(directory)) / f"{name.split()[0]}{len(figures)}.mcap"
-            found = measure(name, log, options)
-            worst, last = (math.nan, math.nan) if options.no_error else error_of(log, options.part)
-            figures[name] = found | {"largest_error": worst, "last_error": last}
-            factors = " | ".join(f"{options.duration / found[time]:.2f}" for time in ("real", "cpu", "process"))
-            print(f"| {name} | {SIGNALS[name][1]:g} | {factors} | {worst:.2%} | {last:.2%} |", flush=True)
+            for mode in [options.mode] if options.mode else MODES:
+                stem = f"{name.replace(' %', '').replace(' ', '_')}_{mode}"
+                logs = [(options.keep or Path(directory)) / f"{stem}_{seed}.mcap" for seed in options.seeds]
+                runs = [
+                    figures_of(name, mode, seed, log, options) for seed, log in zip(options.seeds, logs, strict=True)
+                ]
+                figures[f"{name}, {mode}"] = runs
+                print(row(name, mode, runs), flush=True)
     if options.json:
         options.json.write_text(json.dumps(figures, indent=1))
 

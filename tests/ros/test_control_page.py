@@ -7,12 +7,10 @@ import subprocess
 import sys
 
 import pytest
+from logged_commands import stimuli_taken
 from rosgraph_msgs.msg import Clock
 
-from bilayer_core.observed.inputs import STIMULUS
-from bilayer_core.record.encoders import decode_input
-from bilayer_core.record.log_reader import read_info, read_messages
-from bilayer_core.record.topics import INPUTS
+from bilayer_core.record.log_reader import read_info
 from bilayer_sim_ros.conversions import to_seconds
 
 PERIOD = 0.02
@@ -34,12 +32,6 @@ def controller(root, domain, tmp_path):
     process.wait()
 
 
-def commands(log):
-    """When which value was taken."""
-    inputs = (decode_input(data) for _, _, _, data in read_messages(log, {INPUTS.full_name()}) if data is not None)
-    return [(told.time, told.values[0]) for told in inputs if told.kind == STIMULUS]
-
-
 def test_the_controller_of_the_page_answers_each_tick_and_again_after_a_reset(
     start, connect, controller, domain, tmp_path
 ):
@@ -55,7 +47,7 @@ def test_the_controller_of_the_page_answers_each_tick_and_again_after_a_reset(
     assert controller.poll() is None
     assert read_info(log).termination == "reset" and read_info(log.with_stem("run_1")).complete
     for path, most in ((log, 21), (log.with_stem("run_1"), 20)):
-        found = commands(path)
+        found = stimuli_taken(path)
         times = [round(time / PERIOD) for time, _ in found]
         assert 5 < len(times) <= most and times == list(range(len(times)))
         expected = [0.5 - 0.5 * math.cos(6.0 * time) for time, _ in found]

@@ -4,11 +4,14 @@ import ast
 import math
 import signal
 import time
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from geometry_msgs.msg import PointStamped
+from logged_commands import stimuli_taken
 from std_msgs.msg import Float64MultiArray
 
 from bilayer_core import Simulator, load_scene
@@ -27,7 +30,7 @@ FAST = 4.0
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_a_controller_is_one_short_file_that_imports_nothing_of_the_project(root, name):
     source = (root / f"bilayer_sim_ros/controllers/{name}.py").read_text(encoding="utf-8")
-    assert source.count("\n") < 150
+    assert source.count("\n") < 170
     nodes = list(ast.walk(ast.parse(source)))
     names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     names += [node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
@@ -158,24 +161,46 @@ def test_beside_a_free_run_it_stands_still_in_a_pause_and_begins_anew_after_a_re
         ("goal_controller", {"channel": "swelling", "period": 0.08, "tolerance": 1e-6, "goal": [1.0, 0.0, 0.0]}),
     ],
 )
-def test_in_lockstep_a_reset_brings_the_same_values_again(start, connect, domain, name, parameters):
-    simulation = start("sim_node", domain, {"scene": "bending", "lockstep": True, "start_paused": True, "rate": 50.0})
+def test_in_lockstep_a_reset_brings_the_same_values_again(start, connect, domain, tmp_path, name, parameters):
+    log = tmp_path / "run.mcap"
+    simulation = {"scene": "bending", "lockstep": True, "start_paused": True, "rate": 50.0, "log": log}
+    node = start("sim_node", domain, simulation)
     controller = start(f"controllers.{name}", domain, parameters)
-    client = connect(simulation)
-    applied = client.listen(Float64MultiArray, "/bilayer_sim/stimulus_applied")
-    rounds = []
+    client = connect(node)
     for _ in range(2):
-        client.drain()
-        del applied[:-1]
         for _ in range(12):
             assert client.call("step").success
-        client.drain()
-        values = [message.data[0] for message in applied]
-        rounds.append([value for value, before in zip(values, [None, *values], strict=False) if value != before])
         assert client.call("reset").success
-    assert len(rounds[0]) > 4 and max(rounds[0]) > 0.5
-    assert rounds[0] == rounds[1]
     assert controller.running
+    node.send(signal.SIGINT)
+    assert node.wait() == 0, node.output
+    first, second = stimuli_taken(log), stimuli_taken(log.with_stem("run_1"))
+    assert [time for time, _ in first] == pytest.approx(np.arange(12) * 0.02)
+    assert max(value for _, value in first) > 0.5 and len({value for _, value in first}) > 3
+    assert first == second
+
+
+def catches(process, number):
+    """Whether a process has a handler of its own for a signal."""
+    status = Path(f"/proc/{process.pid}/status").read_text()
+    caught = next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt"))
+    return bool(int(caught, 16) >> (number - 1) & 1)
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["before discovery", "after discovery"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_on_simulated_time_that_nobody_publishes_a_signal_ends_it(start, connect, domain, number, known):
+    running = [start(f"controllers.{name}", domain, {"use_sim_time": True}) for name in CONTROLLERS]
+    client = connect(running[0])
+    count = partial(client.node.count_publishers, "/bilayer_sim/stimulus_stamped")
+    if known:
+        client.spin_until(lambda: count() == len(running), "publishers of all")
+    else:
+        client.spin_until(lambda: all(catches(of, signal.SIGTERM) for of in running), "handlers of all")
+    for of in running:
+        of.send(number)
+    for of in running:
+        assert of.wait(30) == 0 and "Traceback" not in of.output, of.output
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from bilayer_core.record.description_text import from_json
 
 SERVED = {"scene": "bending", "rerun": "serve"}
 ADDRESS = r"following (\S+): rerun rerun\+http://127\.0\.0\.1:(\d+)/proxy  or in a browser  http://127\.0\.0\.1:(\d+)/"
-LEAST_PACE = 0.75
-"""Of real time, which was asked for. Whoever is waited for stops the node; a busy machine costs it and its reports
-some tenths of a second."""
+LEAST_PART = 0.4
+"""Of the pace without viewers. A node that waits for stopped viewers stands still; other programs may take a part of
+the processor in any phase."""
 
 
 def followers(node):
@@ -51,7 +51,8 @@ def test_a_served_node_says_where_at_this_machine_and_its_viewers_end_with_it(st
     assert shapes[0] == frames[0] == 0.0
     assert frames[-1] > 0.5 and len(frames) > 0.5 * 50 * frames[-1] and len(shapes) > 0.5 * 20 * shapes[-1]
     below = process.children(recursive=True)
-    assert len(below) == 2 and all(of.nice() == 10 for of in below)
+    lower = min(process.nice() + 10, 19)
+    assert len(below) == 2 and all(of.nice() == lower for of in below)
     node.send(signal.SIGINT)
     assert node.wait() == 0, node.output
     psutil.wait_procs(below, 10)
@@ -123,7 +124,7 @@ def test_a_stopped_follower_does_not_slow_the_physics_and_a_killed_one_is_told_o
     node.wait_for("the live view has ended with exit code -9; the simulation goes on without it")
     alone = pace(1.0)
     print(f"\nsimulated over real time: shown {shown:.3f}, with stopped viewers {stopped:.3f}, alone {alone:.3f}")
-    assert min(shown, stopped, alone) > LEAST_PACE
+    assert min(shown, stopped) > LEAST_PART * alone > 0.0
     assert node.output.count("live view has ended") == 1
 
 

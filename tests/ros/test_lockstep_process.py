@@ -5,10 +5,13 @@ import random
 import signal
 import time
 
+import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from logged_commands import stimuli_taken
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 
@@ -94,6 +97,30 @@ def test_a_run_does_not_depend_on_when_the_controller_answers(start, connect, do
         assert first == second
 
 
+@pytest.mark.usefixtures("kernels")
+def test_a_timer_on_simulated_time_answers_all_ticks_but_the_start(start, connect, domain, tmp_path):
+    log, limit = tmp_path / "run.mcap", 4.0
+    parameters = {"log": log, "duration": 0.4, "lockstep_timeout": limit, "start_paused": True}
+    node = start("sim_node", domain, LOCKSTEP | parameters)
+    client = connect(node)
+    client.node.set_parameters([Parameter("use_sim_time", value=True)])
+    send = client.sender(Float64, CHANNEL)
+    client.spin_until(lambda: client.node.count_publishers("/clock"), "the clock")
+
+    def answer():
+        send(Float64(data=control_law(client.node.get_clock().now().nanoseconds * 1e-9)))
+
+    client.node.create_timer(0.02, answer)
+    assert client.call("resume").success
+    client.spin_to_the_end()
+    assert node.wait() == 0, node.output
+    assert node.output.count("no answer of swelling within") == 1
+    ticks = np.arange(1, 20) * 0.02
+    fallback, *answers = stimuli_taken(log)
+    assert fallback == (0.0, 0.0)
+    assert answers == [(pytest.approx(now), pytest.approx(control_law(now))) for now in ticks]
+
+
 def test_without_a_controller_time_stands_still_and_the_node_says_so(start, connect, domain, tmp_path):
     log = tmp_path / "run.mcap"
     node = start("sim_node", domain, LOCKSTEP | {"log": log})
@@ -110,6 +137,7 @@ def test_without_a_controller_time_stands_still_and_the_node_says_so(start, conn
     assert {to_seconds(message.clock) for message in clock} == {0.0}
     client.spin_until(lambda: to_seconds(diagnostics[-1].header.stamp) == 0.0 and len(diagnostics) > 8, "more of them")
     assert node.output.count("simulated time stands still at t = 0 s") == 1
+    assert "does not fire at t = 0. Answer in the callback of /clock, or set the parameter 'lockstep_ti" in node.output
     node.send(signal.SIGINT)
     assert node.wait(30) == 0, node.output
     assert "Traceback" not in node.output

@@ -136,7 +136,7 @@ def test_each_stimulus_is_logged_at_the_time_from_which_it_acts(log, run):
 
 
 def test_a_controller_without_a_simulation_gives_up_with_exit_code_2(start, domain):
-    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 0.5})
+    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 0.5, "use_sim_time": True})
     assert controller.wait() == 2
     assert "nobody subscribes to /bilayer_sim/stimulus/humidity (waited 0.5 s)" in controller.output
 
@@ -164,7 +164,7 @@ def subscriber(domain):
 
 
 def test_without_a_clock_the_controller_does_not_take_real_time_for_simulated(start, domain, subscriber):
-    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 8.0})
+    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 8.0, "use_sim_time": True})
     assert controller.wait() == 2
     assert "/clock is silent, and simulated_time is true (waited 8 s)" in controller.output
     assert not subscriber
@@ -172,7 +172,9 @@ def test_without_a_clock_the_controller_does_not_take_real_time_for_simulated(st
 
 def test_a_ramp_in_real_time_needs_no_clock(start, domain, subscriber):
     begin = time.monotonic()
-    controller = start("controllers.ramp_controller", domain, {"simulated_time": False, "duration": 0.5})
+    controller = start(
+        "controllers.ramp_controller", domain, {"simulated_time": False, "duration": 0.5, "use_sim_time": True}
+    )
     assert controller.wait() == 0, controller.output
     assert time.monotonic() - begin > 0.5
     assert subscriber[-1] == 1.0 and len(set(subscriber)) > 10

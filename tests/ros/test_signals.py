@@ -216,7 +216,14 @@ def test_a_node_ends_without_a_word_of_an_executor_that_was_about_to_wait(ended)
 def test_signals_end_controllers_with_0_and_no_traceback_when(domain, tmp_path, moment):
     running = {
         name: subprocess.Popen(
-            [sys.executable, "-c", CONTROLLER.format(name=name, moment=moment)],
+            [
+                sys.executable,
+                "-c",
+                CONTROLLER.format(name=name, moment=moment),
+                "--ros-args",
+                "-p",
+                "use_sim_time:=true",
+            ],
             cwd=tmp_path,
             env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
             stdout=subprocess.PIPE,

@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 import rclpy
+from acted_scenes import TWO_CHANNELS
 from mcap.reader import make_reader
 from processes import bilayer
 from rclpy.context import Context
@@ -22,29 +23,6 @@ from std_msgs.msg import Float64
 
 from bilayer_sim_ros.conversions import to_seconds
 
-SCENE = """
-schema: 1
-name: two_channels
-title: A strip whose layers are driven by two channels
-duration: 10
-materials:
-  soft: {youngs_modulus: 1e6, density: 1000, poisson_ratio: 0.5, retardation_time: 10 ms}
-stimuli:
-  heat: {minimum: 0, maximum: 1, schedule: {type: hold, value: 0}}
-  light: {minimum: 0, maximum: 1, schedule: {type: hold, value: 0.5}}
-rods:
-  - name: strip
-    width: 10 mm
-    stations: 11
-    path: {shape: straight, start: [0, 0, 0], direction: [1, 0, 0], length: 60 mm}
-    normal: [0, 0, 1]
-    clamp_start: wall
-    layers:
-      - {name: lower, material: soft, thickness: 1 mm, eigenstrain: {stimulus: heat, gain: 3 %}}
-      - {name: upper, material: soft, thickness: 1 mm, eigenstrain: {stimulus: light, gain: 3 %}}
-bodies:
-  - {name: wall, position: [0, 0, 0], motion: {type: prescribed}}
-"""
 DURATION = 0.4
 LONGEST_DELAY = 0.02
 """Of an answer [s of real time]."""
@@ -121,7 +99,7 @@ def load(processes):
 @pytest.mark.parametrize("interpolation", ["linear", pytest.param("hold", marks=pytest.mark.slow)])
 def test_two_controllers_make_the_same_run_three_times_once_under_load(start, domain, tmp_path, interpolation):
     scene = tmp_path / "two.yaml"
-    scene.write_text(SCENE)
+    scene.write_text(TWO_CHANNELS)
     runs, ignored = [], 0
     for seed in range(3):
         log = tmp_path / f"{seed}.mcap"
