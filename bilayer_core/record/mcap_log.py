@@ -1,8 +1,9 @@
 """The MCAP log: an observer that writes every frame in a thread of its own.
 
 A log holds the topics of `bilayer_core.record.topics` as ROS 2 messages (profile ``ros2``), the scene as attachment
-``scene.yaml``, and the metadata records ``versions``, ``settings``, ``description`` (before the first message) and
-``run`` (``complete``, ``termination``, ``last_time``; written at the end, so a log without it was cut off).
+``scene.yaml``, and the metadata records ``versions``, ``machine``, ``settings`` and ``description`` (before the first
+message), ``chain`` (after each chunk, see `record.chain`) and ``run`` (``complete``, ``termination``, ``last_time`` and
+the end of the chain; written at the end, so a log without it was cut off).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
+from bilayer_core.record.chain import CHAIN, END, SCENE_ATTACHMENT, Chain, place_of_seal
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_input
 from bilayer_core.record.event_messages import encode_event
@@ -36,7 +38,6 @@ SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
-SCENE_ATTACHMENT = "scene.yaml"
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 
@@ -293,13 +294,19 @@ class _LogFile:
             undo.callback(self._file.close)
             undo.callback(_delete, path)
             used = {**versions(), "mcap": mcap.__version__}
-            self._log = McapFile(self._file, CHUNK_SIZE, "ros2", f"bilayer_sim_ros {used['bilayer_sim_ros']}")
+            library = f"bilayer_sim_ros {used['bilayer_sim_ros']}"
+            self._log = McapFile(self._file, CHUNK_SIZE, "ros2", library, self._add_link)
             self._log.add_attachment(SCENE_ATTACHMENT, "application/yaml", description.scene_text.encode())
-            self._log.add_metadata("versions", used)
-            self._log.add_metadata("machine", machine())
-            settings = {key: text for key, text in description.settings.items() if key not in used}
-            self._log.add_metadata("settings", settings)
-            self._log.add_metadata("description", to_text(description))
+            head = {
+                "versions": used,
+                "machine": machine(),
+                "settings": {key: text for key, text in description.settings.items() if key not in used},
+                "description": to_text(description),
+            }
+            for name, metadata in head.items():
+                self._log.add_metadata(name, metadata)
+            self._chain, self._seal = Chain(description.scene_text, head), place_of_seal(description)
+            self._add_link()
             schemas: dict[str, int] = {}
             self._topics: dict[str, int] = {}
             for spec in (*self._encoder.topics, *input_topics(description)):
@@ -315,9 +322,11 @@ class _LogFile:
     def write(self, item: Frame | Input | Event) -> None:
         """Write the messages of a frame, of what acts from outside, or of an event."""
         if isinstance(item, Input):
-            self._add(INPUTS.name, nanoseconds(item.time), encode_input(item))
+            stamp, data = nanoseconds(item.time), encode_input(item)
+            self._chain.add_input(stamp, data)
+            self._add(INPUTS.name, stamp, data)
             if item.kind == STIMULUS:
-                self._add(f"stimulus/{item.name}", nanoseconds(item.time), encode_float64(item.values[0]))
+                self._add(f"stimulus/{item.name}", stamp, encode_float64(item.values[0]))
         elif isinstance(item, Event):
             self._add_events([item])
         else:
@@ -332,6 +341,7 @@ class _LogFile:
             self._block = FrameBlock(self._encoder.small_messages(frame), self._topics)
         stamp, display = nanoseconds(frame.time), self._gate.is_due(frame.time)
         self._block.fill(frame, self._sequence)
+        self._chain.add_state(stamp, 0.0 if self._seal is None else frame.state[self._seal])
         self._log.add_records(self._block.records, self._block.places, stamp)
         for name in (*self._each, *(self._large if display else ())):
             self._add(name, stamp, self._encoder.encode(name, frame))
@@ -342,6 +352,10 @@ class _LogFile:
 
     def _add(self, name: str, stamp: int, data: bytes) -> None:
         self._log.add_message(self._topics[name], stamp, self._sequence, data)
+
+    def _add_link(self) -> None:
+        """Write the hash of the states and inputs in the chunks so far."""
+        self._log.add_metadata(CHAIN, self._chain.link.as_metadata())
 
     def time_to_flush(self) -> float | None:
         """Wall time until `flush` is due [s], None if there is nothing to flush."""
@@ -366,7 +380,7 @@ class _LogFile:
         """Write the metadata ``run`` and the file's index."""
         self._add_events(self._events.end(float(ending["last_time"])))
         self._log.flush()
-        self._log.add_metadata("run", ending)
+        self._log.add_metadata(END, ending | self._chain.link.as_metadata())
         self._log.finish()
         self._file.flush()
         self._sync()
