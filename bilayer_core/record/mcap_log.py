@@ -26,10 +26,11 @@ from bilayer_core.record.event_messages import encode_event
 from bilayer_core.record.events import Event, EventDetector
 from bilayer_core.record.frame_block import FrameBlock
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
+from bilayer_core.record.markers import deleting_all_first
 from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import EVENTS, INPUTS, QOS, TF, DisplayGate, Rate, TopicSpec, input_topics
+from bilayer_core.record.topics import EVENTS, INPUTS, MARKERS, QOS, TF, DisplayGate, Rate, TopicSpec, input_topics
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
 GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wakes ten times a second [s of wall time]
@@ -286,6 +287,7 @@ class _LogFile:
         self._file = open_alone(path, force)
         self._each = [TF.name] if tf else []
         self._large = [spec.name for spec in self._encoder.topics if spec.rate is Rate.DISPLAY]
+        self._has_markers = False
         self._block: FrameBlock | None = None
         self._sequence = 0
         self._unflushed_since: float | None = None
@@ -344,7 +346,10 @@ class _LogFile:
         self._chain.add_state(stamp, 0.0 if self._seal is None else frame.state[self._seal])
         self._log.add_records(self._block.records, self._block.places, stamp)
         for name in (*self._each, *(self._large if display else ())):
-            self._add(name, stamp, self._encoder.encode(name, frame))
+            data = self._encoder.encode(name, frame)
+            if name == MARKERS and not self._has_markers:
+                self._has_markers, data = True, deleting_all_first(data)
+            self._add(name, stamp, data)
 
     def _add_events(self, events: list[Event]) -> None:
         for event in events:
