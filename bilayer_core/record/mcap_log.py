@@ -30,7 +30,7 @@ from bilayer_core.record.markers import deleting_all_first
 from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import EVENTS, INPUTS, MARKERS, QOS, TF, DisplayGate, Rate, TopicSpec, input_topics
+from bilayer_core.record.topics import EVENTS, INPUTS, MARKERS, QOS, TF, DisplayGate, Rate, input_topics
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
 GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wakes ten times a second [s of wall time]
@@ -39,7 +39,6 @@ SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
-_INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 
 class McapRecorder:
@@ -314,7 +313,7 @@ class _LogFile:
             for spec in (*self._encoder.topics, *input_topics(description)):
                 if spec.type not in schemas:
                     schemas[spec.type] = self._log.add_schema(spec.type, schema_text(spec.type))
-                channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: _profile(spec)})
+                channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: spec.offered_profile})
                 self._topics[spec.name] = channel
             self._log.describe_outside()
             self._log.flush()
@@ -393,23 +392,6 @@ class _LogFile:
     def close(self) -> None:
         """Close the file as it is."""
         self._file.close()
-
-
-def _profile(spec: TopicSpec) -> str:
-    """What rosbag2 is told of a topic, in the numbers of `rmw`: the last messages kept, reliable, volatile."""
-    policies = {
-        "history": 1,
-        "depth": spec.depth,
-        "reliability": 1,
-        "durability": 2,
-        "deadline": _INFINITE,
-        "lifespan": _INFINITE,
-        "liveliness": 1,
-        "liveliness_lease_duration": _INFINITE,
-        "avoid_ros_namespace_conventions": "false",
-    }
-    lines = [f"{key}: {value}" for key, value in policies.items()]
-    return "- " + "\n  ".join(lines) + "\n"
 
 
 def _delete(path: Path) -> None:

@@ -16,6 +16,7 @@ LOG_NAMESPACE = "/bilayer_sim"
 FRAME_ID = "world"
 QOS = "offered_qos_profiles"
 """Metadata of a channel: the quality of service that its topic is offered with, in the form of rosbag2."""
+_INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 
 class Rate(Enum):
@@ -53,6 +54,25 @@ class TopicSpec:
     def full_name(self, namespace: str = LOG_NAMESPACE) -> str:
         """Absolute name under `namespace`."""
         return self.name if self.name.startswith("/") else f"{namespace}/{self.name}"
+
+    @property
+    def offered_profile(self) -> str:
+        """Its quality of service as rosbag2 stores it, with the numbers of `rmw`: the last messages kept, reliable,
+        volatile.
+        """
+        policies = {
+            "history": 1,
+            "depth": self.depth,
+            "reliability": 1,
+            "durability": 2,
+            "deadline": _INFINITE,
+            "lifespan": _INFINITE,
+            "liveliness": 1,
+            "liveliness_lease_duration": _INFINITE,
+            "avoid_ros_namespace_conventions": "false",
+        }
+        lines = [f"{key}: {value}" for key, value in policies.items()]
+        return "- " + "\n  ".join(lines) + "\n"
 
 
 MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
