@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Self
 
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.cdr import NANOSECONDS, read_float64_multi_array
+from bilayer_core.record.cdr import read_float64_multi_array, seconds_text
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_records import ATTACHMENT, METADATA, content, parse, walk
 from bilayer_core.record.opening import open_log
@@ -171,7 +171,7 @@ def check_chain(path: str | Path, description: Description) -> Wholeness:
         last = time
         while wanted is not None and wanted.messages == chain.messages:
             if wanted != chain.link:
-                return _broken(f"some states or inputs up to t = {_seconds(last)} s", good)
+                return _broken(f"some states or inputs up to t = {seconds_text(last)} s", good)
             good, wanted = last, next(expected, None)
     found = chain.link
     if wanted is not None and wanted.messages > found.messages:
@@ -180,7 +180,7 @@ def check_chain(path: str | Path, description: Description) -> Wholeness:
     if wanted is not None or (end is not None and end != found):
         return _broken("some states or inputs at the end", good)
     if end is None:
-        until = "it holds none" if last is None else f"the last one is of t = {_seconds(last)} s"
+        until = "it holds none" if last is None else f"the last one is of t = {seconds_text(last)} s"
         return Wholeness(
             True,
             False,
@@ -191,12 +191,8 @@ def check_chain(path: str | Path, description: Description) -> Wholeness:
 
 def _broken(which: str, good: int | None, there: str = "") -> Wholeness:
     """Return what is wrong with some states or inputs, all before which up to a time [ns] are as they were written."""
-    since = "" if good is None else f"; up to t = {_seconds(good)} s all are as they were written"
+    since = "" if good is None else f"; up to t = {seconds_text(good)} s all are as they were written"
     return Wholeness(True, False, f"{which} were changed, removed or added{since}{there and f' ({there})'}")
-
-
-def _seconds(time: int) -> str:
-    return f"{time / NANOSECONDS:.9g}"
 
 
 def _sound_seal(data: bytes, place: int | None) -> float:

@@ -108,11 +108,14 @@ def delete_all() -> bytes:
 def deleting_all_first(message: bytes) -> bytes:
     """Return a ``MarkerArray`` of a `MarkerEncoder` with one marker more: the first, which deletes all before it.
 
-    A viewer handles all markers of an array before it draws, so those that it shows already do not flicker.
+    A viewer handles all markers of an array before it draws, so those that it shows already do not flicker. An array
+    that begins so already stays as it is.
     """
     deletion = delete_all()[_MARKERS_START:]
     # The markers that follow keep their alignment: this one takes a multiple of 8 bytes.
     deletion += bytes(-len(deletion) % 8)
+    if message.startswith(deletion, _MARKERS_START):
+        return message
     (count,) = _COUNT.unpack_from(message, len(HEADER))
     return message[: len(HEADER)] + _COUNT.pack(count + 1) + deletion + message[_MARKERS_START:]
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import STIMULUS
-from bilayer_core.record.cdr import NANOSECONDS, nanoseconds
+from bilayer_core.record.cdr import nanoseconds, seconds_text
 from bilayer_core.record.encoders import FrameEncoder, decode_input, encode_float64
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.markers import deleting_all_first
@@ -110,7 +110,7 @@ class DerivedComparison:
 
 
 def _at(topic: str, time: int, how: str) -> str:
-    return f"t = {time / NANOSECONDS:.9g} s: the message of {topic} {how}"
+    return f"t = {seconds_text(time)} s: the message of {topic} {how}"
 
 
 def _by_frame(messages: Iterable[Message]) -> Iterator[list[Message]]:
