@@ -15,6 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import printable, shortened
 from bilayer_core.record.cdr import HEADER, NANOSECONDS
 from bilayer_core.record.indexed_log import Channel, IndexedLog, Message
 from bilayer_core.record.markers import delete_all, deleting_all_first
@@ -85,7 +86,7 @@ class ReplayTopics:
             except InputError as error:
                 refused[str(error)].append(channel.topic)
         for reason, topics in refused.items():
-            warn(f"left out, as {reason}: {', '.join(topics)}")
+            warn(f"left out, as {printable(reason)}: {', '.join(map(shortened, topics))}")
         names = {publisher.topic_name for publisher in self._publishers.values()}
         if playback.stored_clock and node.resolve_topic_name(CLOCK_TOPIC) not in names:
             raise InputError(
@@ -110,7 +111,7 @@ class ReplayTopics:
             profile = offered_profile(channel.qos)
         except InputError as error:
             profile = QoSProfile(depth=DEPTH)
-            self._warn(f"topic {channel.topic}: {error}; it is offered reliable and volatile")
+            self._warn(f"topic {shortened(channel.topic)}: {error}; it is offered reliable and volatile")
         try:
             publisher = self._node.create_publisher(ros_class, name, profile)
         except Exception as error:  # of many kinds: names, types without support, what the middleware refuses
@@ -143,7 +144,9 @@ class ReplayTopics:
             if channel not in self._unsendable:
                 self._unsendable.add(channel)
                 reason = " ".join(str(error).split())
-                self._warn(f"topic {self._topics[channel]}: a message that cannot be sent is left out ({reason})")
+                self._warn(
+                    f"topic {shortened(self._topics[channel])}: a message that cannot be sent is left out ({reason})"
+                )
 
     def finish_instant(self) -> None:
         """Publish what viewers of the run get of a time, all messages of which were sent."""

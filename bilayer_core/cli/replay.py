@@ -12,6 +12,7 @@ from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.nodes import become_replay_node
 from bilayer_core.cli.options import Duration, Verb, set_option
 from bilayer_core.cli.signals import Interruption
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar, progress_bar
 from bilayer_core.errors import InputError
 from bilayer_core.record.topics import LOG_NAMESPACE
@@ -156,23 +157,23 @@ def _tell(found: Verification) -> None:
     count = f"{found.states} states, {found.inputs} inputs"
     count += "" if found.derived is None else f", {found.derived} derived messages"
     if found.passed:
-        click.echo(f"{count}: all {how}")
+        say(f"{count}: all {how}")
     elif found.equal:
-        click.echo(f"not whole: {count} up to t = {found.last_time:.9g} s were compared, and are {how}")
+        say(f"not whole: {count} up to t = {found.last_time:.9g} s were compared, and are {how}")
     if found.first is not None:
-        click.echo(f"not {how}; the first difference is at {found.first}")
+        say(f"not {how}; the first difference is at {found.first}")
     if found.largest is not None and not (found.equal and found.tolerance is None):
-        click.echo(f"largest difference of a position: {found.largest}")
+        say(f"largest difference of a position: {found.largest}")
     if found.first_derived:
-        click.echo(f"the first difference of a derived message is at {found.first_derived}")
+        say(f"the first difference of a derived message is at {found.first_derived}")
     if found.stopped:
-        click.echo(f"the run {found.stopped}")
+        say(f"the run {found.stopped}")
     if found.wholeness.reason:
-        click.echo(f"the log: {found.wholeness.reason}")
+        say(f"the log: {found.wholeness.reason}")
     if found.not_compared:
-        click.echo(f"not compared: {', '.join(_short(found.not_compared))}")
+        say(f"not compared: {', '.join(_short(found.not_compared))}")
     for name, (then, now) in found.changed.items():
-        click.echo(f"  {name:20}{then} in the log, {now} here")
+        say(f"  {name:20}{then} in the log, {now} here")
 
 
 def _short(topics: tuple[str, ...]) -> list[str]:
@@ -229,7 +230,7 @@ def _go_on(
         simulator.run(duration, observers=observers, interrupted=interrupt.grant, progress=show, inputs=inputs)
     if not quiet:
         for line in summary_lines({**simulator.summary(), "duration": duration}, set()):
-            click.echo(line)
+            say(line)
     if interrupt.granted:
         raise Interruption(interrupt.wished)
 
@@ -274,7 +275,7 @@ def _branch_out(
             show(f"{varied.name} = {of.value:g}")
     write_branches(branches, varied.name, rrd, force)
     if not quiet:
-        click.echo(f"{len(branches)} branches from t = {begin:g} s to {until:g} s by {varied.name}: {rrd}")
+        say(f"{len(branches)} branches from t = {begin:g} s to {until:g} s by {varied.name}: {rrd}")
         for of in branches:
             if of.stopped:
-                click.echo(f"  {varied.name} = {of.value:g} stopped at t = {of.run.times[-1]:g} s: {of.stopped}")
+                say(f"  {varied.name} = {of.value:g} stopped at t = {of.run.times[-1]:g} s: {of.stopped}")
