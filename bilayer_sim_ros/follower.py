@@ -107,10 +107,7 @@ def _follow(options: argparse.Namespace, stop: Stop) -> None:
                 _say(what if there else f"{what}; what it showed is served until Ctrl-C")
             if not there and not told and now - begun > PATIENCE:
                 told = True
-                _say(
-                    f"no node {options.node} publishes {listener.topic} yet (replay_node never does: view its log); "
-                    "waiting for it until Ctrl-C"
-                )
+                _say(f"no node {options.node} publishes {listener.topic} yet; waiting for it until Ctrl-C")
         view.show()
 
 

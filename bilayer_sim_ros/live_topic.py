@@ -6,6 +6,7 @@ import array
 import math
 import time
 from collections import deque
+from collections.abc import Sequence
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -112,7 +113,12 @@ class LivePublisher:
         parts = [(spec.full_name(), self._encoder.encode(spec.name, frame)) for spec in specs]
         parts += [(EVENTS.full_name(), encode_event(event)) for event in self._events]
         self._events.clear()
-        label, data = pack(parts)
-        dimension = MultiArrayDimension(label=label, size=len(data), stride=len(data))
-        self._publisher.publish(UInt8MultiArray(layout=MultiArrayLayout(dim=[dimension]), data=array.array("B", data)))
+        self._publisher.publish(live_message(parts))
         self._sent_at, self._held = now, None
+
+
+def live_message(parts: Sequence[tuple[str, bytes]]) -> UInt8MultiArray:
+    """Return the message on ``~/live`` that has the messages of a frame, by their topics in a log."""
+    label, data = pack(parts)
+    dimension = MultiArrayDimension(label=label, size=len(data), stride=len(data))
+    return UInt8MultiArray(layout=MultiArrayLayout(dim=[dimension]), data=array.array("B", data))

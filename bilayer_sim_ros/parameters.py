@@ -193,7 +193,10 @@ REPLAY_NODE = (
     ),
     NodeParameter("play.rate", 1.0, "seconds of the log per second", 0.0, above_minimum=True, live=True),
     NodeParameter(
-        "play.position", 0.0, "time of the log [s], about once a second; setting it seeks, and keeps paused", live=True
+        "play.position",
+        0.0,
+        "time since the log's first message [s], about once a second; setting it seeks, and keeps paused",
+        live=True,
     ),
     NodeParameter("play.loop", False, "begin again at the end"),
     NodeParameter("play.start_paused", False, "wait for the service ~/resume at the start"),
@@ -207,8 +210,9 @@ REPLAY_NODE = (
     NodeParameter(
         "play.clock_publish_frequency",
         0.0,
-        "messages on /clock per second [Hz]; 0 = none. A /clock in the log is not published",
+        "messages on /clock per second [Hz]; 0 = none",
         0.0,
     ),
     NodeParameter("play.clock_publish_on_topic_publish", False, "a message on /clock right before each that is played"),
+    NodeParameter("play.clock_from_log", False, "publish the messages on /clock that the log holds"),
 )

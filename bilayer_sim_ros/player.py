@@ -12,7 +12,7 @@ from functools import partial
 from typing import Protocol
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.cdr import NANOSECONDS, nanoseconds
+from bilayer_core.record.cdr import nanoseconds, seconds_text
 from bilayer_core.record.indexed_log import IndexedLog, Message
 from bilayer_sim_ros.log_clock import LogClock
 from bilayer_sim_ros.requests import Requests
@@ -39,8 +39,14 @@ class Outlet(Protocol):
     channels: Collection[int]
     latched: Mapping[int, int]
 
-    def send(self, channel: int, data: bytes) -> None:
+    def restart(self) -> None:
+        """Take note that messages of another time follow: at the start, after a seek, and when a loop begins again."""
+
+    def send(self, message: Message) -> None:
         """Publish a message."""
+
+    def finish_instant(self) -> None:
+        """Take note that all messages of one time have been sent."""
 
     def forget(self, channel: int) -> None:
         """Have nobody get what was published on a latched channel until now."""
@@ -72,6 +78,8 @@ class Playback:
         Clock messages per second of real time [Hz]; 0 = none.
     clock_on_publish : bool
         Whether a clock message with its time goes out right before each message.
+    stored_clock : bool
+        Whether the clock messages in the log are played.
     """
 
     begin: int
@@ -82,6 +90,7 @@ class Playback:
     paused: bool = False
     clock_rate: float = 0.0
     clock_on_publish: bool = False
+    stored_clock: bool = False
 
 
 class Player:
@@ -98,7 +107,7 @@ class Player:
         Likewise called by that thread alone.
     playback : Playback
     moved : callable
-        Called with the time of the log [s] about once a second and after each request, in the player's thread.
+        Called with the time of the log [ns] about once a second and after each request, in the player's thread.
     behind : callable
         Called with how much later than the rate asks messages have become in all [s], when that grows.
     finished : callable
@@ -118,7 +127,7 @@ class Player:
         outlet: Outlet,
         playback: Playback,
         *,
-        moved: Callable[[float], None] = lambda _: None,
+        moved: Callable[[int], None] = lambda _: None,
         behind: Callable[[float], None] = lambda _: None,
         finished: Callable[[], None] = lambda: None,
     ):
@@ -162,9 +171,9 @@ class Player:
         return self._clock.rate
 
     @property
-    def position(self) -> float:
-        """Time of the log [s]."""
-        return min(self._clock.now, self._playback.end) / NANOSECONDS
+    def position(self) -> int:
+        """Time of the log [ns]."""
+        return min(self._clock.now, self._playback.end)
 
     def pause(self) -> Future:
         """Ask to stand still; the result is a text."""
@@ -268,10 +277,12 @@ class Player:
             self._outlet.send_clock(sent.time)
         self._send(sent)
         self._next = self._following(self._messages)
+        if self._next is None or self._next.time != sent.time:
+            self._outlet.finish_instant()
         return sent
 
     def _send(self, message: Message) -> None:
-        self._outlet.send(message.channel, message.data)
+        self._outlet.send(message)
         depth = self._outlet.latched.get(message.channel)
         if depth is not None:
             self._held[message.channel] = [*self._held[message.channel], message.time][-depth:]
@@ -289,6 +300,7 @@ class Player:
         following = self._following(messages)
         latched = {channel: self._log.latest(channel, position, n) for channel, n in self._outlet.latched.items()}
         self._messages, self._next = messages, following
+        self._outlet.restart()
         self._clock.jump(position)
         for channel, depth in self._outlet.latched.items():
             self._restore(channel, latched[channel], depth)
@@ -324,7 +336,7 @@ class Player:
         return do
 
     def _state(self) -> str:
-        return f"{'paused' if self.paused else 'playing'} at t = {self.position:.9g} s"
+        return f"{'paused' if self.paused else 'playing'} at t = {seconds_text(self.position)} s"
 
     def _do_pause(self) -> str:
         self._clock.stop()
@@ -338,8 +350,8 @@ class Player:
     def _do_play_next(self) -> str:
         sent = self._step(self._playback.loop)
         if sent is None:
-            raise InputError(f"there is no message after t = {self.position:.9g} s; seek to an earlier time")
-        return f"sent {self._topics[sent.channel]} of t = {sent.time / NANOSECONDS:.9g} s"
+            raise InputError(f"there is no message after t = {seconds_text(self.position)} s; seek to an earlier time")
+        return f"sent {self._topics[sent.channel]} of t = {seconds_text(sent.time)} s"
 
     def _do_burst(self, count: int) -> int:
         sent = 0
@@ -363,8 +375,8 @@ class Player:
     def _do_seek(self, position: int) -> str:
         first, last = self._log.start, self._playback.end
         if not first <= position <= last:
-            span = f"{first / NANOSECONDS:.9g} to {last / NANOSECONDS:.9g} s"
-            raise InputError(f"t = {position / NANOSECONDS:.9g} s is not in what is played, which is {span}")
+            span = f"{seconds_text(first)} to {seconds_text(last)} s"
+            raise InputError(f"t = {seconds_text(position)} s is not in what is played, which is {span}")
         self._go_to(position)
         return self._state()
 
@@ -376,4 +388,4 @@ class Player:
 
     def _do_end(self) -> str:
         self._stopping.set()
-        return f"stopped at t = {self.position:.9g} s"
+        return f"stopped at t = {seconds_text(self.position)} s"

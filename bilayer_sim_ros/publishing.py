@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -10,7 +12,8 @@ from rosgraph_msgs.msg import Clock
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.encoders import FrameEncoder
 from bilayer_core.record.events import Event
-from bilayer_core.record.topics import DisplayGate, Rate, TopicSpec, output_topics
+from bilayer_core.record.markers import deleting_all_first
+from bilayer_core.record.topics import MARKERS, DisplayGate, Rate, TopicSpec, output_topics
 from bilayer_sim_ros.conversions import to_time
 from bilayer_sim_ros.events import EventPublisher
 from bilayer_sim_ros.live_topic import LivePublisher
@@ -48,6 +51,7 @@ class FramePublisher:
             for spec in self._encoder.topics
             if clock or spec.name != CLOCK_TOPIC
         ]
+        self._viewers, self._shown = 0, -math.inf
         self._events = EventPublisher(node, description)
         self._live = LivePublisher(node, description, self._encoder, rate, marker_rate)
 
@@ -67,10 +71,20 @@ class FramePublisher:
         """Send `frame` on every topic that has a subscriber and is due, or on every one of them."""
         display = self._gate.is_due(frame.time) or everything
         for spec, publisher in self._topics:
-            if (display or spec.rate is not Rate.DISPLAY) and publisher.get_subscription_count() > 0:
-                publisher.publish(self._encoder.encode(spec.name, frame))
+            subscribers = publisher.get_subscription_count()
+            if (display or spec.rate is not Rate.DISPLAY) and subscribers > 0:
+                data = self._encoder.encode(spec.name, frame)
+                if spec.name == MARKERS and self._is_first(frame.time, subscribers):
+                    data = deleting_all_first(data)
+                publisher.publish(data)
         self._events.publish(frame)
         self._live.publish(frame, everything)
+
+    def _is_first(self, time: float, viewers: int) -> bool:
+        """Return whether markers of a time [s] are the first of a run, or the first that one of the viewers gets."""
+        first = time < self._shown or viewers > self._viewers
+        self._viewers, self._shown = viewers, time
+        return first
 
     def tell(self, event: Event) -> None:
         """Send an event that frames do not show."""

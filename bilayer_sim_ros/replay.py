@@ -10,7 +10,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from bilayer_core.errors import BilayerError, InputError
-from bilayer_core.record.cdr import NANOSECONDS, nanoseconds
+from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, seconds_text
 from bilayer_core.record.indexed_log import IndexedLog
 from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.parameters import REPLAY_NODE, Value
@@ -22,6 +22,10 @@ from bilayer_sim_ros.services import Service, Services, trigger
 LAG_PERIOD = 5.0
 """Real time between two warnings that messages come late [s]."""
 POSITION, RATE = "play.position", "play.rate"
+CLOCKS_MADE = ("play.clock_publish_frequency", "play.clock_publish_on_topic_publish")
+STORED_CLOCK = "play.clock_from_log"
+LATEST_CLOCK = 2**31 * NANOSECONDS
+"""Time that a message on /clock cannot hold [ns]."""
 
 
 def play(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> None:
@@ -35,15 +39,18 @@ def play(node: Node, parameters: Mapping[str, Value], stop: threading.Event) -> 
 def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: threading.Event) -> None:
     playback = playback_of(log, parameters)
     logger = node.get_logger()
-    topics = ReplayTopics(node, log.channels, playback.clock_rate > 0.0 or playback.clock_on_publish, logger.warning)
+    topics = ReplayTopics(node, log, playback, logger.warning)
     if not topics.channels:
         raise InputError(f"{log.path}: holds no topic that can be published")
 
-    def move(position: float) -> None:
-        node.executor.create_task(show, position)
+    def move(time: int) -> None:
+        node.executor.create_task(show, (time - log.start) / NANOSECONDS)
 
     def show(position: float) -> None:
         live.show({POSITION: position, RATE: player.rate})
+
+    def seek(position: float) -> Future:
+        return player.seek(log.start + nanoseconds(position))
 
     def warn_of_lag(lag: float) -> None:
         logger.warning(
@@ -54,11 +61,11 @@ def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: th
 
     player = Player(log, topics, playback, moved=move, behind=warn_of_lag, finished=stop.set)
     offered = trigger_services(player) if parameters["services"] == "std_srvs" else rosbag2_services(node, player)
-    changes = {POSITION: lambda seconds: player.seek(nanoseconds(seconds)), RATE: player.set_rate}
+    changes = {POSITION: seek, RATE: player.set_rate}
     live = LiveParameters(node, REPLAY_NODE, changes)
     services = Services(node, offered)
     kind = "std_srvs/Trigger" if parameters["services"] == "std_srvs" else "rosbag2_interfaces"
-    span = f"t = {playback.first / NANOSECONDS:.9g} to {playback.end / NANOSECONDS:.9g} s"
+    span = f"t = {seconds_text(playback.first)} to {seconds_text(playback.end)} s"
     logger.info(
         f"{'paused' if playback.paused else 'playing'} {log.path}, {span}, {len(topics.channels)} topics; "
         f"services ({kind}): {' '.join(f'~/{service.name}' for service in offered)}"
@@ -72,7 +79,7 @@ def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: th
     if player.error is not None:
         raise player.error
     late = f"; {player.lag:.2f} s later than {RATE} asked" if player.lag else ""
-    logger.info(f"ended at t = {player.position:.9g} s{late}")
+    logger.info(f"ended at t = {seconds_text(player.position)} s{late}")
 
 
 def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
@@ -81,6 +88,13 @@ def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
         parameters[f"play.{name}"]
         for name in ("start_offset", "playback_duration", "playback_until_timestamp", "position")
     )
+    made = [name for name in CLOCKS_MADE if parameters[name]]
+    if parameters[STORED_CLOCK] and made:
+        raise InputError(
+            f"parameter '{STORED_CLOCK}' is true, and '{made[0]}' asks for another /clock; set one of them"
+        )
+    if made and log.end >= LATEST_CLOCK:
+        raise InputError(f"parameter '{made[0]}': {log.path} has times that do not fit into a message on /clock")
     length = (log.end - log.start) / NANOSECONDS
     if offset > length:
         raise InputError(f"parameter 'play.start_offset' is {offset:g}; {log.path} takes {length:.9g} s")
@@ -92,11 +106,11 @@ def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
         ends.append(nanoseconds(min(until, log.end / NANOSECONDS)))
     end = min(max(ends), log.end)
     if end < begin:
-        span = f"{begin / NANOSECONDS:.9g} to {log.end / NANOSECONDS:.9g} s"
+        span = f"{seconds_text(begin)} to {seconds_text(log.end)} s"
         raise InputError(f"parameter 'play.playback_until_timestamp' is {until:.9g}; {log.path} is played from {span}")
-    first = nanoseconds(position) if position else begin
+    first = log.start + nanoseconds(position) if position else begin
     if not log.start <= first <= end:
-        span = f"{log.start / NANOSECONDS:.9g} to {end / NANOSECONDS:.9g} s"
+        span = f"0 to {seconds_text(end - log.start)} s from its first message on"
         raise InputError(f"parameter '{POSITION}' is {position:.9g}; {log.path} is played from {span}")
     return Playback(
         begin=begin,
@@ -105,8 +119,9 @@ def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
         rate=parameters[RATE],
         loop=parameters["play.loop"],
         paused=parameters["play.start_paused"],
-        clock_rate=parameters["play.clock_publish_frequency"],
-        clock_on_publish=parameters["play.clock_publish_on_topic_publish"],
+        clock_rate=parameters[CLOCKS_MADE[0]],
+        clock_on_publish=parameters[CLOCKS_MADE[1]],
+        stored_clock=parameters[STORED_CLOCK],
     )
 
 

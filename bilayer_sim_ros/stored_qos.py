@@ -20,7 +20,8 @@ def offered_profile(text: str) -> QoSProfile:
     """What to offer a topic with: reliable, volatile, the last ten messages, where the log says nothing else.
 
     Of several publishers in the log, the strongest offers count, so that who could listen to any of them can listen;
-    each of them kept its own last messages, so that the depths add up.
+    each of them kept its own last messages, so that the depths add up. Names stay those of ROS topics: without its
+    conventions (``avoid_ros_namespace_conventions``) a log could publish what looks like requests to services.
 
     Parameters
     ----------
@@ -64,7 +65,6 @@ def _profile(entry: dict) -> QoSProfile:
         deadline=_duration(entry.get("deadline")),
         lifespan=_duration(entry.get("lifespan")),
         liveliness_lease_duration=_duration(entry.get("liveliness_lease_duration")),
-        avoid_ros_namespace_conventions=str(entry.get("avoid_ros_namespace_conventions", "false")).lower() == "true",
     )
 
 

@@ -15,12 +15,13 @@ from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar, progress_bar
 from bilayer_core.errors import InputError
+from bilayer_core.record.topics import LOG_NAMESPACE
 
 if TYPE_CHECKING:
     from bilayer_core.runs.replay import Verification
 
 DIFFERS = 1
-"""Exit code if a run does not come out as it is in the log."""
+"""Exit code if a run does not come out as it is in the log, or the log is not whole."""
 
 
 THENCE = "From there on; null: its schedule."
@@ -31,6 +32,7 @@ MANY = "Many runs, each with another value of stimulus.CHANNEL, load.NAME or a k
 @click.argument("log", metavar="LOG.mcap")
 @click.option("--verify", "verifies", is_flag=True, help="Simulate the run again, and compare every state in the log.")
 @click.option("--tolerance", type=float, metavar="X", help="Part of the longest rod by which positions may differ.")
+@click.option("--derived", is_flag=True, help="For --verify: compare markers, energies and the like as well.")
 @json_option("Write what came of it")
 @click.option("--from", "moment", type=Duration(from_zero=True), metavar="T", help="Go on from this time of the log.")
 @set_option
@@ -49,6 +51,7 @@ def replay(
     log: str,
     verifies: bool,
     tolerance: float | None,
+    derived: bool,
     json_file: str | None,
     moment: float | None,
     overrides: tuple[str, ...],
@@ -67,7 +70,7 @@ def replay(
     """Make the run of a log again: to verify it (--verify), or another one from an instant on (--from). Or publish
     its messages on ROS 2 (--ros).
 
-    Exit code 1 if --verify finds a difference.
+    Exit code 1 if --verify finds a difference, or that states or inputs are missing.
     """
     from bilayer_core.record.log_head import read_head
 
@@ -79,7 +82,14 @@ def replay(
     changes = {"--set": overrides, "--stimulus": stimuli, "--load": loads, "--duration": duration, "--log": new}
     changes |= {"--rrd": rrd, "--vary": vary}
     if publishes:
-        others = {**changes, "--tolerance": tolerance, "--json": json_file, "--force": force, "--quiet": quiet}
+        others = {
+            **changes,
+            "--tolerance": tolerance,
+            "--derived": derived,
+            "--json": json_file,
+            "--force": force,
+            "--quiet": quiet,
+        }
         given = [option for option, value in others.items() if value is not None and value is not False and value != ()]
         if given:
             raise InputError(f"{given[0]}: is not for --ros")
@@ -92,8 +102,8 @@ def replay(
         given = [option for option, value in changes.items() if value]
         if given:
             raise InputError(f"{given[0]}: is for --from; --verify makes the run as it was")
-        return _verify(log, tolerance, json_file, force, quiet)
-    for option, value in (("--tolerance", tolerance), ("--json", json_file)):
+        return _verify(log, tolerance, derived, json_file, force, quiet)
+    for option, value in (("--tolerance", tolerance), ("--derived", derived or None), ("--json", json_file)):
         if value is not None:
             raise InputError(f"{option}: is for --verify")
     changed = _values("--stimulus", stimuli), _values("--load", loads)
@@ -106,14 +116,18 @@ def replay(
     return 0
 
 
-def _verify(log: str, tolerance: float | None, json_file: str | None, force: bool, quiet: bool) -> int:
+def _verify(log: str, tolerance: float | None, derived: bool, json_file: str | None, force: bool, quiet: bool) -> int:
     from bilayer_core.runs.replay import verify
 
     if tolerance is not None and not tolerance > 0.0:
         raise InputError(f"--tolerance: {tolerance} is not allowed; it must be a part of the longest rod above 0")
+    if tolerance is not None and derived:
+        raise InputError(
+            "--derived: compares messages byte by byte, and --tolerance lets states differ; give one of them"
+        )
     with json_to(json_file, force) as write_json:
         compile_kernels(quiet)
-        found = verify(log, tolerance)
+        found = verify(log, tolerance, derived)
         write_json(json.dumps(_as_json(found), indent=2))
         if not quiet:
             _tell(found)
@@ -128,6 +142,11 @@ def _as_json(found: Verification) -> dict:
         "inputs": found.inputs,
         "tolerance": found.tolerance,
         "stopped": found.stopped,
+        "whole": found.wholeness.whole if found.wholeness.hashed else None,
+        "not_whole": found.wholeness.reason,
+        "derived": found.derived,
+        "first_derived": found.first_derived,
+        "not_compared": found.not_compared,
         "changed": {name: list(pair) for name, pair in found.changed.items()},
         **{name: None if of is None else vars(of) for name, of in differences.items()},
     }
@@ -135,16 +154,31 @@ def _as_json(found: Verification) -> dict:
 
 def _tell(found: Verification) -> None:
     how = "equal bit for bit" if found.tolerance is None else f"equal within {found.tolerance:g} of the longest rod"
+    count = f"{found.states} states, {found.inputs} inputs"
+    count += "" if found.derived is None else f", {found.derived} derived messages"
     if found.passed:
-        say(f"{found.states} states, {found.inputs} inputs: all {how}")
+        say(f"{count}: all {how}")
+    elif found.equal:
+        say(f"not whole: {count} up to t = {found.last_time:.9g} s were compared, and are {how}")
     if found.first is not None:
         say(f"not {how}; the first difference is at {found.first}")
-    if found.largest is not None and not (found.passed and found.tolerance is None):
+    if found.largest is not None and not (found.equal and found.tolerance is None):
         say(f"largest difference of a position: {found.largest}")
+    if found.first_derived:
+        say(f"the first difference of a derived message is at {found.first_derived}")
     if found.stopped:
         say(f"the run {found.stopped}")
+    if found.wholeness.reason:
+        say(f"the log: {found.wholeness.reason}")
+    if found.not_compared:
+        say(f"not compared: {', '.join(_short(found.not_compared))}")
     for name, (then, now) in found.changed.items():
         say(f"  {name:20}{then} in the log, {now} here")
+
+
+def _short(topics: tuple[str, ...]) -> list[str]:
+    """Return topics as a run names them, those of all bodies or channels as one."""
+    return list(dict.fromkeys(topic.removeprefix(f"{LOG_NAMESPACE}/").split("/")[0] or topic for topic in topics))
 
 
 def _values(option: str, texts: tuple[str, ...]) -> dict[str, float | None]:

@@ -30,6 +30,12 @@ def nanoseconds(time: float) -> int:
     return round(time * NANOSECONDS)
 
 
+def seconds_text(time: int) -> str:
+    """Return a time [ns] in seconds, with all its digits: also those of epoch times, which a float does not have."""
+    whole, rest = divmod(abs(time), NANOSECONDS)
+    return f"{'-' if time < 0 else ''}{whole}.{rest:09d}".rstrip("0").rstrip(".")
+
+
 def stamp_of(time: int) -> bytes:
     """A ``builtin_interfaces/Time``, without padding before it, of a time [ns]."""
     return _STAMP.pack(*divmod(time, NANOSECONDS))

@@ -17,7 +17,7 @@ from bilayer_core.record.cdr import SEPARATOR, Template, read_float64_multi_arra
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.record.tf_frames import TfEncoder
-from bilayer_core.record.topics import FRAME_ID, TF, Rate, output_topics
+from bilayer_core.record.topics import FRAME_ID, MARKERS, TF, Rate, output_topics
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
 SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")
@@ -153,7 +153,7 @@ class FrameEncoder:
             "state": SmallMessage(state_template(description), lambda frame: frame.state),
             "nodes": self._nodes_encoder(),
             "points": self._points_encoder(description),
-            "markers": MarkerEncoder(description, self._node_frames).encode,
+            MARKERS: MarkerEncoder(description, self._node_frames).encode,
         }
         if tf:
             self._encoders[TF.name] = TfEncoder(description, self._node_frames, tf).encode

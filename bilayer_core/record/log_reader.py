@@ -14,6 +14,7 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
 from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
+from bilayer_core.record.chain import END, STATE, Link
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.log_records import METADATA, content, read_metadata, walk
@@ -21,7 +22,7 @@ from bilayer_core.record.log_source import LogSource
 from bilayer_core.record.logged_run import LoggedRun
 from bilayer_core.record.opening import open_log
 from bilayer_core.record.run_data import RunData
-from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
+from bilayer_core.record.topics import INPUTS
 
 __all__ = [
     "CUT_OFF",
@@ -39,9 +40,8 @@ __all__ = [
 CUT_OFF = "cut off"
 REPAIRED = "repair"
 """Metadata record of a log that `repair` has made: what it kept and lost."""
-LATE = ("run", REPAIRED)
+LATE = (END, REPAIRED)
 """Metadata records that stand after the messages."""
-STATE = f"{LOG_NAMESPACE}/state"
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def read_info(path: str | Path) -> LogInfo:
     spans = file.spans()
     times = [min(first for _, first, _ in spans.values()), max(last for _, _, last in spans.values())] if spans else []
     metadata = _read_metadata(path)
-    ending = metadata.get("run", {})
+    ending = metadata.get(END, {})
     start, last = (time / NANOSECONDS for time in times) if times else (0.0, 0.0)
     return LogInfo(
         path=str(path),
@@ -203,8 +203,12 @@ def _lacks(head: Head, file: LogFile, metadata: dict[str, dict[str, str]]) -> tu
         lacks.append("the quality of service of its topics: rosbag2 plays them with its own")
     if not file.has_index:
         lacks.append("an index, as it was not finished: `bilayer repair` makes a log with one of it")
-    if dropped := metadata.get("run", {}).get("dropped_frames"):
+    if dropped := metadata.get(END, {}).get("dropped_frames"):
         lacks.append(f"{dropped} frames, left out while the disk was behind; no input is missing")
+    if end := Link.of(metadata.get(END, {})):
+        for what, count, topic in (("states", end.states, STATE), ("inputs", end.inputs, INPUTS.full_name())):
+            if missing := count - len(file.times(topic)):
+                lacks.append(f"{missing} {what}, which were taken out of it or lost")
     if lost := metadata.get(REPAIRED, {}).get("lost"):
         lacks.append(f"what was lost before it was repaired: {lost}")
     return tuple(lacks)

@@ -15,16 +15,22 @@
                                  differ by decades, so length is logarithmic: `ARROW_DECADE` times
                                  log10(1 + force / `ARROW_FORCE`). Deleted while nothing touches.
 ================================ =============================================================================
+
+Viewers keep markers until something deletes them, also those of a robot that was shown before on the same topic. So the
+first array of a log, and the first one that a viewer gets from a node, starts with a marker that deletes all
+(`deleting_all_first`).
 """
 
 from __future__ import annotations
+
+import struct
 
 import numpy as np
 
 from bilayer_core.kinematics.marker_lines import place_arrows
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
 from bilayer_core.observed.frame import Description, Frame, ShapeInfo
-from bilayer_core.record.cdr import Template
+from bilayer_core.record.cdr import HEADER, Template
 from bilayer_core.record.node_frames import NodeFrames, layer_rows
 from bilayer_core.record.ribbons import Ribbons
 from bilayer_core.record.topics import FRAME_ID
@@ -53,8 +59,10 @@ CLAMP_ARROWS = (
 )
 """Namespace and colour of arrows, what of a wrench they show, and from which size they grow [N, N m]."""
 CUBE, SPHERE, CYLINDER, LINE_LIST = 1, 2, 3, 5
-ADD, DELETE = 0, 2
+ADD, DELETE, DELETE_ALL = 0, 2, 3
 _IDENTITY = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+_COUNT = struct.Struct("<I")
+_MARKERS_START = len(HEADER) + _COUNT.size
 
 
 def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarray = ARROW_FORCE) -> np.ndarray:
@@ -85,6 +93,31 @@ def shape_marker(shape: ShapeInfo) -> tuple[int, tuple[float, ...], np.ndarray]:
         return {"sphere": SPHERE, "box": CUBE, "cylinder": CYLINDER}[shape.kind], tuple(shape.size), pose
     pose[:3] -= 0.5 * PLANE_THICKNESS * matrix_from_quaternion(pose[3:])[:, 2]
     return CUBE, (PLANE_SIZE, PLANE_SIZE, PLANE_THICKNESS), pose
+
+
+def delete_all() -> bytes:
+    """Return a ``visualization_msgs/MarkerArray`` that deletes all markers which a viewer has on its topic."""
+    template = Template()
+    template.put("<u4", 1)
+    _head(template, "", CUBE, (0.0,) * 4, (0.0,) * 3, action=DELETE_ALL)
+    template.put("<u4", 0, 0)
+    _tail(template)
+    return template.to_bytes()
+
+
+def deleting_all_first(message: bytes) -> bytes:
+    """Return a ``MarkerArray`` of a `MarkerEncoder` with one marker more: the first, which deletes all before it.
+
+    A viewer handles all markers of an array before it draws, so those that it shows already do not flicker. An array
+    that begins so already stays as it is.
+    """
+    deletion = delete_all()[_MARKERS_START:]
+    # The markers that follow keep their alignment: this one takes a multiple of 8 bytes.
+    deletion += bytes(-len(deletion) % 8)
+    if message.startswith(deletion, _MARKERS_START):
+        return message
+    (count,) = _COUNT.unpack_from(message, len(HEADER))
+    return message[: len(HEADER)] + _COUNT.pack(count + 1) + deletion + message[_MARKERS_START:]
 
 
 class MarkerEncoder:
@@ -218,6 +251,7 @@ def _head(
     *,
     scale_field: str = "",
     pose_field: str = "",
+    action: int = ADD,
     action_field: str = "",
 ) -> None:
     """Append a Marker up to its points; fields with a name change from frame to frame (of the scale, x alone)."""
@@ -227,7 +261,7 @@ def _head(
     if action_field:
         template.array(action_field, "<i4", (1,))
     else:
-        template.put("<i4", ADD)
+        template.put("<i4", action)
     if pose_field:
         template.array(pose_field, "<f8", (7,))
     else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import BinaryIO
 
 MESSAGE = 5
@@ -51,15 +51,25 @@ class McapFile:
         From how many bytes on a chunk is written [bytes].
     profile, library : str
         For the header.
+    chunk_written : callable
+        Called after each chunk and its indexes; it may add metadata.
     """
 
-    def __init__(self, file: BinaryIO, chunk_size: int, profile: str, library: str):
+    def __init__(
+        self,
+        file: BinaryIO,
+        chunk_size: int,
+        profile: str,
+        library: str,
+        chunk_written: Callable[[], None] = lambda: None,
+    ):
         from mcap import records, writer
         from mcap.data_stream import RecordBuilder
         from mcap.opcode import Opcode
 
         self._records, self._builder, self._opcodes = records, RecordBuilder, Opcode
         self._file, self._chunk_size, self._magic = file, chunk_size, writer.MCAP0_MAGIC
+        self._chunk_written = chunk_written
         self._place = 0
         self._schemas: list = []
         self._channels: list = []
@@ -231,6 +241,7 @@ class McapFile:
             )
         )
         self._begin_chunk()
+        self._chunk_written()
 
     def _bytes_of(self, record) -> bytes:
         builder = self._builder()

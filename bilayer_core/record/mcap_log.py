@@ -1,8 +1,9 @@
 """The MCAP log: an observer that writes every frame in a thread of its own.
 
 A log holds the topics of `bilayer_core.record.topics` as ROS 2 messages (profile ``ros2``), the scene as attachment
-``scene.yaml``, and the metadata records ``versions``, ``settings``, ``description`` (before the first message) and
-``run`` (``complete``, ``termination``, ``last_time``; written at the end, so a log without it was cut off).
+``scene.yaml``, and the metadata records ``versions``, ``machine``, ``settings`` and ``description`` (before the first
+message), ``chain`` (after each chunk, see `record.chain`) and ``run`` (``complete``, ``termination``, ``last_time`` and
+the end of the chain; written at the end, so a log without it was cut off).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
+from bilayer_core.record.chain import CHAIN, END, Chain, place_of_seal
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_input
 from bilayer_core.record.event_messages import encode_event
@@ -25,10 +27,11 @@ from bilayer_core.record.events import Event, EventDetector
 from bilayer_core.record.frame_block import FrameBlock
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
 from bilayer_core.record.log_head import SCENE_ATTACHMENT
+from bilayer_core.record.markers import deleting_all_first
 from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import EVENTS, INPUTS, QOS, TF, DisplayGate, Rate, TopicSpec, input_topics
+from bilayer_core.record.topics import EVENTS, INPUTS, MARKERS, QOS, TF, DisplayGate, Rate, input_topics
 
 CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the thread and lose more in a crash
 GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wakes ten times a second [s of wall time]
@@ -37,7 +40,6 @@ SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
-_INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 
 class McapRecorder:
@@ -285,6 +287,7 @@ class _LogFile:
         self._file = open_alone(path, force)
         self._each = [TF.name] if tf else []
         self._large = [spec.name for spec in self._encoder.topics if spec.rate is Rate.DISPLAY]
+        self._has_markers = False
         self._block: FrameBlock | None = None
         self._sequence = 0
         self._unflushed_since: float | None = None
@@ -293,19 +296,25 @@ class _LogFile:
             undo.callback(self._file.close)
             undo.callback(_delete, path)
             used = {**versions(), "mcap": mcap.__version__}
-            self._log = McapFile(self._file, CHUNK_SIZE, "ros2", f"bilayer_sim_ros {used['bilayer_sim_ros']}")
+            library = f"bilayer_sim_ros {used['bilayer_sim_ros']}"
+            self._log = McapFile(self._file, CHUNK_SIZE, "ros2", library, self._add_link)
             self._log.add_attachment(SCENE_ATTACHMENT, "application/yaml", description.scene_text.encode())
-            self._log.add_metadata("versions", used)
-            self._log.add_metadata("machine", machine())
-            settings = {key: text for key, text in description.settings.items() if key not in used}
-            self._log.add_metadata("settings", settings)
-            self._log.add_metadata("description", to_text(description))
+            head = {
+                "versions": used,
+                "machine": machine(),
+                "settings": {key: text for key, text in description.settings.items() if key not in used},
+                "description": to_text(description),
+            }
+            for name, metadata in head.items():
+                self._log.add_metadata(name, metadata)
+            self._chain, self._seal = Chain(description.scene_text, head), place_of_seal(description)
+            self._add_link()
             schemas: dict[str, int] = {}
             self._topics: dict[str, int] = {}
             for spec in (*self._encoder.topics, *input_topics(description)):
                 if spec.type not in schemas:
                     schemas[spec.type] = self._log.add_schema(spec.type, schema_text(spec.type))
-                channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: _profile(spec)})
+                channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: spec.offered_profile})
                 self._topics[spec.name] = channel
             self._log.describe_outside()
             self._log.flush()
@@ -315,9 +324,11 @@ class _LogFile:
     def write(self, item: Frame | Input | Event) -> None:
         """Write the messages of a frame, of what acts from outside, or of an event."""
         if isinstance(item, Input):
-            self._add(INPUTS.name, nanoseconds(item.time), encode_input(item))
+            stamp, data = nanoseconds(item.time), encode_input(item)
+            self._chain.add_input(stamp, data)
+            self._add(INPUTS.name, stamp, data)
             if item.kind == STIMULUS:
-                self._add(f"stimulus/{item.name}", nanoseconds(item.time), encode_float64(item.values[0]))
+                self._add(f"stimulus/{item.name}", stamp, encode_float64(item.values[0]))
         elif isinstance(item, Event):
             self._add_events([item])
         else:
@@ -332,9 +343,13 @@ class _LogFile:
             self._block = FrameBlock(self._encoder.small_messages(frame), self._topics)
         stamp, display = nanoseconds(frame.time), self._gate.is_due(frame.time)
         self._block.fill(frame, self._sequence)
+        self._chain.add_state(stamp, 0.0 if self._seal is None else frame.state[self._seal])
         self._log.add_records(self._block.records, self._block.places, stamp)
         for name in (*self._each, *(self._large if display else ())):
-            self._add(name, stamp, self._encoder.encode(name, frame))
+            data = self._encoder.encode(name, frame)
+            if name == MARKERS and not self._has_markers:
+                self._has_markers, data = True, deleting_all_first(data)
+            self._add(name, stamp, data)
 
     def _add_events(self, events: list[Event]) -> None:
         for event in events:
@@ -342,6 +357,10 @@ class _LogFile:
 
     def _add(self, name: str, stamp: int, data: bytes) -> None:
         self._log.add_message(self._topics[name], stamp, self._sequence, data)
+
+    def _add_link(self) -> None:
+        """Write the hash of the states and inputs in the chunks so far."""
+        self._log.add_metadata(CHAIN, self._chain.link.as_metadata())
 
     def time_to_flush(self) -> float | None:
         """Wall time until `flush` is due [s], None if there is nothing to flush."""
@@ -366,7 +385,7 @@ class _LogFile:
         """Write the metadata ``run`` and the file's index."""
         self._add_events(self._events.end(float(ending["last_time"])))
         self._log.flush()
-        self._log.add_metadata("run", ending)
+        self._log.add_metadata(END, ending | self._chain.link.as_metadata())
         self._log.finish()
         self._file.flush()
         self._sync()
@@ -374,23 +393,6 @@ class _LogFile:
     def close(self) -> None:
         """Close the file as it is."""
         self._file.close()
-
-
-def _profile(spec: TopicSpec) -> str:
-    """What rosbag2 is told of a topic, in the numbers of `rmw`: the last messages kept, reliable, volatile."""
-    policies = {
-        "history": 1,
-        "depth": spec.depth,
-        "reliability": 1,
-        "durability": 2,
-        "deadline": _INFINITE,
-        "lifespan": _INFINITE,
-        "liveliness": 1,
-        "liveliness_lease_duration": _INFINITE,
-        "avoid_ros_namespace_conventions": "false",
-    }
-    lines = [f"{key}: {value}" for key, value in policies.items()]
-    return "- " + "\n  ".join(lines) + "\n"
 
 
 def _delete(path: Path) -> None:

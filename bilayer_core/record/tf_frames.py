@@ -9,6 +9,8 @@ y along the width, z along the tangent. A closed rod has no ends; of one whose l
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 
 from bilayer_core.observed.frame import Description, Frame
@@ -66,6 +68,19 @@ class TfEncoder:
         self._numbers[self._places] = poses
         self._template.set_time(frame.time)
         return self._template.to_bytes()
+
+
+def read_prefix(description: Description, message: bytes) -> str:
+    """Return what names of frames in a message of `TfEncoder` begin with; empty if it is no such message."""
+    names = TfEncoder(description, NodeFrames(description), "").names
+    lead = Template()
+    lead.put("<u4", len(names))
+    lead.header(FRAME_ID)
+    lead.put("<u4", 0)  # the length of the first name
+    begin = len(lead)
+    (length,) = struct.unpack_from("<I", message, begin - 4) if len(message) >= begin else (0,)
+    name = message[begin : begin + max(length - 1, 0)].decode(errors="replace")
+    return name.removesuffix(names[0]) if names and name.endswith(names[0]) else ""
 
 
 def _rows_of_ends(description: Description) -> dict[str, tuple[int, int]]:

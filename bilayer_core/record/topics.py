@@ -16,6 +16,7 @@ LOG_NAMESPACE = "/bilayer_sim"
 FRAME_ID = "world"
 QOS = "offered_qos_profiles"
 """Metadata of a channel: the quality of service that its topic is offered with, in the form of rosbag2."""
+_INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 
 class Rate(Enum):
@@ -54,8 +55,29 @@ class TopicSpec:
         """Absolute name under `namespace`."""
         return self.name if self.name.startswith("/") else f"{namespace}/{self.name}"
 
+    @property
+    def offered_profile(self) -> str:
+        """Its quality of service as rosbag2 stores it, with the numbers of `rmw`: the last messages kept, reliable,
+        volatile.
+        """
+        policies = {
+            "history": 1,
+            "depth": self.depth,
+            "reliability": 1,
+            "durability": 2,
+            "deadline": _INFINITE,
+            "lifespan": _INFINITE,
+            "liveliness": 1,
+            "liveliness_lease_duration": _INFINITE,
+            "avoid_ros_namespace_conventions": "false",
+        }
+        lines = [f"{key}: {value}" for key, value in policies.items()]
+        return "- " + "\n  ".join(lines) + "\n"
+
 
 MULTI_ARRAY = "std_msgs/msg/Float64MultiArray"
+MARKERS = "markers"
+"""Name of the topic for RViz and Foxglove (`record.markers`)."""
 TF = TopicSpec("/tf", "tf2_msgs/msg/TFMessage", Rate.OUTPUT, depth=100)
 """Frames of bodies and ends of rods (`record.tf_frames`), where they are asked for; the depth is that of tf2 itself.
 They come with every frame: who looks one up by the stamp of a pose, a wrench or `com` finds just that time.
@@ -78,7 +100,8 @@ def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec
     ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
                                      frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
     ``points``                       x y z strain curvature fx fy fz of the same nodes, then of contact points of bodies
-    ``markers``                      layers coloured by their strain, bodies, obstacles, contact forces
+    ``markers``                      layers coloured by their strain, bodies, obstacles, contact forces; the first array
+                                     of a log deletes all markers that a viewer has
     ================================ ==================================================================================
     """
     output, display = Rate.OUTPUT, Rate.DISPLAY
@@ -102,7 +125,7 @@ def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec
         *((TF,) if tf else ()),
         TopicSpec("nodes", "geometry_msgs/msg/PoseArray", display),
         TopicSpec("points", "sensor_msgs/msg/PointCloud2", display),
-        TopicSpec("markers", "visualization_msgs/msg/MarkerArray", display),
+        TopicSpec(MARKERS, "visualization_msgs/msg/MarkerArray", display),
     )
 
 

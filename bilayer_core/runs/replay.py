@@ -21,15 +21,18 @@ from bilayer_core.observed.inputs import FRICTION, LOAD, STIMULUS, UNTIL, Input
 from bilayer_core.observed.system import machine, versions
 from bilayer_core.printable import shortened
 from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
+from bilayer_core.record.chain import STATE, Wholeness, check_chain
 from bilayer_core.record.encoders import decode_input
+from bilayer_core.record.log_chunks import LogFile
+from bilayer_core.record.log_head import Head
 from bilayer_core.record.log_reader import read_head, read_messages, read_state
-from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
+from bilayer_core.record.topics import INPUTS
+from bilayer_core.runs.derived import DerivedComparison
 from bilayer_core.scene.loader import parse_scene
 from bilayer_core.simulation.simulator import Simulator
 
 Array = np.ndarray
 Shape = tuple[int, ...]
-STATE = f"{LOG_NAMESPACE}/state"
 SEAL = "seal"
 """Part of a state that sums up the others."""
 MOST_INPUTS = 2_000_000
@@ -82,6 +85,8 @@ class Verification:
 
     Attributes
     ----------
+    wholeness : Wholeness
+        Whether the log still holds all states and inputs that were written.
     states : int
         That were compared.
     inputs : int
@@ -94,24 +99,42 @@ class Verification:
         Why the run could not be made to the end of the log; empty if it could.
     changed : dict
         What differs between the machine and versions of the log and the present ones: name to (then, now).
+    last_time : float
+        Of the last state that was compared [s].
+    derived : int or None
+        Derived messages that were compared; None if that was not asked for.
+    first_derived : str
+        The first of them that differs; empty if none does.
+    not_compared : tuple of str
+        Topics of the log that were not compared.
     """
 
     tolerance: float | None
+    wholeness: Wholeness
     states: int = 0
     inputs: int = 0
     first: Difference | None = None
     largest: Difference | None = None
     stopped: str = ""
     changed: dict[str, tuple[str, str]] = field(default_factory=dict)
+    last_time: float = math.nan
+    derived: int | None = None
+    first_derived: str = ""
+    not_compared: tuple[str, ...] = ()
+
+    @property
+    def equal(self) -> bool:
+        """Whether everything that was compared came out as it is in the log."""
+        return self.first is None and not self.stopped and not self.first_derived
 
     @property
     def passed(self) -> bool:
-        """Whether the run came out as it is in the log."""
-        return self.first is None and not self.stopped
+        """Whether the run came out as it is in the log, and the log is whole; of older logs, that is not known."""
+        return self.equal and (self.wholeness.whole or not self.wholeness.hashed)
 
 
-def verify(path: str | Path, tolerance: float | None = None) -> Verification:
-    """Simulate a log's run again, and compare every state in it.
+def verify(path: str | Path, tolerance: float | None = None, derived: bool = False) -> Verification:
+    """Simulate a log's run again, compare every state in it, and check that no state and no input is missing.
 
     Parameters
     ----------
@@ -119,6 +142,8 @@ def verify(path: str | Path, tolerance: float | None = None) -> Verification:
     tolerance : float, optional
         Part of the longest rod by which positions of nodes and bodies may differ, for logs of other machines; without
         one all values are to be the same bit for bit.
+    derived : bool
+        Compare derived messages as well, byte by byte, as long as states are equal; not with a tolerance.
 
     Raises
     ------
@@ -128,17 +153,21 @@ def verify(path: str | Path, tolerance: float | None = None) -> Verification:
     path = Path(path)
     with naming(path):
         refuse_without_inputs(path)
-        found = _verified(path, tolerance)
+        found = _verified(path, tolerance, derived)
         if not found.states:
             raise InputError(f"{path}: holds no state; nothing can be compared")
         return found
 
 
-def _verified(path: Path, tolerance: float | None) -> Verification:
+def _verified(path: Path, tolerance: float | None, derived: bool) -> Verification:
     simulator = simulator_of(path)
     longest = max(rod.path.length for rod in simulator.scene.rods)
     comparison = _Comparison(simulator.description, None if tolerance is None else tolerance * longest)
-    result, until, waiting = Verification(tolerance, changed=_changed(path)), math.inf, []
+    file, head = LogFile(path), read_head(path)
+    messages = DerivedComparison(head.description, file) if derived else None
+    compared = {STATE, INPUTS.full_name(), *(messages.topics if messages else ())}
+    result, until, waiting = Verification(tolerance, check_chain(path, head.description)), math.inf, []
+    result.changed, result.not_compared = _changed(head), tuple(sorted(file.topics.keys() - compared))
     for event in _events(path):
         if isinstance(event, Input):
             waiting.append(event)
@@ -156,7 +185,14 @@ def _verified(path: Path, tolerance: float | None) -> Verification:
                 break
         until = _apply(simulator, waiting, until)
         result.states += 1
+        result.last_time = time
         comparison.add(event, simulator.save_state(), result)
+        if messages and result.first is None:
+            messages.add_frame(simulator.frame())
+    if messages:
+        if result.equal:
+            messages.finish(result.wholeness.whole)
+        result.derived, result.first_derived = messages.count, messages.first
     return result
 
 
@@ -314,9 +350,8 @@ def _apply(simulator: Simulator, waiting: list[Input], until: float) -> float:
     return until
 
 
-def _changed(path: Path) -> dict[str, tuple[str, str]]:
-    """Versions and parts of the machine that are not those of the log."""
-    head = read_head(path)
+def _changed(head: Head) -> dict[str, tuple[str, str]]:
+    """Return versions and parts of the machine that are not those of the log."""
     then, now = head.versions | head.machine, versions() | machine()
     return {key: (then[key], now[key]) for key in now if key in then and then[key] != now[key]}
 

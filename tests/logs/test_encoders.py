@@ -9,10 +9,21 @@ import pytest
 import synthetic_run
 from rclpy.serialization import deserialize_message
 from rosbags.typesys import Stores, get_typestore
+from visualization_msgs.msg import Marker
 
 from bilayer_core.record.cdr import nanoseconds, read_float64_multi_array
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, multi_array_template
-from bilayer_core.record.markers import ADD, ARROW_DECADE, ARROW_FORCE, DELETE, LINE_LIST, SPHERE
+from bilayer_core.record.markers import (
+    ADD,
+    ARROW_DECADE,
+    ARROW_FORCE,
+    DELETE,
+    DELETE_ALL,
+    LINE_LIST,
+    SPHERE,
+    delete_all,
+    deleting_all_first,
+)
 from bilayer_core.record.schemas import schema_text
 from bilayer_core.record.topics import MULTI_ARRAY, TF, DisplayGate, Rate, output_topics, stimulus_topics
 
@@ -189,6 +200,19 @@ def test_markers_tile_ribbons_with_bars_and_show_forces_only_while_there_are_any
     shaft = np.array([[p.x, p.y, p.z] for p in arrows.points[:2]])
     force = 0.02 * np.hypot(1.0, 0.4)
     assert np.linalg.norm(shaft[1] - shaft[0]) == pytest.approx(ARROW_DECADE * np.log10(1 + force / ARROW_FORCE))
+
+
+@pytest.mark.parametrize("time", [0.5, 2.0], ids=["nothing touches", "with arrows"])
+def test_an_array_that_deletes_all_first_shows_the_same_markers_after_that(time, encoder, typestore):
+    kind = TOPICS["markers"].type
+    plain = encoder.encode("markers", synthetic_run.frame(time))
+    message = typestore.deserialize_cdr(deleting_all_first(plain), kind)
+    assert bytes(typestore.serialize_cdr(message, kind)) == deleting_all_first(plain)
+    first, *others = message.markers
+    (alone,) = typestore.deserialize_cdr(delete_all(), kind).markers
+    assert first.action == alone.action == DELETE_ALL == Marker.DELETEALL
+    message.markers = others
+    assert bytes(typestore.serialize_cdr(message, kind)) == plain
 
 
 def test_display_topics_come_once_in_each_of_their_periods():

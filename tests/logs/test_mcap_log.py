@@ -19,6 +19,7 @@ from bilayer_core.errors import InputError, OutputError, SimulationError
 from bilayer_core.record import mcap_log
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
+from bilayer_core.record.markers import DELETE_ALL
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.memory import MemoryRecorder
 
@@ -69,6 +70,14 @@ def test_info_says_what_the_log_holds(log):
 def test_the_scene_and_the_description_come_back(log):
     assert scene_from_log(log) == synthetic_run.SCENE_TEXT
     assert_equal_descriptions(read_description(log), synthetic_run.description())
+
+
+def test_only_the_first_markers_of_a_log_delete_those_of_another_one(log):
+    with log.open("rb") as file:
+        messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages("/bilayer_sim/markers")
+        actions = [[marker.action for marker in decoded.markers] for *_, decoded in messages]
+    assert [action.count(DELETE_ALL) for action in actions] == [1] + 50 * [0]
+    assert actions[0][0] == DELETE_ALL
 
 
 def test_arrays_read_from_the_log_are_those_that_were_observed(log):

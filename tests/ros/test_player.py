@@ -26,11 +26,17 @@ class Outlet:
         self.channels = list(self._topics)
         self.latched = {channel: latched[topic] for channel, topic in self._topics.items() if topic in latched}
         self._delay = delay
-        self.sent, self.times = [], []
+        self.sent, self.times, self.passes, self.instants = [], [], [], []
 
-    def send(self, channel, data):
+    def finish_instant(self):
+        self.instants.append(len(self.sent))
+
+    def restart(self):
+        self.passes.append(len(self.sent))
+
+    def send(self, message):
         time.sleep(self._delay)
-        self.sent.append((self._topics[channel], value_of(data)))
+        self.sent.append((self._topics[message.channel], value_of(message.data)))
         self.times.append(time.monotonic())
 
     def forget(self, channel):
@@ -112,6 +118,14 @@ def test_all_messages_go_out_once_and_by_time(play):
     assert player.outlet.sent == [(topic, value) for _, topic, value in expected]
 
 
+def test_each_pass_and_the_end_of_each_instant_are_told(play):
+    player = play([*counted(2, 0.0), *counted(2, 0.0, "/b", 0.5)], paused=True, loop=True)
+    assert ask(player.burst(5)) == 5
+    ask(player.seek(0))
+    assert player.outlet.passes == [0, 4, 5]
+    assert player.outlet.instants == [2, 4]
+
+
 @pytest.mark.parametrize("rate", [0.5, 2.0])
 def test_no_message_goes_out_before_its_time(play, rate):
     begin = time.monotonic()
@@ -137,7 +151,7 @@ def test_the_end_waits_for_the_time_that_was_asked_for(play):
     bother(player)
     assert played(player) == [0, 1]
     assert time.monotonic() - begin >= 0.2
-    assert player.position == 0.2
+    assert player.position == SECOND // 5
 
 
 def test_a_loop_begins_again_at_the_offset_until_it_is_stopped(play):
@@ -160,14 +174,14 @@ def test_a_paused_player_sends_one_message_when_it_is_asked_for_the_next(play):
     assert ask(player.play_next()) == "sent /a of t = 0 s"
     assert ask(player.play_next()) == "sent /a of t = 0.1 s"
     assert values(player) == [0, 1]
-    assert player.paused and player.position == 0.1
+    assert player.paused and player.position == SECOND // 10
 
 
 def test_a_paused_player_stays_paused_after_a_seek_and_plays_on_from_there(play):
     player = play(counted(), paused=True)
     for position, expected in ((0.55, 6), (0.9, 9), (0.0, 0), (0.3, 3)):
         ask(player.seek(round(position * SECOND)))
-        assert player.paused and player.position == position
+        assert player.paused and player.position == round(position * SECOND)
         ask(player.play_next())
         assert values(player)[-1] == expected
     assert len(values(player)) == 4
@@ -236,7 +250,7 @@ def test_another_rate_acts_at_once_and_time_goes_on_from_where_it_is(play):
     wait_for(lambda: values(player))
     before = player.position
     ask(player.set_rate(1e-6))
-    assert before <= player.position < 900.0
+    assert before <= player.position < 900 * SECOND
     ask(player.set_rate(FAST))
     assert played(player) == [0, 1]
 

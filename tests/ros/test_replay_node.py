@@ -265,7 +265,7 @@ def test_what_cannot_be_published_is_named_once_and_the_rest_is_played(start, co
     client.call("resume", NODE)
     client.spin_to_the_end()
     assert node.wait() == 0 and numbers(heard) == [0, 1, 2]
-    assert node.output.count("aliens/msg/Ship cannot be imported") == 1
+    assert node.output.count("aliens/msg/Ship is in no installed package") == 1
     assert "/alien, /alien_too" in node.output
     assert "'Float64' is no type of a message, such as 'std_msgs/msg/Float64': /misnamed" in node.output
     assert "/no topic" in node.output
@@ -341,6 +341,11 @@ def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it_and_then_plays(r
             "'play.playback_until_timestamp' is 0.05; ",
         ),
         ({"play.position": 99.0}, "'play.position' is 99; "),
+        ({"play.clock_from_log": True}, "'play.clock_from_log' is true; "),
+        (
+            {"play.clock_from_log": True, "play.clock_publish_frequency": 40.0},
+            "'play.clock_from_log' is true, and 'play.clock_publish_frequency' asks for another /clock",
+        ),
         ({"services": "rosbag2"}, "rosbag2_interfaces"),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else "",

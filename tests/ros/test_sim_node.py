@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, Float64MultiArray
-from visualization_msgs.msg import MarkerArray
+from visualization_msgs.msg import Marker, MarkerArray
 
 from bilayer_core import Simulator, load_scene
 from bilayer_sim_ros.conversions import to_seconds
@@ -158,6 +158,32 @@ def test_markers_show_every_layer_where_the_simulation_has_it(client, heard, sce
         assert len(marker.colors) == len(marker.points)
     assert {marker.header.frame_id for marker in markers} == {"world"}
     assert len(shown) == len(markers)
+
+
+def deletions(messages):
+    return [[marker.action for marker in message.markers].count(Marker.DELETEALL) for message in messages]
+
+
+def test_each_viewer_first_deletes_the_markers_of_another_robot_and_once(client, heard):
+    early = heard(MarkerArray, "markers")
+    client.drain()
+    seen = len(early)
+    late = client.listen(MarkerArray, "/bilayer_sim/markers")
+    client.spin_until(lambda: len(late) == 3, "the paused frame again")  # repeated once a second
+    assert late[0].markers[0].action == Marker.DELETEALL and len(late[0].markers) > 1
+    assert deletions(late) == [1, 0, 0]
+    client.drain()
+    assert sum(deletions(early[seen:])) == 1
+
+
+def test_the_first_markers_after_a_reset_delete_those_before(client, heard):
+    markers = heard(MarkerArray, "markers")
+    step(client, markers)
+    client.drain()
+    seen = len(markers)
+    assert client.call("reset").success
+    client.spin_until(lambda: len(markers) > seen, "markers of the start")
+    assert deletions(markers[seen:])[0] == 1
 
 
 def test_all_outputs_of_one_step_carry_the_same_simulated_time(client, heard):

@@ -1,0 +1,111 @@
+"""What viewers get of a replay: markers of one time alone, the description, whole frames, positions and clocks."""
+
+import signal
+
+import numpy as np
+import pytest
+import recordings
+import synthetic_run
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+from written_logs import number, write_log
+
+from bilayer_core.record.description_text import from_json
+from bilayer_core.record.log_reader import read_description
+from bilayer_core.record.mcap_log import McapRecorder
+
+NODE = "/bilayer_replay"
+EPOCH = 1_764_000_000.0
+
+
+@pytest.fixture(scope="module")
+def run_log(tmp_path_factory):
+    """Half a second of a run, all topics."""
+    path = tmp_path_factory.mktemp("logs") / "run.mcap"
+    synthetic_run.run(McapRecorder(path, 50.0, 20.0), np.linspace(0.0, 0.5, 26))
+    return path
+
+
+def call(client, service_type, name, request):
+    service = client.node.create_client(service_type, f"{NODE}/{name}")
+    client.spin_until(service.service_is_ready, name)
+    future = service.call_async(request)
+    client.spin_until(future.done, "an answer")
+    return future.result()
+
+
+def seek(client, position):
+    """The result of setting the position."""
+    wished = Parameter("play.position", value=position).to_parameter_msg()
+    return call(client, SetParameters, "set_parameters", SetParameters.Request(parameters=[wished])).results[0]
+
+
+def test_markers_of_another_time_are_deleted_at_the_start_after_a_seek_and_in_each_loop(
+    start, connect, domain, run_log
+):
+    parameters = {"play.start_paused": True, "play.loop": True, "play.start_offset": 0.1}
+    node = start("replay_node", domain, parameters, [str(run_log)])
+    client, heard = connect(node), []
+    markers = client.node.create_subscription(MarkerArray, f"{NODE}/markers", heard.append, QoSProfile(depth=100))
+    client.spin_until(lambda: markers.get_publisher_count() > 0, "a publisher of markers")
+    assert client.call("resume", NODE).success
+    client.spin_until(lambda: len(heard) > 12, "two passes")
+    assert seek(client, 0.3).successful
+    count = len(heard)
+    client.spin_until(lambda: len(heard) > count + 2, "markers after a seek")
+    arrays = [(array.markers[0].action == Marker.DELETEALL, array.markers[-1].header.stamp.nanosec) for array in heard]
+    passes = [deletes for deletes, _ in arrays]
+    assert arrays[0][0] and sum(passes) >= 3
+    for (_, before), (deletes, stamp) in zip(arrays, arrays[1:], strict=False):
+        assert deletes or stamp > before
+        assert not deletes or stamp <= before or stamp >= 0.3e9
+
+
+def test_view_follow_shows_a_replay_with_its_description(start, connect, domain, run_log, tmp_path):
+    node = start("replay_node", domain, {"play.start_paused": True, "play.rate": 0.5}, [str(run_log)])
+    client, told = connect(node), []
+    kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    client.node.create_subscription(String, f"{NODE}/description", told.append, kept)
+    client.spin_until(lambda: told, "the description")
+    assert from_json(told[0].data).scene_text == read_description(run_log).scene_text
+    path = tmp_path / "seen.rrd"
+    follower = start("follower", domain, arguments=["--serve", f"--node={NODE}", f"--save={path}"])
+    follower.wait_for(f"following {NODE}")
+    client.call("resume", NODE)
+    follower.wait_for(f"{NODE} has ended")
+    assert node.wait() == 0, node.output
+    follower.send(signal.SIGTERM)
+    assert follower.wait() == 0, follower.output
+    times = recordings.times_of(path)
+    shown, shapes = times["/plots/stimulus/humidity"], times["/world/strands/arm_0/active"]
+    assert shown[0] == 0.0 and shown[-1] == 0.5 and len(shown) > 20
+    assert shapes[0] == 0.0 and len(shapes) > 8
+
+
+def test_positions_of_a_log_with_epoch_stamps_count_from_its_first_message(start, connect, domain, tmp_path):
+    log = write_log(tmp_path / "log.mcap", [("/a", EPOCH + 0.5 * k, number(k)) for k in range(5)])
+    node = start("replay_node", domain, {"play.start_paused": True, "play.position": 0.5}, [str(log)])
+    client = connect(node)
+    assert client.call("is_paused", NODE).message == "paused at t = 1764000000.5 s"
+    assert client.call("play_next", NODE).message == "sent /a of t = 1764000000.5 s"
+    assert seek(client, 1.5).successful
+    assert client.call("play_next", NODE).message == "sent /a of t = 1764000001.5 s"
+    found = call(client, GetParameters, "get_parameters", GetParameters.Request(names=["play.position"]))
+    assert found.values[0].double_value == 1.5
+    refused = seek(client, 3.0)
+    assert not refused.successful and "is not in what is played, which is 1764000000 to 1764000002 s" in refused.reason
+
+
+def test_the_clock_of_a_log_is_played_where_it_is_asked_for(start, connect, domain, run_log):
+    node = start("replay_node", domain, {"play.start_paused": True, "play.clock_from_log": True}, [str(run_log)])
+    client, clock = connect(node), []
+    heard = client.node.create_subscription(Clock, "/clock", clock.append, QoSProfile(depth=100))
+    client.spin_until(lambda: heard.get_publisher_count() > 0, "a publisher of /clock")
+    client.call("resume", NODE)
+    client.spin_to_the_end()
+    assert node.wait() == 0
+    assert [message.clock.nanosec for message in clock] == [round(0.02e9 * k) for k in range(26)]
