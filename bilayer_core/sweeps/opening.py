@@ -15,6 +15,8 @@ from typing import Any
 from urllib.request import urlopen
 
 from bilayer_core.errors import EngineError, InputError, OutputError
+from bilayer_core.extras import require
+from bilayer_core.record.private_directory import private_directory
 from bilayer_core.sweeps.engine import Engine, refuse_other_versions
 from bilayer_core.sweeps.execute import LOGS, prepare
 from bilayer_core.sweeps.job import Job
@@ -60,11 +62,9 @@ def open_engine(
     EngineError
         If no process starts.
     """
-    try:
-        import dask
-        import distributed  # noqa: F401
-    except ImportError:
-        raise InputError("sweeps need Dask: pip install 'bilayer_sim_ros[sweep]'") from None
+    require("sweep", "dask", "distributed")
+    import dask
+
     with ExitStack() as stack:
         if scheduler is None:
             workers = workers or len(os.sched_getaffinity(0))
@@ -79,7 +79,7 @@ def open_engine(
 def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) -> Engine:
     from distributed import Client, LocalCluster
 
-    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="bilayer-sweep-", ignore_cleanup_errors=True))
+    folder = stack.enter_context(private_directory())
     try:
         with _keyboard_unheard():
             cluster = LocalCluster(
@@ -89,7 +89,7 @@ def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None) ->
                 host="127.0.0.1",
                 dashboard_address="127.0.0.1:0",
                 memory_limit=memory or "auto",
-                local_directory=folder,
+                local_directory=str(folder),
                 silence_logs=logging.CRITICAL,
             )
             stack.enter_context(cluster)

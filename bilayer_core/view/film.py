@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bilayer_core.errors import InputError
 from bilayer_core.record.paths import draft_of
 
 if TYPE_CHECKING:
     from PIL import Image
 
-MISSING = "films need ffmpeg; install it with: pip install 'bilayer_sim_ros[film]'"
 ENCODING = ["-preset", "superfast", "-crf", "21", "-movflags", "+faststart", "-f", "mp4"]
 """Of x264: small enough to send, no blocks to be seen; a film begins before all of it is loaded."""
-
-
-def require_ffmpeg() -> None:
-    """Raise InputError, with what to install, where no film can be made."""
-    if importlib.util.find_spec("imageio_ffmpeg") is None:
-        raise InputError(MISSING)
 
 
 def save_mp4(pictures: Iterable[Image.Image], size: tuple[int, int], rate: float, path: str | Path) -> int:

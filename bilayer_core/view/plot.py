@@ -5,7 +5,6 @@ Quantities of one unit share a panel, panels share the axis of time. matplotlib 
 
 from __future__ import annotations
 
-import importlib.util
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.paths import check_output_path, draft_of
 from bilayer_core.record.run_data import RunData
@@ -147,8 +147,7 @@ def plot(
     InputError
         If a log or quantity is not there, the file cannot be written, or matplotlib is missing.
     """
-    if importlib.util.find_spec("matplotlib") is None:
-        raise InputError("plot: matplotlib is not installed; install it with: pip install 'bilayer_sim_ros[plot]'")
+    require("plot", "matplotlib")
     if out is not None:
         if Path(out).suffix.lower() not in SUFFIXES:
             raise InputError(f"{out}: must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
