@@ -94,19 +94,31 @@ def _write_tables(source: LogSource, tables: dict[Path, Table]) -> None:
         for first in range(0, len(group), TABLES_AT_ONCE):
             with ExitStack() as open_files:
                 some = group[first : first + TABLES_AT_ONCE]
-                writers = [(table, open_files.enter_context(_writer(path, table.columns))) for path, table in some]
-                every = [entry for table, _ in writers for entry in table.entries]
+                writers = [open_files.enter_context(_writer(path, table.columns)) for path, table in some]
+                every = [entry for _, table in some for entry in table.entries]
                 for rows, block in source.blocks(every):
-                    for table, write in writers:
-                        write(table.arrays(time_of(source, table)[rows], block))
+                    for (path, table), write in zip(some, writers, strict=True):
+                        with _named(path):
+                            write(table.arrays(time_of(source, table)[rows], block))
 
 
 @contextmanager
 def _writer(path: Path, columns: list[Column]) -> Iterator[Callable[[list[np.ndarray]], None]]:
     """Yield a function that takes arrays of the columns, for a file that is closed afterwards."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with _csv_writer(path, columns) if path.suffix.lower() == CSV else _parquet_writer(path, columns) as write:
+    writer = _csv_writer if path.suffix.lower() == CSV else _parquet_writer
+    with _named(path), writer(path, columns) as write:
         yield write
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Have an OSError that names no file name this one."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
 
 
 @contextmanager
@@ -127,7 +139,7 @@ def _parquet_writer(path: Path, columns: list[Column]) -> Iterator[Callable[[lis
     import pyarrow
     from pyarrow import parquet
 
-    with ExitStack() as closing:
+    with path.open("wb") as file, ExitStack() as closing:  # whose errors say more than those of pyarrow
         opened: list[parquet.ParquetWriter] = []
         units = {name: unit for name, unit in columns}
 
@@ -139,7 +151,7 @@ def _parquet_writer(path: Path, columns: list[Column]) -> Iterator[Callable[[lis
                     for (name, unit), of in zip(columns, held, strict=True)
                 ]
                 schema = pyarrow.schema(fields, metadata={"units": json.dumps(units)})
-                opened.append(closing.enter_context(parquet.ParquetWriter(path, schema)))
+                opened.append(closing.enter_context(parquet.ParquetWriter(file, schema)))
             opened[0].write_table(pyarrow.Table.from_arrays(held, schema=opened[0].schema))
 
         yield write
@@ -207,6 +219,7 @@ def _draft_of_directory(out: Path, force: bool) -> Iterator[Path]:
         raise InputError(f"{out}: cannot be written: there is no directory {parent}")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{out}: cannot be written: no permission to write in {parent}")
+    draft = None
     try:
         with private_directory(parent) as draft:
             yield draft
@@ -216,7 +229,8 @@ def _draft_of_directory(out: Path, force: bool) -> Iterator[Path]:
                 _make_parents(target, out)
                 move(file, target, force)
     except OSError as error:
-        raise unwritable(out, error) from error
+        path = Path(error.filename or out)
+        raise unwritable(out / path.relative_to(draft) if draft in path.parents else path, error) from error
 
 
 def _make_parents(target: Path, out: Path) -> None:

@@ -87,8 +87,9 @@ def move(draft: Path, target: Path, force: bool) -> None:
 
 
 def unwritable(path: str | Path, error: OSError) -> OutputError:
-    """An OSError as one that names the file."""
-    return OutputError(f"{path}: cannot be written: {error.strerror or error}")
+    """Return an OSError as one that names the file."""
+    reason = error.strerror or (os.strerror(error.errno) if error.errno else error)
+    return OutputError(f"{path}: cannot be written: {reason}")
 
 
 def write_text(path: str | Path, text: str, force: bool) -> None:

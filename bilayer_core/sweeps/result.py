@@ -187,7 +187,11 @@ def write_table(journal: Journal, keys: set[str], about: Columns, directory: Pat
     fields = [pyarrow.field(name, _kind(pyarrow, found)) for name, found in kinds.items()]
     schema = pyarrow.schema([*fields, pyarrow.field("summary", pyarrow.string())], {ABOUT: json.dumps(asdict(about))})
     path = directory / TABLE
-    with draft_of(path, force=True) as draft, parquet.ParquetWriter(draft, schema) as writer:
+    with (
+        draft_of(path, force=True) as draft,
+        draft.open("wb") as file,  # whose errors say more than those of pyarrow
+        parquet.ParquetWriter(file, schema) as writer,
+    ):
         block: list[dict[str, Any]] = []
         for row in journal.rows(keys):
             block.append(_fitting(pyarrow, schema, row))

@@ -5,6 +5,7 @@ Quantities of one unit share a panel, panels share the axis of time. matplotlib 
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -172,8 +173,11 @@ def plot(
             if out is None:
                 pyplot.show()
                 return
+            suffix, content = Path(out).suffix.lower(), io.BytesIO()  # the pdf backend fails badly on a full disk
+            creator = {"Creator": "bilayer plot"} if suffix == ".pdf" else None
+            figure.savefig(content, format=suffix.removeprefix("."), metadata=creator)
             with draft_of(out, force) as draft:
-                figure.savefig(draft, metadata={"Creator": "bilayer plot"} if draft.suffix == ".pdf" else None)
+                draft.write_bytes(content.getvalue())
         finally:
             pyplot.close(figure)
 
