@@ -7,12 +7,12 @@ import os
 import resource
 import subprocess
 import sys
-import tempfile
 import time as clock
 from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import SimulationError
+from ..record.private_directory import private_directory
 from ..scene.loader import load_scene
 from .configurations import shapes
 from .results import Results
@@ -56,9 +56,9 @@ def measure(results: Results, quick: bool, progress: Callable[[str], None] = lam
 
 
 def _starts(scene: str, model: str, dimension: int) -> dict:
-    with tempfile.TemporaryDirectory(prefix="bilayer-bench-") as cache:
-        cold = first_step(scene, model, dimension, Path(cache))
-        warm = [first_step(scene, model, dimension, Path(cache)) for _ in range(WARM_REPEATS)]
+    with private_directory() as cache:
+        cold = first_step(scene, model, dimension, cache)
+        warm = [first_step(scene, model, dimension, cache) for _ in range(WARM_REPEATS)]
     return {"cold": cold, "warm": min(warm, key=lambda start: start["cpu_time"])}
 
 

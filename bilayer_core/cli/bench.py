@@ -36,7 +36,7 @@ def bench(
     """
     from bilayer_core.bench import run
     from bilayer_core.bench.results import Results
-    from bilayer_core.validate.figures import check_matplotlib
+    from bilayer_core.extras import require
 
     chosen = run.chosen_names(only, quick)
     if listing:
@@ -45,7 +45,7 @@ def bench(
     if references:
         _make_references(run.chosen_problems(chosen))
         return
-    check_matplotlib()
+    require("bench", "matplotlib")
     directory = output_directory(out)
     results = Results(directory, quick, resume, force)
     with count_bar(run.count(chosen, quick), quiet) as show:

@@ -53,9 +53,9 @@ def fit(
 
     directory = None if out is None else output_directory(out)
     if directory is not None:
-        from bilayer_core.validate.figures import check_matplotlib
+        from bilayer_core.extras import require
 
-        check_matplotlib()
+        require("--out: figures", "matplotlib")
         outputs.check_outputs(directory, force)
     with json_to(json_file) as write_json:
         compile_kernels(quiet)

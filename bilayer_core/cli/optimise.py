@@ -49,14 +49,14 @@ def optimise(
     """
     from pathlib import Path
 
+    from bilayer_core.extras import require
     from bilayer_core.sweeps import optimise as search
-    from bilayer_core.sweeps.plots import check_matplotlib, draw
+    from bilayer_core.sweeps.plots import draw
     from bilayer_core.sweeps.result import read_results
 
     if (maximise is None) == (minimise is None):
         raise click.UsageError("give --maximise METRIC or --minimise METRIC")
-    if plotted:
-        check_matplotlib()
+    require("optimise", "dask", "distributed", "optuna", "pyarrow", *(["matplotlib"] if plotted else []))
     compile_kernels(quiet)
     with runs_bar(trials, 0, quiet) as show:
         optimum = search.optimise(

@@ -33,6 +33,7 @@ from bilayer_core.cli.terminal import say
 from bilayer_core.cli.validate import validate
 from bilayer_core.cli.view import view
 from bilayer_core.errors import BilayerError
+from bilayer_core.extras import is_optional, missing_library
 
 INTERNAL_ERROR = 70
 """A fault of this program and not of its input; what sysexits.h calls EX_SOFTWARE."""
@@ -100,6 +101,9 @@ def run_program(arguments: Sequence[str] | None, signals: Signals) -> int:
     except Exception as error:
         if signals.behind(error) is not None:
             raise
+        if isinstance(error, ModuleNotFoundError) and is_optional(error.name or ""):
+            _explain(settings, str(missing_library("this command", error.name)))
+            return BilayerError.exit_code
         text = " ".join(f"{type(error).__name__}: {error}".split())
         _explain(settings, f"internal error: {text}\nPlease report it, with what the same command prints with --debug.")
         return INTERNAL_ERROR

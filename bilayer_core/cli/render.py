@@ -123,12 +123,11 @@ def render(
     if mp4 and background == "transparent":
         raise InputError("--background: a film cannot be transparent; a picture, a sheet or an animation can")
 
-    from bilayer_core.view.film import require_ffmpeg
+    from bilayer_core.extras import require
     from bilayer_core.view.render import Look, Studio
 
+    require("render", "vtkmodules", "PIL", *(["imageio_ffmpeg"] if mp4 else []))
     look = Look.of(camera, background, colour=colour, size=size, reactions=reactions)
-    if mp4:
-        require_ffmpeg()
     studio = Studio(file, look)
     if studio.warning is not None:
         say(f"warning: {studio.warning}", err=True)

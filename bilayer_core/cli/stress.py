@@ -50,16 +50,16 @@ def stress(
     workers = workers or len(os.sched_getaffinity(0))
     if mutations:
         return _judge_seeded_bugs(only, listed, resume, output_directory(out), workers, quiet)
+    from bilayer_core.extras import require
     from bilayer_core.stress import report
     from bilayer_core.stress.journal import Journal, head_of
     from bilayer_core.stress.run import chosen_cases, measure, write
-    from bilayer_core.validate.figures import check_matplotlib
 
     cases = chosen_cases(only, quick, scenes)
     if listed:
         _list(cases)
         return 0
-    check_matplotlib()
+    require("stress", "pebble", "matplotlib")
     directory = output_directory(out)
     journal = Journal(directory, head_of(cases), resume)
     with json_to(json_file) as write_json:

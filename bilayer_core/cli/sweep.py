@@ -116,6 +116,7 @@ def sweep(
     Writes DIR/results.sqlite as results come, then DIR/results.parquet: a row for each run, also for one that could
     not go on, with its reason. Killed at any moment, --resume makes what is missing.
     """
+    from bilayer_core.extras import require
     from bilayer_core.sweeps.design import count_of
     from bilayer_core.sweeps.journal import Journal
     from bilayer_core.sweeps.opening import Processes
@@ -127,10 +128,7 @@ def sweep(
     if listed:
         _list(read)
         return
-    if plotted:
-        from bilayer_core.sweeps.plots import check_matplotlib
-
-        check_matplotlib()
+    require("sweep", "dask", "distributed", "pyarrow", *(["matplotlib"] if plotted else []))
     compile_kernels(quiet)
     with Journal(directory, read.content, resume=resume, force=force) as journal:
         keys = read.keys()

@@ -28,6 +28,7 @@ WIDTHS = (52, 13, 13, 9, 7, 6)
 @click.option("--list", "listing", is_flag=True, help="Say what each case is checked against, and compute nothing.")
 def validate(out: str | None, json_file: str | None, only: str | None, quick: bool, listing: bool) -> int:
     """Compute the paper's validations and every other case with a known answer; exit code 1 if one fails."""
+    from bilayer_core.extras import require
     from bilayer_core.validate import figures, register, report
 
     cases = register.select(only, quick)
@@ -37,7 +38,7 @@ def validate(out: str | None, json_file: str | None, only: str | None, quick: bo
         return 0
     directory = None if out is None else output_directory(out)
     if directory is not None:
-        figures.check_matplotlib()
+        require("--out: figures", "matplotlib")
     with json_to(json_file) as write_json:
         compile_kernels(quiet=False)
         _print_line(("case", "computed", "reference", "error", "limit", ""), "bold")

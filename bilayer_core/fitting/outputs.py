@@ -10,6 +10,7 @@ from typing import Any
 
 from bilayer_core.fitting.result import FitResult
 from bilayer_core.observed.system import versions
+from bilayer_core.record.csv_cells import text_cell
 from bilayer_core.record.paths import check_output_path, write_text
 from bilayer_core.scene.loader import scene_text
 
@@ -89,7 +90,7 @@ def residuals_text(result: FitResult) -> str:
                 sigma = result.sigma[column.name] if column.sigma is None else column.sigma[j]
                 found = (column.values[j], sigma, result.started[j, k], result.fitted[j, k], residuals[j, k])
                 shown = [repr(float(value / column.factor)) for value in found]
-                rows.writerow([repr(time), column.name, column.shown_unit, *shown])
+                rows.writerow([repr(time), text_cell(column.name), text_cell(column.shown_unit), *shown])
     return text.getvalue()
 
 

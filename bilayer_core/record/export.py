@@ -1,22 +1,27 @@
-"""A log as files that other tools read: csv, parquet, npz. Some megabytes of it are in memory, however long it is."""
+"""A log as files that other tools read: csv, parquet, npz. Some megabytes of it are in memory, however long it is.
+
+Names of quantities come from the log, which may be a stranger's: `file_names` makes names of files and members of them.
+"""
 
 from __future__ import annotations
 
-import importlib.util
+import csv
 import json
 import os
-import shutil
-import tempfile
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
+from bilayer_core.record.csv_cells import text_cell
+from bilayer_core.record.file_names import file_names
 from bilayer_core.record.log_source import SHAPE_TIME, TIME, LogSource
-from bilayer_core.record.paths import check_output_path, draft_of, unwritable
+from bilayer_core.record.paths import check_output_path, draft_of, move, unwritable
+from bilayer_core.record.private_directory import private_directory
 from bilayer_core.record.quantities import Entry
 from bilayer_core.record.tables import Column, Table, chosen, one_table, time_of
 
@@ -54,8 +59,8 @@ def export(path: str | Path, out: str | Path, kind: str, names: Sequence[str] = 
         If writing fails.
     """
     out, source = Path(out), LogSource(path)
-    if kind != NPZ and importlib.util.find_spec("pyarrow") is None:
-        raise InputError(f"{kind[1:]} is written by pyarrow; install it with: pip install 'bilayer_sim_ros[export]'")
+    if kind == PARQUET:
+        require("--parquet", "pyarrow")
     if out.name in ("", "-"):
         raise InputError(f"{kind[1:]}: {str(out)!r} is not allowed; it must be the name of a file or a directory")
     wanted = chosen(source, names)
@@ -75,7 +80,10 @@ def export(path: str | Path, out: str | Path, kind: str, names: Sequence[str] = 
         if out.suffix.lower() in (CSV, PARQUET, NPZ):
             raise InputError(f"{out}: must end in {kind}, or be the name of a directory")
         with _draft_of_directory(out, force) as directory:
-            _write_tables(source, {directory / f"{entry.name}{kind}": Table([entry], own=True) for entry in wanted})
+            paths = file_names(entry.name for entry in wanted)
+            _write_tables(
+                source, {directory / f"{paths[entry.name]}{kind}": Table([entry], own=True) for entry in wanted}
+            )
     return [entry.name for entry in wanted]
 
 
@@ -86,37 +94,56 @@ def _write_tables(source: LogSource, tables: dict[Path, Table]) -> None:
         for first in range(0, len(group), TABLES_AT_ONCE):
             with ExitStack() as open_files:
                 some = group[first : first + TABLES_AT_ONCE]
-                writers = [(table, open_files.enter_context(_writer(path, table.columns))) for path, table in some]
-                every = [entry for table, _ in writers for entry in table.entries]
+                writers = [open_files.enter_context(_writer(path, table.columns)) for path, table in some]
+                every = [entry for _, table in some for entry in table.entries]
                 for rows, block in source.blocks(every):
-                    for table, write in writers:
-                        write(table.arrays(time_of(source, table)[rows], block))
+                    for (path, table), write in zip(some, writers, strict=True):
+                        with _named(path):
+                            write(table.arrays(time_of(source, table)[rows], block))
 
 
 @contextmanager
-def _writer(path: Path, columns: list[Column]) -> Iterator:
-    """A function that takes arrays of the columns, for a file that is closed afterwards."""
-    import pyarrow
-    from pyarrow import csv, parquet
-
+def _writer(path: Path, columns: list[Column]) -> Iterator[Callable[[list[np.ndarray]], None]]:
+    """Yield a function that takes arrays of the columns, for a file that is closed afterwards."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    if path.suffix.lower() == CSV:
-        header = ",".join(f"{name} [{unit}]" if unit else name for name, unit in columns)
-        with path.open("wb") as file:
-            file.write(f"{header}\n".encode())
-            options = csv.WriteOptions(include_header=False)
+    writer = _csv_writer if path.suffix.lower() == CSV else _parquet_writer
+    with _named(path), writer(path, columns) as write:
+        yield write
 
-            def write(arrays):
-                csv.write_csv(pyarrow.Table.from_arrays(list(map(pyarrow.array, arrays)), names), file, options)
 
-            names = [name for name, _ in columns]
-            yield write
-        return
-    with ExitStack() as closing:
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Have an OSError that names no file name this one."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
+
+
+@contextmanager
+def _csv_writer(path: Path, columns: list[Column]) -> Iterator[Callable[[list[np.ndarray]], None]]:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        header = (f"{name} [{unit}]" if unit else name for name, unit in columns)
+        csv.writer(file, lineterminator="\n").writerow(map(text_cell, header))
+
+        def write(arrays: list[np.ndarray]) -> None:
+            rows = zip(*(array.astype(str).tolist() for array in arrays), strict=True)  # the shortest exact digits
+            file.writelines(f"{','.join(row)}\n" for row in rows)
+
+        yield write
+
+
+@contextmanager
+def _parquet_writer(path: Path, columns: list[Column]) -> Iterator[Callable[[list[np.ndarray]], None]]:
+    import pyarrow
+    from pyarrow import parquet
+
+    with path.open("wb") as file, ExitStack() as closing:  # whose errors say more than those of pyarrow
         opened: list[parquet.ParquetWriter] = []
         units = {name: unit for name, unit in columns}
 
-        def write(arrays):
+        def write(arrays: list[np.ndarray]) -> None:
             held = list(map(pyarrow.array, arrays))
             if not opened:
                 fields = [
@@ -124,7 +151,7 @@ def _writer(path: Path, columns: list[Column]) -> Iterator:
                     for (name, unit), of in zip(columns, held, strict=True)
                 ]
                 schema = pyarrow.schema(fields, metadata={"units": json.dumps(units)})
-                opened.append(closing.enter_context(parquet.ParquetWriter(path, schema)))
+                opened.append(closing.enter_context(parquet.ParquetWriter(file, schema)))
             opened[0].write_table(pyarrow.Table.from_arrays(held, schema=opened[0].schema))
 
         yield write
@@ -133,15 +160,16 @@ def _writer(path: Path, columns: list[Column]) -> Iterator:
 
 
 def _write_npz(source: LogSource, wanted: list[Entry], path: Path) -> None:
-    """Arrays by the names of their quantities, the two times, ``units`` and ``labels``."""
+    """Write arrays by the names of their quantities, the two times, ``units`` and ``labels``."""
     texts = {
         "units": [(entry.name, entry.unit) for entry in wanted],
         "labels": [(entry.name, " ".join(entry.labels)) for entry in wanted if entry.labels],
     }
     arrays = {name: np.array(rows, str).reshape(len(rows), 2) for name, rows in texts.items()}
     arrays |= {TIME: source.times[TIME], SHAPE_TIME: source.times[SHAPE_TIME]}
+    members = file_names((entry.name for entry in wanted), taken=arrays)
     with (
-        tempfile.TemporaryDirectory(prefix=".bilayer-", dir=path.parent) as parts,
+        private_directory(path.parent) as parts,
         zipfile.ZipFile(path, "w", zipfile.ZIP_STORED, allowZip64=True) as archive,
     ):
         for name, array in arrays.items():
@@ -152,9 +180,9 @@ def _write_npz(source: LogSource, wanted: list[Entry], path: Path) -> None:
             count = len(source.times[SHAPE_TIME if of_shape else TIME])
             for first in range(0, len(group), TABLES_AT_ONCE):
                 some = group[first : first + TABLES_AT_ONCE]
-                _write_parts(source, some, count, Path(parts))
+                _write_parts(source, some, count, parts)
                 for k, entry in enumerate(some):
-                    archive.write(Path(parts) / f"{k}.npy", f"{entry.name}.npy")
+                    archive.write(parts / f"{k}.npy", f"{members[entry.name]}.npy")
 
 
 def _write_parts(source: LogSource, wanted: list[Entry], count: int, directory: Path) -> None:
@@ -181,7 +209,7 @@ def _write_head(file, dtype: np.dtype, shape: tuple[int, ...]) -> None:
 
 @contextmanager
 def _draft_of_directory(out: Path, force: bool) -> Iterator[Path]:
-    """A directory whose files are moved to `out` when all are written."""
+    """Yield a directory whose files are moved to `out` when all are written."""
     if out.exists() and not out.is_dir():
         raise InputError(f"{out}: is a file; choose another name for a directory")
     if out.is_dir() and any(out.iterdir()) and not force:
@@ -191,15 +219,25 @@ def _draft_of_directory(out: Path, force: bool) -> Iterator[Path]:
         raise InputError(f"{out}: cannot be written: there is no directory {parent}")
     if not os.access(parent, os.W_OK | os.X_OK):
         raise InputError(f"{out}: cannot be written: no permission to write in {parent}")
-    draft = Path(tempfile.mkdtemp(prefix=".bilayer-", dir=parent))
+    draft = None
     try:
-        yield draft
-        for file in sorted(draft.rglob("*")):
-            if file.is_file():
+        with private_directory(parent) as draft:
+            yield draft
+            out.mkdir(exist_ok=True)
+            for file in sorted(path for path in draft.rglob("*") if path.is_file()):
                 target = out / file.relative_to(draft)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                os.replace(file, target)
+                _make_parents(target, out)
+                move(file, target, force)
     except OSError as error:
-        raise unwritable(out, error) from error
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
+        path = Path(error.filename or out)
+        raise unwritable(out / path.relative_to(draft) if draft in path.parents else path, error) from error
+
+
+def _make_parents(target: Path, out: Path) -> None:
+    """Make the directories of a file below `out`; InputError if a link is among them."""
+    directory = out
+    for part in target.relative_to(out).parts[:-1]:
+        directory /= part
+        if directory.is_symlink():
+            raise InputError(f"{directory}: is a link, and exported files must stay in {out}; remove the link")
+        directory.mkdir(exist_ok=True)

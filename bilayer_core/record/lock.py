@@ -62,11 +62,27 @@ def _without_emptying(path: str, flags: int) -> int:
 
 def _lock(file: BinaryIO, path: Path) -> None:
     """Lock a file until it is closed."""
+    locked = try_lock(file)
+    if locked is False:
+        raise InputError(f"{path}: another program is writing it; wait for its end, or choose another name")
+    if locked is None and fcntl is not None:
+        _log.warning("%s: cannot be locked, so a second writer would not be noticed", path)
+
+
+def try_lock(file: BinaryIO) -> bool | None:
+    """Lock an open file until it is closed, without waiting.
+
+    Returns
+    -------
+    bool or None
+        Whether this process has the lock now; None if the file system or the operating system has no locks.
+    """
     if fcntl is None:
-        return
+        return None
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        raise InputError(f"{path}: another program is writing it; wait for its end, or choose another name") from error
-    except OSError as error:
-        _log.warning("%s: cannot be locked (%s), so a second writer would not be noticed", path, error.strerror)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return None
+    return True

@@ -8,9 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bilayer_core.errors import InputError, OutputError
-
-DRAFT_STEM = 32
-"""Characters of a file's name that the name of its draft has: names may be 255 bytes long."""
+from bilayer_core.record.private_directory import private_directory
 
 
 def check_output_path(path: str | Path, force: bool = False, suffix: str = "") -> Path:
@@ -48,7 +46,7 @@ def check_output_path(path: str | Path, force: bool = False, suffix: str = "") -
 
 @contextmanager
 def draft_of(path: str | Path, force: bool) -> Iterator[Path]:
-    """A draft, a file beside `path` with the same suffix, which becomes `path` when the block ends.
+    """Yield the path of a draft with the name of `path`, in a private directory; it becomes `path` at the block's end.
 
     If the block raises, also where a signal ends the program, the draft is removed and what `path` held stays. Devices,
     pipes, and files in directories that cannot be written to, are their own drafts.
@@ -67,28 +65,31 @@ def draft_of(path: str | Path, force: bool) -> Iterator[Path]:
     """
     path = Path(path)
     target = path.resolve()  # a link stays one
-    if direct := _is_special(path) or not os.access(target.parent, os.W_OK | os.X_OK):
-        draft = target
-    else:
-        draft = target.with_name(f".bilayer-{os.getpid()}-{target.stem[:DRAFT_STEM]}{target.suffix}")
     try:
-        yield draft
-        if not direct:
-            if not force:
-                target.touch(exist_ok=False)
-            os.replace(draft, target)
+        if _is_special(path) or not os.access(target.parent, os.W_OK | os.X_OK):
+            yield target
+            return
+        with private_directory(target.parent) as directory:
+            draft = directory / target.name
+            yield draft
+            move(draft, target, force)
     except FileExistsError as error:
         raise OutputError(f"{path}: cannot be written: another program has made it meanwhile") from error
     except OSError as error:
         raise unwritable(path, error) from error
-    finally:
-        if not direct:
-            draft.unlink(missing_ok=True)
+
+
+def move(draft: Path, target: Path, force: bool) -> None:
+    """Give a draft its name; FileExistsError if there is such a file and `force` does not say to replace it."""
+    if not force:
+        target.touch(exist_ok=False)
+    os.replace(draft, target)
 
 
 def unwritable(path: str | Path, error: OSError) -> OutputError:
-    """An OSError as one that names the file."""
-    return OutputError(f"{path}: cannot be written: {error.strerror or error}")
+    """Return an OSError as one that names the file."""
+    reason = error.strerror or (os.strerror(error.errno) if error.errno else error)
+    return OutputError(f"{path}: cannot be written: {reason}")
 
 
 def write_text(path: str | Path, text: str, force: bool) -> None:

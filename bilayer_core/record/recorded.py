@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bilayer_core.extras import require
 from bilayer_core.observed.frame import Description
 from bilayer_core.record.quantities import AXES, Entry, Quantity, unknown_quantity
 
@@ -66,6 +67,7 @@ class Recorded(ABC):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """All but shapes of rods as columns over time, such as ``body/ball/position.z``; needs pandas."""
+        require("to_dataframe", "pandas")
         import pandas
 
         columns = {}
@@ -81,6 +83,7 @@ class Recorded(ABC):
         """All quantities with their units; those of rods are over ``shape_time`` and have nodes of their own; needs
         xarray.
         """
+        require("to_xarray", "xarray")
         import xarray
 
         variables = {}

@@ -7,13 +7,14 @@ what it holds is written anew by the library's own writer, with an index.
 
 from __future__ import annotations
 
+import io
 import shutil
 import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS
@@ -47,7 +48,10 @@ from bilayer_core.record.log_records import (
 from bilayer_core.record.log_summary import read_summary
 from bilayer_core.record.mcap_log import CHUNK_SIZE
 from bilayer_core.record.opening import open_log
-from bilayer_core.record.paths import check_output_path, draft_of
+from bilayer_core.record.paths import check_output_path, draft_of, unwritable
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer as Buffer
 
 SUFFIX = ".mcap"
 _KNOWN = set(range(HEADER, DATA_END + 1))
@@ -119,11 +123,26 @@ def repair(path: str | Path, new: str | Path, force: bool = False) -> Repaired:
     with open_log(path):  # says what is wrong with the name, or that it is no log, before anything is written
         check_output_path(new, force, SUFFIX)
     with draft_of(new, force) as draft:
-        with open_log(path) as file, draft.open("wb") as output:
+        with open_log(path) as file, io.BufferedWriter(_NewLog(draft, new)) as output:
             found = _Repair(file, output).run()
         if found.whole:
             shutil.copyfile(path, draft)
     return found
+
+
+class _NewLog(io.FileIO):
+    """The file that is written; its errors are told apart from those of the log that is read meanwhile."""
+
+    def __init__(self, draft: Path, path: Path):
+        super().__init__(draft, "w")
+        self._path = path
+
+    def write(self, data: Buffer) -> int:
+        """Write bytes and return how many were; OutputError if that fails."""
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise unwritable(self._path, error) from error
 
 
 class _Repair:

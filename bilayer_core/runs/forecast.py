@@ -7,7 +7,6 @@ cannot be compressed. Noise stands for these digits, the same each time.
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.record.mcap_log import SUFFIX, McapRecorder
+from bilayer_core.record.private_directory import private_directory
 from bilayer_core.scene.profile import extremes
 from bilayer_core.simulation.simulator import Simulator
 
@@ -75,8 +75,8 @@ def forecast(simulator: Simulator, rate: float | None = None) -> LogSize:
     marker_rate = min(rate, scene.output.marker_rate)
     frames = _Frames(simulator, description)
     count = int(min(MOST, max(FEWEST, FRAMES_SIZE // (16 * frames.size))))
-    with tempfile.TemporaryDirectory(prefix="bilayer_forecast_") as directory:
-        path = Path(directory) / f"run{SUFFIX}"
+    with private_directory() as directory:
+        path = directory / f"run{SUFFIX}"
         first, small, full = (
             _written(path, description, frames, displays, n) for displays, n in ((1, 1), (1, count), (count, count))
         )

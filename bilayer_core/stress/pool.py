@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, wait
 from multiprocessing import get_context
 
-from ..errors import InputError
+from ..extras import require
 from .case import Outcome, Record, StressCase
 
 MEMORY = 3 * 2**30
@@ -37,10 +37,9 @@ def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record]
     InputError
         If the library for it is not installed.
     """
-    try:
-        from pebble import ProcessExpired, ProcessPool
-    except ImportError:
-        raise InputError("`bilayer stress` needs pebble: pip install 'bilayer_sim_ros[stress]'") from None
+    require("stress", "pebble")
+    from pebble import ProcessExpired, ProcessPool
+
     left = list(reversed(list(cases)))
     with ProcessPool(workers, CASES_A_WORKER, context=get_context("spawn"), initializer=_begin) as pool:
         waiting = {}

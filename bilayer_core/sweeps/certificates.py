@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 
 if TYPE_CHECKING:
     from distributed import Security
 
-NEEDS_DASK = "sweeps need Dask: pip install 'bilayer_sim_ros[sweep]'"
 ENCRYPTED = "tls://"
 OPTIONS = {
     "ca_file": ("--tls-ca-file", "distributed.comm.tls.ca-file"),
@@ -39,10 +39,9 @@ def security_of(ca_file: str | None, cert: str | None, key: str | None) -> Secur
     InputError
         If Dask is not installed.
     """
-    try:
-        from distributed import Security
-    except ImportError:
-        raise InputError(NEEDS_DASK) from None
+    require("--scheduler", "dask", "distributed")
+    from distributed import Security
+
     given = {"tls_ca_file": ca_file, "tls_client_cert": cert, "tls_client_key": key}
     return Security(**{name: value for name, value in given.items() if value is not None})
 

@@ -162,6 +162,9 @@ def _locked(directory: Path) -> Any:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"out: {directory}: cannot be made a directory: {error.strerror or error}") from error
+    for path in (directory / LOCK, directory / FILE):
+        if path.is_symlink():
+            raise InputError(f"{path}: is a link, and results must stay in {directory}; remove the link")
     try:
         return open_alone(directory / LOCK, force=True)
     except OSError as error:

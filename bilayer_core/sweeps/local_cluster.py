@@ -11,13 +11,12 @@ import logging
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from multiprocessing import get_context
 from typing import Any
 
 from distributed import Nanny, Scheduler, Security, SpecCluster, Worker
 
-from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 
 HOST = "127.0.0.1"
 
@@ -57,9 +56,10 @@ def start_cluster(workers: int, memory: float | None, folder: str, dashboard: bo
     RuntimeError
         If no process starts.
     """
-    if dashboard and find_spec("bokeh") is None:
-        raise InputError("--dashboard: Dask's dashboard needs Bokeh: pip install bokeh")
-    common = {"host": HOST, "protocol": "tls://", "security": _temporary_security()}
+    if dashboard:
+        require("--dashboard", "bokeh")
+    # The key and the certificate are made here, and are kept in memory.
+    common = {"host": HOST, "protocol": "tls://", "security": Security.temporary()}
     served = {"dashboard": dashboard, "dashboard_address": f"{HOST}:0"}
     options = common | {
         "nthreads": 1,
@@ -75,14 +75,6 @@ def start_cluster(workers: int, memory: float | None, folder: str, dashboard: bo
             security=common["security"],
             silence_logs=logging.CRITICAL,
         )
-
-
-def _temporary_security() -> Security:
-    """Return a key and a certificate that were made just now, and are kept in memory."""
-    try:
-        return Security.temporary()
-    except ImportError:
-        raise InputError("sweeps need cryptography: pip install 'bilayer_sim_ros[sweep]'") from None
 
 
 @contextmanager

@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 from urllib.request import urlopen
 
 from bilayer_core.errors import EngineError, InputError, OutputError
-from bilayer_core.sweeps.certificates import NEEDS_DASK, check_certificates, is_encrypted, security_of
+from bilayer_core.extras import require
+from bilayer_core.record.private_directory import private_directory
+from bilayer_core.sweeps.certificates import check_certificates, is_encrypted, security_of
 from bilayer_core.sweeps.engine import Engine, refuse_other_versions
 from bilayer_core.sweeps.execute import LOGS, prepare
 from bilayer_core.sweeps.job import Job
@@ -84,11 +86,9 @@ def open_engine(job: Job, processes: Processes, memory: float | None = None) -> 
     EngineError
         If no process starts.
     """
-    try:
-        import dask
-        import distributed  # noqa: F401
-    except ImportError:
-        raise InputError(NEEDS_DASK) from None
+    require("sweep", "dask", "distributed", "cryptography")
+    import dask
+
     with ExitStack() as stack:
         if processes.scheduler is None:
             workers = processes.workers or len(os.sched_getaffinity(0))
@@ -106,9 +106,9 @@ def _embedded(stack: ExitStack, job: Job, workers: int, memory: float | None, da
 
     from bilayer_core.sweeps.local_cluster import start_cluster
 
-    folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="bilayer-sweep-", ignore_cleanup_errors=True))
+    folder = stack.enter_context(private_directory())
     try:
-        cluster = stack.enter_context(start_cluster(workers, memory, folder, dashboard))
+        cluster = stack.enter_context(start_cluster(workers, memory, str(folder), dashboard))
     except RuntimeError as error:
         hint = "in a program, call it below `if __name__ == '__main__':`, since processes read the program again"
         raise EngineError(f"sweep: no process starts on this machine ({error}); {hint}") from error

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_core.record.paths import write_text
 from bilayer_core.scene.loader import load_content, scene_content, scene_text
@@ -181,10 +182,9 @@ def _distribution(optuna: Any, parameter: Parameter) -> Any:
 
 
 def _optuna() -> Any:
-    try:
-        import optuna
-    except ImportError:
-        raise InputError("`bilayer optimise` needs Optuna: pip install 'bilayer_sim_ros[sweep]'") from None
+    require("optimise", "optuna")
+    import optuna
+
     return optuna
 
 

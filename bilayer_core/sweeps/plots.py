@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.record.paths import draft_of
 from bilayer_core.sweeps.job import Row
 from bilayer_core.sweeps.result import SweepResult
@@ -26,14 +26,6 @@ MAP, MISSING = "viridis", "#bbbbbb"
 Column = np.ndarray
 
 
-def check_matplotlib() -> None:
-    """Raise InputError if pictures cannot be drawn."""
-    import importlib.util
-
-    if importlib.util.find_spec("matplotlib") is None:
-        raise InputError("--plot: matplotlib is not installed; install it with: pip install 'bilayer_sim_ros[sweep]'")
-
-
 def draw(result: SweepResult, directory: Path) -> list[Path]:
     """Draw all pictures that results give; existing ones are replaced.
 
@@ -42,7 +34,7 @@ def draw(result: SweepResult, directory: Path) -> list[Path]:
     list of Path
         The files written: ``lines_METRIC.png``, ``map_METRIC.png``, ``parallel.png``, ``pareto.png``.
     """
-    check_matplotlib()
+    require("--plot", "matplotlib")
     import matplotlib
     from matplotlib.figure import Figure
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.record.paths import draft_of
 from bilayer_core.sweeps.job import Outcome, Row
 from bilayer_core.sweeps.journal import Journal
@@ -119,10 +120,9 @@ class SweepResult:
 
     def to_dataframe(self) -> pandas.DataFrame:
         """A table with a row for each run; needs pandas."""
-        try:
-            import pandas
-        except ImportError:
-            raise InputError("to_dataframe: needs pandas: pip install pandas") from None
+        require("to_dataframe", "pandas")
+        import pandas
+
         return pandas.DataFrame([row.columns() for row in self._rows])
 
 
@@ -188,7 +188,11 @@ def write_table(journal: Journal, keys: set[str], about: Columns, directory: Pat
     fields = [pyarrow.field(name, _kind(pyarrow, found)) for name, found in kinds.items()]
     schema = pyarrow.schema([*fields, pyarrow.field("summary", pyarrow.string())], {ABOUT: json.dumps(asdict(about))})
     path = directory / TABLE
-    with draft_of(path, force=True) as draft, parquet.ParquetWriter(draft, schema) as writer:
+    with (
+        draft_of(path, force=True) as draft,
+        draft.open("wb") as file,  # whose errors say more than those of pyarrow
+        parquet.ParquetWriter(file, schema) as writer,
+    ):
         block: list[dict[str, Any]] = []
         for row in journal.rows(keys):
             block.append(_fitting(pyarrow, schema, row))
@@ -200,10 +204,9 @@ def write_table(journal: Journal, keys: set[str], about: Columns, directory: Pat
 
 
 def _parquet() -> Any:
-    try:
-        from pyarrow import parquet
-    except ImportError:
-        raise InputError("tables of results need pyarrow: pip install 'bilayer_sim_ros[sweep]'") from None
+    require("tables of results", "pyarrow")
+    from pyarrow import parquet
+
     return parquet
 
 

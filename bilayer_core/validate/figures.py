@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
 from ..record.paths import draft_of
 from ..scene.config import Coupling
 from . import bending, helix, laminate
@@ -22,23 +21,6 @@ from .torsion import MESHES
 INK, BLUE, ORANGE, GREY = "#222222", "#1f77b4", "#d95f02", "#999999"
 DPI = 150
 TURNS, TURN_STATIONS = 1.5, 151
-
-
-def check_matplotlib() -> None:
-    """Whether figures can be drawn.
-
-    Raises
-    ------
-    InputError
-        If matplotlib is not installed.
-    """
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "--out: figures need matplotlib; install it with: pip install 'bilayer_sim_ros[plot]', "
-            "or write the table alone with --json FILE"
-        ) from error
 
 
 def draw(cases: Iterable[Case], directory: Path) -> list[Path]:

@@ -5,7 +5,7 @@ Quantities of one unit share a panel, panels share the axis of time. matplotlib 
 
 from __future__ import annotations
 
-import importlib.util
+import io
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.paths import check_output_path, draft_of
 from bilayer_core.record.run_data import RunData
@@ -147,8 +148,7 @@ def plot(
     InputError
         If a log or quantity is not there, the file cannot be written, or matplotlib is missing.
     """
-    if importlib.util.find_spec("matplotlib") is None:
-        raise InputError("plot: matplotlib is not installed; install it with: pip install 'bilayer_sim_ros[plot]'")
+    require("plot", "matplotlib")
     if out is not None:
         if Path(out).suffix.lower() not in SUFFIXES:
             raise InputError(f"{out}: must end in {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")
@@ -173,8 +173,11 @@ def plot(
             if out is None:
                 pyplot.show()
                 return
+            suffix, content = Path(out).suffix.lower(), io.BytesIO()  # the pdf backend fails badly on a full disk
+            creator = {"Creator": "bilayer plot"} if suffix == ".pdf" else None
+            figure.savefig(content, format=suffix.removeprefix("."), metadata=creator)
             with draft_of(out, force) as draft:
-                figure.savefig(draft, metadata={"Creator": "bilayer plot"} if draft.suffix == ".pdf" else None)
+                draft.write_bytes(content.getvalue())
         finally:
             pyplot.close(figure)
 

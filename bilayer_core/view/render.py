@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.view.arrows import contact_arrows, reaction_arrows
 from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
@@ -141,9 +142,9 @@ class Studio:
 
     def film(self, path: str | Path, times: Sequence[float], rate: float, note: str = "") -> None:
         """Write pictures at `times` [s] as a film of so many pictures a second."""
-        from bilayer_core.view.film import require_ffmpeg, save_mp4
+        from bilayer_core.view.film import save_mp4
 
-        require_ffmpeg()
+        require("films", "imageio_ffmpeg")
         setting = self._set(times, Insets(), rate, FILM_SIZE)
         save_mp4(self._written(setting, time_text(times, note)), setting.size, rate, path)
 

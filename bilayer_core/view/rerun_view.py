@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
-import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.record.paths import check_output_path, draft_of
+from bilayer_core.record.private_directory import private_directory
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.colouring import STRAIN
 
@@ -111,15 +110,12 @@ def _as_recording(path: str | Path, colour: str) -> Iterator[Path]:
             raise InputError(f"{path}: there is no such file")
         yield path.resolve()
         return
-    directory = Path(tempfile.mkdtemp(prefix="bilayer_view_"))
-    try:
+    with private_directory() as directory:
         recording = directory / f"{path.stem}.rrd"
         convert_log(path, recording, colour)
         yield recording
-    finally:
-        shutil.rmtree(directory, ignore_errors=True)
 
 
 def require_rerun() -> None:
-    if importlib.util.find_spec("rerun") is None:
-        raise InputError("the viewer is not installed; install it with: pip install 'bilayer_sim_ros[viewer]'")
+    """Raise InputError, with the command that installs it, if rerun is missing."""
+    require("the viewer", "rerun", "rerun_cli")

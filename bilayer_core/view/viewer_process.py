@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import missing_library
 from bilayer_core.view.layout import TIMELINE
 
 WINDOW_SIZE = "1920x1080"
@@ -65,7 +66,7 @@ def viewer_executable() -> Path:
     """The viewer's own program: killing the script of that name on PATH would leave the viewer running."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is None or spec.origin is None:
-        raise InputError("the viewer is not installed; install it with: pip install 'bilayer_sim_ros[viewer]'")
+        raise missing_library("the viewer", "rerun_cli")
     directory = Path(spec.origin).parent
     bundled = directory / "Rerun.app" / "Contents" / "MacOS" / "Rerun"
     return bundled if sys.platform == "darwin" and bundled.exists() else directory / "rerun"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes.util
-import importlib.util
 import math
 import sys
 from typing import Any
@@ -11,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.extras import require
 from bilayer_core.view.camera import HALF_SLOPE, Shot
 from bilayer_core.view.theme import Theme
 
-MISSING = "pictures and films need VTK; install it with: pip install 'bilayer_sim_ros[film]'"
 MISSING_DRIVER = (
     "there is no OpenGL driver to draw with; on Debian and Ubuntu install Mesa's software driver with: "
     "sudo apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri"
@@ -29,9 +28,7 @@ ROOM = 2  # pixels round what is seen
 
 def require_vtk() -> None:
     """Raise InputError, with what to install, where nothing can be drawn."""
-    for module in ("vtkmodules", "PIL"):
-        if importlib.util.find_spec(module) is None:
-            raise InputError(MISSING)
+    require("pictures and films", "vtkmodules", "PIL")
     if sys.platform == "linux" and not any(map(ctypes.util.find_library, ("EGL", "OSMesa"))):
         raise InputError(MISSING_DRIVER)
 

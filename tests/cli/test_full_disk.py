@@ -7,10 +7,13 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
+import synthetic_run
 from processes import TIMEOUT, bilayer, command, environment
 
 from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_core.record.mcap_log import McapRecorder
 
 FULL = "File too large"
 """What the system says where a file would be longer than the limit of its process: to the program, a full disk."""
@@ -88,6 +91,40 @@ def test_a_recording_whose_end_finds_no_room_is_not_left_as_if_it_were_whole(her
 def test_a_new_scene_without_room_leaves_no_file_and_says_why(here):
     new = with_room(100, "new", "robot.yaml")
     assert (new.returncode, new.stderr) == (3, f"bilayer: robot.yaml: cannot be written: {FULL}\n")
+    assert list(here.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A log made by hand, of half a megabyte; and matplotlib has kept its list of fonts."""
+    import matplotlib.font_manager  # noqa: F401
+
+    path = tmp_path_factory.mktemp("log") / "run.mcap"
+    synthetic_run.run(McapRecorder(path), np.arange(40) * 0.02)
+    return path
+
+
+WRITERS = {
+    "repair LOG out.mcap": "out.mcap",
+    "export LOG --csv out.csv": "out.csv",
+    "export LOG energy/bend energy/twist --csv tables": "tables/energy/bend.csv",
+    "export LOG --parquet out.parquet": "out.parquet",
+    "export LOG com --parquet tables": "tables/com.parquet",
+    "export LOG --npz out.npz": "out.npz",
+    "compare LOG LOG --json out.json": "out.json",
+    "plot LOG com.z --out out.pdf": "out.pdf",
+    "plot LOG com.z --out out.svg": "out.svg",
+    "render LOG --png out.png": "out.png",
+    "render LOG --gif out.gif --frames 2": "out.gif",
+    "render LOG --mp4 out.mp4 --frames 10": "out.mp4",
+}
+
+
+@pytest.mark.parametrize("arguments", WRITERS)
+def test_a_command_names_the_file_that_found_no_room_and_nothing_else(here, log, arguments):
+    words = [str(log) if word == "LOG" else word for word in arguments.split()]
+    ended = with_room(400, *words)
+    assert (ended.returncode, ended.stderr) == (3, f"bilayer: {WRITERS[arguments]}: cannot be written: {FULL}\n")
     assert list(here.iterdir()) == []
 
 

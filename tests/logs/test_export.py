@@ -1,7 +1,6 @@
 """Quantities of a log as csv, parquet and npz, read by other tools."""
 
 import csv
-import importlib.util
 import json
 
 import numpy as np
@@ -114,14 +113,6 @@ def test_nothing_is_overwritten_without_being_asked_and_failures_leave_nothing(l
     assert main(["export", str(log), "--parquet", str(tmp_path / "new")]) == 3
     assert "No space left" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["com.csv", "out"]
-
-
-def test_a_missing_library_is_told_with_what_installs_it(log, tmp_path, monkeypatch, capsys):
-    find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *a: None if name == "pyarrow" else find(name, *a))
-    assert main(["export", str(log), "com", "--csv", str(tmp_path / "com.csv")]) == 2
-    assert "pip install 'bilayer_sim_ros[export]'" in capsys.readouterr().err
-    assert main(["export", str(log), "com", "--npz", str(tmp_path / "com.npz")]) == 0
 
 
 def test_a_log_without_frames_is_exported_as_tables_without_rows(tmp_path):

@@ -68,4 +68,4 @@ def test_without_dask_the_command_says_what_to_install(call, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     code, _, err = call()
     assert code == 2
-    assert err.endswith("bilayer: sweeps need Dask: pip install 'bilayer_sim_ros[sweep]'\n")
+    assert err.endswith("install it with: pip install 'bilayer_sim_ros[sweep]'\n")

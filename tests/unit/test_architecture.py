@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 # Each part, and the parts that it may import beside itself.
-BASE = {"names", "printable", "errors", "jit"}
+BASE = {"names", "printable", "errors", "extras", "jit"}
 GEOMETRY = BASE | {"kinematics", "contact"}
 MECHANICS = GEOMETRY | {"scene", "model", "forces"}
 ENGINE = MECHANICS | {"integrators", "engine"}
@@ -20,6 +20,7 @@ ALLOWED = {
     "names": set(),
     "printable": set(),
     "errors": {"printable"},
+    "extras": {"errors"},
     "jit": {"errors"},
     "scene": BASE | {"kinematics"},
     "kinematics": BASE,

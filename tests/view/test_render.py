@@ -1,6 +1,7 @@
 """Pictures and films without a screen, and a look at their pixels."""
 
 import dataclasses
+import sys
 
 import numpy as np
 import pytest
@@ -308,6 +309,6 @@ def test_what_is_missing_is_said_with_what_to_install(log, monkeypatch):
     monkeypatch.setattr(window.ctypes.util, "find_library", lambda name: None)
     with pytest.raises(InputError, match="apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri"):
         Studio(log, Look.of())
-    monkeypatch.setattr(window.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "vtkmodules", None)
     with pytest.raises(InputError, match=r"pip install 'bilayer_sim_ros\[film\]'"):
         Studio(log, Look.of())
