@@ -63,7 +63,9 @@ def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) 
     memory = recording.memory_recording()
     recording.send_recording_name(f"{widest.description.scene_name}: {len(branches)} branches by {name}")
     times = min(of.run.times[0] for of in branches), max(of.run.times[-1] for of in branches)
-    recording.send_blueprint(_blueprint(scales, Curves.between(*map(float, times)), len(branches) <= MOST_IN_LEGEND))
+    recording.send_blueprint(
+        _blueprint(name, scales, Curves.between(*map(float, times)), len(branches) <= MOST_IN_LEGEND)
+    )
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     recording.log("summary", plain_text(summary(branches, name)), static=True)
     log_obstacles(recording, widest.description, scales)
@@ -77,7 +79,7 @@ def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) 
         _send_rods(recording, under, of.run, colour)
         log_bodies(recording, of.run.description, scales, f"{under}/bodies")
         send_bodies(recording, of.run, f"{under}/bodies")
-        _send_curves(recording, f"{number:0{digits}}", f"{name} = {of.value:.4g}", of.run, colour)
+        _send_curves(recording, f"{number:0{digits}}", f"{of.value:.4g}", of.run, colour)
     Path(rrd_path).write_bytes(memory.drain_as_bytes())
     recording.disconnect()
 
@@ -119,7 +121,7 @@ def _send_curves(recording: rr.RecordingStream, number: str, label: str, run: Ru
         )
 
 
-def _blueprint(scales: Scales, curves: Curves, legend: bool) -> rrb.Blueprint:
+def _blueprint(name: str, scales: Scales, curves: Curves, legend: bool) -> rrb.Blueprint:
     robot = rrb.Spatial3DView(
         name="Branches",
         origin="world",
@@ -129,7 +131,7 @@ def _blueprint(scales: Scales, curves: Curves, legend: bool) -> rrb.Blueprint:
             kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
         ),
     )
-    plots = [curves.view(Plot(curve, title), legend) for curve, title in CURVES.items()]
+    plots = [curves.view(Plot(curve, f"{title} by {name}"), legend) for curve, title in CURVES.items()]
     text = rrb.TextDocumentView(name="Run", origin="summary")
     left = rrb.Vertical(robot, text, row_shares=[9, 2])
     return whole(rrb.Horizontal(left, rrb.Vertical(*plots), column_shares=[5, 3]), time_panel="collapsed")

@@ -23,7 +23,7 @@ MIDDLE = "world/middle"
 """Entity that the camera follows."""
 EVENTS = "events"
 GRAVITY = "gravity"
-LEGEND_ROOM = 0.5
+LEGEND_ROOM = 0.6
 """Empty time to the right of the curves, by the time that they take: the legend stands there and covers none."""
 LEAST_ROWS = 3
 """Height of a plot in lines of text, its title among them; one with more curves is higher."""

@@ -35,8 +35,8 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 WITH_PREFIX = ("m", "N", "J", "N m", "s", "m/s")
 KINDS = {"m": "position", "N": "force", "N m": "moment", "J": "energy", "1/m": "curvature"}
 """What a panel with several quantities shows, by its unit."""
-MOST_LINES, INSIDE_LINES = 40, 6
-"""In one panel; up to the second number the legend stands inside of it."""
+MOST_LINES = 40
+"""In one panel."""
 MOST_POINTS = 20_000
 """Of a line: more than a printed figure shows. Longer ones are drawn by the smallest and largest value of each part."""
 STYLE = {
@@ -222,9 +222,8 @@ def _draw_panel(axes, unit: str, held: list[Line], names: Sequence[str], several
     axes.set_ylabel(f"{_label(own, unit)}{shown}")
     axes.margins(x=0.0)
     if len(held) > 1:
-        inside = len(held) <= INSIDE_LINES
-        place = {"loc": "best"} if inside else {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
-        axes.legend(handlelength=1.6, labelspacing=0.2, **place)
+        # Beside the axes, where no curve can be.
+        axes.legend(handlelength=1.6, labelspacing=0.2, loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2)
 
 
 def _label(own: list[str], unit: str) -> str:

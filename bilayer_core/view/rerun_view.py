@@ -118,11 +118,14 @@ def _as_recording(path: str | Path, colour: str) -> Iterator[Path]:
     if path.suffix.lower() == RRD_SUFFIX:
         if not path.is_file():
             raise InputError(f"{path}: there is no such file")
-        yield path.resolve()
+        from bilayer_core.view.recording_check import refuse_markdown
+
+        refuse_markdown(path)
+        yield path.resolve()  # which rerun cannot take for an option or a URL
         return
     directory = Path(tempfile.mkdtemp(prefix="bilayer_view_"))
     try:
-        recording = directory / f"{path.stem}.rrd"
+        recording = directory / "run.rrd"
         convert_log(path, recording, colour)
         yield recording
     finally:

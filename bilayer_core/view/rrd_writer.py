@@ -44,8 +44,8 @@ LEGEND_HEIGHT = 14  # pixels of the colour bar
 EVENT_COLOURS = {"flight": (255, 214, 90), "contact": (64, 224, 148), "stimulus": (255, 130, 110)}
 PLAIN_COLOUR = (200, 204, 210)
 BODIES = "world/bodies"
-SUMMED = "on nodes, sizes summed"
-"""Curve of all contact forces."""
+SUMMED = "sum over nodes"
+"""Curve of the sizes of all contact forces."""
 
 
 def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) -> None:
