@@ -123,6 +123,7 @@ setup(
             "pandas>=2.2",
             "pebble>=5.0",
             "pillow>=10.1",
+            "playwright>=1.50",
             "pyarrow>=15",
             "pytest>=8",
             "pytest-timeout>=2.3",
