@@ -76,7 +76,8 @@ kernels: $(STAMP)  ## Compile the kernels, once for each state of the sources.
 	$(BIN)/python -m bilayer_core.jit.compile_all
 
 # What the system must supply: Python's module venv, and Mesa's software drivers, which need no graphics card: of OpenGL for
-# pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`).
+# pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`). `make test` needs
+# the browser Chromium as well, for `bilayer view --web`.
 # Debian and Ubuntu packages are installed where this command may, else the line to paste is printed.
 system:
 	@command -v $(PYTHON) >/dev/null || { \
@@ -93,6 +94,7 @@ system:
 	PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL.so.1 && \
 	    PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL_ || \
 	    missing="$$missing libegl1 libegl-mesa0 libgl1-mesa-dri"; \
+	$(if $(filter test,$(MAKECMDGOALS)),command -v chromium >/dev/null || missing="$$missing chromium";) \
 	test -n "$$missing" || exit 0; \
 	if test "$$(id -u)" = 0; then sudo=; elif sudo -n true 2>/dev/null; then sudo=sudo; else sudo=no; fi; \
 	if test "$$sudo" != no && command -v apt-get >/dev/null; then \

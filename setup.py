@@ -42,7 +42,7 @@ ROS_PLATFORM = "sys_platform == 'linux' and platform_machine == 'x86_64'"
 data_files = [
     ("share/ament_index/resource_index/packages", ["resource/bilayer_sim_ros"]),
     (f"share/{NAME}", ["package.xml"]),
-    (f"share/{NAME}/config", glob("config/*.yaml") + glob("config/*.rviz")),
+    (f"share/{NAME}/config", glob("config/*.yaml") + glob("config/*.rviz") + ["config/foxglove.json"]),
     (f"share/{NAME}/config/scenes", glob("config/scenes/*.yaml")),
     (f"share/{NAME}/config/sweeps", glob("config/sweeps/*.yaml") + glob("config/sweeps/*.py")),
     (f"share/{NAME}/config/templates", glob("config/templates/*.yaml")),
@@ -131,6 +131,7 @@ setup(
             "pandas>=2.2",
             "pebble>=5.0",
             "pillow>=10.1",
+            "playwright>=1.50",
             "pyarrow>=15",
             "pytest>=8",
             "pytest-timeout>=2.3",

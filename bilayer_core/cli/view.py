@@ -79,7 +79,7 @@ def view(
             raise InputError(f"--node: is followed without a log; leave out {file}")
         _follow(file, node or NODE, bind, port, serve, web, save, colour or STRAIN)
         return
-    from bilayer_core.view.rerun_view import convert_log, open_viewer, screenshot
+    from bilayer_core.view.rerun_view import convert_log, open_browser, open_viewer, screenshot
 
     if save:
         convert_log(file, save, colour or STRAIN)
@@ -87,8 +87,12 @@ def view(
     if picture:
         screenshot(save or file, picture, moment, colour or STRAIN)
         say(f"picture    {picture}")
-    if not save and not picture:
-        open_viewer(file, web, colour or STRAIN)
+    if save or picture:
+        return
+    if web:
+        open_browser(file, say, colour or STRAIN)
+    else:
+        open_viewer(file, colour or STRAIN)
 
 
 def _follow(

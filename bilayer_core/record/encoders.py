@@ -77,20 +77,20 @@ def pose_array_template(count: int) -> Template:
     return template
 
 
-def point_cloud_template(count: int) -> Template:
-    """``sensor_msgs/PointCloud2``: field ``points``, rows of `POINT_FIELDS`."""
-    step = 4 * len(POINT_FIELDS)
+def point_cloud_template(count: int, fields: tuple[str, ...] = POINT_FIELDS) -> Template:
+    """``sensor_msgs/PointCloud2``: field ``points``, rows of float32 with these names."""
+    step = 4 * len(fields)
     template = Template()
     template.header(FRAME_ID)
-    template.put("<u4", 1, count, len(POINT_FIELDS))  # height, width, number of fields
-    for index, name in enumerate(POINT_FIELDS):
+    template.put("<u4", 1, count, len(fields))  # height, width, number of fields
+    for index, name in enumerate(fields):
         template.text(name)
         template.put("<u4", 4 * index)
         template.put("u1", _FLOAT32_FIELD)
         template.put("<u4", 1)
     template.put("u1", 0)  # is_bigendian
     template.put("<u4", step, step * count, step * count)  # point_step, row_step, length of data
-    template.array("points", "<f4", (count, len(POINT_FIELDS)), alignment=1)
+    template.array("points", "<f4", (count, len(fields)), alignment=1)
     template.put("u1", 1)  # is_dense
     return template
 

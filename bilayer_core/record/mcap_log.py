@@ -20,6 +20,7 @@ from bilayer_core.observed.inputs import STIMULUS, Input
 from bilayer_core.record.backlog import Backlog
 from bilayer_core.record.cdr import nanoseconds
 from bilayer_core.record.chain import CHAIN, END, Chain, place_of_seal
+from bilayer_core.record.clouds import CloudEncoder
 from bilayer_core.record.description_text import to_text
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, encode_input
 from bilayer_core.record.event_messages import encode_event
@@ -283,6 +284,7 @@ class _LogFile:
 
         self._gate = gate
         self._encoder = FrameEncoder(description, tf)
+        self._clouds = CloudEncoder(description)
         self._events = EventDetector(description)
         self._file = open_alone(path, force)
         self._each = [TF.name] if tf else []
@@ -311,7 +313,7 @@ class _LogFile:
             self._add_link()
             schemas: dict[str, int] = {}
             self._topics: dict[str, int] = {}
-            for spec in (*self._encoder.topics, *input_topics(description)):
+            for spec in (*self._encoder.topics, *self._clouds.topics, *input_topics(description)):
                 if spec.type not in schemas:
                     schemas[spec.type] = self._log.add_schema(spec.type, schema_text(spec.type))
                 channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: spec.offered_profile})
@@ -349,6 +351,8 @@ class _LogFile:
             data = self._encoder.encode(name, frame)
             if name == MARKERS and not self._has_markers:
                 self._has_markers, data = True, deleting_all_first(data)
+            self._add(name, stamp, data)
+        for name, data in self._clouds.encode(frame) if display else ():
             self._add(name, stamp, data)
 
     def _add_events(self, events: list[Event]) -> None:

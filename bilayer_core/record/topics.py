@@ -136,6 +136,12 @@ The label is ``step,time,kind:name``: two numbers, time in [s], and then the val
 """
 
 
+OBSTACLE_POINTS = TopicSpec("obstacle_points", "sensor_msgs/msg/PointCloud2", Rate.EVENT)
+BODY_POINTS = TopicSpec("body_points", "sensor_msgs/msg/PointCloud2", Rate.DISPLAY)
+FORCE_POINTS = TopicSpec("contact_force_points", "sensor_msgs/msg/PointCloud2", Rate.DISPLAY)
+"""Of a log, for viewers that draw no markers: points x y z on surfaces and along contact forces (`record.clouds`)."""
+
+
 EVENTS = TopicSpec("events", "rcl_interfaces/msg/Log", Rate.EVENT)
 """What happened, in words (`record.events`)."""
 

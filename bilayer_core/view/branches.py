@@ -12,8 +12,8 @@ import rerun.blueprint as rrb
 
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.drawable import refuse_undrawable
-from bilayer_core.view.layout import TIMELINE, whole
-from bilayer_core.view.rrd_writer import log_bodies, log_obstacles, send_bodies
+from bilayer_core.view.layout import TIMELINE, Curves, Plot, whole
+from bilayer_core.view.rrd_writer import log_bodies, log_obstacles, plain_text, send_bodies
 from bilayer_core.view.scales import Scales, choose_scales
 from bilayer_core.view.theme import BACKGROUND
 
@@ -62,10 +62,12 @@ def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) 
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()
     recording.send_recording_name(f"{widest.description.scene_name}: {len(branches)} branches by {name}")
-    recording.send_blueprint(_blueprint(scales, len(branches) <= MOST_IN_LEGEND), make_active=False, make_default=True)
+    times = min(of.run.times[0] for of in branches), max(of.run.times[-1] for of in branches)
+    recording.send_blueprint(
+        _blueprint(name, scales, Curves.between(*map(float, times)), len(branches) <= MOST_IN_LEGEND)
+    )
     recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    text = rr.TextDocument(summary(branches, name), media_type="text/markdown")
-    recording.log("summary", text, static=True)
+    recording.log("summary", plain_text(summary(branches, name)), static=True)
     log_obstacles(recording, widest.description, scales)
     digits = len(str(len(branches) - 1))
     extent = float(np.ptp(values)) or 1.0
@@ -77,21 +79,20 @@ def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) 
         _send_rods(recording, under, of.run, colour)
         log_bodies(recording, of.run.description, scales, f"{under}/bodies")
         send_bodies(recording, of.run, f"{under}/bodies")
-        _send_curves(recording, f"{number:0{digits}}", f"{name} = {of.value:.4g}", of.run, colour)
+        _send_curves(recording, f"{number:0{digits}}", f"{of.value:.4g}", of.run, colour)
     Path(rrd_path).write_bytes(memory.drain_as_bytes())
     recording.disconnect()
 
 
 def summary(branches: Sequence[Branch], name: str) -> str:
-    """What is shown, in Markdown."""
+    """Return what is shown, as plain text."""
     run, values = branches[0].run, [of.value for of in branches]
     begin = float(run.times[0])
     lines = [
-        f"**{run.description.scene_name}: {len(branches)} branches from t = {begin:.6g} s**",
-        "",
-        f"- **Colour:** {name} from {min(values):g} (blue) to {max(values):g} (orange).",
+        f"{run.description.scene_name}: {len(branches)} branches from t = {begin:.6g} s",
+        f"Colour: {name} from {min(values):g} (blue) to {max(values):g} (orange).",
     ]
-    lines += [f"- **{name} = {of.value:g}** stopped: {of.stopped}." for of in branches if of.stopped]
+    lines += [f"{name} = {of.value:g} stopped: {of.stopped}." for of in branches if of.stopped]
     return "\n".join(lines)
 
 
@@ -120,7 +121,7 @@ def _send_curves(recording: rr.RecordingStream, number: str, label: str, run: Ru
         )
 
 
-def _blueprint(scales: Scales, legend: bool) -> rrb.Blueprint:
+def _blueprint(name: str, scales: Scales, curves: Curves, legend: bool) -> rrb.Blueprint:
     robot = rrb.Spatial3DView(
         name="Branches",
         origin="world",
@@ -130,10 +131,7 @@ def _blueprint(scales: Scales, legend: bool) -> rrb.Blueprint:
             kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
         ),
     )
-    curves = [
-        rrb.TimeSeriesView(name=title, origin=f"plots/{curve}", plot_legend=rrb.PlotLegend(visible=legend))
-        for curve, title in CURVES.items()
-    ]
+    plots = [curves.view(Plot(curve, f"{title} by {name}"), legend) for curve, title in CURVES.items()]
     text = rrb.TextDocumentView(name="Run", origin="summary")
     left = rrb.Vertical(robot, text, row_shares=[9, 2])
-    return whole(rrb.Horizontal(left, rrb.Vertical(*curves), column_shares=[5, 3]), time_panel="collapsed")
+    return whole(rrb.Horizontal(left, rrb.Vertical(*plots), column_shares=[5, 3]), time_panel="collapsed")

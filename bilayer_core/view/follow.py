@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import time as clock
+import webbrowser
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -106,16 +105,14 @@ def open_for(
     """Open what the user wants to look with; the window, which `ending` closes."""
     if not serving.window:
         return None
-    if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    from bilayer_core.view.server import has_screen, open_window
+
+    if not has_screen():
         say("there is no screen here: no window is opened, viewers may connect from elsewhere")
         return None
     if serving.web:
-        import webbrowser
-
         webbrowser.open(server.web_address)
         return None
-    from bilayer_core.view.server import open_window
-
     window = open_window(server)
     ending.callback(window.terminate)
     return window

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import rerun as rr
@@ -12,13 +13,15 @@ from bilayer_core.record.arriving import ArrivingRun
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.arrows import metres_per, scaled_reactions
 from bilayer_core.view.colouring import STRAIN
-from bilayer_core.view.layout import GRAVITY, arranged, entity_name, explanation, robot_view
+from bilayer_core.view.layout import GRAVITY, Curves, Plot, arranged, entity_name, explanation, robot_view
 from bilayer_core.view.live_scales import LiveScales
 from bilayer_core.view.rrd_writer import RunSender
 from bilayer_core.view.scales import place_moving_eye
 from bilayer_core.view.server import ViewServer, suffixed
 
 APPLICATION = "bilayer_sim"
+SHOWN = 10.0
+"""Longest time that plots show [s]; who looks can zoom out."""
 STILL_ROOM, MOVING_ROOM = 1.6, 1.3
 """Times as far as the first frame asks for: what will come is not known."""
 
@@ -111,16 +114,18 @@ def _layout(run: RunData, scales: LiveScales) -> rrb.Blueprint:
     else:
         eye, target = scales.scales.eye, scales.scales.target
     eye = target + (MOVING_ROOM if scales.moves else STILL_ROOM) * (eye - target)
-    plots = [("stimulus", "Stimulus")] if description.channels else []
+    bodies = len(description.bodies)
+    plots = [Plot("stimulus", "Stimulus", len(description.channels))] if description.channels else []
     if description.obstacles or any(body.shape for body in description.bodies):
-        plots.append(("contact_force", "Contact force [N]"))
+        plots.append(Plot("contact_force", "Contact force [N]", bodies + 1))
     if any(body.holds_rods for body in description.bodies):
-        plots.append(("clamp_force", "Force on clamps [N]"))
-    plots.append(("height", "Height of mass centres [mm]"))
+        plots.append(Plot("clamp_force", "Force on clamps [N]", bodies))
+    plots.append(Plot("height", "Height of mass centres [mm]", bodies + 1))
     groups = {name: GRAVITY if name == GRAVITY else "energy" for name in run.energy}
-    plots += [(group, f"{group.capitalize()} [mJ]") for group in dict.fromkeys(sorted(groups.values()))]
-    plots.append(("solver", "Solver"))
-    alone = [(f"{group}/{entity_name(name)}", f"{name} [mJ]") for name, group in groups.items()]
+    for group, count in sorted(Counter(groups.values()).items()):
+        plots.append(Plot(group, f"{group.capitalize()} [mJ]", count))
+    plots.append(Plot("solver", "Solver", 2))
+    alone = [Plot(f"{group}/{entity_name(name)}", f"{name} [mJ]") for name, group in groups.items()]
     robot = robot_view(eye, target, scales.moves)
     title = scales.colouring.title if scales.colouring.quantity == STRAIN else scales.colouring.quantity  # units change
-    return arranged(robot, title, plots, alone, events=True, play="following")
+    return arranged(robot, title, Curves.until_now(SHOWN), plots, alone, events=True, play="following")

@@ -6,6 +6,7 @@ Quantities of one unit share a panel, panels share the axis of time. matplotlib 
 from __future__ import annotations
 
 import io
+import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +27,9 @@ MILLIMETRE = 1.0 / 25.4
 WIDTHS = {"single": 86.0, "double": 178.0}
 """Of the columns of most journals [mm]."""
 PANEL_HEIGHT, FRAME_HEIGHT = 42.0, 14.0
-"""Of each panel, and of what is below the last one [mm]."""
+"""Of each panel without its legend, and of what is below the last one [mm]."""
+LEGEND_LINE, LETTER, HANDLE = 3.4, 1.4, 8.0
+"""Height of a line of a legend; width of a letter of it, and of what stands before a name [mm]."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Okabe and Ito's, which the colour-blind tell apart."""
 DASHES = ("-", "--", ":", "-.")
@@ -36,8 +39,8 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 WITH_PREFIX = ("m", "N", "J", "N m", "s", "m/s")
 KINDS = {"m": "position", "N": "force", "N m": "moment", "J": "energy", "1/m": "curvature"}
 """What a panel with several quantities shows, by its unit."""
-MOST_LINES, INSIDE_LINES = 40, 6
-"""In one panel; up to the second number the legend stands inside of it."""
+MOST_LINES = 40
+"""In one panel."""
 MOST_POINTS = 20_000
 """Of a line: more than a printed figure shows. Longer ones are drawn by the smallest and largest value of each part."""
 STYLE = {
@@ -196,38 +199,65 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
                 f"{MOST_LINES}, or single components such as com.z"
             )
     inches = WIDTHS.get(width, width) * MILLIMETRE
-    height = (PANEL_HEIGHT * len(panels) + FRAME_HEIGHT) * MILLIMETRE
+    several = len({line.run for line in lines}) > 1
+    legends = [_Legend.of(held, names, several, inches / MILLIMETRE) for held in panels.values()]
+    rows = sum(legend.rows for legend in legends)
+    height = (PANEL_HEIGHT * len(panels) + FRAME_HEIGHT + LEGEND_LINE * rows) * MILLIMETRE
     figure, all_axes = pyplot.subplots(
         len(panels), sharex=True, squeeze=False, figsize=(inches, height), layout="constrained"
     )
-    several = len({line.run for line in lines}) > 1
-    for axes, (unit, held) in zip(all_axes[:, 0], panels.items(), strict=True):
-        _draw_panel(axes, unit, held, names, several)
+    for axes, (unit, held), legend in zip(all_axes[:, 0], panels.items(), legends, strict=True):
+        _draw_panel(axes, unit, held, legend)
     all_axes[-1, 0].set_xlabel("time [s]")
     figure.align_ylabels()
     return figure
 
 
-def _draw_panel(axes, unit: str, held: list[Line], names: Sequence[str], several: bool) -> None:
+@dataclass(frozen=True)
+class _Legend:
+    """What the curves of a panel are called, above its axes: there it covers none."""
+
+    labels: tuple[str, ...]
+    columns: int
+
+    @classmethod
+    def of(cls, held: list[Line], names: Sequence[str], several: bool, width: float) -> _Legend:
+        """The legend of curves, in as many columns as fit into a width [mm]."""
+        short = _without_common(list(dict.fromkeys(line.name for line in held)))
+        labels = [", ".join([short[line.name]] * (len(short) > 1) + [names[line.run]] * several) for line in held]
+        columns = int((width - FRAME_HEIGHT) / (HANDLE + LETTER * max(map(len, labels))))
+        return cls(tuple(labels), min(max(columns, 1), len(labels)))
+
+    @property
+    def rows(self) -> int:
+        """Its lines; none if there is one curve, which the axis names."""
+        return math.ceil(len(self.labels) / self.columns) if len(self.labels) > 1 else 0
+
+
+def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
     factor, prefix = _prefix(unit, held)
     own = list(dict.fromkeys(line.name for line in held))
-    short = _without_common(own)
-    for line in held:
+    for line, label in zip(held, legend.labels, strict=True):
         first, second = (line.run, own.index(line.name)) if len(own) == 1 else (own.index(line.name), line.run)
-        told = [short[line.name]] * (len(own) > 1) + [names[line.run]] * several
         axes.plot(
             *_thinned(line.times, line.values / factor),
             color=COLOURS[first % len(COLOURS)],
             linestyle=DASHES[(second + first // len(COLOURS)) % len(DASHES)],
-            label=", ".join(told),
+            label=label,
         )
     shown = f" [{prefix}{unit}]" if unit else ""
     axes.set_ylabel(f"{_label(own, unit)}{shown}")
     axes.margins(x=0.0)
-    if len(held) > 1:
-        inside = len(held) <= INSIDE_LINES
-        place = {"loc": "best"} if inside else {"loc": "upper left", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2}
-        axes.legend(handlelength=1.6, labelspacing=0.2, **place)
+    if legend.rows:
+        axes.legend(
+            ncols=legend.columns,
+            handlelength=1.6,
+            labelspacing=0.2,
+            columnspacing=1.0,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            borderaxespad=0.2,
+        )
 
 
 def _label(own: list[str], unit: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -77,13 +77,22 @@ class RrdRecorder(MemoryRecorder):
             write_rrd(self.run_data(), self.path, self._force)
 
 
-def open_viewer(path: str | Path, web: bool = False, colour: str = STRAIN) -> None:
-    """Show an ``.rrd`` or ``.mcap`` file in the rerun viewer (or a browser) and wait until it is closed."""
+def open_viewer(path: str | Path, colour: str = STRAIN) -> None:
+    """Show an ``.rrd`` or ``.mcap`` file in the rerun viewer and wait until it is closed."""
     require_rerun()
     from bilayer_core.view.viewer_process import show
 
     with _as_recording(path, colour) as recording:
-        show(recording, web)
+        show(recording)
+
+
+def open_browser(path: str | Path, say: Callable[[str], None], colour: str = STRAIN) -> None:
+    """Show an ``.rrd`` or ``.mcap`` file in a browser until a signal comes; `say` takes the line with the address."""
+    require_rerun()
+    from bilayer_core.view.server import serve
+
+    with _as_recording(path, colour) as recording:
+        serve(recording, str(path), say)
 
 
 def screenshot(path: str | Path, png_path: str | Path, time: float | None = None, colour: str = STRAIN) -> None:
@@ -108,10 +117,13 @@ def _as_recording(path: str | Path, colour: str) -> Iterator[Path]:
     if path.suffix.lower() == RRD_SUFFIX:
         if not path.is_file():
             raise InputError(f"{path}: there is no such file")
-        yield path.resolve()
+        from bilayer_core.view.recording_check import refuse_markdown
+
+        refuse_markdown(path)
+        yield path.resolve()  # which rerun cannot take for an option or a URL
         return
     with private_directory() as directory:
-        recording = directory / f"{path.stem}.rrd"
+        recording = directory / "run.rrd"
         convert_log(path, recording, colour)
         yield recording
 

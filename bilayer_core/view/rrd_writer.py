@@ -44,8 +44,8 @@ LEGEND_HEIGHT = 14  # pixels of the colour bar
 EVENT_COLOURS = {"flight": (255, 214, 90), "contact": (64, 224, 148), "stimulus": (255, 130, 110)}
 PLAIN_COLOUR = (200, 204, 210)
 BODIES = "world/bodies"
-SUMMED = "on nodes, sizes summed"
-"""Curve of all contact forces."""
+SUMMED = "sum over nodes"
+"""Curve of the sizes of all contact forces."""
 
 
 def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) -> None:
@@ -62,7 +62,7 @@ def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) ->
     scales, colouring = choose_scales(run), choose_colouring(run, colour)
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
-    recording.send_blueprint(blueprint(run, scales, colouring), make_active=False, make_default=True)
+    recording.send_blueprint(blueprint(run, scales, colouring))  # active: rerun's page ignores one that is not
     sender = RunSender(recording, run.description)
     sender.begin(scales)
     sender.explain(summary(run, scales, colouring), colouring)
@@ -104,13 +104,13 @@ class RunSender:
         recording.log(MIDDLE, rr.Points3D.from_fields(radii=0.0), static=True)
 
     def explain(self, text: str, colouring: Colouring, time: float | None = None) -> None:
-        """Say in Markdown what is shown and draw the colour bar: for the whole run, or from a time on [s]."""
+        """Say in plain text what is shown and draw the colour bar: for the whole run, or from a time on [s]."""
         bar = np.tile(_bytes(colouring.colour_map[:, :3]), (LEGEND_HEIGHT, 1, 1))
         steps = bar.shape[1]
         ticks = [[min(max(6.0, place * steps), steps - 6.0), LEGEND_HEIGHT + 8] for place, _ in colouring.ticks]
         texts = [text for _, text in colouring.ticks]
         shown = {
-            "summary": rr.TextDocument(text, media_type="text/markdown"),
+            "summary": plain_text(text),
             "legend": rr.Image(bar),
             "legend/ticks": rr.Points2D(ticks, labels=texts, radii=0.01, colors=(200, 200, 200), show_labels=True),
         }
@@ -257,6 +257,11 @@ def _time(times: np.ndarray) -> list[rr.TimeColumn]:
 def _bytes(colours: np.ndarray) -> np.ndarray:
     """Colours from 0 to 1 as uint8."""
     return np.rint(colours * 255).astype(np.uint8)
+
+
+def plain_text(text: str) -> rr.TextDocument:
+    """Return text that viewers show as it is: as Markdown, a title from a stranger could make them fetch an address."""
+    return rr.TextDocument(text, media_type=rr.MediaType.TEXT)
 
 
 def log_obstacles(recording: rr.RecordingStream, description: Description, scales: Scales) -> None:

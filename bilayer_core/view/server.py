@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import signal
 import socket
 import subprocess
 import sys
 import tempfile
 import time as clock
+import webbrowser
+from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.view.viewer_process import viewer_environment, viewer_executable
@@ -22,6 +26,7 @@ MEMORY_LIMIT = "1GB"
 """Of what is kept for viewers that come late; beyond it the oldest is dropped."""
 START_LIMIT = 30.0  # longest wait for the server to answer [s]
 EXIT_LIMIT = 5.0  # longest wait for it to end before it is killed [s]
+CHECK_PERIOD = 0.5  # between two looks at whether the server still runs [s]
 _PR_SET_PDEATHSIG = 1
 
 
@@ -36,6 +41,8 @@ class ViewServer:
         Address of this machine at which it listens; ``0.0.0.0`` for all, where whoever reaches the machine can look.
     port : int, optional
         For viewers; by default the first free one from `PORT` on.
+    recording : Path, optional
+        An ``.rrd`` file that it shows from the start; an absolute path, which rerun cannot take for an option or a URL.
 
     Attributes
     ----------
@@ -50,8 +57,8 @@ class ViewServer:
         If the address or the port cannot be had.
     """
 
-    def __init__(self, bind: str = LOCAL, port: int | None = None):
-        self.bind = bind
+    def __init__(self, bind: str = LOCAL, port: int | None = None, recording: Path | None = None):
+        self.bind, self._recording = bind, recording
         self.port = _free_port(bind, PORT, "") if port is None else _free_port(bind, port, "--port")
         self.web_port = _free_port(bind, WEB_PORT, "", but=self.port)
         self._host = socket.gethostname() if bind in ("0.0.0.0", "::") else bind
@@ -78,6 +85,7 @@ class ViewServer:
         command = [str(viewer_executable()), "--serve-web", "--bind", self.bind, "--port", str(self.port)]
         command += ["--web-viewer-port", str(self.web_port), "--server-memory-limit", MEMORY_LIMIT]
         command += ["--cors-allow-origin", f"http://{_bracketed(self._host)}:{self.web_port}"]
+        command += [str(self._recording)] if self._recording else []
         libc = ctypes.CDLL(None) if sys.platform == "linux" else None
         self._output = tempfile.TemporaryFile()
         self._process = subprocess.Popen(
@@ -127,6 +135,37 @@ class ViewServer:
                 if clock.monotonic() > deadline:
                     raise OutputError(f"the viewer's server has not answered for {START_LIMIT:g} s") from None
                 clock.sleep(0.05)
+
+
+def serve(recording: Path, name: str, say: Callable[[str], None]) -> NoReturn:
+    """Show a recording in a browser, until a signal comes.
+
+    Parameters
+    ----------
+    recording : Path
+        Absolute.
+    name : str
+        What the user calls it.
+    say : callable
+        Takes the line for the screen, with the address.
+
+    Raises
+    ------
+    OutputError
+        If the server ends.
+    """
+    with ViewServer(recording=recording) as server:
+        say(f"{name}: {server.web_address} (served to this machine only, until Ctrl-C)")
+        if has_screen():
+            webbrowser.open(server.web_address)
+        while True:
+            server.check()
+            clock.sleep(CHECK_PERIOD)
+
+
+def has_screen() -> bool:
+    """Return whether a window can be opened."""
+    return sys.platform != "linux" or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def open_window(server: ViewServer) -> subprocess.Popen:

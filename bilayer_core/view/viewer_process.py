@@ -39,16 +39,12 @@ _log = logging.getLogger(__name__)
 Answer = TypeVar("Answer")
 
 
-def show(recording: Path, web: bool) -> None:
-    """Open a recording in a window or a browser; return when the viewer is closed."""
-    command = [str(viewer_executable()), str(recording)]
-    if web:
-        command += ["--web-viewer", "--bind", "127.0.0.1", "--port", "auto", "--web-viewer-port", "0"]
-    else:
-        command += ["--bind", "127.0.0.1", "--port", "auto"]
+def show(recording: Path) -> None:
+    """Open a recording in a window; return when it is closed."""
+    command = [str(viewer_executable()), str(recording), "--bind", "127.0.0.1", "--port", "auto"]
     code = subprocess.call(command, env=viewer_environment())
     if code:
-        raise InputError(f"the viewer ended with exit code {code}; without a screen use a browser or a screenshot")
+        raise InputError(f"the viewer ended with exit code {code}; without a screen use --web or --screenshot")
 
 
 def take_picture(recording: Path, time: float | None = None) -> bytes:

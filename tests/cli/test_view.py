@@ -1,5 +1,6 @@
 """`bilayer view`: what it hands to the viewer's functions."""
 
+import click
 import pytest
 
 from bilayer_core.cli import main
@@ -9,7 +10,7 @@ from bilayer_core.cli import main
 def viewer(monkeypatch, tmp_path):
     """Notes what the viewer's functions are asked to do instead of doing it; the directory is empty."""
     asked = []
-    for name in ("convert_log", "open_viewer", "screenshot"):
+    for name in ("convert_log", "open_browser", "open_viewer", "screenshot"):
         monkeypatch.setattr(
             f"bilayer_core.view.rerun_view.{name}", lambda *arguments, name=name: asked.append((name, *arguments))
         )
@@ -20,9 +21,9 @@ def viewer(monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "asked"),
     [
-        (["run.mcap"], [("open_viewer", "run.mcap", False, "strain")]),
-        (["run.rrd", "--web"], [("open_viewer", "run.rrd", True, "strain")]),
-        (["run.mcap", "--colour", "contact"], [("open_viewer", "run.mcap", False, "contact")]),
+        (["run.mcap"], [("open_viewer", "run.mcap", "strain")]),
+        (["run.rrd", "--web"], [("open_browser", "run.rrd", click.echo, "strain")]),
+        (["run.mcap", "--colour", "contact"], [("open_viewer", "run.mcap", "contact")]),
         (["run.mcap", "--save", "run.rrd"], [("convert_log", "run.mcap", "run.rrd", "strain")]),
         (["run.mcap", "--screenshot", "run.png"], [("screenshot", "run.mcap", "run.png", None, "strain")]),
         (

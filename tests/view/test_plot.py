@@ -10,7 +10,7 @@ import synthetic_run
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.view.plot import MOST_POINTS, Line, draw, lines_of
+from bilayer_core.view.plot import MOST_POINTS, STYLE, Line, draw, lines_of
 
 matplotlib.use("agg")
 TIMES = np.arange(0, 26) * 0.02
@@ -52,6 +52,17 @@ def test_several_logs_are_drawn_over_each_other_and_named(logs, closing, tmp_pat
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["slow", "fast"]
     assert len({line.get_color() for line in axes.get_lines()}) == 2
     assert [len(line.get_xdata()) for line in axes.get_lines()] == [26, 13]
+
+
+@pytest.mark.parametrize("wanted", [["com"], ["com", "energy/*"], ["body/*/position", f"{ROD}/contact_force"]])
+def test_legends_stand_above_the_axes_within_the_figure(logs, closing, wanted):
+    with matplotlib.rc_context(STYLE):
+        figure = draw(lines_of(read_log(logs / "slow.mcap"), 0, wanted), ["slow"])
+        figure.canvas.draw()
+    for axes in figure.axes:
+        legend, inside = axes.get_legend().get_window_extent(), axes.get_window_extent()
+        assert legend.y0 >= inside.y1 and legend.y1 <= figure.bbox.y1 and legend.x1 <= figure.bbox.x1
+        assert inside.width > 0.6 * figure.bbox.width and inside.height > 0.6 * figure.bbox.height / len(figure.axes)
 
 
 @pytest.mark.parametrize("suffix", ["pdf", "png", "svg"])

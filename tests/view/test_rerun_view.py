@@ -95,6 +95,15 @@ def test_legend_and_curves_are_shown(viewer):
 
 
 @pytest.mark.slow
+def test_legends_cover_no_curve(viewer):
+    plots = picture(viewer, None)[PLOTS]
+    for colour in [(240, 220, 90), (190, 140, 255), (255, 107, 129)]:  # energies, which have no axes but these
+        columns = np.unique(np.nonzero(np.abs(plots - colour).max(axis=2) < 60)[1])
+        curve = columns[columns < 0.63 * plots.shape[1]]  # the time that the run takes
+        assert len(curve) > 0.9 * np.ptp(curve) and np.ptp(curve) > 0.5 * plots.shape[1]
+
+
+@pytest.mark.slow
 def test_the_viewer_has_nothing_to_complain_about(viewer):
     picture(viewer, None)
     assert viewer.complaints() == []
