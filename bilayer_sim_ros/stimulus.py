@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from bilayer_core.errors import InputError
+from bilayer_core.scene.channel_range import value_in_range
 from bilayer_sim_ros.answers import Answers
 
 # Simulated times are multiples of the step, up to rounding [s].
@@ -32,10 +32,11 @@ class Channel:
     schedule: Schedule
 
     def accept(self, value: float) -> float:
-        """`value` as a float; InputError when it is not finite or out of range."""
-        if not (math.isfinite(value) and self.minimum <= value <= self.maximum):
-            raise InputError(f"stimulus '{self.name}' is {value:g}; allowed is {self.minimum:g} to {self.maximum:g}")
-        return float(value)
+        """Return `value`, or the end of the range that it passes by rounding; InputError when there is no such."""
+        accepted = value_in_range(value, self.minimum, self.maximum)
+        if accepted is None:
+            raise InputError(f"stimulus '{self.name}' is {value:.10g}; allowed is {self.minimum:g} to {self.maximum:g}")
+        return accepted
 
 
 class StimulusInputs:
