@@ -8,6 +8,7 @@ from dataclasses import asdict
 import click
 
 from bilayer_core.cli.options import Verb
+from bilayer_core.cli.terminal import say
 
 
 @click.command(cls=Verb)
@@ -23,7 +24,7 @@ def info(file: str, as_json: bool, quantities: bool) -> None:
         return
     found = read_info(file)
     if as_json:
-        click.echo(json.dumps(asdict(found), indent=2, ensure_ascii=False))
+        click.echo(json.dumps(asdict(found), indent=2))
         return
     rows = {
         "scene": f"{found.scene} ({found.title})",
@@ -35,11 +36,11 @@ def info(file: str, as_json: bool, quantities: bool) -> None:
         "versions": ", ".join(f"{key} {value}" for key, value in found.versions.items()),
     }
     for name, text in rows.items():
-        click.echo(f"{name:10}{text}")
+        say(f"{name:10}{text}")
     for lack in found.lacks:
-        click.echo(f"{'lacks':10}{lack}")
+        say(f"{'lacks':10}{lack}")
     for topic, content in found.topics.items():
-        click.echo(f"  {topic:36}{content['type']:40}{content['count']} messages")
+        say(f"  {topic:36}{content['type']:40}{content['count']} messages")
 
 
 def _list_quantities(file: str, as_json: bool) -> None:
@@ -48,9 +49,9 @@ def _list_quantities(file: str, as_json: bool) -> None:
     entries = LogSource(file).entries.values()
     if as_json:
         told = [{"name": of.name, "unit": of.unit, "axes": of.axes, "labels": of.labels} for of in entries]
-        click.echo(json.dumps(told, indent=2, ensure_ascii=False))
+        click.echo(json.dumps(told, indent=2))
         return
     for entry in entries:
         unit = f"[{entry.unit}]" if entry.unit else ""
         of_nodes = "each node: " if entry.of_shape and entry.labels else "each node" if entry.of_shape else ""
-        click.echo(f"  {entry.name:44}{unit:12}{of_nodes}{' '.join(entry.labels)}".rstrip())
+        say(f"  {entry.name:44}{unit:12}{of_nodes}{' '.join(entry.labels)}".rstrip())

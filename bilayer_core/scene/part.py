@@ -9,7 +9,8 @@ from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from bilayer_core.scene.faults import refuse, shortened
+from bilayer_core.printable import shortened
+from bilayer_core.scene.faults import refuse
 from bilayer_core.scene.units import (
     Length,
     Number,
