@@ -11,7 +11,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
 from bilayer_sim_ros.message_types import CLOCK_TOPIC
-from bilayer_sim_ros.near_misses import nearest, of_topics, remap_sources
+from bilayer_sim_ros.near_misses import nearest, of_topics
+from bilayer_sim_ros.ros_arguments import remap_sources
 
 PERIOD = 1.0
 """Real time between two looks [s]."""

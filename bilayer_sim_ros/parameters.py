@@ -36,6 +36,8 @@ class NodeParameter:
         All values of a text parameter; empty when any text will do.
     live : bool
         Whether it may be set while the node runs; others are read once, at the start.
+    formerly : str
+        A name that it had, by which it may still be given at the start.
     """
 
     name: str
@@ -45,6 +47,7 @@ class NodeParameter:
     above_minimum: bool = False
     choices: tuple[str, ...] = ()
     live: bool = False
+    formerly: str = ""
 
     @property
     def allowed(self) -> str:
@@ -102,8 +105,8 @@ def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) 
 
 
 FRICTION_OF_SCENE = -1.0
-FRICTION = ("friction", "friction.forward", "friction.backward", "friction.sideways")
-"""Coefficients of friction; what they mean says `contact.friction` of scenes."""
+FRICTION = ("friction.coefficient", "friction.forward", "friction.backward", "friction.sideways")
+"""Coefficients of friction, by the keys of `contact.friction` of scenes."""
 
 SIM_NODE = (
     NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
@@ -124,9 +127,10 @@ SIM_NODE = (
         NodeParameter(
             name,
             FRICTION_OF_SCENE,
-            f"coefficient of {name.replace('.', ', ')}, from the next tick on; -1 = as the scene says",
+            f"`contact.{name}` of the scene, from the next tick on; -1 = as the scene says",
             0.0,
             live=True,
+            formerly="friction" if name == FRICTION[0] else "",
         )
         for name in FRICTION
     ),
