@@ -111,12 +111,17 @@ FRICTION = ("friction.coefficient", "friction.forward", "friction.backward", "fr
 SIM_NODE = (
     NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
     NodeParameter(
-        "rate", 0.0, "frames published and logged per simulated second [Hz]; 0 = as the scene says", 0.0, live=True
+        "rate",
+        0.0,
+        "frames published and logged per simulated second [Hz]; 0 = as the scene says; adaptive steps also end at the "
+        "times of a larger rate than the scene's",
+        0.0,
+        live=True,
     ),
     NodeParameter(
         "marker_rate",
         0.0,
-        "frames per simulated second that carry nodes, points and markers [Hz]; 0 = as the scene says",
+        "frames per simulated second that carry nodes, points and markers [Hz], at most `rate`; 0 = as the scene says",
         0.0,
         live=True,
     ),

@@ -56,6 +56,8 @@ class StimulusInputs:
 
     Attributes
     ----------
+    ticks : int
+        How many have begun; counted by the stepping thread.
     notify : callable
         Called after each message, in the thread that received it.
     late : callable
@@ -76,6 +78,7 @@ class StimulusInputs:
         self.late: Callable[[float, str], None] = lambda time, name: None
         self.missed: Callable[[float, Sequence[str]], None] = lambda time, names: None
         self._first: dict[str, float] = {}
+        self.ticks = 0
         self.reset()
 
     def reset(self, keep_first: bool = False) -> None:
@@ -88,6 +91,11 @@ class StimulusInputs:
         self._acting: dict[str, float | None] = {}
         self._late: set[str] = set()
         self._missing: frozenset[str] = frozenset()
+
+    @property
+    def channels(self) -> list[Channel]:
+        """All channels, in the scene's order."""
+        return list(self._channels.values())
 
     @property
     def heard(self) -> Collection[str]:
@@ -188,6 +196,7 @@ class StimulusInputs:
 
         None gives a channel back to the scene's schedule.
         """
+        self.ticks += 1
         with self._lock:
             received, self._received = self._received, {}
             missing = frozenset() if self._answers is None else self._answers.close()
