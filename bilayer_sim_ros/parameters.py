@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
 
 Value = bool | float | int | str | list[str]
 
@@ -73,7 +74,8 @@ class NodeParameter:
             value = OFF
         if self._is_allowed(value):
             return float(value) if isinstance(self.default, float) else value
-        raise InputError(f"parameter '{self.name}' is {value!r}; allowed is {self.allowed} ({self.description})")
+        found = shortened(repr(value))
+        raise InputError(f"parameter '{self.name}' is {found}; allowed is {self.allowed} ({self.description})")
 
     def _is_allowed(self, value: object) -> bool:
         if isinstance(self.default, bool) or isinstance(value, bool):
@@ -100,7 +102,7 @@ def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) 
         if name not in known and name not in BUILT_IN and not name.startswith(BUILT_IN_PREFIX):
             close = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean '{close[0]}'? " if close else ""
-            raise InputError(f"there is no parameter '{name}': {hint}There are: {', '.join(known)}")
+            raise InputError(f"there is no parameter '{shortened(name)}': {hint}There are: {', '.join(known)}")
     return {name: parameter.accept(overrides.get(name, parameter.default)) for name, parameter in known.items()}
 
 

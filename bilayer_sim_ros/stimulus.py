@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
 from bilayer_core.scene.channel_range import value_in_range
 from bilayer_sim_ros.answers import Answers
 
 # Simulated times are multiples of the step, up to rounding [s].
 TIME_ROUNDING = 1e-9
+FEW_NAMES = 5
+"""Of a message that is refused, that a warning quotes."""
 
 
 class Schedule(Protocol):
@@ -126,7 +129,7 @@ class StimulusInputs:
         if len(values) != len(self._channels):
             raise InputError(
                 f"a stimulus message has {len(values)} values; expected are {len(self._channels)}: "
-                + ", ".join(self._channels)
+                + shortened(", ".join(self._channels))
             )
         pairs = zip(self._channels.values(), values, strict=True)
         self._keep({channel.name: channel.accept(value) for channel, value in pairs})
@@ -145,13 +148,15 @@ class StimulusInputs:
             If names and values are not one each, or one of them is refused; all last good values stay in force.
         """
         if not names or len(names) != len(values) or len(set(names)) != len(names):
+            few = shortened(", ".join(map(shortened, names[:FEW_NAMES])) + (", ..." if len(names) > FEW_NAMES else ""))
             raise InputError(
-                f"a stamped stimulus has {len(names)} names ({', '.join(names)}) and {len(values)} positions; "
+                f"a stamped stimulus has {len(names)} names ({few}) and {len(values)} positions; "
                 "expected is one position for each name, and each name once"
             )
         for name in names:
             if name not in self._channels:
-                raise InputError(f"there is no stimulus '{name}'; allowed is {', '.join(self._channels) or 'none'}")
+                known = shortened(", ".join(self._channels)) or "none"
+                raise InputError(f"there is no stimulus '{shortened(name)}'; allowed is {known}")
         pairs = zip(names, values, strict=True)
         return self._keep({name: self._channels[name].accept(value) for name, value in pairs}, tick)
 

@@ -16,6 +16,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 
 from bilayer_core.errors import InputError
 from bilayer_core.model.model import Model
+from bilayer_core.printable import shortened
 from bilayer_sim_ros.answers import mount
 from bilayer_sim_ros.commands import Commands
 from bilayer_sim_ros.contradictions import Contradictions, source_of, warn_of_contradiction
@@ -29,6 +30,8 @@ LONGEST_REST = 0.005
 """So long services may wait for the end of a rest [s]."""
 ROUND = 0.5e-3
 """Messages that are looked for at once are taken within about that time of each other [s]."""
+LONGEST_WARNING = 300
+"""Characters of a warning that quotes what others sent."""
 REFUSAL_PERIOD = 1.0
 """Real time between two warnings about refused messages [s]."""
 IGNORED_PERIOD = 10.0
@@ -139,7 +142,7 @@ def controlled_bodies(model: Model) -> list[str]:
 def _warn_of_ignored(node: Node, inputs: StimulusInputs, names: Sequence[str], tick: int, fault: str) -> None:
     counts = ", ".join(f"{count} {why}" for why, count in inputs.ignored.items() if count)
     node.get_logger().warning(
-        f"lockstep: an answer of {', '.join(names)} to t = {tick * 1e-9:.9g} s is {fault} and is ignored "
+        f"lockstep: an answer of {shortened(', '.join(names))} to t = {tick * 1e-9:.9g} s is {fault} and is ignored "
         f"(so far: {counts})",
         throttle_duration_sec=IGNORED_PERIOD,
     )
@@ -147,7 +150,8 @@ def _warn_of_ignored(node: Node, inputs: StimulusInputs, names: Sequence[str], t
 
 def warn_of_refusal(node: Node, reason: str) -> None:
     """Say why something is refused, if that has not been said just now."""
-    node.get_logger().warning(f"refused: {reason}; the last good value stays", throttle_duration_sec=REFUSAL_PERIOD)
+    text = f"refused: {shortened(reason, LONGEST_WARNING)}; the last good value stays"
+    node.get_logger().warning(text, throttle_duration_sec=REFUSAL_PERIOD)
 
 
 def _subscribe(

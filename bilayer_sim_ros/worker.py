@@ -300,8 +300,8 @@ class SimulationWorker:
     def _next_stop(self) -> float:
         """Return where adaptive steps end at the latest, beside the scene's own output times [s].
 
-        That is when a controller or a frame is due, or the run ends. Frames at a smaller rate than the scene's are those
-        of the first step after their time.
+        That is when a controller or a frame is due, or the run ends. Frames at a smaller rate than the scene's are
+        those of the first step after their time.
         """
         now = self._simulator.time
         due = self._control.next_stop(now)
