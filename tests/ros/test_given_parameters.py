@@ -1,5 +1,7 @@
 """What counts of parameters that are given several times, for other nodes or without a flag; in one process."""
 
+import sys
+
 import pytest
 import rclpy
 from rclpy.context import Context
@@ -9,6 +11,7 @@ from bilayer_core.errors import InputError
 from bilayer_sim_ros.configured_node import ConfiguredNode
 from bilayer_sim_ros.parameters import SIM_NODE
 from bilayer_sim_ros.ros_arguments import matches
+from bilayer_sim_ros.simulation_node import SimulationNode
 from bilayer_sim_ros.unread_arguments import refuse_bare_parameters, unread_arguments
 
 NAMES = [parameter.name for parameter in SIM_NODE]
@@ -80,6 +83,23 @@ def test_arguments_of_the_node_itself_go_before_those_of_the_process(values):
     own = ["--ros-args", "--params-file", "1.yaml", "-p", "duration:=0.75"]
     files = [section("/**", "2"), section("/**", "3")]
     assert values("-p duration:=0.5 --params-file 0.yaml", files, cli_args=own)["duration"] == 0.75
+
+
+def test_nodes_in_other_programs_read_the_command_line_of_the_process(domain, tmp_path, monkeypatch):
+    (tmp_path / "mine.yaml").write_text(section("left", "2"))
+    words = ["-p", "scene:=bending", "-p", "duration:=0.5", "--params-file", str(tmp_path / "mine.yaml")]
+    monkeypatch.setattr(sys, "argv", ["program", "--ros-args", *words])
+    context = Context()
+    rclpy.init(context=context, domain_id=domain)
+    try:
+        nodes = [SimulationNode(name, context=context) for name in ("left", "right")]
+        assert [node.values["duration"] for node in nodes] == [0.5, 0.5]
+        own = SimulationNode("own", context=context, use_global_arguments=False)
+        assert own.values["duration"] == 0.0
+        for node in (*nodes, own):
+            node.destroy_node()
+    finally:
+        rclpy.shutdown(context=context)
 
 
 def test_the_former_name_of_a_parameter_works_at_the_start(values, capfd):
