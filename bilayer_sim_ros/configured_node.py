@@ -105,8 +105,9 @@ def overrides_of(
         if len(candidates) > 1 and given_name not in in_code and value in candidates:
             value = candidates[-1]
         elif name in overrides:
-            both = f"{overrides[name]!r}, and as '{min(given_name, name)}' {value!r}"
-            raise InputError(f"parameter '{name}' is given twice: {both}; leave one of them out")
+            former = next(old for old, new in present.items() if new == name)
+            both = f"{overrides[name]!r} and {value!r}, one of them by the former name '{former}'"
+            raise InputError(f"parameter '{name}' is given twice: {both}; leave one out")
         overrides[name] = value
         if given_name in present:
             node.undeclare_parameter(given_name)
@@ -118,10 +119,10 @@ def overrides_of(
 def declare(
     node: Node, table: Sequence[NodeParameter], overrides: Mapping[str, Any], given: Mapping[str, Value] | None = None
 ) -> dict[str, Value]:
-    """Declare the parameters in `table`; their values, with those that were `given` in another way.
+    """Declare the parameters in `table`, and return their values with those that were `given` in another way.
 
-    The node has declared overrides by itself, so that a mistyped name is seen. They are declared anew, with their
-    types: an integer will do for a number. Parameters that are not live are read at the start only.
+    The node has declared its overrides by itself, which shows mistyped names. They are declared again with their types:
+    an integer will do for a number. Parameters that are not live are read at the start only.
     """
     given = given or {}
     for name in given.keys() & overrides.keys():
