@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from geometry_msgs.msg import Pose, PoseStamped
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
 from bilayer_core.simulation.simulator import Simulator
 
 FRAMES = ("", "world")
@@ -47,7 +48,7 @@ class Commands:
     def pose(self, body: str, message: PoseStamped) -> Callable[[], None]:
         """What asks for a body to go to a pose; InputError if its frame is not that of the world."""
         if message.header.frame_id not in FRAMES:
-            frame = message.header.frame_id
+            frame = shortened(message.header.frame_id)
             raise InputError(f"pose of body {body!r}: frame {frame!r} is not allowed; it must be 'world'")
         position, quaternion = position_and_quaternion(message.pose)
         return lambda: self.ask((POSE, body), lambda simulator, _: simulator.set_pose(body, position, quaternion))

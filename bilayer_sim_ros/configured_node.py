@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
@@ -12,10 +13,14 @@ from rclpy.node import Node
 
 from bilayer_core.errors import InputError
 from bilayer_sim_ros.parameters import NodeParameter, Value, accept_all
+from bilayer_sim_ros.ros_arguments import Given, given_parameters, in_order
 
 
 class ConfiguredNode(Node):
     """A node whose parameters are those of a table; mistyped names and bad values are refused.
+
+    A value on the command line goes before those in parameter files, in whichever order and with whichever type they
+    are given; values in code (`parameter_overrides`) go before both.
 
     Parameters
     ----------
@@ -23,6 +28,8 @@ class ConfiguredNode(Node):
     table : sequence of NodeParameter
     given : mapping, optional
         Values that were given in another way than as parameters.
+    arguments : sequence of str, optional
+        What `rclpy.init` got; by default the command line of the process, as for `rclpy.init`.
     **of_node
         As for `rclpy.node.Node`.
 
@@ -42,6 +49,7 @@ class ConfiguredNode(Node):
         node_name: str,
         table: Sequence[NodeParameter],
         given: Mapping[str, Value] | None = None,
+        arguments: Sequence[str] | None = None,
         **of_node: Any,
     ):
         try:
@@ -50,21 +58,73 @@ class ConfiguredNode(Node):
             raise InputError(
                 'a parameter has no value: allowed is one of its type, and [""] for a list of nothing'
             ) from error
+        of_process = sys.argv if arguments is None else arguments
+        sources = [
+            given_parameters(of_process if of_node.get("use_global_arguments", True) else ()),
+            given_parameters(of_node.get("cli_args") or ()),
+        ]
+        in_code = {parameter.name for parameter in of_node.get("parameter_overrides") or ()}
         try:
-            self.values = declare(self, table, given)
+            overrides = overrides_of(self, table, sources, in_code)
+            self.values = declare(self, table, overrides, given)
         except InputError:
             self.destroy_node()
             raise
 
 
-def declare(node: Node, table: Sequence[NodeParameter], given: Mapping[str, Value] | None = None) -> dict[str, Value]:
-    """Declare the parameters in `table`; their values, with those that were `given` in another way.
+def overrides_of(
+    node: Node, table: Sequence[NodeParameter], sources: Sequence[Sequence[Given]], in_code: Collection[str]
+) -> dict[str, Any]:
+    """Return the values that a node was given, by the present names of parameters; warns of former names.
 
-    The node has declared overrides by itself, so that a mistyped name is seen. They are declared anew, with their
-    types: an integer will do for a number. Parameters that are not live are read at the start only.
+    Parameters
+    ----------
+    node : Node
+        Has declared its overrides by itself.
+    table : sequence of NodeParameter
+    sources : sequence of sequence of Given
+        What arguments say; later ones go before earlier ones.
+    in_code : collection of str
+        Names of parameters that the program itself sets.
+
+    Raises
+    ------
+    InputError
+        For a parameter that is given by both of its names.
+    """
+    present = {parameter.formerly: parameter.name for parameter in table if parameter.formerly}
+    several: dict[str, list[Given]] = {}
+    for source in sources:
+        renamed = (replace(given, name=present.get(given.name, given.name)) for given in source)
+        for name, values in in_order(renamed, node.get_fully_qualified_name()).items():
+            several.setdefault(name, []).extend(values)
+    overrides: dict[str, Any] = {}
+    for given_name, parameter in node.get_parameters_by_prefix("").items():
+        name, value = present.get(given_name, given_name), parameter.value
+        candidates = [given.value for given in several.get(name, ())]
+        if len(candidates) > 1 and given_name not in in_code and value in candidates:
+            value = candidates[-1]
+        elif name in overrides:
+            former = next(old for old, new in present.items() if new == name)
+            both = f"{overrides[name]!r} and {value!r}, one of them by the former name '{former}'"
+            raise InputError(f"parameter '{name}' is given twice: {both}; leave one out")
+        overrides[name] = value
+        if given_name in present:
+            node.undeclare_parameter(given_name)
+            text = f"parameter '{given_name}' is now called '{name}'; the old name works at the start only"
+            node.get_logger().warning(text)
+    return overrides
+
+
+def declare(
+    node: Node, table: Sequence[NodeParameter], overrides: Mapping[str, Any], given: Mapping[str, Value] | None = None
+) -> dict[str, Value]:
+    """Declare the parameters in `table`, and return their values with those that were `given` in another way.
+
+    The node has declared its overrides by itself, which shows mistyped names. They are declared again with their types:
+    an integer will do for a number. Parameters that are not live are read at the start only.
     """
     given = given or {}
-    overrides = {name: parameter.value for name, parameter in node.get_parameters_by_prefix("").items()}
     for name in given.keys() & overrides.keys():
         raise InputError(f"'{name}' is given twice: {given[name]!r}, and as a parameter {overrides[name]!r}")
     values = accept_all(table, {**overrides, **given})

@@ -20,6 +20,7 @@ from bilayer_core.errors import BilayerError, InputError
 from bilayer_sim_ros.configured_node import ConfiguredNode
 from bilayer_sim_ros.parameters import NodeParameter, Value
 from bilayer_sim_ros.signals import Signals, Stop
+from bilayer_sim_ros.unread_arguments import refuse_bare_parameters, unread_arguments
 
 SomeNode = TypeVar("SomeNode", bound=Node)
 Make = Callable[[Mapping[str, Value]], SomeNode]
@@ -52,14 +53,18 @@ def run(
     stop = signals.take()
     argv = sys.argv if argv is None else [executable, *argv]
     try:
+        refuse_bare_parameters(argv, [parameter.name for parameter in table])
         arguments = remove_ros_args(argv)[1:]
+    except InputError as error:
+        print(f"{executable}: {error}", file=sys.stderr)
+        return InputError.exit_code
     except RuntimeError as error:
         print(f"{executable}: {_not_understood(error)}", file=sys.stderr)
         return InputError.exit_code
     options = _parse(executable, table, arguments, argument)
     given = {argument: options.argument} if argument is not None and options.argument is not None else {}
     try:
-        _run_node(signals, make, work, stop, argv, given)
+        _run_node(signals, table, make, work, stop, argv, given)
     except BilayerError as error:
         if options.debug:
             raise
@@ -81,7 +86,7 @@ def run_task(
     """Run `task(node, parameters, stop)` as a ROS 2 executable, with a node that has no life of its own; see `run`."""
 
     def make(given: Mapping[str, Value]) -> ConfiguredNode:
-        return ConfiguredNode(node_name, table, given)
+        return ConfiguredNode(node_name, table, given, argv)
 
     def work(node: ConfiguredNode, stop: Stop) -> None:
         task(node, node.values, stop)
@@ -120,6 +125,7 @@ def _parse(
 
 def _run_node(
     signals: Signals,
+    table: Sequence[NodeParameter],
     make: Make[SomeNode],
     work: Work[SomeNode],
     stop: Stop,
@@ -135,6 +141,8 @@ def _run_node(
     thread = threading.Thread(target=_spin, args=(executor, ended), name="executor", daemon=True)
     try:
         node = make(given)
+        for text in unread_arguments(argv, node.get_fully_qualified_name(), [parameter.name for parameter in table]):
+            node.get_logger().warning(text)
         executor.add_node(node)
         thread.start()
         work(node, stop)

@@ -10,11 +10,16 @@ from rclpy.clock import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
+from bilayer_core.printable import shortened
 from bilayer_sim_ros.message_types import CLOCK_TOPIC
-from bilayer_sim_ros.near_misses import nearest, of_topics, remap_sources
+from bilayer_sim_ros.near_misses import nearest, of_topics
+from bilayer_sim_ros.ros_arguments import remap_sources
+from bilayer_sim_ros.subscriptions import LONGEST_WARNING
 
 PERIOD = 1.0
 """Real time between two looks [s]."""
+MOST_WARNINGS = 100
+"""Of one node about topics: each is remembered, so that it is given once."""
 
 
 class GraphWatch:
@@ -39,6 +44,8 @@ class GraphWatch:
 
     def look(self) -> None:
         """Say what has not been said."""
+        if len(self._told) >= MOST_WARNINGS:
+            return
         published, subscribed = {}, set()
         for topic, types in self._node.get_topic_names_and_types():
             if topic in self._told or not (topic.startswith(self._prefix) or topic in self._inputs):
@@ -60,9 +67,11 @@ class GraphWatch:
         for topic, sent in self._watched.items():
             if topic not in self._told and (text := self._unheard(topic, sent)):
                 said[topic] = text
-        for topic, text in said.items():
+        for topic, text in list(said.items())[: MOST_WARNINGS - len(self._told)]:
             self._told.add(topic)
-            self._node.get_logger().warning(text)
+            self._node.get_logger().warning(shortened(text, LONGEST_WARNING))
+        if len(self._told) >= MOST_WARNINGS:
+            self._node.get_logger().warning(f"{MOST_WARNINGS} warnings about topics were given; no more follow")
 
     def _unheard(self, topic: str, sent: str) -> str:
         """What is to be said of those who listen to a topic, on which `sent` is sent, and can hear nothing."""
@@ -89,7 +98,8 @@ def warn_of_unused_remaps(node: Node, argv: Sequence[str]) -> None:
             continue
         meant = nearest(node.resolve_topic_name(source, only_expand=True), topics | services, prefix)
         if meant:
-            node.get_logger().warning(f"{source} is remapped, but is no name of this node: did you mean {meant}?")
+            text = f"{shortened(source)} is remapped, but is no name of this node: did you mean {meant}?"
+            node.get_logger().warning(text)
 
 
 def _type_name(message_type: type) -> str:

@@ -22,7 +22,7 @@ PREFIX = "play."
 
 
 def argument_name(parameter: NodeParameter) -> str:
-    """Name of the argument for a parameter."""
+    """Return the name of the argument for a parameter."""
     return RENAMED.get(parameter.name, parameter.name.removeprefix(PREFIX))
 
 
@@ -48,8 +48,18 @@ def parameters_of(table: Iterable[NodeParameter], given: Mapping[str, str]) -> d
     InputError
         For a text that says no value of the parameter's type.
     """
-    texts = [(parameter, given.get(argument_name(parameter), "")) for parameter in table]
-    return {parameter.name: value_of(parameter, text) for parameter, text in texts if text}
+    texts = [
+        (name, parameter, given.get(argument, "")) for parameter in table for argument, name in arguments_of(parameter)
+    ]
+    return {name: value_of(parameter, text) for name, parameter, text in texts if text}
+
+
+def arguments_of(parameter: NodeParameter) -> list[tuple[str, str]]:
+    """Return the names of arguments for a parameter, each with the name by which the node gets it: also a former one,
+    of which the node warns.
+    """
+    former = [(parameter.formerly, parameter.formerly)] if parameter.formerly else []
+    return [(argument_name(parameter), parameter.name), *former]
 
 
 def value_of(parameter: NodeParameter, text: str) -> Value:

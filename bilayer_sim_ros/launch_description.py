@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 
 from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, OpaqueFunction
 from launch.logging import get_logger
 from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.launch_arguments import NODE_ARGUMENTS, argument_name, describe, near_misses, parameters_of
+from bilayer_sim_ros.launch_arguments import (
+    NODE_ARGUMENTS,
+    argument_name,
+    arguments_of,
+    describe,
+    near_misses,
+    parameters_of,
+)
 from bilayer_sim_ros.parameters import NodeParameter
 
 PACKAGE = "bilayer_sim_ros"
@@ -39,13 +46,11 @@ def node_description(executable: str, node_name: str, table: Sequence[NodeParame
 
     def node(context: LaunchContext) -> list[Node]:
         given = context.launch_configurations
-        for text in near_misses(arguments, given):
+        read = [argument for parameter in table for argument, _ in arguments_of(parameter)]
+        for text in near_misses([*NODE_ARGUMENTS, *read], given):
             get_logger(PACKAGE).warning(text)
         try:
-            values = {
-                name: ParameterValue(value, value_type=list[str] if isinstance(value, list) else type(value))
-                for name, value in parameters_of(table, given).items()
-            }
+            values = parameters_of(table, given)
         except InputError as error:
             raise RuntimeError(f"{executable}: {error}") from None
         return [
@@ -54,7 +59,13 @@ def node_description(executable: str, node_name: str, table: Sequence[NodeParame
                 executable=executable,
                 name=given["name"],
                 namespace=given["namespace"],
-                parameters=[part for part in (given["params_file"], values) if part],
+                parameters=[given["params_file"]] if given["params_file"] else [],
+                # On the command line, where they go before the file; JSON is YAML.
+                ros_arguments=[
+                    word
+                    for name, value in values.items()
+                    for word in ("-p", f"{name}:={json.dumps(value, ensure_ascii=False)}")
+                ],
                 output="screen",
                 emulate_tty=True,
             )

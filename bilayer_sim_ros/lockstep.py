@@ -7,6 +7,7 @@ import time as clock
 from collections.abc import Callable, Sequence
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
 from bilayer_sim_ros.answers import mount
 from bilayer_sim_ros.conversions import to_nanoseconds
 from bilayer_sim_ros.stimulus import StimulusInputs
@@ -63,8 +64,8 @@ def channels_that_answer(names: Sequence[str], channels: Sequence[str], bodies: 
         if name not in allowed or needed.count(name) > 1:
             fault = "is there twice" if name in allowed else "is no channel of the scene"
             raise InputError(
-                f"parameter 'lockstep_answers' is {needed}: '{name}' {fault}; allowed are, each once, "
-                f"{', '.join(allowed) or 'none, as the scene has no channel'}"
+                f"parameter 'lockstep_answers' is {shortened(str(needed))}: '{shortened(name)}' {fault}; allowed are, "
+                f"each once, {shortened(', '.join(allowed)) or 'none, as the scene has no channel'}"
             )
     return needed
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 
 LIKENESS = 0.75
 """Of two names from which one may be meant by the other; 1 = the same."""
-REMAP_FLAGS = ("-r", "--remap")
-ROS_ARGS, END_OF_ROS_ARGS = "--ros-args", "--"
 
 
 def nearest(name: str, names: Iterable[str], prefix: str = "") -> str:
@@ -65,18 +63,3 @@ def of_topics(
             if meant:
                 said[topic] = f"{topic} is listened to, but not published: did you mean {meant}?"
     return said
-
-
-def remap_sources(argv: Sequence[str]) -> Iterator[str]:
-    """Names that a command line remaps, as they stand there; not those of nodes and namespaces."""
-    inside, flag = False, False
-    for word in argv:
-        if word in (ROS_ARGS, END_OF_ROS_ARGS):
-            inside, flag = word == ROS_ARGS, False
-        elif inside and flag:
-            source = word.partition(":=")[0].rpartition(":")[2]  # a rule may begin with the name of a node
-            if source and not source.startswith("__"):
-                yield source
-            flag = False
-        else:
-            flag = inside and word in REMAP_FLAGS

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
 
 Value = bool | float | int | str | list[str]
 
@@ -36,6 +37,8 @@ class NodeParameter:
         All values of a text parameter; empty when any text will do.
     live : bool
         Whether it may be set while the node runs; others are read once, at the start.
+    formerly : str
+        A name that it had, by which it may still be given at the start.
     """
 
     name: str
@@ -45,6 +48,7 @@ class NodeParameter:
     above_minimum: bool = False
     choices: tuple[str, ...] = ()
     live: bool = False
+    formerly: str = ""
 
     @property
     def allowed(self) -> str:
@@ -70,7 +74,8 @@ class NodeParameter:
             value = OFF
         if self._is_allowed(value):
             return float(value) if isinstance(self.default, float) else value
-        raise InputError(f"parameter '{self.name}' is {value!r}; allowed is {self.allowed} ({self.description})")
+        found = shortened(repr(value))
+        raise InputError(f"parameter '{self.name}' is {found}; allowed is {self.allowed} ({self.description})")
 
     def _is_allowed(self, value: object) -> bool:
         if isinstance(self.default, bool) or isinstance(value, bool):
@@ -97,23 +102,28 @@ def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) 
         if name not in known and name not in BUILT_IN and not name.startswith(BUILT_IN_PREFIX):
             close = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean '{close[0]}'? " if close else ""
-            raise InputError(f"there is no parameter '{name}': {hint}There are: {', '.join(known)}")
+            raise InputError(f"there is no parameter '{shortened(name)}': {hint}There are: {', '.join(known)}")
     return {name: parameter.accept(overrides.get(name, parameter.default)) for name, parameter in known.items()}
 
 
 FRICTION_OF_SCENE = -1.0
-FRICTION = ("friction", "friction.forward", "friction.backward", "friction.sideways")
-"""Coefficients of friction; what they mean says `contact.friction` of scenes."""
+FRICTION = ("friction.coefficient", "friction.forward", "friction.backward", "friction.sideways")
+"""Coefficients of friction, by the keys of `contact.friction` of scenes."""
 
 SIM_NODE = (
     NodeParameter("scene", "gripping", "scene file, or name of a bundled scene"),
     NodeParameter(
-        "rate", 0.0, "frames published and logged per simulated second [Hz]; 0 = as the scene says", 0.0, live=True
+        "rate",
+        0.0,
+        "frames published and logged per simulated second [Hz]; 0 = as the scene says; adaptive steps also end at the "
+        "times of a larger rate than the scene's",
+        0.0,
+        live=True,
     ),
     NodeParameter(
         "marker_rate",
         0.0,
-        "frames per simulated second that carry nodes, points and markers [Hz]; 0 = as the scene says",
+        "frames per simulated second that carry nodes, points and markers [Hz], at most `rate`; 0 = as the scene says",
         0.0,
         live=True,
     ),
@@ -124,9 +134,10 @@ SIM_NODE = (
         NodeParameter(
             name,
             FRICTION_OF_SCENE,
-            f"coefficient of {name.replace('.', ', ')}, from the next tick on; -1 = as the scene says",
+            f"`contact.{name}` of the scene, from the next tick on; -1 = as the scene says",
             0.0,
             live=True,
+            formerly="friction" if name == FRICTION[0] else "",
         )
         for name in FRICTION
     ),

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
+from bilayer_core.printable import shortened
 from bilayer_core.record.events import Event, late_stimulus
 from bilayer_sim_ros.conversions import PATIENCE, status_without_run, to_diagnostics
 from bilayer_sim_ros.outputs import create_output
@@ -105,7 +106,7 @@ class Announcer:
         self._tell(late_stimulus(time, f"none on {name} for {self._timeout:g} s", self._fallback))
 
     def _say_missing(self, time: float, names: Sequence[str]) -> None:
-        text = f"no answer of {', '.join(names)} within {self._wait:g} s of real time"
+        text = f"no answer of {shortened(', '.join(names))} within {self._wait:g} s of real time"
         self._tell(late_stimulus(time, text, self._fallback))
         self._node.get_logger().warning(
             f"lockstep: {text} at t = {time:.6g} s; {self._fallback}", throttle_duration_sec=WARNING_PERIOD

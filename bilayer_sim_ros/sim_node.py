@@ -26,7 +26,7 @@ def main(argv: list[str] | None = None) -> int:
         warn_of_unused_remaps(node, sys.argv if argv is None else argv)
         node.simulate(stop)
 
-    code = run(signals, "sim_node", SIM_NODE, lambda _: SimulationNode(), work, argv)
+    code = run(signals, "sim_node", SIM_NODE, lambda _: SimulationNode(arguments=argv), work, argv)
     if any(node.compiling for node in nodes):
         leave(code)
     return code

@@ -18,6 +18,7 @@ from bilayer_sim_ros.live_friction import LiveFriction, friction_overrides
 from bilayer_sim_ros.live_parameters import LiveParameters
 from bilayer_sim_ros.live_view import SERVE
 from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
+from bilayer_sim_ros.output_rates import refuse_marker_rate
 from bilayer_sim_ros.pacing import Pacer
 from bilayer_sim_ros.parameters import FRICTION, OFF, SIM_NODE, Value
 from bilayer_sim_ros.publishing import ClockPublisher, FramePublisher
@@ -92,6 +93,7 @@ def wire(
     if changed := friction_overrides(scene, parameters):
         scene = load_scene(parameters["scene"], changed)
     rate, marker_rate = parameters["rate"] or scene.output.rate, parameters["marker_rate"] or scene.output.marker_rate
+    refuse_marker_rate(parameters["marker_rate"], rate)
     rerun_path = "" if parameters["rerun"] in (OFF, SERVE) else parameters["rerun"]
     patience = 0.0 if parameters["real_time_factor"] else UNPACED_PATIENCE
     tf = tf_prefix(node, parameters)
@@ -144,12 +146,12 @@ def wire(
         finished=finished,
     )
     rest = None if lockstep else Rest(ticks, lambda: pacer.factor)
-    subscribe_stimuli(node, inputs, description.channels, rest)
+    subscribe_stimuli(node, inputs, rest)
     subscribe_commands(node, commands, inputs, simulator.model)
     changes = {
         "real_time_factor": worker.set_real_time_factor,
         "rate": lambda value: worker.set_rate(value or scene.output.rate),
-        "marker_rate": lambda value: worker.set_marker_rate(value or scene.output.marker_rate),
+        "marker_rate": lambda value: worker.set_marker_rate(value or scene.output.marker_rate, asked=value > 0.0),
         **LiveFriction(simulator, commands, lambda event: worker.tell(event)).changes,
     }
     live = LiveParameters(node, SIM_NODE, changes)

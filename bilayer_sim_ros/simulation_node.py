@@ -32,7 +32,8 @@ class SimulationNode(ConfiguredNode):
         Called with this node when the simulation has ended and its files are finished, in a thread of the node's own;
         not for one that was never started.
     **of_node
-        As for `rclpy.node.Node`: ``namespace``, ``context``, ``parameter_overrides``, ``cli_args`` and others.
+        As for `rclpy.node.Node`: ``namespace``, ``context``, ``parameter_overrides``, ``cli_args`` and others. Where
+        `rclpy.init` gets other arguments than the command line, give them as ``arguments`` too.
 
     Raises
     ------

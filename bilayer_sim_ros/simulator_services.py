@@ -18,9 +18,11 @@ from rclpy.type_support import check_is_valid_srv_type
 
 from bilayer_core.errors import BilayerError
 from bilayer_core.observed.frame import Description
+from bilayer_core.printable import shortened
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.entities import Entities
 from bilayer_sim_ros.services import Service
+from bilayer_sim_ros.subscriptions import LONGEST_WARNING
 
 UNSUPPORTED, OK, NOT_FOUND, FAILED = 0, 1, 2, 4
 """Of `simulation_interfaces/msg/Result`."""
@@ -117,7 +119,8 @@ def _services(srv: Any, worker: Worker, entities: Entities, quit: Callable[[str]
 
     def one_state(request: Any) -> Future:
         if request.entity not in entities.names:
-            text = f"there is no entity {request.entity!r}; there are {', '.join(entities.names)}"
+            known = shortened(", ".join(entities.names), LONGEST_WARNING)
+            text = f"there is no entity '{shortened(request.entity)}'; there are {known}"
             return _done(([], Result(NOT_FOUND, text)))
         return look_at([request.entity])
 
@@ -144,7 +147,7 @@ def _services(srv: Any, worker: Worker, entities: Entities, quit: Callable[[str]
             response.state.state = state
 
     def refuse_state(request: Any) -> Future:
-        return _done(Result(UNSUPPORTED, NOT_STATE.format(request.entity)))
+        return _done(Result(UNSUPPORTED, NOT_STATE.format(shortened(request.entity))))
 
     return [
         Service("get_simulator_features", srv.GetSimulatorFeatures, lambda _: _done(None), write_features),
@@ -211,7 +214,7 @@ def _filtered(entities: Entities, filters: Any) -> tuple[list[str], Result]:
     try:
         pattern = re.compile(filters.filter)
     except re.error as error:
-        return [], Result(FAILED, f"the filter {filters.filter!r} is no regular expression: {error}")
+        return [], Result(FAILED, f"the filter '{shortened(filters.filter)}' is no regular expression: {error}")
     return [name for name in entities.names if pattern.search(name)], Result()
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
+from bilayer_core.scene.channel_range import value_in_range
 from bilayer_sim_ros.answers import Answers
 
 # Simulated times are multiples of the step, up to rounding [s].
 TIME_ROUNDING = 1e-9
+FEW_NAMES = 5
+"""Of a message that is refused, that a warning quotes."""
 
 
 class Schedule(Protocol):
@@ -32,10 +35,11 @@ class Channel:
     schedule: Schedule
 
     def accept(self, value: float) -> float:
-        """`value` as a float; InputError when it is not finite or out of range."""
-        if not (math.isfinite(value) and self.minimum <= value <= self.maximum):
-            raise InputError(f"stimulus '{self.name}' is {value:g}; allowed is {self.minimum:g} to {self.maximum:g}")
-        return float(value)
+        """Return `value`, or the end of the range that it passes by rounding; InputError when there is no such."""
+        accepted = value_in_range(value, self.minimum, self.maximum)
+        if accepted is None:
+            raise InputError(f"stimulus '{self.name}' is {value:.10g}; allowed is {self.minimum:g} to {self.maximum:g}")
+        return accepted
 
 
 class StimulusInputs:
@@ -55,6 +59,8 @@ class StimulusInputs:
 
     Attributes
     ----------
+    ticks : int
+        How many have begun; counted by the stepping thread.
     notify : callable
         Called after each message, in the thread that received it.
     late : callable
@@ -75,6 +81,7 @@ class StimulusInputs:
         self.late: Callable[[float, str], None] = lambda time, name: None
         self.missed: Callable[[float, Sequence[str]], None] = lambda time, names: None
         self._first: dict[str, float] = {}
+        self.ticks = 0
         self.reset()
 
     def reset(self, keep_first: bool = False) -> None:
@@ -87,6 +94,11 @@ class StimulusInputs:
         self._acting: dict[str, float | None] = {}
         self._late: set[str] = set()
         self._missing: frozenset[str] = frozenset()
+
+    @property
+    def channels(self) -> list[Channel]:
+        """All channels, in the scene's order."""
+        return list(self._channels.values())
 
     @property
     def heard(self) -> Collection[str]:
@@ -117,7 +129,7 @@ class StimulusInputs:
         if len(values) != len(self._channels):
             raise InputError(
                 f"a stimulus message has {len(values)} values; expected are {len(self._channels)}: "
-                + ", ".join(self._channels)
+                + shortened(", ".join(self._channels))
             )
         pairs = zip(self._channels.values(), values, strict=True)
         self._keep({channel.name: channel.accept(value) for channel, value in pairs})
@@ -136,13 +148,15 @@ class StimulusInputs:
             If names and values are not one each, or one of them is refused; all last good values stay in force.
         """
         if not names or len(names) != len(values) or len(set(names)) != len(names):
+            few = shortened(", ".join(map(shortened, names[:FEW_NAMES])) + (", ..." if len(names) > FEW_NAMES else ""))
             raise InputError(
-                f"a stamped stimulus has {len(names)} names ({', '.join(names)}) and {len(values)} positions; "
+                f"a stamped stimulus has {len(names)} names ({few}) and {len(values)} positions; "
                 "expected is one position for each name, and each name once"
             )
         for name in names:
             if name not in self._channels:
-                raise InputError(f"there is no stimulus '{name}'; allowed is {', '.join(self._channels) or 'none'}")
+                known = shortened(", ".join(self._channels)) or "none"
+                raise InputError(f"there is no stimulus '{shortened(name)}'; allowed is {known}")
         pairs = zip(names, values, strict=True)
         return self._keep({name: self._channels[name].accept(value) for name, value in pairs}, tick)
 
@@ -187,6 +201,7 @@ class StimulusInputs:
 
         None gives a channel back to the scene's schedule.
         """
+        self.ticks += 1
         with self._lock:
             received, self._received = self._received, {}
             missing = frozenset() if self._answers is None else self._answers.close()

@@ -18,6 +18,7 @@ from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.result import Termination
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.control import Control
+from bilayer_sim_ros.output_rates import refuse_marker_rate, refuse_rate
 from bilayer_sim_ros.pacing import CONTROLLERS, LOG, OTHERS, PHYSICS, SUBSCRIBERS, Pacer
 from bilayer_sim_ros.periods import Periods
 from bilayer_sim_ros.recording import LogStatus, Recording
@@ -98,6 +99,7 @@ class SimulationWorker:
         self._recording = recording
         self._frames = Periods(rate)
         self._marker_rate = marker_rate
+        refuse_rate(simulator, rate)
         self._pacer = pacer
         self._duration = duration
         self._stop_listening: Callable[[], None] = lambda: None
@@ -185,9 +187,17 @@ class SimulationWorker:
         """Ask for frames at another rate [Hz]."""
         return self._requests.ask(lambda answer: self._do_set_rates(rate, self._marker_rate, answer))
 
-    def set_marker_rate(self, rate: float) -> Future:
-        """Ask for topics made to be looked at, at another rate [Hz]."""
-        return self._requests.ask(lambda answer: self._do_set_rates(self._frames.rate, rate, answer))
+    def set_marker_rate(self, rate: float, asked: bool = True) -> Future:
+        """Ask for topics made to be looked at, at another rate [Hz]; one that nobody `asked` for may exceed that of
+        frames, with which they come then.
+        """
+
+        def set_rate(answer: Future) -> None:
+            if asked:
+                refuse_marker_rate(rate, self._frames.rate)
+            self._do_set_rates(self._frames.rate, rate, answer)
+
+        return self._requests.ask(set_rate)
 
     # The rest runs in the worker's thread.
 
@@ -290,10 +300,15 @@ class SimulationWorker:
             self._single_steps.popleft().set_result(f"paused at t = {now:.6g} s")
 
     def _next_stop(self) -> float:
-        """When a controller is due, or the run ends [s]: where adaptive steps end at the latest, beside the scene's own
-        output times. Frames at another rate are those of the first step after their time.
+        """Return where adaptive steps end at the latest, beside the scene's own output times [s].
+
+        That is when a controller or a frame is due, or the run ends. Frames at a smaller rate than the scene's are
+        those of the first step after their time.
         """
-        due = self._control.next_stop(self._simulator.time)
+        now = self._simulator.time
+        due = self._control.next_stop(now)
+        if self._simulator.tolerance is not None and self._frames.rate > self._simulator.scene.output.rate:
+            due = min(due, self._frames.next_end(now))
         return due if due < self._duration - TIME_ROUNDING * self._simulator.dt else self._duration
 
     def _hand_out(self) -> None:
@@ -349,10 +364,11 @@ class SimulationWorker:
         answer.set_result("")
 
     def _do_set_rates(self, rate: float, marker_rate: float, answer: Future) -> None:
+        refuse_rate(self._simulator, rate)
         self._frames.rate, self._marker_rate = rate, marker_rate
         self._publisher.set_rates(rate, marker_rate)
         self._recording.set_rates(rate, marker_rate)
-        text = f"rate is {rate:g} Hz, marker_rate is {marker_rate:g} Hz"
+        text = f"rate is {rate:g} Hz, marker_rate is {min(rate, marker_rate):g} Hz"
         self.tell(changed_setting(self._simulator.time, text))
         answer.set_result("")
 

@@ -33,6 +33,9 @@ ERROR_HELP = "Show the global error of the headline numbers, from runs at twice 
 OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_state": ".npz"}
 """How the names of outputs end, by their options."""
 
+RATE_ROUNDING = 1e-9
+"""Part of a rate by which two are the same."""
+
 
 @click.command(cls=Verb)
 @scene_argument
@@ -45,7 +48,10 @@ OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_stat
 @set_option
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")
 @click.option(
-    "--log-rate", type=Rate(), metavar="HZ", help="Frames recorded per simulated second; the run stays the same."
+    "--log-rate",
+    type=Rate(),
+    metavar="HZ",
+    help="Frames recorded per simulated second, at most one a step; the run stays the same.",
 )
 @click.option("--tf", is_flag=True, help="Have frames of bodies and ends of rods on /tf in the log.")
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
@@ -69,6 +75,8 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     observers = _open_outputs(config, options)
     simulator = _make_simulator(config, options["from_state"], options["at"], options["budget"], quiet)
     duration = _duration(simulator, duration)
+    if not quiet:
+        _say_if_too_often(simulator, options["log_rate"])
     judge = _Judge(simulator, duration, quiet) if options["error_estimate"] else None
     failure = _simulate(simulator, duration, observers, interrupt, quiet, judge)
     if judge is not None and failure is None and not interrupt.granted:
@@ -87,6 +95,16 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
             raise Interruption(interrupt.wished)
         if judge is not None and judge.interruption is not None:
             raise judge.interruption
+
+
+def _say_if_too_often(simulator: Simulator, rate: float | None) -> None:
+    """Say that fewer frames than asked for may be recorded, where steps need not end as often."""
+    adaptive = simulator.tolerance is not None
+    most = simulator.scene.output.rate if adaptive else 1.0 / simulator.dt
+    if rate is not None and rate > most * (1.0 + RATE_ROUNDING):
+        end = f"end at least {most:g} times a second" if adaptive else f"end {most:g} times a second"
+        remedy = f"--set output.rate={rate:g} has them end at these times" if adaptive else "a shorter --dt gives more"
+        say(f"--log-rate {rate:g}: steps {end}, and each gives one frame at most; {remedy}", err=True)
 
 
 def _is_stdout(key: str, options: dict[str, Any]) -> bool:

@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from bilayer_core.printable import shortened
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
+from bilayer_core.scene.channel_range import value_in_range
 from bilayer_core.scene.faults import Fault, refuse, refuse_all
 from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
@@ -308,5 +309,5 @@ def faults_of_range(stimulus: Stimulus) -> list[Fault]:
     return [
         (("schedule", *key), value, f"must lie in the range of the channel, {low:g} to {high:g} [{stimulus.unit}]")
         for key, value in stimulus.schedule.points().items()
-        if not low <= value <= high
+        if value_in_range(value, low, high) is None
     ]

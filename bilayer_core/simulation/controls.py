@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from ..errors import InputError
 from ..model.override import acts, jump_to, ramp_to
 from ..observed.inputs import FRICTION, LOAD, POSE, STIMULUS, Input, values_of_pose
+from ..scene.channel_range import value_in_range
 from .friction import change_friction
 from .poses import LEAST_TIME, new_goal
 from .readings import Readings
@@ -26,7 +27,8 @@ class Controls(Readings):
         ----------
         channel : str
         value : float or None
-            None gives it back to the scene's schedule.
+            None gives it back to the scene's schedule. A value that passes the range by rounding only, such as
+            1.0000000000000002, is the end of the range.
         over : float
             Simulated time in which it gets there, linearly, from what it is now [s]; 0 is a jump. Steps follow a ramp
             without beginning again, also one that is replaced by another on its way: what comes often is cheaper so.
@@ -41,13 +43,14 @@ class Controls(Readings):
             known = ", ".join(self.scene.stimuli) or "none"
             raise InputError(f"stimulus {channel!r}: no such channel; the scene {self.scene.name!r} has: {known}")
         allowed = self.scene.stimuli[channel]
-        if value is not None and not (math.isfinite(value) and allowed.minimum <= value <= allowed.maximum):
+        accepted = None if value is None else value_in_range(value, allowed.minimum, allowed.maximum)
+        if value is not None and accepted is None:
             raise InputError(
                 f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
                 f"to {allowed.maximum:g} (unit {allowed.unit})"
             )
-        self._override(list(self.scene.stimuli).index(channel), f"stimulus {channel!r}", value, over)
-        self._note(STIMULUS, channel, math.nan if value is None else float(value), float(over))
+        self._override(list(self.scene.stimuli).index(channel), f"stimulus {channel!r}", accepted, over)
+        self._note(STIMULUS, channel, math.nan if accepted is None else accepted, float(over))
 
     def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
         """Multiply force and moment of a load by a factor from the next step on.

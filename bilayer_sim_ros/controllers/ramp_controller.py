@@ -22,6 +22,7 @@ from builtin_interfaces.msg import Time
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -79,12 +80,20 @@ class RampController(Node):
             self.create_timer(1.0 / rate, lambda: self.hear(real.now().to_msg()), clock=self.steady)
 
     def parameter(self, name: str, default, description: str):
-        """Declare a parameter; its value."""
+        """Declare a parameter and return its value; whole numbers will do for numbers."""
         self.known.add(name)
+        value = default
         if self.has_parameter(name):  # as it was given, with any type
+            value = self.get_parameter(name).value
             self.undeclare_parameter(name)
+        kind, wanted = map(Parameter.Type.from_parameter_value, (value, default))
+        if kind != wanted and kind.name.replace("INTEGER", "DOUBLE") == wanted.name:
+            value = float(value) if wanted == Parameter.Type.DOUBLE else list(map(float, value))
+        elif kind != wanted:
+            allowed = wanted.name.lower().replace("_", " ")
+            raise ValueError(f"parameter '{name}' is {str(value)[:100]!r}; allowed is a value of the type {allowed}")
         descriptor = ParameterDescriptor(description=description, read_only=True)
-        return self.declare_parameter(name, default, descriptor).value
+        return self.declare_parameter(name, value, descriptor, ignore_override=True).value
 
     @property
     def connected(self) -> bool:

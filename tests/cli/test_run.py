@@ -107,6 +107,26 @@ def test_the_end_of_a_run_is_the_same_bit_for_bit_whatever_records_it(here, step
         assert set(slow) <= set(fast)  # which has all steps
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (
+            ["--tolerance", "1e-4"],
+            "steps end at least 50 times a second, and each gives one frame at most; --set output",
+        ),
+        (["--dt", "2 ms"], "steps end 500 times a second, and each gives one frame at most; a shorter --dt gives more"),
+        (["--tolerance", "1e-4", "--set", "output.rate=1000"], None),
+        (["--dt", "1 ms"], None),
+    ],
+    ids=["adaptive", "fixed", "adaptive, as the scene says", "fixed, short enough"],
+)
+def test_more_frames_than_steps_have_to_give_are_told_at_the_start(here, capsys, options, said):
+    log = ["--log", "run.mcap", "--log-rate", "1 kHz"]
+    assert main(["run", "cantilever", "--duration", "10 ms", *log, *options]) == 0
+    told = capsys.readouterr().err
+    assert (f"--log-rate 1000: {said}" in told) if said else "--log-rate" not in told
+
+
 def test_the_log_holds_the_scene_with_all_changes(here):
     options = ["--dt", "2 ms", "--set", "rods.strip.stations=21", "--log-rate", "10", "--quiet", "--log", "run.mcap"]
     assert main(["run", "cantilever", "--duration", "0.01", *options]) == 0

@@ -11,6 +11,7 @@ from rclpy.serialization import deserialize_message
 from rosbags.typesys import Stores, get_typestore
 from visualization_msgs.msg import Marker
 
+from bilayer_core import Simulator, load_scene
 from bilayer_core.record.cdr import nanoseconds, read_float64_multi_array
 from bilayer_core.record.encoders import FrameEncoder, encode_float64, multi_array_template
 from bilayer_core.record.markers import (
@@ -175,6 +176,21 @@ def test_the_axes_of_a_node_are_director_width_and_tangent(encoder, typestore):
     np.testing.assert_array_equal(
         [poses[node].position.x, poses[node].position.y, poses[node].position.z], frame.positions[node]
     )
+
+
+@pytest.mark.parametrize(("model", "nodes"), [("laminate", 200), ("two_rod", 392)])
+def test_points_are_the_nodes_in_their_order_and_then_contact_points_of_bodies(model, nodes, typestore):
+    simulator = Simulator(load_scene("gripping"), model=model)
+    encoder, topics = FrameEncoder(simulator.description), {of.name: of for of in output_topics(simulator.description)}
+    decoded = {
+        name: typestore.deserialize_cdr(encoder.encode(name, simulator.frame()), topics[name].type)
+        for name in ("nodes", "points")
+    }
+    at = np.array([[p.position.x, p.position.y, p.position.z] for p in decoded["nodes"].poses])
+    points = decoded["points"].data.view("<f4").reshape(-1, 8)
+    assert (len(at), len(points)) == (nodes, nodes + 1)
+    np.testing.assert_array_equal(points[:nodes, :3], at.astype("<f4"))
+    assert points[nodes, 3:5].tolist() == [0.0, 0.0]
 
 
 def test_markers_tile_ribbons_with_bars_and_show_forces_only_while_there_are_any(encoder, typestore):

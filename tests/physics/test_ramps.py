@@ -114,6 +114,7 @@ def test_loads_may_be_set_by_ramps():
         (0.5, float("inf"), "over = inf is not allowed"),
         (None, 0.1, "over = 0.1 s needs a value to get to"),
         (2.0, 0.1, "2.0 is not allowed; it must be from 0 to 1"),
+        (1.00000001, 0.1, "1.00000001 is not allowed; it must be from 0 to 1"),
     ],
 )
 def test_a_ramp_that_cannot_be_is_refused_and_changes_nothing(value, over, fault):
@@ -122,6 +123,16 @@ def test_a_ramp_that_cannot_be_is_refused_and_changes_nothing(value, over, fault
     with pytest.raises(InputError, match=fault):
         driven.set_stimulus("swelling", value, over=over)
     np.testing.assert_array_equal(driven.save_state(), before)
+
+
+@pytest.mark.parametrize(("value", "end"), [(1.0000000000000002, 1.0), (-1e-17, 0.0), (1.0 + 5e-10, 1.0)])
+def test_a_stimulus_that_passes_its_range_by_rounding_is_the_end_of_the_range(value, end):
+    driven, told = bender(), []
+    driven.listen(told.append)
+    driven.set_stimulus("swelling", value)
+    driven.run(until=0.001)
+    assert driven.stimulus["swelling"] == end
+    assert told[0].values[0] == end
 
 
 def test_a_ramp_shorter_than_what_counts_as_one_time_is_a_jump():

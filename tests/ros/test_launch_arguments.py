@@ -47,6 +47,11 @@ def test_arguments_of_the_player_have_short_names():
     assert len(set(map(argument_name, REPLAY_NODE))) == len(REPLAY_NODE)
 
 
+def test_the_former_name_of_an_argument_still_works():
+    assert parameters_of(SIM_NODE, {"friction": "0.3"}) == {"friction": 0.3}
+    assert parameters_of(SIM_NODE, {"friction.coefficient": "0.3"}) == {"friction.coefficient": 0.3}
+
+
 def test_arguments_that_almost_have_the_name_of_one_are_told():
     assert near_misses(DECLARED, ["scene", "real_time_facto", "logg", "use_rviz", "world"]) == [
         "launch argument 'real_time_facto' is not read: did you mean 'real_time_factor'?",
@@ -71,7 +76,6 @@ def warnings(monkeypatch):
         "launch.logging": {"get_logger": lambda name: SimpleNamespace(warning=said.append)},
         "launch_ros": {},
         "launch_ros.actions": {"Node": Noted},
-        "launch_ros.parameter_descriptions": {"ParameterValue": lambda value, value_type: value},
     }
     for name, content in modules.items():
         module = ModuleType(name)
@@ -98,9 +102,11 @@ def test_launch_files_declare_all_arguments_and_start_one_node(root, warnings, f
     given = {name: argument.default_value for name, argument in declared.items()}
     (node,) = function.function(SimpleNamespace(launch_configurations=given))
     assert (node.package, node.executable, node.parameters) == ("bilayer_sim_ros", executable, [])
+    assert node.ros_arguments == []
     given |= {"params_file": "mine.yaml", "log": "a.mcap", "rat": "2"}
     (node,) = function.function(SimpleNamespace(launch_configurations=given))
-    assert node.parameters == ["mine.yaml", {"log": "a.mcap"}]
+    assert node.parameters == ["mine.yaml"]
+    assert node.ros_arguments == ["-p", 'log:="a.mcap"']
     assert warnings == ["launch argument 'rat' is not read: did you mean 'rate'?"]
     with pytest.raises(RuntimeError, match=f"{executable}: parameter .*'fast'"):
         function.function(SimpleNamespace(launch_configurations=given | {"rate": "fast"}))

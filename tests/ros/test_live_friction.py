@@ -62,12 +62,12 @@ def ask(client, kind, service, request):
 
 
 def set_friction(client, **values):
-    parameters = [Parameter(name.replace("_", "."), value=value).to_parameter_msg() for name, value in values.items()]
+    parameters = [Parameter(f"friction.{key}", value=value).to_parameter_msg() for key, value in values.items()]
     return ask(client, SetParameters, "set_parameters", SetParameters.Request(parameters=parameters)).results[0]
 
 
 def shown(client):
-    answer = ask(client, GetParameters, "get_parameters", GetParameters.Request(names=["friction"]))
+    answer = ask(client, GetParameters, "get_parameters", GetParameters.Request(names=["friction.coefficient"]))
     return answer.values[0].double_value
 
 
@@ -89,27 +89,30 @@ def test_without_friction_in_the_scene_no_coefficient_can_be_given():
     with pytest.raises(InputError, match=r"'friction.forward' is 0.1; .* has no contact.friction, so allowed is -1"):
         friction_overrides(smooth, none | {"friction.forward": 0.1})
     live = LiveFriction(Simulator(smooth), Commands(pytest.fail), pytest.fail)
-    with pytest.raises(InputError, match="parameter 'friction' is 0.1: .*nothing slides against friction in the scene"):
-        live.changes["friction"](0.1)
+    with pytest.raises(
+        InputError, match="'friction.coefficient' is 0.1: .*nothing slides against friction in the scene"
+    ):
+        live.changes["friction.coefficient"](0.1)
 
 
 def test_a_block_slides_once_friction_is_below_the_slope_until_a_reset(client, process, folder):
     poses, events = client.listen(PoseStamped, "/bilayer_sim/body_pose/block"), []
     client.node.create_subscription(Log, "/bilayer_sim/events", events.append, 100)
-    assert shown(client) == 0.4
+    assert shown(client) == 0.4  # by the name that the coefficient had before
+    assert process.output.count("parameter 'friction' is now called 'friction.coefficient'") == 1
     assert abs(way(client, poses)) < 1e-5
-    assert set_friction(client, friction=0.2).successful
+    assert set_friction(client, coefficient=0.2).successful
     slid = way(client, poses)
     cosine = math.cos(math.atan(SLOPE))
     assert slid == pytest.approx(0.5 * GRAVITY * (SLOPE - 0.2) * cosine * 0.2**2, rel=0.05)
     assert [event.msg for event in events if event.name == "setting"] == ["contact.friction.coefficient is 0.2"]
-    assert set_friction(client, friction=-1.0).successful
+    assert set_friction(client, coefficient=-1.0).successful
     way(client, poses)
     assert abs(way(client, poses)) < 1e-5  # by the 0.4 with which the node was started
     for bad in (-0.1, math.nan, math.inf):
-        refused = set_friction(client, friction_sideways=bad)
+        refused = set_friction(client, sideways=bad)
         assert not refused.successful and "allowed is a finite number >= 0, or -1" in refused.reason
-    assert set_friction(client, friction=0.0).successful
+    assert set_friction(client, coefficient=0.0).successful
     assert client.call("reset").success
     client.spin_until(lambda: shown(client) == 0.4, "the value of the start after a reset")
     assert abs(way(client, poses)) < 1e-5

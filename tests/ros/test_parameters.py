@@ -2,7 +2,7 @@ import pytest
 import yaml
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.parameters import REPLAY_NODE, SIM_NODE, NodeParameter, accept_all
+from bilayer_sim_ros.parameters import BUILT_IN, REPLAY_NODE, SIM_NODE, NodeParameter, accept_all
 
 RATE = NodeParameter("rate", 50.0, "messages per second [Hz]", minimum=0.0, above_minimum=True)
 MODE = NodeParameter("mode", "hold", "what acts", choices=("hold", "zero"))
@@ -68,6 +68,12 @@ def test_the_parameter_file_lists_every_parameter_with_its_default(root):
 @pytest.mark.parametrize("table", [SIM_NODE, REPLAY_NODE])
 def test_every_default_is_allowed(table):
     assert accept_all(table, {}) == {p.name: p.default for p in table}
+
+
+@pytest.mark.parametrize("table", [SIM_NODE, REPLAY_NODE])
+def test_no_name_of_a_parameter_is_the_prefix_of_another(table):
+    names = {*BUILT_IN, *(parameter.name for parameter in table)}
+    assert not [name for name in names for other in names if other.startswith(f"{name}.")]
 
 
 @pytest.mark.parametrize("parameter", REPLAY_NODE, ids=lambda parameter: parameter.name)

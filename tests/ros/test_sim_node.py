@@ -280,10 +280,27 @@ def test_rates_may_be_set_at_any_time_and_are_told_as_events(client, heard):
             assert set_parameter(client, name, value).successful
 
 
+def test_a_rate_above_that_of_the_scene_may_be_set_at_any_time(client, heard):
+    clock = heard(Clock, "/clock")
+    try:
+        assert set_parameter(client, "rate", 400.0).successful
+        assert [to_seconds(step(client, clock).clock) for _ in range(4)] == pytest.approx(
+            [0.0025, 0.005, 0.0075, 0.01], abs=1e-9
+        )
+    finally:
+        assert set_parameter(client, "rate", 50.0).successful
+
+
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
         ("rate", -1.0, "-1"),
+        ("rate", 2e6, "'rate' is 2e+06; allowed is at most 1e+06 Hz"),
+        (
+            "marker_rate",
+            100.0,
+            "'marker_rate' is 100; allowed is at most the rate of frames, 50 Hz: set 'rate' to that",
+        ),
         ("real_time_factor", "fast", "parameter 'real_time_factor' is 'fast'; allowed is a finite number >= 0"),
         ("scene", "gripping", "read-only"),
     ],

@@ -11,6 +11,7 @@ from rosgraph_msgs.msg import Clock
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.record.log_reader import read_info, read_log, read_state
+from bilayer_core.runs.replay import verify
 
 FAST = {"scene": "bending", "real_time_factor": 0}
 
@@ -71,6 +72,32 @@ def test_frames_at_another_rate_are_those_of_the_first_steps_after_their_times(s
     unwatched = Simulator(load_scene("bending"), tolerance=1e-3)
     unwatched.run(0.5)
     np.testing.assert_array_equal(read_state(log)[0], unwatched.save_state())
+
+
+def test_a_rate_above_that_of_the_scene_has_all_its_frames_at_their_times(start, domain, tmp_path):
+    log = tmp_path / "run.mcap"
+    parameters = {"rate": 200, "marker_rate": 200, "duration": 0.5, "stimulus_fallback": "schedule"}
+    node = start("sim_node", domain, FAST | parameters | {"log": log})
+    assert node.wait() == 0, node.output
+    assert read_log(log).times == pytest.approx(np.arange(101) / 200.0, abs=1e-9)
+    assert read_info(log).topics["/bilayer_sim/markers"]["count"] == 101
+    assert verify(log).passed
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        (
+            {"rate": 200, "dt": 0.01},
+            "'rate' is 200; allowed is at most 100 Hz: fixed steps of 0.01 s end no more often",
+        ),
+        ({"marker_rate": 100}, "'marker_rate' is 100; allowed is at most the rate of frames, 50 Hz"),
+    ],
+)
+def test_a_rate_that_cannot_be_kept_is_refused(start, domain, parameters, said):
+    node = start("sim_node", domain, FAST | parameters)
+    assert node.wait() == 2
+    assert said in node.output
 
 
 def test_dt_alone_asks_for_fixed_steps(start, domain, tmp_path):

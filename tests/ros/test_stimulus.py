@@ -29,7 +29,17 @@ def test_of_several_messages_between_two_steps_the_last_counts():
     assert stimulus.changes(0.0) == {"humidity": 0.6, "current": 5.0}
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -0.1, 1.1])
+def test_values_that_pass_the_range_by_rounding_are_its_ends_by_every_topic():
+    stimulus = inputs()
+    stimulus.receive("humidity", 1.0000000000000002)
+    assert stimulus.changes(0.0) == {"humidity": 1.0}
+    stimulus.receive_all([-1e-17, 8.000000000000002])
+    assert stimulus.changes(0.1) == {"humidity": 0.0, "current": 8.0}
+    assert stimulus.receive_stamped(1, ["humidity", "current"], [1.0 + 1e-12, 2.0 - 1e-12]) == ""
+    assert stimulus.changes(0.2) == {"humidity": 1.0, "current": 2.0}
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -0.1, 1.1, 1.00000001, -1e-8])
 def test_a_value_out_of_range_is_refused_and_the_last_good_one_stays(value):
     stimulus = inputs()
     stimulus.receive("humidity", 0.5)

@@ -272,6 +272,25 @@ def test_a_fault_of_a_schedule_is_told_without_its_type_in_the_key_path(schedule
 
 
 @pytest.mark.parametrize(
+    "schedule",
+    [
+        {**SINE, "amplitude": 0.5000000000000001},
+        {**RAMP, "to": 1.0000000000000002},
+        {**TABLE, "values": [-1e-17, 1.0000000000000002]},
+    ],
+    ids=str,
+)
+def test_a_schedule_that_passes_its_range_by_rounding_only_is_allowed(schedule):
+    load_scene(changed("stimuli.humidity.schedule", schedule))
+
+
+@pytest.mark.parametrize("value", [1.00000001, -1e-8])
+def test_a_schedule_that_passes_its_range_by_more_than_rounding_is_refused(value):
+    (fault,) = faults_of(changed("stimuli.humidity.schedule", {"type": "hold", "value": value}))
+    assert "must lie in the range of the channel, 0 to 1 [1]" in fault
+
+
+@pytest.mark.parametrize(
     ("motion", "fault"),
     [
         ({**MOVE, "displacements": [[0, 0, 1]]}, ".displacements[0]: found [0.0, 0.0, 1.0]; must be [0, 0, 0]"),
