@@ -75,7 +75,7 @@ class Announcer:
     def _say_log(self, status: Status) -> None:
         if status.log.failure and status.log.failure != self._failure:
             self._node.get_logger().error(f"{status.log.failure}; the simulation goes on without it")
-        elif status.dropped:
+        elif status.dropped and not status.log.failure:
             self._node.get_logger().warning(
                 f"the disk is slower than the log: {status.log.dropped} frames are left out so far, but no input",
                 throttle_duration_sec=WARNING_PERIOD,

@@ -178,7 +178,7 @@ class SimulationRun:
             self._simulation.announcer.say_compiling(done, total)
 
     def _say_end(self, worker, simulator) -> None:
-        if worker.log_status.dropped:
+        if worker.log_status.dropped and not worker.log_status.failure:
             self._logger.warning(f"the log lacks {worker.log_status.dropped} frames: the disk was too slow")
         if worker.error is None:
             self._logger.info(

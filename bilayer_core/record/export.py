@@ -128,10 +128,15 @@ def _csv_writer(path: Path, columns: list[Column]) -> Iterator[Callable[[list[np
         csv.writer(file, lineterminator="\n").writerow(map(text_cell, header))
 
         def write(arrays: list[np.ndarray]) -> None:
-            rows = zip(*(array.astype(str).tolist() for array in arrays), strict=True)  # the shortest exact digits
-            file.writelines(f"{','.join(row)}\n" for row in rows)
+            row = ",".join(map(_digits, arrays)) + "\n"
+            file.writelines(map(row.__mod__, zip(*(array.tolist() for array in arrays), strict=True)))
 
         yield write
+
+
+def _digits(array: np.ndarray) -> str:
+    """Return the format of numbers that reads back to the last bit."""
+    return "%.9g" if array.dtype == np.float32 else "%r"
 
 
 @contextmanager

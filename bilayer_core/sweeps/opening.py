@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import socket
-import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -206,14 +205,14 @@ def _check(engine: Engine, address: str, job: Job, answer: dict[str, Any]) -> No
 
 @contextmanager
 def _token(job: Job) -> Iterator[str]:
-    """Name of a file that is in the directory of logs meanwhile; empty if there are none."""
+    """Yield the name of something that is in the directory of logs meanwhile; empty if there are no logs."""
     if job.logs == "none":
         yield ""
         return
     folder = Path(job.directory, LOGS)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(prefix=".shared-", dir=folder) as file:
-            yield Path(file.name).name
+        with private_directory(folder) as directory:
+            yield directory.parent.name
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written: {error.strerror or error}") from error

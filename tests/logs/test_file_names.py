@@ -128,7 +128,7 @@ def test_an_export_keeps_a_file_that_comes_while_it_is_written(log, tmp_path, mo
         (tmp_path / "out" / "com.csv").write_text("precious")
 
     monkeypatch.setattr(module, "_write_tables", meanwhile)
-    with pytest.raises(OutputError, match=r"out: cannot be written: File exists"):
+    with pytest.raises(OutputError, match=r"out/com.csv: cannot be written: File exists"):
         export(log, tmp_path / "out", CSV, ["com"])
     assert (tmp_path / "out" / "com.csv").read_text() == "precious"
 
