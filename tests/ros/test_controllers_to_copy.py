@@ -27,7 +27,7 @@ FAST = 4.0
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_a_controller_is_one_short_file_that_imports_nothing_of_the_project(root, name):
     source = (root / f"bilayer_sim_ros/controllers/{name}.py").read_text(encoding="utf-8")
-    assert source.count("\n") < 150
+    assert source.count("\n") < 170
     nodes = list(ast.walk(ast.parse(source)))
     names = [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     names += [node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
