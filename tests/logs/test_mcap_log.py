@@ -125,7 +125,7 @@ def test_rosbags_reads_every_message(log):
         counts = {connection.topic: connection.msgcount for connection in reader.connections}
         decoded = [reader.deserialize(raw, connection.msgtype) for connection, _, raw in reader.messages()]
         offered = {connection.topic: connection.ext.offered_qos_profiles for connection in reader.connections}
-    assert len(decoded) == sum(counts.values()) == 14 * 51 + 2 + 3  # inputs, events
+    assert len(decoded) == sum(counts.values()) == 15 * 51 + 26 + 1 + 2 + 3  # contact, ground, inputs, events
     assert {len(profiles) for profiles in offered.values()} == {1}
     profile = offered["/bilayer_sim/state"][0]
     assert (profile.history.name, profile.depth) == ("KEEP_LAST", 10)
@@ -141,7 +141,7 @@ def test_mcap_ros2_reads_every_message_in_order_of_time(log):
         last = {}
         for _, channel, message, decoded in reader.iter_decoded_messages():
             last[channel.topic] = (message.log_time, decoded)
-    assert len(last) == 17
+    assert len(last) == 20
     stamp, pose = last["/bilayer_sim/body_pose/ball"]
     assert stamp == 10**9
     assert (pose.header.stamp.sec, pose.header.frame_id) == (1, "world")

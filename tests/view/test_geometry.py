@@ -130,7 +130,7 @@ def test_the_text_beside_the_picture_states_its_scales():
     assert "axial strain [%]: -6 (blue) over 0 (grey) to +6 (red)" in text
     # Arrows of 21.5 mN become a quarter of the robot's 116 mm, up to rounding of the scale.
     assert "8 mN for 10 mm" in text
-    assert "Squares on the ground:** 15 mm" in text
+    assert "Squares on the ground: 15 mm" in text
 
 
 @pytest.mark.parametrize(("value", "scale"), [(0.052, 0.06), (0.06, 0.06), (9.1e-5, 1e-4), (1.2, 1.5), (70.0, 70.0)])
