@@ -17,7 +17,7 @@ import numpy as np
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.friction import COEFFICIENTS
 from bilayer_core.observed.frame import Description
-from bilayer_core.observed.inputs import FRICTION, LOAD, STIMULUS, UNTIL, Input
+from bilayer_core.observed.inputs import FRICTION, LOAD, RESET, STIMULUS, UNTIL, Input
 from bilayer_core.observed.system import machine, versions
 from bilayer_core.record.cdr import read_float64_multi_array
 from bilayer_core.record.chain import STATE, Wholeness, check_chain
@@ -160,6 +160,9 @@ def verify(path: str | Path, tolerance: float | None = None, derived: bool = Fal
         if isinstance(event, Input):
             waiting.append(event)
             result.inputs += event.kind != UNTIL
+            if event.kind == RESET:  # what was set, and steps since the last state, no longer matter
+                simulator.reset()
+                until, waiting = math.inf, []
             continue
         time = float(event[0])
         if result.states == 0:
