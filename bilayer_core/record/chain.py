@@ -176,7 +176,8 @@ def check_chain(path: str | Path, description: Description) -> Wholeness:
             good, wanted = last, next(expected, None)
     found = chain.link
     if wanted is not None and wanted.messages > found.messages:
-        there = f"{found.states} of {wanted.states} states and {found.inputs} of {wanted.inputs} inputs are there"
+        written = end or links[-1]
+        there = f"{found.states} of {written.states} states and {found.inputs} of {written.inputs} inputs are there"
         return _broken("some states or inputs at the end", good, there)
     if wanted is not None or (end is not None and end != found):
         return _broken("some states or inputs at the end", good)

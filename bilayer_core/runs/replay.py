@@ -17,7 +17,7 @@ import numpy as np
 from bilayer_core.errors import InputError, SimulationError, naming
 from bilayer_core.model.friction import COEFFICIENTS
 from bilayer_core.observed.frame import Description
-from bilayer_core.observed.inputs import FRICTION, LOAD, STIMULUS, UNTIL, Input
+from bilayer_core.observed.inputs import FRICTION, LOAD, RESET, STIMULUS, UNTIL, Input
 from bilayer_core.observed.system import machine, versions
 from bilayer_core.printable import shortened
 from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
@@ -172,6 +172,9 @@ def _verified(path: Path, tolerance: float | None, derived: bool) -> Verificatio
         if isinstance(event, Input):
             waiting.append(event)
             result.inputs += event.kind != UNTIL
+            if event.kind == RESET:  # what was set, and steps since the last state, no longer matter
+                simulator.reset()
+                until, waiting = math.inf, []
             continue
         time = float(event[0])
         if result.states == 0:

@@ -224,6 +224,20 @@ def test_a_log_that_left_frames_out_is_whole(tmp_path, monkeypatch):
     assert found.passed and 0 < found.states < recorder.dropped + found.states <= 11
 
 
+def test_a_log_that_goes_on_after_a_reset_comes_out_and_is_whole(tmp_path):
+    simulator, path = Simulator(load_scene(pushed())), tmp_path / "run.mcap"
+    detach = simulator.attach(McapRecorder(path, rate=100.0))
+    for stimulus in (0.5, 0.2):
+        simulator.set_stimulus("heat", stimulus)
+        simulator.run(0.05)
+        simulator.step()  # no frame is of this one
+        simulator.reset()
+    simulator.run(0.03)
+    detach()
+    found = verify(path, derived=True)
+    assert found.passed and found.inputs == 4 and found.states > 10
+
+
 def test_a_log_without_a_hash_is_verified_and_said_to_be_of_an_older_version(log, tmp_path, capsys):
     def older(record):
         if record.name == END:

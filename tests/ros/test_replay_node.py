@@ -341,7 +341,7 @@ def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it_and_then_plays(r
             "'play.playback_until_timestamp' is 0.05; ",
         ),
         ({"play.position": 99.0}, "'play.position' is 99; "),
-        ({"play.clock_from_log": True}, "'play.clock_from_log' is true; "),
+        ({"play.clock_from_log": True}, "'play.clock_from_log' is true, and "),
         (
             {"play.clock_from_log": True, "play.clock_publish_frequency": 40.0},
             "'play.clock_from_log' is true, and 'play.clock_publish_frequency' asks for another /clock",
