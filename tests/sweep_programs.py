@@ -42,7 +42,15 @@ def end(processes):
     for process in processes:
         process.terminate()
     for process in processes:
-        process.wait(20)
+        process.wait(60)
+
+
+def await_workers(address, count=1):
+    """Wait until workers have joined a scheduler; a sweep waits for them no longer than a user would."""
+    from distributed import Client
+
+    with Client(address, set_as_default=False) as client:
+        client.wait_for_workers(count, timeout=120)
 
 
 def start_scheduler(file, *options):

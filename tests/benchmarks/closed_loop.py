@@ -97,7 +97,7 @@ def control(name: str, channel: str, seed: int, mode: str) -> None:
             sent += 1
             if mode == TOPICS:
                 publisher.publish(Float64(data=value))
-        if mode == LOCKSTEP and now != answered:
+        if mode == LOCKSTEP and now != answered and publisher.get_subscription_count() > 0:
             answered = now
             publisher.publish(Float64(data=value))
 
@@ -196,11 +196,15 @@ def figures_of(name: str, mode: str, seed: int, log: Path, options: argparse.Nam
 def row(name: str, mode: str, runs: list[dict[str, float]]) -> str:
     """The row of a table: from the smallest to the largest figure of some runs."""
     cells = [name, f"{SIGNALS[name][1]:g}", mode]
-    for key in (*FACTORS, *ERRORS):
-        low, high = min(run[key] for run in runs), max(run[key] for run in runs)
-        form = ".2%" if key in ERRORS else ".2f"
-        cells.append(f"{low:{form}} to {high:{form}}")
+    cells += [extent([run[key] for run in runs]) for key in FACTORS]
+    cells += [f"{extent([100.0 * run[key] for run in runs])} %" for key in ERRORS]
     return f"| {' | '.join(cells)} |"
+
+
+def extent(values: list[float]) -> str:
+    """From the smallest to the largest of some values."""
+    low, high = f"{min(values):.2g}", f"{max(values):.2g}"
+    return low if low == high else f"{low} to {high}"
 
 
 def main() -> None:

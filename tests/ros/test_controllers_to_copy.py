@@ -141,7 +141,7 @@ def test_beside_a_free_run_it_stands_still_in_a_pause_and_begins_anew_after_a_re
         assert client.call("resume").success
         client.spin_until(lambda: applied[-1].data[0] > 0.4, "a part of the way")
         values = [message.data[0] for message in applied[begun:]]
-        assert min(values) < 0.1 and max(np.diff(values)) < 0.2  # it rises from the start on
+        assert min(values) < 0.1 and max(np.diff(values)) < 0.4  # it rises from the start on, not from where it was
         assert client.call("pause").success
         client.spin_until(lambda: applied[-1].data == applied[-2].data, "the first repetition of the paused time")
         still = applied[-1].data[0]

@@ -1,21 +1,28 @@
-"""The feedback controller in lockstep: the same run bit for bit, however late and slow it is, and after a reset."""
+"""Feedback in lockstep: each tick has a frame, and the same run comes out however late and slow the controller is."""
 
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 
-import numpy as np
 import pytest
 from acted_scenes import TWO_CHANNELS
 from logged_commands import stimuli_taken
 from rosgraph_msgs.msg import Clock
 
+from bilayer_core import Simulator, load_scene
 from bilayer_core.record.log_reader import read_messages
 from bilayer_core.record.topics import INPUTS
+from bilayer_sim_ros import worker
+from bilayer_sim_ros.commands import Commands
+from bilayer_sim_ros.control import Control
 from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.pacing import Pacer
+from bilayer_sim_ros.recording import Recording
+from bilayer_sim_ros.stimulus import StimulusInputs
 
 LOCKSTEP = {"lockstep": True, "real_time_factor": 0.0}
 BEAT = {"period": 0.08, "tolerance": 1e-5, "axis": [0.0, 0.0, -1.0], "goal": [0.0, 0.0, -0.01]}
@@ -65,9 +72,9 @@ def before(time, messages):
     return [message for message in messages if message[1] < 1e9 * time]
 
 
-def run(start, domain, log, lateness, seed, longest_nap, **parameters):
+def run(start, domain, log, lateness, seed, longest_nap):
     """Run a node to its end; the controller begins so long after the node waits for it [s], or before the node."""
-    simulation = LOCKSTEP | {"scene": "bending", "log": log} | parameters
+    simulation = LOCKSTEP | {"scene": "bending", "log": log, "duration": 0.4}
     if lateness is None:
         with goal_controller(domain, seed=seed, longest_nap=longest_nap):
             node = start("sim_node", domain, simulation)
@@ -80,29 +87,86 @@ def run(start, domain, log, lateness, seed, longest_nap, **parameters):
         assert node.wait() == 0, node.output
 
 
+class Audience:
+    """Somebody who subscribes to frames."""
+
+    wanted = True
+
+    def __init__(self, heard):
+        self._heard = heard
+
+    def publish(self, frame, everything=False):
+        self._heard.append(("frame", frame.time))
+
+
+class Gate:
+    """Controllers that hear of ticks, and answer at once or never."""
+
+    wait_ends_at = float("inf")
+
+    def __init__(self, heard, waiting):
+        self._heard, self.waiting = heard, waiting
+
+    def publish(self, time):
+        self._heard.append(("tick", time))
+
+    def open(self, time, stand=False):
+        self.publish(time)
+
+
+def start_worker(waiting, finished=lambda: None):
+    """A run with 30 frames and 100 ticks a second, and what is heard of it, in order."""
+    simulator, heard = Simulator(load_scene("bending")), []
+    simulator.compile()
+    control = Control(StimulusInputs([], 0.0, "hold"), Commands(pytest.fail), 100.0, "hold", Gate(heard, waiting))
+    started = worker.SimulationWorker(
+        simulator,
+        control=control,
+        publisher=Audience(heard),
+        recording=Recording("", "", 30.0, 30.0, 0.0),
+        rate=30.0,
+        pacer=Pacer(0.0),
+        duration=0.2,
+        report=lambda status: None,
+        finished=finished,
+    )
+    started.start()
+    return started, heard
+
+
+def test_each_tick_has_a_frame_before_it_also_where_the_rate_gives_none():
+    over = threading.Event()
+    started, heard = start_worker(waiting=False, finished=over.set)
+    assert over.wait(60.0) and started.error is None
+    ticks = [time for kind, time in heard if kind == "tick"]
+    assert ticks == pytest.approx([k / 100 for k in range(21)])
+    before = [heard[index - 1] for index, (kind, _) in enumerate(heard) if kind == "tick"]
+    assert before == [("frame", time) for time in ticks]
+
+
+def test_while_a_tick_waits_its_frame_is_repeated_with_it(monkeypatch):
+    monkeypatch.setattr(worker, "SHOWING_PERIOD", 0.01)
+    deadline = time.monotonic() + 60.0
+    started, heard = start_worker(waiting=True)
+    while len(heard) < 8 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    started.stop()
+    assert started.error is None
+    assert heard[:8] == [("frame", 0.0), ("tick", 0.0)] * 4
+
+
 @pytest.mark.slow
 def test_ten_runs_whose_controllers_start_late_and_are_slow_are_equal(start, domain, tmp_path):
     cases = [(lateness, nap) for lateness in (None, 0.0, 0.5, 2.0) for nap in (0.0, 0.05)] + [(None, 0.1), (1.0, 0.1)]
     logs = [tmp_path / f"{seed}.mcap" for seed in range(len(cases))]
     for seed, ((lateness, nap), log) in enumerate(zip(cases, logs, strict=True)):
-        run(start, domain, log, lateness, seed, nap, duration=0.4)
+        run(start, domain, log, lateness, seed, nap)
     first = states(logs[0])
     assert len(stimuli_taken(logs[0])) == 20
     peaks = {value for _, value in stimuli_taken(logs[0]) if value > 0.05}
     assert len(peaks) > 5  # beats of different sizes: what the controller saw decides
     for log in logs[1:]:
         assert states(log) == first
-
-
-def test_ticks_between_frames_have_frames_for_controllers(start, domain, tmp_path):
-    logs = [tmp_path / "early.mcap", tmp_path / "late.mcap"]
-    for log, lateness, nap in zip(logs, (None, 1.0), (0.0, 0.01), strict=True):
-        run(start, domain, log, lateness, 1, nap, duration=0.2, rate=30.0, control_period=0.01)
-    times = [when for when, _ in stimuli_taken(logs[0])]
-    assert times == pytest.approx(np.arange(20) * 0.01, abs=1e-9)
-    assert states(logs[0]) == states(logs[1])
-    frames = [stamp for topic, stamp, _ in states(logs[0]) if topic.endswith("state")]
-    assert len(frames) == 7  # the log keeps to its rate
 
 
 def test_two_feedback_controllers_make_the_same_run_after_a_reset_and_with_a_pause(start, connect, domain, tmp_path):

@@ -240,8 +240,8 @@ def test_an_answer_takes_no_polling_period(start, connect, domain, tmp_path):
     client.node.create_subscription(Clock, "/clock", answer, 10)
     client.spin_until(lambda: heard, "the start")
     assert client.call("resume").success
-    client.spin_until(lambda: len(heard) >= 300, "300 answers")
+    client.spin_until(lambda: len(heard) >= 100, "100 answers")
     moments = [moment for _, moment in heard]
     trips = sorted(b - a for a, b in zip(moments[:-1], moments[1:], strict=True))
-    # A worker that nobody wakes looks again after a second.
-    assert trips[len(trips) // 2] < 0.1, "half of the round trips, each with a step"
+    # A worker that nobody wakes looks again after a second; a trip takes milliseconds, and longer on a busy machine.
+    assert trips[len(trips) // 2] < 0.5, "half of the round trips, each with a step"

@@ -11,7 +11,7 @@ import time
 
 import pytest
 import yaml
-from sweep_programs import address_in, dask, end, start_scheduler, wait_until
+from sweep_programs import address_in, await_workers, dask, end, start_scheduler, wait_until
 
 from bilayer_core import read_results
 from bilayer_core.errors import EngineError, InputError
@@ -167,10 +167,7 @@ def test_workers_with_another_version_are_refused_before_the_first_run(strip, tm
         with pytest.raises(InputError, match="has no workers; start some with `dask worker ADDRESS`"):
             sweep(strip, scheduler=address)
         processes.append(dask("worker", *options, BILAYER_JIT_PUBLIC="1"))  # other compiled code
-        from distributed import Client
-
-        with Client(address, set_as_default=False) as client:
-            client.wait_for_workers(1, timeout=60)
+        await_workers(address)
         with pytest.raises(InputError, match=r"has other versions: sources \w+ \(here \w+\)"):
             sweep(strip, scheduler=address)
     finally:
@@ -197,6 +194,7 @@ def test_a_scheduler_that_goes_is_told_and_what_is_done_is_kept(strip, tmp_path)
         address = address_in(file)
         options = address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)
         processes.append(dask("worker", *options))
+        await_workers(address)
         seen = []
 
         def look(row):
