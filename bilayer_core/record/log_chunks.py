@@ -29,6 +29,7 @@ from bilayer_core.record.log_records import (
     walk,
 )
 from bilayer_core.record.opening import is_finished, open_log
+from bilayer_core.record.topics import LOG_NAMESPACE
 
 MOST_BARE = 1 << 20
 """Of messages that stand outside of chunks, as many as are read at once [bytes]."""
@@ -36,10 +37,11 @@ MOST_BARE = 1 << 20
 
 @dataclass(frozen=True)
 class LogChannel:
-    """A topic in a file: its full name and ROS type, and what rosbag2 is told of it."""
+    """A topic in a file: its full name and ROS type, how its messages are encoded, and what rosbag2 is told of it."""
 
     topic: str
     type: str
+    encoding: str
     metadata: dict[str, str]
 
 
@@ -62,6 +64,8 @@ class LogFile:
     Attributes
     ----------
     path : Path
+    namespace : str
+        What the names of a run's topics begin with.
     channels : dict
         Number -> `LogChannel`.
     has_index : bool
@@ -75,6 +79,8 @@ class LogFile:
         If it is no MCAP file, or is damaged.
     """
 
+    namespace = LOG_NAMESPACE
+
     def __init__(self, path: str | Path):
         self.path = Path(path)
         self.channels: dict[int, LogChannel] = {}
@@ -82,11 +88,7 @@ class LogFile:
         self._chunks: list[_Chunk] = []
         with open_log(self.path) as file:
             summary = read_summary(file)
-            self.has_index = summary is not None and (
-                bool(summary.chunk_indexes)
-                or not summary.channels
-                or (summary.statistics is not None and summary.statistics.message_count == 0)
-            )
+            self.has_index = summary is not None and _is_index(summary)
             if self.has_index:
                 self._take(summary, file)
             else:
@@ -103,6 +105,10 @@ class LogFile:
 
         Chunks that have none of them, or whose messages are all before `begin` [ns], are not unpacked.
         """
+        return ((topic, time, data) for topic, time, _, data in self.records(topics, begin))
+
+    def records(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, int, bytes]]:
+        """Yield what `messages` yields, with the time at which a message was sent [ns] before its data."""
         with open_log(self.path) as file:
             for chunk in self._chunks:
                 wanted = {
@@ -116,9 +122,9 @@ class LogFile:
                 for opcode, start, end in records_of(inside):
                     if opcode != MESSAGE:
                         continue
-                    number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
+                    number, _, time, sent = MESSAGE_HEAD.unpack_from(inside, start)
                     if number in wanted:
-                        yield wanted[number], time, inside[start + MESSAGE_HEAD.size : end]
+                        yield wanted[number], time, sent, inside[start + MESSAGE_HEAD.size : end]
 
     def _is(self, number: int, topics: set[str] | None) -> bool:
         return number in self.channels and (topics is None or self.channels[number].topic in topics)
@@ -196,9 +202,10 @@ class LogFile:
         self._chunks[-1].times = {number: np.array(of, np.uint64) for number, of in times.items()}
 
     def _add_channel(self, channel) -> None:
-        if channel.schema_id not in self._schemas:
+        if channel.schema_id and channel.schema_id not in self._schemas:
             raise InputError(f"{self.path}: is damaged: the type of {channel.topic} is missing")
-        self.channels[channel.id] = LogChannel(channel.topic, self._schemas[channel.schema_id], channel.metadata)
+        name = self._schemas.get(channel.schema_id, "")  # of number 0: the file does not say
+        self.channels[channel.id] = LogChannel(channel.topic, name, channel.message_encoding, channel.metadata)
 
     def _add_index(self, data: bytes) -> bool:
         """Take a message index of the last chunk; False if it speaks of a channel that is not known yet."""
@@ -207,6 +214,14 @@ class LogFile:
             return False
         self._chunks[-1].times[number] = times
         return True
+
+
+def _is_index(summary) -> bool:
+    """Return whether a summary tells all that a file holds; other writers may leave parts of it out."""
+    if summary.statistics is not None and summary.statistics.message_count == 0:
+        return True
+    described = all(channel.schema_id in (0, *summary.schemas) for channel in summary.channels.values())
+    return bool(summary.chunk_indexes and summary.channels) and described
 
 
 def read_summary(file: BinaryIO):

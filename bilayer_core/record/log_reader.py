@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
+from bilayer_core.record.bag import Bag, BagRun, split_address
 from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
 from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.log_head import Head, read_head
+from bilayer_core.record.log_head import Head, is_log, read_head
 from bilayer_core.record.log_records import METADATA, content, parse, walk
 from bilayer_core.record.log_source import LogSource
 from bilayer_core.record.logged_run import LoggedRun
@@ -40,18 +42,23 @@ CUT_OFF = "cut off"
 REPAIRED = "repair"
 """Metadata record of a log that `repair` has made: what it kept and lost."""
 STATE = f"{LOG_NAMESPACE}/state"
+READ_BAGS = ("view", "render", "plot", "export", "compare")
+"""Verbs that read bags too."""
+FIRST_DATE = 946_684_800 * NANOSECONDS
+"""Of the year 2000: messages that were logged before have no date, but a time of simulation [ns]."""
 
 
 @dataclass(frozen=True)
 class LogInfo:
-    """What a log holds: the content of `bilayer info` (`dataclasses.asdict` gives its JSON).
+    """What a log, a bag or another file holds: the content of `bilayer info` (`dataclasses.asdict` gives its JSON).
 
     Attributes
     ----------
     path, scene, title : str
+        Scene and title are empty where the file does not say.
     versions, settings : dict
     start_time, last_time, duration : float
-        Simulated time of the first and last message, and between them [s].
+        Simulated time of the first and last message, and between them [s]; of a bag, if it holds one run.
     channels : tuple of str
         Stimulus channels.
     topics : dict
@@ -64,6 +71,14 @@ class LogInfo:
         Of the file [bytes].
     lacks : tuple of str
         What a log of this version holds and this one does not, and what cannot be done without.
+    kind : str
+        ``"log"``; ``"bag"``, which a recorder made of the messages of nodes; ``"mcap"`` without any such messages.
+    runs : tuple of BagRun
+        Of a bag.
+    recorded : tuple of str
+        When the first and the last message of a bag were recorded, in UTC; empty where it does not say.
+    commands : tuple of str
+        Verbs of `bilayer` that can read the file beside ``info``.
     """
 
     path: str
@@ -80,11 +95,24 @@ class LogInfo:
     termination: str
     size: int
     lacks: tuple[str, ...] = ()
+    kind: str = "log"
+    runs: tuple[BagRun, ...] = ()
+    recorded: tuple[str, ...] = ()
+    commands: tuple[str, ...] = (*READ_BAGS, "replay", "repair", "run --from-state")
 
 
 def read_info(path: str | Path) -> LogInfo:
-    """What a log holds, from its index or, when it was cut off, by reading it through. InputError if it is no log."""
-    path = Path(path)
+    """What a log holds, from its index or, when it was cut off, by reading it through; what a bag holds, by reading it
+    through once, and any other MCAP file.
+
+    Raises
+    ------
+    InputError
+        If it is no MCAP file, or is damaged.
+    """
+    path, node, number = split_address(path)
+    if node or number or path.is_dir() or not is_log(path):
+        return _info_of_bag(Bag(path, node), number)
     head, file = read_head(path), LogFile(path)
     stamps = {topic: file.times(topic) for topic in sorted(file.topics)}
     filled = [of for of in stamps.values() if len(of)]
@@ -108,6 +136,46 @@ def read_info(path: str | Path) -> LogInfo:
         size=path.stat().st_size,
         lacks=_lacks(head, file, metadata),
     )
+
+
+def _info_of_bag(bag: Bag, number: int) -> LogInfo:
+    """What a file holds that is no log of ours."""
+    files = bag.files
+    logged = {topic: files.times(topic) for topic in sorted(files.topics)}
+    filled = [of for of in logged.values() if len(of)]
+    span = [int(min(of.min() for of in filled)), int(max(of.max() for of in filled))] if filled else []
+    runs = tuple(run for run in bag.runs if number in (0, run.number))
+    source = LogSource(f"{files.path}{runs[0].address}", *bag.opened(runs[0])) if len(runs) == 1 else None
+    return LogInfo(
+        path=str(files.path),
+        scene=source.description.scene_name if source else "",
+        title=source.description.title if source else "",
+        versions={},
+        settings=source.description.settings if source else {},
+        start_time=runs[0].start_time if source else 0.0,
+        last_time=runs[0].last_time if source else 0.0,
+        duration=runs[0].last_time - runs[0].start_time if source else 0.0,
+        channels=source.description.channels if source else (),
+        topics={topic: {"type": files.topics[topic], "count": len(of)} for topic, of in logged.items()},
+        complete=False,
+        termination="",
+        size=sum(part.path.stat().st_size for part in files.parts),
+        lacks=_lacks_of_bag(bag, source),
+        kind="bag" if bag.runs else "mcap",
+        runs=runs,
+        recorded=tuple(map(_date, span)) if span and span[0] >= FIRST_DATE else (),
+        commands=READ_BAGS if bag.runs else (),
+    )
+
+
+def _lacks_of_bag(bag: Bag, source: LogSource | None) -> tuple[str, ...]:
+    lacks = [f"{topic}: its quantities are not there" for topic in (source.lacks if source else ())]
+    lacks += [f"{part.path}: an index, as it was not finished" for part in bag.files.parts if not part.has_index]
+    return tuple(lacks)
+
+
+def _date(time: int) -> str:
+    return datetime.fromtimestamp(time // NANOSECONDS, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 def read_description(path: str | Path) -> Description:
@@ -145,7 +213,8 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
 
 
 def read_log(path: str | Path) -> RunData:
-    """A run as arrays over time, which are read when they are asked for.
+    """A run as arrays over time, which are read when they are asked for: of a log, or of a bag of ``ros2 bag record``
+    (`opened_run.open_run` says how runs in one are named).
 
     ``run["com"]`` reads that quantity alone, so that also logs larger than the memory can be looked into; attributes
     such as ``run.positions`` read all that comes at one rate. Times are those at which the log has all topics of a

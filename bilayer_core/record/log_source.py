@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -14,15 +13,17 @@ from bilayer_core.observed.frame import Description
 from bilayer_core.record import encoders
 from bilayer_core.record.cdr import NANOSECONDS, Template, read_float64_multi_array
 from bilayer_core.record.event_messages import decode_event
-from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.log_head import Head, read_head
+from bilayer_core.record.log_head import Head
 from bilayer_core.record.node_frames import node_order
+from bilayer_core.record.opened_run import MessageSource, open_run
 from bilayer_core.record.quantities import Entry, Quantity, entries
-from bilayer_core.record.topics import EVENTS, LOG_NAMESPACE, Rate, output_topics
+from bilayer_core.record.topics import EVENTS, Rate, output_topics
 
 Array = np.ndarray
 BLOCK = 8 << 20
 """About as much is read at once [bytes]."""
+PADDING = 4
+"""Some middlewares fill messages up to a multiple of this [bytes]."""
 TIME, SHAPE_TIME = "time", "shape_time"
 """The two times of a run: of frames, and of shapes of rods."""
 _WIDTHS = {"body_positions": 3, "body_quaternions": 4, "contact_wrenches": 6, "clamp_wrenches": 6}
@@ -63,22 +64,13 @@ class _Queue:
     seen: int = 0
 
 
-class MessageSource(Protocol):
-    """Messages of a run: a file, or what has come of it so far."""
-
-    topics: dict[str, str]
-
-    def times(self, topic: str) -> Array: ...
-
-    def messages(self, topics: set[str] | None = None) -> Iterator[tuple[str, int, bytes]]: ...
-
-
 class LogSource:
     """The quantities of a log.
 
     Parameters
     ----------
     path : str or Path
+        Of a log or a bag, see `open_run`.
     head : Head, optional
     file : MessageSource, optional
         If they are read already.
@@ -101,8 +93,10 @@ class LogSource:
 
     def __init__(self, path: str | Path, head: Head | None = None, file: MessageSource | None = None):
         self.path = Path(path)
-        self.description: Description = (head or read_head(self.path)).description
-        self._file = file or LogFile(self.path)
+        if head is None or file is None:
+            head, file = open_run(path)
+        self.description: Description = head.description
+        self._file = file
         unread = ("/clock", "state", "markers")
         groups: dict[str, list[str]] = {TIME: [], SHAPE_TIME: []}
         for spec in output_topics(self.description):
@@ -111,12 +105,12 @@ class LogSource:
         self._topics: dict[str, _Topic] = {}
         self.times: dict[str, Array] = {}
         lacks: list[str] = []
-        stamps = {name: self._file.times(_full(name)) for names in groups.values() for name in names}
+        stamps = {name: self._file.times(self._full(name)) for names in groups.values() for name in names}
         begun = any(len(of) for of in stamps.values())  # what comes later does not lack in a log of no frame yet
         for group, names in groups.items():
             held = {name: stamps[name] for name in names if len(stamps[name]) or not begun}
             missing = [name for name in names if name not in held]
-            lacks += [_full(name) for name in missing if held or _full(name) not in self._file.topics]
+            lacks += [self._full(name) for name in missing if held or self._full(name) not in self._file.topics]
             self.times[group] = self._align(held)
         self.lacks = tuple(lacks)
         terms, figures = (self._topics[name].labels if name in self._topics else () for name in ("energy", "solver"))
@@ -124,7 +118,7 @@ class LogSource:
         self.entries = {
             entry.name: entry
             for entry in entries(self.description, terms, figures)
-            if _full(entry.topic) not in lacking
+            if self._full(entry.topic) not in lacking
         }
 
     def why_not(self, name: str) -> str | None:
@@ -132,7 +126,7 @@ class LogSource:
         held = self.description
         for entry in entries(held, (), ()):
             if entry.name == name and name not in self.entries:
-                return f"{self.path} does not hold it: it has no {_full(entry.topic)}"
+                return f"{self.path} does not hold it: it has no {self._full(entry.topic)}"
         return None
 
     def read(self, entry: Entry) -> Quantity:
@@ -143,7 +137,7 @@ class LogSource:
     def attributes_with(self, name: str) -> dict[str, object]:
         """That attribute of `RunData`, and all others that come at the same rate."""
         if name == EVENTS.name:
-            return {name: tuple(decode_event(data) for _, _, data in self._file.messages({EVENTS.full_name()}))}
+            return {name: tuple(decode_event(data) for _, _, data in self._file.messages({self._full(EVENTS.name)}))}
         if name in _OF_SHAPES:
             return self._shapes()
         # Of a run that goes on, shapes may have come alone.
@@ -174,7 +168,7 @@ class LogSource:
         """
         queues: dict[str, _Queue] = {}
         for entry in wanted:
-            queues.setdefault(_full(entry.topic), _Queue(self._topics[entry.topic])).wanted.append(entry)
+            queues.setdefault(self._full(entry.topic), _Queue(self._topics[entry.topic])).wanted.append(entry)
         if not queues:
             return
         rows = max(1, most // sum(queue.topic.size for queue in queues.values()))
@@ -185,17 +179,20 @@ class LogSource:
             queue.seen += 1
             if number >= len(topic.stamps) or topic.stamps[number] != stamp:
                 raise InputError(f"{self.path}: is damaged: its index says another time for {name} than the message")
-            if len(data) != topic.size:
+            if not topic.size <= len(data) < topic.size + PADDING:
                 raise InputError(f"{self.path}: {name}: a message has {len(data)} bytes, expected are {topic.size}")
             if topic.kept is not None and not topic.kept[number]:
                 continue
-            queue.messages.append(data)
+            queue.messages.append(data[: topic.size])
             if len(queue.messages) >= rows and all(len(of.messages) >= rows for of in queues.values()):
                 yield slice(done, done + rows), _taken(queues.values(), rows)
                 done += rows
         left = min(len(queue.messages) for queue in queues.values())
         if left:
             yield slice(done, done + left), _taken(queues.values(), left)
+
+    def _full(self, name: str) -> str:
+        return f"{self._file.namespace}/{name}"
 
     def _values(self, wanted: list[Entry]) -> dict[str, Array]:
         """Values of quantities that come at one rate, by name."""
@@ -259,7 +256,7 @@ class LogSource:
         if labelled and not len(stamps):
             return _Topic(name, 1, 0, np.dtype(float), (len(self.description.channels),), stamps)
         if labelled:
-            _, _, data = next(self._file.messages({_full(name)}))
+            _, _, data = next(self._file.messages({self._full(name)}))
             labels, values = read_float64_multi_array(data)
             offset = len(data) - values.nbytes
             return _Topic(name, len(data), offset, values.dtype, values.shape, stamps, tuple(labels))
@@ -278,10 +275,6 @@ class LogSource:
 
 
 _OF_SHAPES = ("positions", "contact_forces", "material_frames", "strain", "curvature")
-
-
-def _full(name: str) -> str:
-    return f"{LOG_NAMESPACE}/{name}"
 
 
 def _group(entry: Entry) -> str:
