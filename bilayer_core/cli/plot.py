@@ -37,7 +37,9 @@ def plot(
     logs = [word for word in logs_and_quantities if _is_log(word)]
     quantities = [word for word in logs_and_quantities if word not in logs]
     if not logs:
-        raise InputError(f"plot: none of {', '.join(logs_and_quantities)} is a log ({SUFFIX}) or a bag; name at least one")
+        raise InputError(
+            f"plot: none of {', '.join(logs_and_quantities)} is a log ({SUFFIX}) or a bag; name at least one"
+        )
     if not quantities:
         raise InputError(
             f"plot: say which quantities, such as com.z; `bilayer info {logs[0]} --quantities` lists those of the log"

@@ -39,6 +39,8 @@ class BagRun:
         Simulated [s].
     described : bool
         Whether the bag holds the node's description.
+    stamped : bool
+        Whether it holds messages with stamps; otherwise times are those since the first message.
     """
 
     node: str
@@ -47,6 +49,7 @@ class BagRun:
     start_time: float
     last_time: float
     described: bool
+    stamped: bool
 
     @property
     def address(self) -> str:
@@ -89,12 +92,23 @@ class Bag:
 
     def __init__(self, path: Path, node: str = ""):
         self.node, self.files = node, BagFiles(path)
-        self._nodes = index_bag(self.files, node)
+        self._nodes, self._unreadable = index_bag(self.files, node)
         self.runs = [
-            BagRun(name, k + 1, len(of.runs), begin / NANOSECONDS, end / NANOSECONDS, bool(of.descriptions))
+            BagRun(name, k + 1, len(of.runs), begin / NANOSECONDS, end / NANOSECONDS, bool(of.descriptions), of.stamped)
             for name, of in sorted(self._nodes.items())
             for k, (begin, end) in enumerate(of.runs)
         ]
+
+    @property
+    def problem(self) -> str:
+        """Which topics of the nodes cannot be read, and why; empty if all can."""
+        if not self._unreadable:
+            return ""
+        first, *others = self._unreadable
+        return (
+            f"{first}{f' and {len(others)} more' if others else ''}: the messages do not begin as ROS 2 encodes "
+            "them; those that `ros2 bag record --compression-mode message` compressed are not read: record without it"
+        )
 
     def opened(self, run: BagRun) -> tuple[Head, BaggedRun]:
         """Return what one of the runs is, and its messages."""
@@ -158,6 +172,8 @@ def choose_run(bag: Bag, number: int = 0) -> BagRun:
     """
     path = bag.files.path
     runs = [run for run in bag.runs if number in (0, run.number)]
+    if not bag.runs and bag.problem:
+        raise InputError(f"{path}: {bag.problem}")
     if not bag.runs:
         raise InputError(
             f"{path}: holds no messages of {bag.node or 'a node sim_node'}; `bilayer info {path}` lists its topics. To "
@@ -166,12 +182,12 @@ def choose_run(bag: Bag, number: int = 0) -> BagRun:
         )
     if len(runs) != 1:
         every = runs or bag.runs
-        told = [f"{path}{run.address} ({run.start_time:g} to {run.last_time:g} s)" for run in every[:MOST_LISTED]]
+        listed = [f"{path}{run.address} ({run.start_time:g} to {run.last_time:g} s)" for run in every[:MOST_LISTED]]
         more = f" and {len(every) - MOST_LISTED} more" if len(every) > MOST_LISTED else ""
-        wrong = "no run of that number" if not runs else f"{len(runs)} runs"
-        jumps = max(run.of for run in every)
-        why = f"; time goes back {jumps - 1} times: a reset, a new start, or two nodes of one name" if jumps > 1 else ""
-        raise InputError(f"{path}: holds {wrong}{why}; name one: {', '.join(told)}{more}")
+        found = f"{len(runs)} runs" if runs else f"no run {number}"
+        back = any(run.of > 1 for run in every)
+        why = " (its time goes back: by a reset, a new start of the node, or two nodes of one name)" if back else ""
+        raise InputError(f"{path}: holds {found}{why}; name one: {', '.join(listed)}{more}")
     return runs[0]
 
 

@@ -10,17 +10,11 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import is_log
+from bilayer_core.record.opening import CONVERT
 
 SUFFIX = ".mcap"
-OTHERS = {
-    ".db3": "the bag is stored with sqlite3",
-    ".zstd": "the files of the bag are compressed as a whole",
-}
-"""What is not read, and why, by the end of a file's name."""
-CONVERT = (
-    "convert it with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml says "
-    "`output_bags: [{uri: NEW, storage_id: mcap, all: true}]`"
-)
+OTHERS = {".db3": "a bag stored with sqlite3", ".zstd": "a bag whose files are compressed as a whole"}
+"""What is not read, by the end of a file's name."""
 
 
 class BagFiles:
@@ -67,14 +61,12 @@ class BagFiles:
 
 def _files_of(path: Path) -> list[Path]:
     if not path.is_dir():
-        if path.suffix.lower() in OTHERS:
-            raise InputError(f"{path}: {OTHERS[path.suffix.lower()]}, which is not read; {CONVERT}")
         return [path]
     inside = sorted(path.iterdir())
     files = [of for of in inside if of.suffix.lower() == SUFFIX]
-    for suffix, reason in OTHERS.items():
+    for suffix, what in OTHERS.items():
         if any(of.suffix.lower() == suffix for of in inside):
-            raise InputError(f"{path}: {reason} (*{suffix}), which is not read; {CONVERT}")
+            raise InputError(f"{path}: is {what}, which is not read; {CONVERT}")
     if not files:
         raise InputError(f"{path}: is a directory without {SUFFIX} files, and so no bag of `ros2 bag record`")
     if logs := [of.name for of in files if is_log(of)]:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import BodyInfo, Description
 from bilayer_core.record.bag_files import BagFiles
 from bilayer_core.record.cdr import HEADER, NANOSECONDS
@@ -103,12 +102,15 @@ class NodeTracks:
         When each description was sent [ns], and it.
     runs : list of (int, int)
         Simulated time of the first and the last message of each run [ns].
+    stamped : bool
+        Whether any messages have stamps; otherwise times are those since the first one came.
     """
 
     node: str
     tracks: dict[str, Track] = field(default_factory=dict)
     descriptions: list[tuple[int, bytes]] = field(default_factory=list)
     runs: list[tuple[int, int]] = field(default_factory=list)
+    stamped: bool = True
 
     def description_of(self, number: int) -> bytes | None:
         """Return the last description that was sent before a run began, or the first one; None without any."""
@@ -117,8 +119,8 @@ class NodeTracks:
         return before[-1] if before else self.descriptions[0][1] if self.descriptions else None
 
 
-def index_bag(files: BagFiles, wanted: str = "") -> dict[str, NodeTracks]:
-    """Return the nodes whose topics a bag holds, by name, after reading it once.
+def index_bag(files: BagFiles, wanted: str = "") -> tuple[dict[str, NodeTracks], list[str]]:
+    """Read a bag once for the nodes whose topics it holds.
 
     Parameters
     ----------
@@ -127,10 +129,12 @@ def index_bag(files: BagFiles, wanted: str = "") -> dict[str, NodeTracks]:
         The full name of a node that is looked for by its name, whatever it has; by default, those that are recognised
         by their topics.
 
-    Raises
-    ------
-    InputError
-        If a message is not as ROS 2 encodes it.
+    Returns
+    -------
+    nodes : dict
+        Full name -> `NodeTracks`.
+    unreadable : list of str
+        Topics whose messages are not encoded as ROS 2 encodes them.
     """
     named: dict[str, dict[str, str]] = {}
     for topic, ros_type in files.topics.items():
@@ -141,7 +145,11 @@ def index_bag(files: BagFiles, wanted: str = "") -> dict[str, NodeTracks]:
     read = {topic: _Reading(files, topic) for names in nodes.values() for topic in names.values()}
     for topic, _, sent, data in files.records(set(read)):
         read[topic].add(sent, data)
-    return {node: _tracks_of(node, {name: read[topic] for name, topic in of.items()}) for node, of in nodes.items()}
+    tracks = {
+        node: _tracks_of(node, {name: read[topic] for name, topic in of.items() if read[topic].readable})
+        for node, of in nodes.items()
+    }
+    return tracks, [topic for topic, of in read.items() if not of.readable]
 
 
 def _is_ours(names: dict[str, str]) -> bool:
@@ -153,7 +161,7 @@ class _Reading:
     """The times of one topic, as it is read."""
 
     def __init__(self, files: BagFiles, topic: str):
-        self._place = f"{files.path}: {topic}"
+        self.readable = True
         self._stamped = files.topics[topic] not in (MULTI_ARRAY, DESCRIPTION.type)
         self._kept = files.topics[topic] == DESCRIPTION.type
         self.sent, self.stamps = array("q"), array("q")
@@ -162,10 +170,8 @@ class _Reading:
     def add(self, sent: int, data: bytes) -> None:
         """Note the times of a message."""
         if data[:2] != HEADER[:2] or len(data) < len(HEADER) + _STAMP.size:
-            raise InputError(
-                f"{self._place}: a message does not begin as ROS 2 encodes it; one that `ros2 bag record` compressed "
-                "(--compression-mode message) is not read: record without it"
-            )
+            self.readable = False
+            return
         self.sent.append(min(sent, 2**63 - 1))
         if self._stamped:
             seconds, rest = _STAMP.unpack_from(data, len(HEADER))
@@ -188,6 +194,7 @@ def _tracks_of(node: str, read: dict[str, _Reading]) -> NodeTracks:
     events = held.tracks.get(EVENTS.name)
     stamped = {name: of for name, of in held.tracks.items() if _type(name) != MULTI_ARRAY and of is not events}
     bare = [of for name, of in held.tracks.items() if _type(name) == MULTI_ARRAY]
+    held.stamped = bool(stamped)
     starts = _separate_runs(list(stamped.values()))
     if events is not None:
         events.runs = np.searchsorted(starts, events.sent, side="right")
@@ -221,18 +228,19 @@ def _separate_runs(stamped: list[Track]) -> Array:
 
 
 def _give_stamps(stamped: list[Track], bare: list[Track]) -> None:
-    """Give messages without stamps those of their frames; without any frame, the time since the first one came."""
+    """Give messages without stamps those of their frames; where none has a stamp, the time since the first one came."""
     if not stamped:
-        first = min((int(of.sent.min()) for of in bare), default=0)
-        for of in bare:
-            of.stamps = of.sent - first
-        return
+        if not bare:
+            return
+        longest = max(bare, key=lambda of: len(of.sent))
+        longest.stamps = longest.sent - longest.sent.min()
+        stamped, bare = [longest], [of for of in bare if of is not longest]
     runs, stamps, sent = (np.concatenate(of) for of in zip(*((t.runs, t.stamps, t.sent) for t in stamped), strict=True))
-    order = np.lexsort((sent, stamps, runs))  # each frame at the first of its messages
+    order = np.lexsort((sent, stamps, runs))
     runs, stamps, sent = runs[order], stamps[order], sent[order]
-    begins = np.r_[True, (np.diff(runs) != 0) | (np.diff(stamps) != 0)]
-    runs, stamps, sent = runs[begins], stamps[begins], np.maximum.accumulate(sent[begins])
+    begins = np.flatnonzero(np.r_[True, (np.diff(runs) != 0) | (np.diff(stamps) != 0)])
+    first, last = (np.maximum.accumulate(of) for of in (sent[begins], np.maximum.reduceat(sent, begins)))
     for of in bare:
-        frames = match_frames(of.sent, sent)
-        of.runs = np.where(frames < 0, -1, runs[frames])
-        of.stamps = np.where(frames < 0, 0, stamps[frames])
+        frames = match_frames(of.sent, first, last)
+        of.runs = np.where(frames < 0, -1, runs[begins][frames])
+        of.stamps = np.where(frames < 0, 0, stamps[begins][frames])

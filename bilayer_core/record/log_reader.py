@@ -14,7 +14,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.bag import Bag, BagRun, split_address
+from bilayer_core.record.bag import Bag, BagRun, choose_run, split_address
 from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, is_log, read_head
@@ -145,33 +145,37 @@ def _info_of_bag(bag: Bag, number: int) -> LogInfo:
     filled = [of for of in logged.values() if len(of)]
     span = [int(min(of.min() for of in filled)), int(max(of.max() for of in filled))] if filled else []
     runs = tuple(run for run in bag.runs if number in (0, run.number))
-    source = LogSource(f"{files.path}{runs[0].address}", *bag.opened(runs[0])) if len(runs) == 1 else None
+    if not runs and (bag.node or number):
+        choose_run(bag, number)  # says which there are
+    lacks, source = [bag.problem] if bag.problem else [], None
+    if len(runs) == 1:
+        try:
+            source = LogSource(f"{files.path}{runs[0].address}", *bag.opened(runs[0]))
+            lacks += [f"{topic}: its quantities are not there" for topic in source.lacks]
+        except InputError as error:
+            lacks.append(str(error))
+    lacks += [f"{part.path}: an index, as it was not finished" for part in files.parts if not part.has_index]
+    lacks += [f"{run.node}: stamps; times are those since its first message" for run in runs if not run.stamped]
     return LogInfo(
         path=str(files.path),
         scene=source.description.scene_name if source else "",
         title=source.description.title if source else "",
         versions={},
         settings=source.description.settings if source else {},
-        start_time=runs[0].start_time if source else 0.0,
-        last_time=runs[0].last_time if source else 0.0,
-        duration=runs[0].last_time - runs[0].start_time if source else 0.0,
+        start_time=runs[0].start_time if len(runs) == 1 else 0.0,
+        last_time=runs[0].last_time if len(runs) == 1 else 0.0,
+        duration=runs[0].last_time - runs[0].start_time if len(runs) == 1 else 0.0,
         channels=source.description.channels if source else (),
         topics={topic: {"type": files.topics[topic], "count": len(of)} for topic, of in logged.items()},
         complete=False,
         termination="",
         size=sum(part.path.stat().st_size for part in files.parts),
-        lacks=_lacks_of_bag(bag, source),
+        lacks=tuple(lacks),
         kind="bag" if bag.runs else "mcap",
         runs=runs,
         recorded=tuple(map(_date, span)) if span and span[0] >= FIRST_DATE else (),
         commands=READ_BAGS if bag.runs else (),
     )
-
-
-def _lacks_of_bag(bag: Bag, source: LogSource | None) -> tuple[str, ...]:
-    lacks = [f"{topic}: its quantities are not there" for topic in (source.lacks if source else ())]
-    lacks += [f"{part.path}: an index, as it was not finished" for part in bag.files.parts if not part.has_index]
-    return tuple(lacks)
 
 
 def _date(time: int) -> str:

@@ -6,7 +6,7 @@ from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Strand
 from bilayer_core.record.run_data import RunData
 
-DRAWN = ("body_pose", "com", "nodes", "points")
+DRAWN = ("body_pose", "nodes", "points")
 """Topics without which there is nothing to draw."""
 
 

@@ -83,8 +83,8 @@ class Studio:
         refuse_undrawable(run, str(path))
         if not all(map(has_sections, run.description.layers)):
             raise InputError(
-                f"{path}: does not hold the node's description, so the widths of its rods are not known; `bilayer view` "
-                "shows their nodes as points"
+                f"{path}: does not hold the node's description, so the widths of its rods are not known; "
+                "`bilayer view` shows their nodes as points"
             )
         self._scales = choose_scales(run)
         self._colouring = choose_colouring(run, look.colour)

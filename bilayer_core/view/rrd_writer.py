@@ -204,10 +204,11 @@ class RunSender:
                 },
             },
             **energy_groups(run, set(self._curves.get("energy", ())) | set(self._curves.get(GRAVITY, ()))),
-            "solver": {"iterations per step": run.solver["iterations"] / np.maximum(run.solver["substeps"], 1)},
         }
-        if np.isfinite(run.solver["min_gap"]).all():  # infinite where nothing can touch
-            groups["solver"]["smallest gap [mm]"] = 1e3 * run.solver["min_gap"]
+        if solver := run.solver:
+            groups["solver"] = {"iterations per step": solver["iterations"] / np.maximum(solver["substeps"], 1)}
+            if np.isfinite(solver["min_gap"]).all():  # infinite where nothing can touch
+                groups["solver"]["smallest gap [mm]"] = 1e3 * solver["min_gap"]
         for group, series in groups.items():
             for name, values in series.items():
                 self._send_curve(group, name, run.times, values)
