@@ -41,6 +41,8 @@ class BagRun:
         Whether the bag holds the node's description.
     stamped : bool
         Whether it holds messages with stamps; otherwise times are those since the first message.
+    certain : bool
+        Whether messages without stamps have the times of their frames for certain.
     """
 
     node: str
@@ -50,6 +52,7 @@ class BagRun:
     last_time: float
     described: bool
     stamped: bool
+    certain: bool
 
     @property
     def address(self) -> str:
@@ -94,7 +97,16 @@ class Bag:
         self.node, self.files = node, BagFiles(path)
         self._nodes, self._unreadable = index_bag(self.files, node)
         self.runs = [
-            BagRun(name, k + 1, len(of.runs), begin / NANOSECONDS, end / NANOSECONDS, bool(of.descriptions), of.stamped)
+            BagRun(
+                name,
+                k + 1,
+                len(of.runs),
+                begin / NANOSECONDS,
+                end / NANOSECONDS,
+                bool(of.descriptions),
+                of.stamped,
+                of.certain,
+            )
             for name, of in sorted(self._nodes.items())
             for k, (begin, end) in enumerate(of.runs)
         ]

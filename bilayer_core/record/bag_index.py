@@ -104,6 +104,8 @@ class NodeTracks:
         Simulated time of the first and the last message of each run [ns].
     stamped : bool
         Whether any messages have stamps; otherwise times are those since the first one came.
+    certain : bool
+        Whether the frames of messages without stamps are certain, see `match_frames`.
     """
 
     node: str
@@ -111,6 +113,7 @@ class NodeTracks:
     descriptions: list[tuple[int, bytes]] = field(default_factory=list)
     runs: list[tuple[int, int]] = field(default_factory=list)
     stamped: bool = True
+    certain: bool = True
 
     def description_of(self, number: int) -> bytes | None:
         """Return the last description that was sent before a run began, or the first one; None without any."""
@@ -163,13 +166,14 @@ class _Reading:
     def __init__(self, files: BagFiles, topic: str):
         self.readable = True
         self._stamped = files.topics[topic] not in (MULTI_ARRAY, DESCRIPTION.type)
+        self._least = len(HEADER) + _STAMP.size * self._stamped
         self._kept = files.topics[topic] == DESCRIPTION.type
         self.sent, self.stamps = array("q"), array("q")
         self.messages: list[bytes] = []
 
     def add(self, sent: int, data: bytes) -> None:
         """Note the times of a message."""
-        if data[:2] != HEADER[:2] or len(data) < len(HEADER) + _STAMP.size:
+        if data[:2] != HEADER[:2] or len(data) < self._least:
             self.readable = False
             return
         self.sent.append(min(sent, 2**63 - 1))
@@ -198,7 +202,7 @@ def _tracks_of(node: str, read: dict[str, _Reading]) -> NodeTracks:
     starts = _separate_runs(list(stamped.values()))
     if events is not None:
         events.runs = np.searchsorted(starts, events.sent, side="right")
-    _give_stamps(list(stamped.values()), bare)
+    held.certain = _give_stamps(list(stamped.values()), bare)
     for number in range(len(starts) + 1):
         kept = [of.stamps[of.runs == number] for of in (*stamped.values(), *bare)]
         kept = [of for of in kept if len(of)]
@@ -227,11 +231,13 @@ def _separate_runs(stamped: list[Track]) -> Array:
     return starts
 
 
-def _give_stamps(stamped: list[Track], bare: list[Track]) -> None:
-    """Give messages without stamps those of their frames; where none has a stamp, the time since the first one came."""
+def _give_stamps(stamped: list[Track], bare: list[Track]) -> bool:
+    """Give messages without stamps those of their frames, or where none has a stamp, the time since the first one came;
+    returns whether they are certain.
+    """
     if not stamped:
         if not bare:
-            return
+            return True
         longest = max(bare, key=lambda of: len(of.sent))
         longest.stamps = longest.sent - longest.sent.min()
         stamped, bare = [longest], [of for of in bare if of is not longest]
@@ -240,7 +246,10 @@ def _give_stamps(stamped: list[Track], bare: list[Track]) -> None:
     runs, stamps, sent = runs[order], stamps[order], sent[order]
     begins = np.flatnonzero(np.r_[True, (np.diff(runs) != 0) | (np.diff(stamps) != 0)])
     first, last = (np.maximum.accumulate(of) for of in (sent[begins], np.maximum.reduceat(sent, begins)))
+    certain = True
     for of in bare:
-        frames = match_frames(of.sent, first, last)
+        frames, sure = match_frames(of.sent, first, last)
+        certain &= sure
         of.runs = np.where(frames < 0, -1, runs[begins][frames])
         of.stamps = np.where(frames < 0, 0, stamps[begins][frames])
+    return certain

@@ -9,15 +9,20 @@ import numpy as np
 Array = np.ndarray
 BAND = 24
 """Frames before and after the nearest one that are tried: more than a middleware keeps of one topic."""
-GAP = 5.0
-"""Price of a frame without a message, or of a message without a frame, in mean distances between frames."""
-FAR = 1.9
-"""Most that a pair costs, in such prices: a recorder that halts for a while separates pairs that it has received."""
+LONG = 95.0
+"""Percentile of the times between frames that counts as the usual one: frames may come in bursts, and a node pauses."""
+GAP = 0.3
+"""Price of a frame without a message, or of a message without a frame, in that time: less than half, so that no pair
+moves to the next frame for the sake of two that have lost their partners. Pairs farther apart than twice the price
+are none.
+"""
+LEAST = 1e5
+"""Least price [ns]: what sending the messages of one frame takes."""
 _PAIR, _NO_FRAME, _NO_MESSAGE = range(3)
 
 
-def match_frames(messages: Array, first: Array, last: Array) -> Array:
-    """Return the number of the frame that each message belongs to, -1 for none.
+def match_frames(messages: Array, first: Array, last: Array) -> tuple[Array, bool]:
+    """Find the frame that each message belongs to.
 
     Without losses, messages and frames are paired one by one. Otherwise the pairing keeps the order and has the least
     sum of distances in time, with a price for what stays without a partner.
@@ -32,17 +37,19 @@ def match_frames(messages: Array, first: Array, last: Array) -> Array:
 
     Returns
     -------
-    ndarray
-        Shape (messages,), integers; those that are not -1 increase.
+    frames : ndarray
+        Number of the frame of each message, -1 for none; shape (messages,), integers that increase but for these.
+    certain : bool
+        Whether there were no losses, or each message is nearer to its frame than to the neighbours of that.
     """
     found = np.full(len(messages), -1)
     if not len(messages) or not len(first):
-        return found
+        return found, True
     start, count = first[0], len(first)
     messages, first, last = ((of - start).astype(float) for of in (messages, first, last))
-    gap = GAP * max(float(first[-1]), 1.0) / max(count - 1, 1)
-    if len(messages) == count and (_distances(messages, first, last) <= FAR * gap).all():
-        return np.arange(count)
+    gap = max(GAP * float(np.percentile(np.diff(first), LONG)) if count > 1 else 0.0, LEAST)
+    if len(messages) == count and (_distances(messages, first, last) <= 2.0 * gap).all():
+        return np.arange(count), True
     nearest = np.maximum.accumulate(np.searchsorted(first, messages))
     low, high = np.clip(nearest - BAND, 0, count), np.clip(nearest + BAND, 0, count)
     choices = _choices(messages, first, last, gap, low, high)
@@ -54,7 +61,12 @@ def match_frames(messages: Array, first: Array, last: Array) -> Array:
             found[message] = used - 1
         message -= choice != _NO_MESSAGE
         used -= choice != _NO_FRAME
-    return found
+    frames, messages = found[found >= 0], messages[found >= 0]
+    own, before, behind = (
+        _distances(messages, first[of], last[of]) for of in (frames, np.maximum(frames - 1, 0), (frames + 1) % count)
+    )
+    nearest_is_own = ((own < before) | (frames == 0)) & ((own < behind) | (frames == count - 1))
+    return found, bool(nearest_is_own.all())
 
 
 def _distances(messages: Array, first: Array, last: Array) -> Array:
@@ -77,8 +89,7 @@ def _choices(messages: Array, first: Array, last: Array, gap: float, low: Array,
 
     for number, message in enumerate(messages):
         used = np.arange(low[number], high[number] + 1)
-        distances = np.minimum(_distances(message, first[used - 1], last[used - 1]), FAR * gap)
-        pair = np.where(used > 0, cost_of(used - 1) + distances, np.inf)
+        pair = np.where(used > 0, cost_of(used - 1) + _distances(message, first[used - 1], last[used - 1]), np.inf)
         alone = cost_of(used) + gap
         best = np.minimum(pair, alone) - gap * used
         cheapest = np.minimum.accumulate(best)

@@ -17,10 +17,11 @@ from bilayer_core.observed.frame import Description
 from bilayer_core.record.bag import Bag, BagRun, choose_run, split_address
 from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
 from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.log_head import Head, is_log, read_head
+from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.log_records import METADATA, content, parse, walk
 from bilayer_core.record.log_source import LogSource
 from bilayer_core.record.logged_run import LoggedRun
+from bilayer_core.record.opened_run import names_log
 from bilayer_core.record.opening import open_log
 from bilayer_core.record.run_data import RunData
 from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
@@ -111,7 +112,7 @@ def read_info(path: str | Path) -> LogInfo:
         If it is no MCAP file, or is damaged.
     """
     path, node, number = split_address(path)
-    if node or number or path.is_dir() or not is_log(path):
+    if not names_log(path, node, number):
         return _info_of_bag(Bag(path, node), number)
     head, file = read_head(path), LogFile(path)
     stamps = {topic: file.times(topic) for topic in sorted(file.topics)}
@@ -155,6 +156,8 @@ def _info_of_bag(bag: Bag, number: int) -> LogInfo:
         except InputError as error:
             lacks.append(str(error))
     lacks += [f"{part.path}: an index, as it was not finished" for part in files.parts if not part.has_index]
+    uncertain = "messages, and when the others were sent: energy, solver and stimulus_applied may be some frames off"
+    lacks += [f"{run.node}: {uncertain}" for run in runs if not run.certain]
     lacks += [f"{run.node}: stamps; times are those since its first message" for run in runs if not run.stamped]
     return LogInfo(
         path=str(files.path),

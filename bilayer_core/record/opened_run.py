@@ -11,6 +11,7 @@ import numpy as np
 from bilayer_core.record.bag import Bag, choose_run, split_address
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, is_log, read_head
+from bilayer_core.record.topics import LOG_NAMESPACE
 
 
 class MessageSource(Protocol):
@@ -22,6 +23,11 @@ class MessageSource(Protocol):
     def times(self, topic: str) -> np.ndarray: ...
 
     def messages(self, topics: set[str] | None = None) -> Iterator[tuple[str, int, bytes]]: ...
+
+
+def names_log(path: Path, node: str, number: int) -> bool:
+    """Return whether a name that `split_address` has split is that of a log, whose only run is of `LOG_NAMESPACE`."""
+    return node in ("", LOG_NAMESPACE) and number in (0, 1) and not path.is_dir() and is_log(path)
 
 
 def open_run(name: str | Path) -> tuple[Head, MessageSource]:
@@ -39,7 +45,7 @@ def open_run(name: str | Path) -> tuple[Head, MessageSource]:
         If there is no such file or run, or the name does not say which one.
     """
     path, node, number = split_address(name)
-    if not (node or number or path.is_dir()) and is_log(path):
+    if names_log(path, node, number):
         return read_head(path), LogFile(path)
     bag = Bag(path, node)
     return bag.opened(choose_run(bag, number))

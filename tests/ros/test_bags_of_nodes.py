@@ -40,8 +40,8 @@ class Recorder:
                 node.create_subscription(message_class(ros_type), topic, take, quality, raw=True)
         client.spin_until(lambda: len(self.count("/description")) == len(nodes), "the descriptions")
 
-    def _take(self, topic, ros_type, data):
-        self.messages.append((topic, ros_type, time.time_ns(), bytes(data)))
+    def _take(self, topic, ros_type, data, information):
+        self.messages.append((topic, ros_type, information["received_timestamp"], bytes(data)))
 
     def count(self, topic):
         """The messages of the topics that end so."""
