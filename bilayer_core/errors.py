@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from bilayer_core.printable import printable
+
 
 class BilayerError(Exception):
-    """Base of all errors raised on purpose by this package."""
+    """Base of all errors raised on purpose by this package.
+
+    Its message may quote a file, a topic or a file's name: as text it has no character that a terminal obeys.
+    """
 
     exit_code = 2
+
+    def __str__(self) -> str:
+        return printable(Exception.__str__(self))  # a KeyError, which some are too, would show it as a literal
 
 
 class SceneError(BilayerError):
@@ -26,7 +36,16 @@ class InputError(BilayerError):
 class UnknownName(InputError, KeyError):
     """There is nothing of this name; the message has the nearest names. As a KeyError it is what mappings raise."""
 
-    __str__ = Exception.__str__  # a KeyError shows its message as a literal
+
+@contextmanager
+def naming(source: object) -> Iterator[None]:
+    """Let errors about what a file holds begin with its name; `source` is its path."""
+    try:
+        yield
+    except BilayerError as error:
+        if error.exit_code != BilayerError.exit_code or str(error).startswith(printable(f"{source}: ")):
+            raise
+        raise InputError(f"{source}: {error}") from error
 
 
 class OutputError(BilayerError):

@@ -10,6 +10,7 @@ import click
 
 from bilayer_core.cli.json_output import STANDARD_OUTPUT, json_option, json_to
 from bilayer_core.cli.options import Verb, say_renamed
+from bilayer_core.cli.terminal import say
 
 if TYPE_CHECKING:
     from bilayer_core.record.compare import Comparison
@@ -53,13 +54,13 @@ def compare(first: str, second: str, json_file: str | None, everything: bool) ->
 
 
 def _tell(found: Comparison, first: str, second: str, all_rows: list, everything: bool) -> None:
-    click.echo(f"t = {found.span[0]:g} to {found.span[1]:g} s, {len(found.differences)} quantities")
+    say(f"t = {found.span[0]:g} to {found.span[1]:g} s, {len(found.differences)} quantities")
     for run, names in zip((first, second), found.only, strict=True):
         if names:
-            click.echo(f"only in {run}: {', '.join(names)}")
+            say(f"only in {run}: {', '.join(names)}")
     told = [row for row in all_rows if everything or float(row[2]) > 0.0]
     if not told:
-        click.echo("equal to the last bit of the logs")
+        say("equal to the last bit of the logs")
         return
     for row in (("quantity", "largest difference", "part of range", "at"), *told):
-        click.echo("  ".join(f"{text:{width}}" for text, width in zip(row, (*WIDTHS, 0), strict=True)).rstrip())
+        say("  ".join(f"{text:{width}}" for text, width in zip(row, (*WIDTHS, 0), strict=True)).rstrip())

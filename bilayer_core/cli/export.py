@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from bilayer_core.cli.options import Verb
+from bilayer_core.cli.terminal import say
 
 TABLE = "A table FILE{0} of all but nodes of rods, or a directory with a file of each quantity."
 
@@ -34,4 +35,4 @@ def export(
         if out:
             names = export(log, out, kind, quantities, force)
             told = names[0] if len(names) == 1 else f"{len(names)} quantities"
-            click.echo(f"{kind[1:]:9}{out}  ({told})")
+            say(f"{kind[1:]:9}{out}  ({told})")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from bilayer_core.cli.options import Verb
+from bilayer_core.cli.terminal import say
 
 if TYPE_CHECKING:
     from bilayer_core.record.log_reader import LogInfo
@@ -28,14 +29,14 @@ def info(file: str, as_json: bool, quantities: bool) -> None:
         return
     found = read_info(file)
     if as_json:
-        click.echo(json.dumps(asdict(found), indent=2, ensure_ascii=False))
+        click.echo(json.dumps(asdict(found), indent=2))
         return
     for name, text in _rows_of_log(found) if found.kind == "log" else _rows_of_bag(found):
-        click.echo(f"{name:10}{text}")
+        say(f"{name:10}{text}")
     for lack in found.lacks:
-        click.echo(f"{'lacks':10}{lack}")
+        say(f"{'lacks':10}{lack}")
     for topic, content in found.topics.items():
-        click.echo(f"  {topic:36}{content['type']:40}{content['count']} messages")
+        say(f"  {topic:36}{content['type']:40}{content['count']} messages")
 
 
 def _rows_of_log(found: LogInfo) -> Iterator[tuple[str, str]]:
@@ -69,9 +70,9 @@ def _list_quantities(file: str, as_json: bool) -> None:
     entries = LogSource(file).entries.values()
     if as_json:
         told = [{"name": of.name, "unit": of.unit, "axes": of.axes, "labels": of.labels} for of in entries]
-        click.echo(json.dumps(told, indent=2, ensure_ascii=False))
+        click.echo(json.dumps(told, indent=2))
         return
     for entry in entries:
         unit = f"[{entry.unit}]" if entry.unit else ""
         of_nodes = "each node: " if entry.of_shape and entry.labels else "each node" if entry.of_shape else ""
-        click.echo(f"  {entry.name:44}{unit:12}{of_nodes}{' '.join(entry.labels)}".rstrip())
+        say(f"  {entry.name:44}{unit:12}{of_nodes}{' '.join(entry.labels)}".rstrip())

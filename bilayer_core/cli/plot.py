@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from bilayer_core.cli.options import Verb
+from bilayer_core.cli.terminal import say
 
 SUFFIX = ".mcap"
 
@@ -46,7 +47,7 @@ def plot(
         )
     plot(logs, quantities, out, node, width if width in WIDTHS else _millimetres(width), labels, force)
     if out:
-        click.echo(f"figure    {Path(out)}")
+        say(f"figure    {Path(out)}")
 
 
 def _is_log(word: str) -> bool:

@@ -29,6 +29,7 @@ from bilayer_core.cli.scenes import scenes, schema
 from bilayer_core.cli.signals import Signals
 from bilayer_core.cli.stress import stress
 from bilayer_core.cli.sweep import sweep
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.validate import validate
 from bilayer_core.cli.view import view
 from bilayer_core.errors import BilayerError
@@ -108,4 +109,4 @@ def _explain(settings: Settings, message: str) -> None:
     """The message, after the traceback of the exception in hand if the user asked for it."""
     if settings.debug:
         traceback.print_exc()
-    click.echo(f"bilayer: {message}", err=True)
+    say(f"bilayer: {message}", err=True)

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from bilayer_core.cli.options import Duration, Verb
+from bilayer_core.cli.terminal import say
 
 SHEET_PICTURES = 6
 MOST_PICTURES = 400
@@ -130,13 +131,13 @@ def render(
         require_ffmpeg()
     studio = Studio(file, look)
     if studio.warning is not None:
-        click.echo(f"warning: {studio.warning}", err=True)
+        say(f"warning: {studio.warning}", err=True)
     if png:
         studio.picture(png, times[0] if times else None)
-        click.echo(f"picture    {png}")
+        say(f"picture    {png}")
     if sheet:
         studio.sheet(sheet, times or studio.spread(frames or SHEET_PICTURES))
-        click.echo(f"sheet      {sheet}")
+        say(f"sheet      {sheet}")
     kinds = (gif, "animation", GIF_RATE, LONGEST_GIF), (mp4, "film", FILM_RATE, LONGEST_FILM)
     for path, kind, rate, longest in kinds:
         if path:
@@ -144,7 +145,7 @@ def render(
             moments, note = _moments(studio, times, frames, rate, speed, longest)
             draw = studio.gif if kind == "animation" else studio.film
             draw(path, moments, rate, note)
-            click.echo(f"{kind:11}{path}: {len(moments)} pictures, {len(moments) / rate:.3g} s{note}")
+            say(f"{kind:11}{path}: {len(moments)} pictures, {len(moments) / rate:.3g} s{note}")
 
 
 def _moments(

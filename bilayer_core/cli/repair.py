@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from bilayer_core.cli.options import Verb
+from bilayer_core.cli.terminal import say
 
 
 @click.command(cls=Verb)
@@ -18,5 +19,5 @@ def repair(log: str, new: str, force: bool) -> None:
     """
     from bilayer_core.record.repair import repair
 
-    click.echo(repair(log, new, force))
-    click.echo(f"log  {new}")
+    say(repair(log, new, force))
+    say(f"log  {new}")

@@ -12,6 +12,7 @@ from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.nodes import become_replay_node
 from bilayer_core.cli.options import Duration, Verb, set_option
 from bilayer_core.cli.signals import Interruption
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar, progress_bar
 from bilayer_core.errors import InputError
 
@@ -135,15 +136,15 @@ def _as_json(found: Verification) -> dict:
 def _tell(found: Verification) -> None:
     how = "equal bit for bit" if found.tolerance is None else f"equal within {found.tolerance:g} of the longest rod"
     if found.passed:
-        click.echo(f"{found.states} states, {found.inputs} inputs: all {how}")
+        say(f"{found.states} states, {found.inputs} inputs: all {how}")
     if found.first is not None:
-        click.echo(f"not {how}; the first difference is at {found.first}")
+        say(f"not {how}; the first difference is at {found.first}")
     if found.largest is not None and not (found.passed and found.tolerance is None):
-        click.echo(f"largest difference of a position: {found.largest}")
+        say(f"largest difference of a position: {found.largest}")
     if found.stopped:
-        click.echo(f"the run {found.stopped}")
+        say(f"the run {found.stopped}")
     for name, (then, now) in found.changed.items():
-        click.echo(f"  {name:20}{then} in the log, {now} here")
+        say(f"  {name:20}{then} in the log, {now} here")
 
 
 def _values(option: str, texts: tuple[str, ...]) -> dict[str, float | None]:
@@ -195,7 +196,7 @@ def _go_on(
         simulator.run(duration, observers=observers, interrupted=interrupt.grant, progress=show, inputs=inputs)
     if not quiet:
         for line in summary_lines({**simulator.summary(), "duration": duration}, set()):
-            click.echo(line)
+            say(line)
     if interrupt.granted:
         raise Interruption(interrupt.wished)
 
@@ -240,7 +241,7 @@ def _branch_out(
             show(f"{varied.name} = {of.value:g}")
     write_branches(branches, varied.name, rrd, force)
     if not quiet:
-        click.echo(f"{len(branches)} branches from t = {begin:g} s to {until:g} s by {varied.name}: {rrd}")
+        say(f"{len(branches)} branches from t = {begin:g} s to {until:g} s by {varied.name}: {rrd}")
         for of in branches:
             if of.stopped:
-                click.echo(f"  {varied.name} = {of.value:g} stopped at t = {of.run.times[-1]:g} s: {of.stopped}")
+                say(f"  {varied.name} = {of.value:g} stopped at t = {of.run.times[-1]:g} s: {of.stopped}")

@@ -15,8 +15,9 @@ from bilayer_core.cli.json_output import STANDARD_OUTPUT
 from bilayer_core.cli.options import Duration, Rate, Verb, scene_argument, set_option
 from bilayer_core.cli.report import summary_lines
 from bilayer_core.cli.signals import Interruption
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
-from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError
+from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError, naming
 
 if TYPE_CHECKING:
     from bilayer_core.converge.study import Study
@@ -112,7 +113,7 @@ class _Judge:
 
         def tell(name: str) -> None:
             if not self._quiet:
-                click.echo(f"  run at {name} done", err=True)
+                say(f"  run at {name} done", err=True)
 
         try:
             self.study = estimate_error(
@@ -169,10 +170,8 @@ def _make_simulator(
         from bilayer_core.record.state_file import read_saved_state
 
         state = read_saved_state(from_state, simulator.description, at)
-        try:
+        with naming(from_state):
             simulator.load_state(state)
-        except InputError as error:
-            raise InputError(f"{from_state}: {error}") from error
     compile_kernels(quiet)
     simulator.compile()
     return simulator
@@ -269,10 +268,10 @@ def _tell(simulator: Simulator, summary: dict[str, Any], options: dict[str, Any]
     """Print what happened."""
     moved = {body.name for body in simulator.scene.bodies if body.motion.type != "prescribed"}
     for line in summary_lines(summary, moved):
-        click.echo(line)
+        say(line)
     for key in OUTPUT_SUFFIXES:
         if options[key] and Path(options[key]).exists():
-            click.echo(f"  {key.replace('_', ' '):22}{options[key]}")
+            say(f"  {key.replace('_', ' '):22}{options[key]}")
     if options["budget"]:
         from bilayer_core.cli.budget_table import print_budget
 

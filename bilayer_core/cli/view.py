@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from bilayer_core.cli.options import Duration, Verb
+from bilayer_core.cli.terminal import say
 
 NODE = "/bilayer_sim"
 FOLLOWING = {"node": "--node", "bind": "--bind", "port": "--port", "serve": "--serve"}
@@ -82,10 +83,10 @@ def view(
 
     if save:
         convert_log(file, save, colour or STRAIN)
-        click.echo(f"recording  {save}")
+        say(f"recording  {save}")
     if picture:
         screenshot(save or file, picture, moment, colour or STRAIN)
-        click.echo(f"picture    {picture}")
+        say(f"picture    {picture}")
     if not save and not picture:
         open_viewer(file, web, colour or STRAIN)
 
@@ -117,4 +118,4 @@ def _follow(
         save=Path(save) if save else None,
         colour=colour,
     )
-    follow_log(file, serving, lambda line: click.echo(line))
+    follow_log(file, serving, say)

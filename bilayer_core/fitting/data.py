@@ -22,9 +22,10 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
 from bilayer_core.record.quantities import Entry, unknown_quantity
 from bilayer_core.record.tables import component_unit
-from bilayer_core.scene.faults import listed, shortened
+from bilayer_core.scene.faults import listed
 from bilayer_core.scene.limits import LARGEST_TABLE, read_text
 from bilayer_core.scene.units import parse_quantity
 

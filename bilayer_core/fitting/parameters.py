@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError, SceneError
+from bilayer_core.printable import shortened
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.faults import shortened
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.scene.overrides import Override, read_overrides
 

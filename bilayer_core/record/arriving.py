@@ -33,6 +33,10 @@ class Messages:
         """When each message of a topic was sent [ns]."""
         return np.array([stamp for name, stamp, _ in self._taken if name == topic], np.uint64)
 
+    def count(self, topic: str) -> int:
+        """Return how many messages of a topic there are."""
+        return sum(name == topic for name, _, _ in self._taken)
+
     def messages(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, bytes]]:
         """Topic, time [ns] and data of each message of some topics, from a time on."""
         return (of for of in self._taken if (topics is None or of[0] in topics) and of[1] >= begin)

@@ -160,6 +160,10 @@ class BaggedRun:
         """Return the simulated time of each message of a topic [ns], in the order of the files."""
         return self._stamps.get(topic, np.empty(0, np.int64))
 
+    def count(self, topic: str) -> int:
+        """Return how many messages of a topic there are."""
+        return len(self.times(topic))
+
     def messages(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, simulated time [ns] and data of each message of some topics, in the order of the files."""
         wanted = self.topics.keys() if topics is None else topics & self.topics.keys()

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
-
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import is_log
@@ -49,9 +47,14 @@ class BagFiles:
         """Return how the messages of a topic are encoded: ``cdr`` for those of ROS 2."""
         return {of.encoding for part in self.parts for of in part.channels.values() if of.topic == topic}
 
-    def times(self, topic: str) -> np.ndarray:
-        """Return when each message of a topic was logged [ns], in the order of the files."""
-        return np.concatenate([part.times(topic) for part in self.parts])
+    def spans(self) -> dict[str, tuple[int, int, int]]:
+        """Return number of messages, and first and last time of logging [ns], of each topic that has some."""
+        found: dict[str, tuple[int, int, int]] = {}
+        for part in self.parts:
+            for topic, (count, first, last) in part.spans().items():
+                others = found.get(topic, (0, first, last))
+                found[topic] = count + others[0], min(first, others[1]), max(last, others[2])
+        return found
 
     def records(self, topics: set[str]) -> Iterator[tuple[str, int, int, bytes]]:
         """Yield topic, times at which it was logged and sent [ns], and data of each message of some topics."""
@@ -76,4 +79,4 @@ def _files_of(path: Path) -> list[Path]:
 
 def _begin(part: LogFile) -> int:
     """Return when the first message was logged [ns]."""
-    return min((int(of.min()) for topic in part.topics if len(of := part.times(topic))), default=0)
+    return min((first for _, first, _ in part.spans().values()), default=0)

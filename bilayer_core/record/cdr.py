@@ -7,8 +7,16 @@ counted from the end of the header; a string is its length with the closing zero
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
+
+from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
+
+Value = TypeVar("Value")
 
 HEADER = b"\x00\x01\x00\x00"
 _STAMP = struct.Struct("<iI")
@@ -115,6 +123,31 @@ def decode(data: bytes | bytearray | memoryview, field: tuple[int, np.dtype, tup
     """View of one field (an item of `Template.fields`) of a message, without a copy."""
     offset, dtype, shape = field
     return np.frombuffer(data, dtype, int(np.prod(shape)), offset if np.prod(shape) else 0).reshape(shape)
+
+
+def decoded(path: str | Path, topic: str, time: int, data: bytes, decode: Callable[[bytes], Value]) -> Value:
+    """Return what a message in a file holds.
+
+    Parameters
+    ----------
+    path : str or Path
+    topic : str
+    time : int
+        Of the message [ns].
+    data : bytes
+    decode : callable
+        Returns the value of `data`; raises ValueError, IndexError or struct.error if that has not the form of its type.
+
+    Raises
+    ------
+    InputError
+        If it has not.
+    """
+    try:
+        return decode(data)
+    except (ValueError, IndexError, OverflowError, struct.error) as error:
+        where = f"{path}: {shortened(topic)}: the message at t = {time / NANOSECONDS:.9g} s"
+        raise InputError(f"{where} is damaged, or not of its type: {error}") from error
 
 
 def read_float64_multi_array(data: bytes) -> tuple[list[str], np.ndarray]:

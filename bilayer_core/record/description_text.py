@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, fields
+import reprlib
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import BodyInfo, Description, JointInfo, ObstacleInfo, ShapeInfo, Strand
+from bilayer_core.printable import shortened
+from bilayer_core.record.description_schema import DescriptionPart, ShapePart, StrandPart
+from bilayer_core.record.json_text import read_json
 
-LATER = ("joints", "channel_units")
-"""What older logs do not have."""
+LONGEST_VALUE = 60
+"""Characters of a found value that are shown."""
 
 
 def _plain(value):
@@ -21,21 +28,21 @@ def _plain(value):
     return np.asarray(value).tolist()
 
 
-def _shape(values: dict) -> ShapeInfo:
-    """A shape from its attributes, in which JSON has made lists of tuples."""
-    return ShapeInfo(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+def _shape(part: ShapePart) -> ShapeInfo:
+    return ShapeInfo(**dict(part))
 
 
-def _strand(values: dict) -> Strand:
-    """A strand from its attributes; older logs have neither offset nor curvature nor layers nor closed ones."""
-    none = np.zeros(len(values["width"]))
+def _strand(part: StrandPart) -> Strand:
+    none = np.zeros(len(part.width))
     return Strand(
-        **{name: values[name] for name in ("name", "rod", "layer")},
-        **{name: slice(*values[name]) for name in ("nodes", "edges")},
-        **{name: np.array(values[name]) for name in ("width", "thickness")},
-        **{name: np.array(values.get(name, none)) for name in ("offset", "curvature")},
-        layers=tuple(map(_strand, values.get("layers", ()))),
-        closed=values.get("closed", False),
+        **dict(part)
+        | {
+            "nodes": slice(*part.nodes),
+            "edges": slice(*part.edges),
+            "offset": none if part.offset is None else part.offset,
+            "curvature": none if part.curvature is None else part.curvature,
+            "layers": tuple(map(_strand, part.layers)),
+        }
     )
 
 
@@ -46,22 +53,40 @@ def to_text(description: Description) -> dict[str, str]:
     return {name: json.dumps(value, default=_plain) for name, value in attributes.items()}
 
 
-def from_text(attributes: dict[str, str], scene_text: str) -> Description:
-    """The description of which `attributes` is `to_text`."""
-    names = [item.name for item in fields(Description) if item.name != "scene_text"]
-    values = {name: json.loads(attributes[name]) for name in names if name in attributes or name not in LATER}
-    values["strands"] = tuple(map(_strand, values["strands"]))
-    values["bodies"] = tuple(
-        BodyInfo(**body | {"shape": _shape(body["shape"]) if body["shape"] else None}) for body in values["bodies"]
+def from_text(attributes: Mapping[str, str], scene_text: str) -> Description:
+    """Return the description of which `attributes` is `to_text`.
+
+    Raises
+    ------
+    InputError
+        With the key, if it has other types, sizes or names than a scene could have.
+    """
+    known = {name: text for name, text in attributes.items() if name in DescriptionPart.model_fields}
+    return _described({name: read_json(text, f"description: {name}") for name, text in known.items()}, scene_text)
+
+
+def _described(values: Mapping[str, Any], scene_text: str) -> Description:
+    try:
+        part = DescriptionPart.model_validate(values)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        key = ".".join(str(step) for step in ("description", *fault["loc"]))
+        missing = fault["type"] in ("missing", "value_error")
+        found = "" if missing else f", found {shortened(reprlib.repr(fault['input']), LONGEST_VALUE)}"
+        raise InputError(f"{shortened(key)}: {fault['msg']}{found}") from None
+    return Description(
+        scene_text=scene_text,
+        **dict(part)
+        | {
+            "strands": tuple(map(_strand, part.strands)),
+            "bodies": tuple(
+                BodyInfo(**dict(body) | {"shape": body.shape and _shape(body.shape)}) for body in part.bodies
+            ),
+            "obstacles": tuple(ObstacleInfo(obstacle.name, _shape(obstacle.shape)) for obstacle in part.obstacles),
+            "joints": tuple(JointInfo(joint.name, joint.body, _shape(joint.shape)) for joint in part.joints),
+            "channel_units": ("",) * len(part.channels) if part.channel_units is None else part.channel_units,
+        },
     )
-    values["obstacles"] = tuple(ObstacleInfo(part["name"], _shape(part["shape"])) for part in values["obstacles"])
-    joints = values.get("joints", ())
-    values["joints"] = tuple(JointInfo(part["name"], part["body"], _shape(part["shape"])) for part in joints)
-    values["channels"] = tuple(values["channels"])
-    values["channel_ranges"] = tuple((lower, upper) for lower, upper in values["channel_ranges"])
-    values["channel_units"] = tuple(values.get("channel_units", [""] * len(values["channels"])))
-    values["state_layout"] = tuple((name, tuple(shape)) for name, shape in values["state_layout"])
-    return Description(scene_text=scene_text, **values)
 
 
 def to_json(description: Description) -> str:
@@ -76,11 +101,9 @@ def from_json(text: str) -> Description:
     Raises
     ------
     InputError
-        If it is none, or that of another version.
+        With the key, if it is none, or that of another version.
     """
-    try:
-        values = json.loads(text)
-        scene = values.pop("scene_text")
-        return from_text({name: json.dumps(value) for name, value in values.items()}, scene)
-    except (AttributeError, KeyError, TypeError, ValueError) as error:
-        raise InputError("what describes the run is not understood: it is of another version, or damaged") from error
+    values = read_json(text, "the description of a run")
+    if not (isinstance(values, dict) and isinstance(values.get("scene_text"), str)):
+        raise InputError("the description of a run: must be a mapping with the scene as text under scene_text")
+    return _described({name: value for name, value in values.items() if name != "scene_text"}, values["scene_text"])

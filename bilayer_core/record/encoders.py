@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from bilayer_core.observed.frame import Description, Frame
-from bilayer_core.observed.inputs import Input
+from bilayer_core.observed.inputs import LOAD, SIZES, STIMULUS, Input
+from bilayer_core.printable import shortened
 from bilayer_core.record.cdr import SEPARATOR, Template, read_float64_multi_array
 from bilayer_core.record.markers import MarkerEncoder
 from bilayer_core.record.node_frames import NodeFrames
@@ -109,10 +110,13 @@ def encode_input(told: Input) -> bytes:
 
 
 def decode_input(data: bytes) -> Input:
-    """The input of such a message."""
+    """Return the input of such a message; ValueError if it is of no kind, or has not the values of its kind."""
     (_, _, label), values = read_float64_multi_array(data)
     kind, _, name = label.partition(":")
-    return Input(int(values[0]), float(values[1]), kind, name, tuple(values[2:].tolist()))
+    given = values[2:].tolist()
+    if kind not in SIZES or not SIZES[kind] - (kind in (STIMULUS, LOAD)) <= len(given) <= SIZES[kind]:
+        raise ValueError(f"an input {shortened(kind)!r} with {len(given)} values is not known")
+    return Input(int(values[0]), float(values[1]), kind, name, tuple(given))
 
 
 class FrameEncoder:

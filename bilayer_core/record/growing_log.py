@@ -14,10 +14,10 @@ from bilayer_core.record.log_records import (
     MAGIC,
     MESSAGE,
     MESSAGE_HEAD,
+    Definitions,
     content,
-    parse,
+    read_chunk,
     records_of,
-    unpacked,
     walk,
 )
 from bilayer_core.record.opening import open_log
@@ -54,7 +54,7 @@ class GrowingLog:
         self.head: Head = read_head(self.path)
         self.finished = False
         self._place = len(MAGIC)
-        self._channels: dict[int, str] = {}
+        self._definitions = Definitions()
         self._file_number = os.stat(self.path).st_ino
 
     @property
@@ -76,17 +76,15 @@ class GrowingLog:
 
     def read(self) -> list[Message]:
         """Topic, time [ns] and data of each message that was added, those of about 8 MB at most."""
-        from mcap.records import Channel
-
         found: list[Message] = []
         size = 0
         with open_log(self.path) as file:
             for place in walk(file, self._place):
                 self._place = place.end
                 if place.opcode == CHANNEL:
-                    self._add(parse(Channel, content(file, place)))
+                    self._definitions.take(CHANNEL, content(file, place))
                 elif place.opcode == CHUNK:
-                    inside = unpacked(content(file, place))
+                    inside = read_chunk(file, place)
                     size += len(inside)
                     found += self._messages(inside)
                 elif place.opcode == FOOTER:
@@ -97,20 +95,16 @@ class GrowingLog:
         return found
 
     def _messages(self, inside: bytes) -> list[Message]:
-        from mcap.records import Channel
-
         found: list[Message] = []
+        channels = self._definitions.channels
         for opcode, start, end in records_of(inside):
             if opcode == CHANNEL:
-                self._add(parse(Channel, inside[start:end]))
+                self._definitions.take(CHANNEL, inside[start:end])
             elif opcode == MESSAGE:
                 number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
-                if number in self._channels:
-                    found.append((self._channels[number], time, inside[start + MESSAGE_HEAD.size : end]))
+                if number in channels:
+                    found.append((channels[number].topic, time, inside[start + MESSAGE_HEAD.size : end]))
         return found
-
-    def _add(self, channel) -> None:
-        self._channels[channel.id] = channel.topic
 
 
 MOST_AT_ONCE = 8 << 20

@@ -1,12 +1,11 @@
-"""Messages of a finished log by their time, from any instant on, with one chunk of the file in memory.
+"""Messages of a finished log by their time, from any instant on, with those chunks in memory that overlap in time.
 
 Any MCAP file with an index will do, those of rosbag2 as well: only topics, types, times and bytes are looked at.
 """
 
 from __future__ import annotations
 
-import bisect
-import itertools
+import heapq
 import shlex
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack
@@ -15,11 +14,13 @@ from pathlib import Path
 from typing import Self
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.opening import damage_told, is_finished, open_log
+from bilayer_core.record.log_records import MESSAGE, MESSAGE_HEAD, read_chunk, records_of
+from bilayer_core.record.log_summary import Summary, read_summary
+from bilayer_core.record.opening import damage_told, open_log
 from bilayer_core.record.topics import QOS
 
-CHUNKS_AT_ONCE = 64
-"""In whose index messages are looked for at once, some seconds of a log."""
+MOST_WAITING = 500_000_000
+"""Of messages of chunks that overlap in time [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -80,28 +81,20 @@ class IndexedLog:
     """
 
     def __init__(self, path: str | Path):
-        from mcap.reader import SeekingReader
-
         self.path = Path(path)
         with ExitStack() as undo:
-            file = undo.enter_context(open_log(self.path))
-            finished = is_finished(file)
-            self._reader = SeekingReader(file, validate_crcs=True)
-            summary = self._reader.get_summary() if finished else None
-            count = summary.statistics.message_count if summary is not None and summary.statistics else None
-            if summary is None or (count != 0 and not (summary.chunk_indexes and summary.channels)):
+            self._file = undo.enter_context(open_log(self.path))
+            summary = read_summary(self._file)
+            if summary is None or (summary.message_count != 0 and not (len(summary) and summary.definitions.channels)):
                 raise _without_index(self.path)
-            chunks = [chunk for chunk in summary.chunk_indexes if chunk.message_end_time or chunk.message_index_offsets]
-            if not chunks:
+            self._summary = summary
+            self._chunks = [chunk for chunk in range(len(summary)) if not summary.is_empty(chunk)]
+            if not self._chunks:
                 raise InputError(f"{self.path}: holds no message")
-            self.start = min(chunk.message_start_time for chunk in chunks)
-            self.end = max(chunk.message_end_time for chunk in chunks)
+            self._chunks.sort(key=lambda chunk: (summary.starts[chunk], summary.place(chunk).begin))
+            self.start = summary.starts[self._chunks[0]]
+            self.end = max(summary.ends[chunk] for chunk in self._chunks)
             self.channels = tuple(sorted(_channels(summary), key=lambda channel: (channel.topic, channel.number)))
-            self._topics = {channel.number: channel.topic for channel in self.channels}
-            # Of the parts in which messages are read: the reader puts all chunks of a part in order first, which for
-            # those of ten minutes takes four times as long as to read one.
-            starts = sorted({chunk.message_start_time for chunk in chunks})
-            self._borders = starts[CHUNKS_AT_ONCE::CHUNKS_AT_ONCE]
             self._resources = undo.pop_all()
 
     def __enter__(self) -> Self:
@@ -116,26 +109,58 @@ class IndexedLog:
 
     def messages(self, channels: Collection[int], start: int) -> Iterator[Message]:
         """Messages of some channels from `start` [ns] on, by time; those of one time in the order of the file."""
-        later = self._borders[bisect.bisect_right(self._borders, start) :]
-        for begin, end in itertools.pairwise([start, *later, max(start, self.end) + 1]):
-            yield from self._read(channels, starting_at=begin, ending_before=end)
+        waiting: list[_Placed] = []
+        size, starts, ends = 0, self._summary.starts, self._summary.ends
+        for chunk in self._chunks:
+            if ends[chunk] < start or not self._summary.has(chunk, channels):
+                continue
+            while waiting and waiting[0][0] < starts[chunk]:
+                message = heapq.heappop(waiting)[-1]
+                size -= len(message.data)
+                yield message
+            for placed in self._of_chunk(chunk, channels):
+                if placed[0] >= start:
+                    heapq.heappush(waiting, placed)
+                    size += len(placed[-1].data)
+            if size > MOST_WAITING:
+                raise InputError(f"{self.path}: more than {MOST_WAITING / 1e6:g} MB of its messages overlap in time")
+        while waiting:
+            yield heapq.heappop(waiting)[-1]
 
     def latest(self, channel: int, before: int, count: int) -> list[Message]:
         """The last messages of a channel before a time [ns], at most `count`, by time."""
-        return list(itertools.islice(self._read({channel}, ending_before=before, reverse=True), count))[::-1]
+        found: list[_Placed] = []
+        starts, ends = self._summary.starts, self._summary.ends
+        for chunk in sorted(self._chunks, key=ends.__getitem__, reverse=True):
+            if len(found) == count and (not found or ends[chunk] < found[0][0]):
+                break
+            if starts[chunk] >= before or not self._summary.has(chunk, {channel}):
+                continue
+            for placed in self._of_chunk(chunk, {channel}):
+                if placed[0] < before:
+                    (heapq.heappush if len(found) < count else heapq.heappushpop)(found, placed)
+        return [placed[-1] for placed in sorted(found)]
 
-    def _read(self, channels: Collection[int], **options: int | bool) -> Iterator[Message]:
-        topics = {self._topics[channel] for channel in channels}
+    def _of_chunk(self, chunk: int, channels: Collection[int]) -> Iterator[_Placed]:
+        """Messages of some channels of a chunk, with their time and place, by which they are put in order."""
+        place = self._summary.place(chunk)
         with damage_told(self.path):
-            for _, channel, message in self._reader.iter_messages(topics, **options):
-                if channel.id in channels:
-                    yield Message(channel.id, message.log_time, message.data)
+            inside = read_chunk(self._file, place)
+            for opcode, start, end in records_of(inside):
+                if opcode == MESSAGE:
+                    number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
+                    if number in channels:
+                        message = Message(number, time, inside[start + MESSAGE_HEAD.size : end])
+                        yield time, place.begin, start, message
 
 
-def _channels(summary) -> Iterator[Channel]:
-    counts = summary.statistics.channel_message_counts if summary.statistics is not None else None
-    for channel in summary.channels.values():
-        schema = summary.schemas.get(channel.schema_id)
+_Placed = tuple[int, int, int, Message]
+
+
+def _channels(summary: Summary) -> Iterator[Channel]:
+    counts = summary.message_counts
+    for channel in summary.definitions.channels.values():
+        schema = summary.definitions.schemas.get(channel.schema_id)
         yield Channel(
             number=channel.id,
             topic=channel.topic,

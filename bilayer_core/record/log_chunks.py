@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,24 +12,27 @@ from typing import BinaryIO
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
+from bilayer_core.record.chunk_table import ChunkTable
 from bilayer_core.record.log_records import (
     CHANNEL,
     CHUNK,
     DATA_END,
+    LARGEST_CHUNK,
     MESSAGE,
     MESSAGE_HEAD,
     MESSAGE_INDEX,
     SCHEMA,
-    DamagedChunk,
+    Definitions,
     Place,
     content,
-    parse,
+    read_chunk,
     read_index,
     records_of,
-    unpacked,
     walk,
 )
-from bilayer_core.record.opening import is_finished, open_log
+from bilayer_core.record.log_summary import Summary, read_summary
+from bilayer_core.record.opening import open_log
 from bilayer_core.record.topics import LOG_NAMESPACE
 
 MOST_BARE = 1 << 20
@@ -43,15 +47,6 @@ class LogChannel:
     type: str
     encoding: str
     metadata: dict[str, str]
-
-
-@dataclass
-class _Chunk:
-    """A chunk, or messages that stand outside of one, with the times of the messages of each channel [ns]."""
-
-    place: Place
-    bare: bool
-    times: dict[int, np.ndarray]
 
 
 class LogFile:
@@ -76,7 +71,7 @@ class LogFile:
     Raises
     ------
     InputError
-        If it is no MCAP file, or is damaged.
+        If it is no MCAP file, or is damaged, or has more in it than is read.
     """
 
     namespace = LOG_NAMESPACE
@@ -84,11 +79,11 @@ class LogFile:
     def __init__(self, path: str | Path):
         self.path = Path(path)
         self.channels: dict[int, LogChannel] = {}
-        self._schemas: dict[int, str] = {}
-        self._chunks: list[_Chunk] = []
+        self._definitions = Definitions()
+        self._chunks = ChunkTable()
         with open_log(self.path) as file:
             summary = read_summary(file)
-            self.has_index = summary is not None and _is_index(summary)
+            self.has_index = summary is not None and summary.is_index
             if self.has_index:
                 self._take(summary, file)
             else:
@@ -97,8 +92,21 @@ class LogFile:
 
     def times(self, topic: str) -> np.ndarray:
         """When each message of a topic was logged [ns], in the order of the file."""
-        of = [times for chunk in self._chunks for number, times in chunk.times.items() if self._is(number, {topic})]
-        return np.concatenate(of) if of else np.empty(0, np.uint64)
+        return self._chunks.times(self._numbers({topic}))
+
+    def count(self, topic: str) -> int:
+        """Return how many messages of a topic there are."""
+        return self._chunks.count(self._numbers({topic}))
+
+    def spans(self) -> dict[str, tuple[int, int, int]]:
+        """Return number of messages, and first and last time [ns], of each topic that has some."""
+        found: dict[str, tuple[int, int, int]] = {}
+        for number, (count, first, last) in self._chunks.spans().items():
+            if number in self.channels:
+                topic = self.channels[number].topic
+                others = found.get(topic, (0, first, last))
+                found[topic] = count + others[0], min(first, others[1]), max(last, others[2])
+        return found
 
     def messages(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, bytes]]:
         """Topic, time [ns] and data of each message of some topics (default all), in the order of the file.
@@ -110,57 +118,40 @@ class LogFile:
     def records(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, int, bytes]]:
         """Yield what `messages` yields, with the time at which a message was sent [ns] before its data."""
         with open_log(self.path) as file:
-            for chunk in self._chunks:
-                wanted = {
-                    number: self.channels[number].topic
-                    for number, times in chunk.times.items()
-                    if len(times) and int(times.max()) >= begin and self._is(number, topics)
-                }
-                if not wanted:
-                    continue
-                inside = self._inside(file, chunk)
+            for place, wanted in self._chunks.with_messages(self._numbers(topics), begin):
+                inside = read_chunk(file, place)
                 for opcode, start, end in records_of(inside):
                     if opcode != MESSAGE:
                         continue
                     number, _, time, sent = MESSAGE_HEAD.unpack_from(inside, start)
                     if number in wanted:
-                        yield wanted[number], time, sent, inside[start + MESSAGE_HEAD.size : end]
+                        yield self.channels[number].topic, time, sent, inside[start + MESSAGE_HEAD.size : end]
 
-    def _is(self, number: int, topics: set[str] | None) -> bool:
-        return number in self.channels and (topics is None or self.channels[number].topic in topics)
+    def _numbers(self, topics: set[str] | None) -> list[int]:
+        return [number for number, channel in self.channels.items() if topics is None or channel.topic in topics]
 
-    def _inside(self, file: BinaryIO, chunk: _Chunk) -> bytes:
-        data = content(file, chunk.place)
-        if chunk.bare:
-            return data
-        try:
-            return unpacked(data)
-        except DamagedChunk as error:
-            raise DamagedChunk(f"the chunk at byte {chunk.place.begin}: {error}") from error
-
-    def _take(self, summary, file: BinaryIO) -> None:
+    def _take(self, summary: Summary, file: BinaryIO) -> None:
         """The file's own index."""
-        self._schemas = {number: schema.name for number, schema in summary.schemas.items()}
-        for channel in summary.channels.values():
+        self._definitions = summary.definitions
+        for channel in summary.definitions.channels.values():
             self._add_channel(channel)
-        for index in sorted(summary.chunk_indexes, key=lambda of: of.chunk_start_offset):
-            place = Place(CHUNK, index.chunk_start_offset + 9, index.chunk_length - 9)
-            self._chunks.append(_Chunk(place, False, {}))
-            file.seek(place.end)
-            indexes = file.read(index.message_index_length)
-            for opcode, start, end in records_of(indexes):
-                if opcode == MESSAGE_INDEX:
-                    self._add_index(indexes[start:end])
-            if not index.message_index_length:
+        for place, length in summary.chunks():
+            self._chunks.begin(place)
+            for index in walk(file, place.end):
+                if index.opcode != MESSAGE_INDEX or index.end > place.end + length:
+                    break
+                self._add_index(content(file, index))
+            if not length:
                 self._look_into(file)
 
     def _scan(self, file: BinaryIO) -> None:
         """A file without an index, from record to record."""
-        indexed = True
+        indexed, known = True, False
         for place in walk(file):
-            if place.opcode == MESSAGE_INDEX and self._chunks and not self._chunks[-1].bare:
-                if not self._add_index(content(file, place)):
+            if place.opcode == MESSAGE_INDEX and self._chunks and self._chunks[-1].opcode == CHUNK:
+                if not known and not self._add_index(content(file, place)):
                     self._look_into(file)
+                    known = True  # from the chunk itself; what its other indexes say would count twice
                 indexed = True
             elif place.opcode in (SCHEMA, CHANNEL, MESSAGE) and self._extend(place):
                 indexed = False
@@ -168,9 +159,8 @@ class LogFile:
                 if not indexed:
                     self._look_into(file)
                 bare = place.opcode != CHUNK
-                place = Place(0, place.begin, place.end - place.begin) if bare else place
-                self._chunks.append(_Chunk(place, bare, {}))
-                indexed = False
+                self._chunks.begin(Place(MESSAGE, place.begin, place.end - place.begin) if bare else place)
+                indexed = known = False
             elif place.opcode == DATA_END:
                 break
         if self._chunks:
@@ -179,32 +169,34 @@ class LogFile:
     def _extend(self, place: Place) -> bool:
         """Add a record outside of chunks to the one before it."""
         last = self._chunks[-1] if self._chunks else None
-        if last is None or not last.bare or last.place.end != place.begin or last.place.length > MOST_BARE:
+        if last is None or last.opcode == CHUNK or last.end != place.begin:
             return False
-        last.place = Place(0, last.place.offset, place.end - last.place.offset)
+        if last.length > MOST_BARE or place.end - last.offset > LARGEST_CHUNK:
+            return False
+        self._chunks.extend(place.end)
         return True
 
     def _look_into(self, file: BinaryIO) -> None:
         """Take channels and times of the last chunk from the chunk itself."""
-        from mcap.records import Channel, Schema
-
-        times = defaultdict(list)
-        inside = self._inside(file, self._chunks[-1])
+        times: dict[int, array] = defaultdict(lambda: array("Q"))
+        inside = read_chunk(file, self._chunks[-1])
         for opcode, start, end in records_of(inside):
             if opcode == MESSAGE:
                 number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
                 times[number].append(time)
             elif opcode == SCHEMA:
-                schema = parse(Schema, inside[start:end])
-                self._schemas[schema.id] = schema.name
+                self._definitions.take(opcode, inside[start:end])
             elif opcode == CHANNEL:
-                self._add_channel(parse(Channel, inside[start:end]))
-        self._chunks[-1].times = {number: np.array(of, np.uint64) for number, of in times.items()}
+                self._add_channel(self._definitions.take(opcode, inside[start:end]))
+        self._chunks.forget()
+        for number, of in times.items():
+            self._chunks.add(number, np.asarray(of))
 
     def _add_channel(self, channel) -> None:
-        if channel.schema_id and channel.schema_id not in self._schemas:
-            raise InputError(f"{self.path}: is damaged: the type of {channel.topic} is missing")
-        name = self._schemas.get(channel.schema_id, "")  # of number 0: the file does not say
+        schema = self._definitions.schemas.get(channel.schema_id)
+        if channel.schema_id and schema is None:
+            raise InputError(f"{self.path}: is damaged: the type of {shortened(channel.topic)} is missing")
+        name = "" if schema is None else schema.name  # of number 0: the file does not say
         self.channels[channel.id] = LogChannel(channel.topic, name, channel.message_encoding, channel.metadata)
 
     def _add_index(self, data: bytes) -> bool:
@@ -212,22 +204,5 @@ class LogFile:
         number, times = read_index(data)
         if number not in self.channels:
             return False
-        self._chunks[-1].times[number] = times
+        self._chunks.add(number, times)
         return True
-
-
-def _is_index(summary) -> bool:
-    """Return whether a summary tells all that a file holds; other writers may leave parts of it out."""
-    if summary.statistics is not None and summary.statistics.message_count == 0:
-        return True
-    described = all(channel.schema_id in (0, *summary.schemas) for channel in summary.channels.values())
-    return bool(summary.chunk_indexes and summary.channels) and described
-
-
-def read_summary(file: BinaryIO):
-    """The index of a finished file (`mcap.summary.Summary`), or None."""
-    from mcap.reader import SeekingReader
-
-    finished = is_finished(file)
-    file.seek(0)
-    return SeekingReader(file).get_summary() if finished else None

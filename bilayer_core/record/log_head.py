@@ -4,18 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
+from bilayer_core.printable import shortened
 from bilayer_core.record.description_text import from_text
-from bilayer_core.record.log_records import ATTACHMENT, METADATA, content, parse, walk
+from bilayer_core.record.log_records import (
+    ATTACHMENT,
+    METADATA,
+    DamagedChunk,
+    Place,
+    content,
+    parse,
+    read_metadata,
+    walk,
+)
 from bilayer_core.record.opening import open_log
 
+SCENE_ATTACHMENT = "scene.yaml"
+LARGEST_SCENE = 5_000_000
+"""Text of a scene in a log, whose tables of values are written out in it [bytes]."""
 _HEAD = ("description", "versions", "settings")
 """Metadata that every log has before its first chunk."""
 
-
+_READ = (*_HEAD, "machine")
 _OWN = {"description": "state_layout", "versions": DISTRIBUTION}
 """A key of the metadata records by which a log is known."""
 
@@ -38,11 +52,9 @@ def is_log(path: Path) -> bool:
     InputError
         If it cannot be read, or is no MCAP file.
     """
-    from mcap.records import Metadata
-
     with open_log(path) as file:
-        records = (parse(Metadata, content(file, place)) for place in walk(file) if place.opcode == METADATA)
-        return any(_OWN.get(record.name) in record.metadata for record in records)
+        records = (read_metadata(content(file, place), _OWN) for place in walk(file) if place.opcode == METADATA)
+        return any(_OWN.get(name) in values for name, values in records)
 
 
 def read_head(path: Path) -> Head:
@@ -53,8 +65,6 @@ def read_head(path: Path) -> Head:
     InputError
         If the file is no log, with what can be done with a bag of ``ros2 bag record``, or is damaged.
     """
-    from mcap.records import Attachment, Metadata
-
     if path.is_dir() or not is_log(path):
         raise InputError(
             f"{path}: is no log of a run, so it does not hold the scene, the solver settings and all that acted; "
@@ -65,11 +75,11 @@ def read_head(path: Path) -> Head:
     scene = None
     with open_log(path) as file:
         for place in walk(file):
-            if place.opcode == ATTACHMENT:
-                scene = parse(Attachment, content(file, place)).data.decode()
+            if place.opcode == ATTACHMENT and scene is None:
+                scene = _scene(file, place)
             elif place.opcode == METADATA:
-                record = parse(Metadata, content(file, place))
-                metadata[record.name] = record.metadata
+                name, values = read_metadata(content(file, place), _READ)
+                metadata |= {name: values} if name in _READ else {}
             if scene is not None and "description" in metadata:
                 break
     missing = [name for name in _HEAD if name not in metadata] + ([] if scene is not None else ["scene"])
@@ -79,10 +89,23 @@ def read_head(path: Path) -> Head:
     versions = metadata["versions"]
     try:
         description = from_text(metadata["description"], scene)
-    except (KeyError, TypeError, ValueError):
-        writer = versions.get(DISTRIBUTION, "unknown")
+    except InputError as error:
+        writer = shortened(versions.get(DISTRIBUTION, "unknown"))
         raise InputError(
-            f"{path}: describes its run in another way than this version reads (it was written by {DISTRIBUTION} "
-            f"{writer}); run its scene again"
+            f"{path}: describes its run in another way than this version reads, or is damaged: {error} (it was written "
+            f"by {DISTRIBUTION} {writer}); run its scene again"
         ) from None
     return Head(description, versions, metadata["settings"], metadata.get("machine", {}))
+
+
+def _scene(file: BinaryIO, place: Place) -> str | None:
+    """Text of the scene, if this attachment is it."""
+    from mcap.records import Attachment
+
+    if place.length > LARGEST_SCENE:
+        return None
+    attachment = parse(Attachment, content(file, place))
+    try:
+        return attachment.data.decode() if attachment.name == SCENE_ATTACHMENT else None
+    except UnicodeDecodeError as error:
+        raise DamagedChunk(f"the scene at byte {place.begin} is not UTF-8 text") from error

@@ -15,10 +15,10 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
 from bilayer_core.record.bag import Bag, BagRun, choose_run, split_address
-from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, read_float64_multi_array
+from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_head import Head, read_head
-from bilayer_core.record.log_records import METADATA, content, parse, walk
+from bilayer_core.record.log_records import METADATA, content, read_metadata, walk
 from bilayer_core.record.log_source import LogSource
 from bilayer_core.record.logged_run import LoggedRun
 from bilayer_core.record.opened_run import names_log
@@ -42,6 +42,8 @@ __all__ = [
 CUT_OFF = "cut off"
 REPAIRED = "repair"
 """Metadata record of a log that `repair` has made: what it kept and lost."""
+LATE = ("run", REPAIRED)
+"""Metadata records that stand after the messages."""
 STATE = f"{LOG_NAMESPACE}/state"
 READ_BAGS = ("view", "render", "plot", "export", "compare")
 """Verbs that read bags too."""
@@ -115,12 +117,10 @@ def read_info(path: str | Path) -> LogInfo:
     if not names_log(path, node, number):
         return _info_of_bag(Bag(path, node), number)
     head, file = read_head(path), LogFile(path)
-    stamps = {topic: file.times(topic) for topic in sorted(file.topics)}
-    filled = [of for of in stamps.values() if len(of)]
-    times = [int(min(of.min() for of in filled)), int(max(of.max() for of in filled))] if filled else []
+    spans = file.spans()
     metadata = _read_metadata(path)
     ending = metadata.get("run", {})
-    start, last = (time / NANOSECONDS for time in times) if times else (0.0, 0.0)
+    start, last = (time / NANOSECONDS for time in _span(spans))
     return LogInfo(
         path=str(path),
         scene=head.description.scene_name,
@@ -131,7 +131,7 @@ def read_info(path: str | Path) -> LogInfo:
         last_time=last,
         duration=last - start,
         channels=head.description.channels,
-        topics={topic: {"type": file.topics[topic], "count": len(of)} for topic, of in stamps.items()},
+        topics=_counts(file.topics, spans),
         complete=ending.get("complete") == "true",
         termination=ending.get("termination", CUT_OFF),
         size=path.stat().st_size,
@@ -142,9 +142,7 @@ def read_info(path: str | Path) -> LogInfo:
 def _info_of_bag(bag: Bag, number: int) -> LogInfo:
     """What a file holds that is no log of ours."""
     files = bag.files
-    logged = {topic: files.times(topic) for topic in sorted(files.topics)}
-    filled = [of for of in logged.values() if len(of)]
-    span = [int(min(of.min() for of in filled)), int(max(of.max() for of in filled))] if filled else []
+    spans = files.spans()
     runs = tuple(run for run in bag.runs if number in (0, run.number))
     if not runs and (bag.node or number):
         choose_run(bag, number)  # says which there are
@@ -169,16 +167,27 @@ def _info_of_bag(bag: Bag, number: int) -> LogInfo:
         last_time=runs[0].last_time if len(runs) == 1 else 0.0,
         duration=runs[0].last_time - runs[0].start_time if len(runs) == 1 else 0.0,
         channels=source.description.channels if source else (),
-        topics={topic: {"type": files.topics[topic], "count": len(of)} for topic, of in logged.items()},
+        topics=_counts(files.topics, spans),
         complete=False,
         termination="",
         size=sum(part.path.stat().st_size for part in files.parts),
         lacks=tuple(lacks),
         kind="bag" if bag.runs else "mcap",
         runs=runs,
-        recorded=tuple(map(_date, span)) if span and span[0] >= FIRST_DATE else (),
+        recorded=tuple(map(_date, _span(spans))) if _span(spans)[0] >= FIRST_DATE else (),
         commands=READ_BAGS if bag.runs else (),
     )
+
+
+def _counts(topics: dict[str, str], spans: dict[str, tuple[int, int, int]]) -> dict[str, dict]:
+    """Type and number of messages of each topic, in the order of their names."""
+    return {topic: {"type": topics[topic], "count": spans.get(topic, (0,))[0]} for topic in sorted(topics)}
+
+
+def _span(spans: dict[str, tuple[int, int, int]]) -> tuple[int, int]:
+    """Times of the first and the last message [ns]; zero if there is none."""
+    times = [time for _, first, last in spans.values() for time in (first, last)] or [0]
+    return min(times), max(times)
 
 
 def _date(time: int) -> str:
@@ -216,7 +225,12 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
         if stamp > last:
             break
         found = data if stamp == last else found
-    return read_float64_multi_array(found)[1].copy(), last / NANOSECONDS
+    if found is None:
+        raise InputError(
+            f"{path}: is damaged: its index has a state at t = {last / NANOSECONDS:.9g} s, its chunks none"
+        )
+    values = decoded(path, STATE, last, found, read_float64_multi_array)[1]
+    return values.copy(), last / NANOSECONDS
 
 
 def read_log(path: str | Path) -> RunData:
@@ -249,12 +263,10 @@ def read_messages(path: str | Path, topics: set[str] | None = None) -> Iterator[
 
 
 def _read_metadata(path: Path) -> dict[str, dict[str, str]]:
-    """All metadata records by name, those after the messages as well."""
-    from mcap.records import Metadata
-
+    """Metadata records by name that stand after the messages."""
     with open_log(path) as file:
-        records = [parse(Metadata, content(file, place)) for place in walk(file) if place.opcode == METADATA]
-    return {record.name: record.metadata for record in records}
+        records = (read_metadata(content(file, place), LATE) for place in walk(file) if place.opcode == METADATA)
+        return {name: values for name, values in records if name in LATE}
 
 
 def _lacks(head: Head, file: LogFile, metadata: dict[str, dict[str, str]]) -> tuple[str, ...]:

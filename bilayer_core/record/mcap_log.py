@@ -24,6 +24,7 @@ from bilayer_core.record.event_messages import encode_event
 from bilayer_core.record.events import Event, EventDetector
 from bilayer_core.record.frame_block import FrameBlock
 from bilayer_core.record.lock import open_alone, refuse_file_in_use
+from bilayer_core.record.log_head import SCENE_ATTACHMENT
 from bilayer_core.record.mcap_file import McapFile
 from bilayer_core.record.paths import check_output_path, unwritable
 from bilayer_core.record.schemas import schema_text
@@ -36,7 +37,6 @@ SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
-SCENE_ATTACHMENT = "scene.yaml"
 _INFINITE = "{sec: 9223372036, nsec: 854775807}"
 
 

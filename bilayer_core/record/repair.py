@@ -17,12 +17,12 @@ from typing import BinaryIO
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.cdr import NANOSECONDS
-from bilayer_core.record.log_chunks import read_summary
 from bilayer_core.record.log_reader import REPAIRED
 from bilayer_core.record.log_records import (
     ATTACHMENT,
     CHANNEL,
     CHUNK,
+    CHUNK_HEAD,
     DATA_END,
     FOOTER,
     HEAD,
@@ -34,14 +34,17 @@ from bilayer_core.record.log_records import (
     METADATA,
     SCHEMA,
     DamagedChunk,
+    Definitions,
     Place,
     content,
     parse,
     read_index,
+    read_metadata,
     records_of,
     unpacked,
     walk,
 )
+from bilayer_core.record.log_summary import read_summary
 from bilayer_core.record.mcap_log import CHUNK_SIZE
 from bilayer_core.record.opening import open_log
 from bilayer_core.record.paths import check_output_path, draft_of
@@ -134,8 +137,7 @@ class _Repair:
         self._found = Repaired()
         self._started = False
         self._last = 0
-        self._schemas: dict[int, object] = {}
-        self._channels: dict[int, object] = {}
+        self._definitions = Definitions()
         self._new: dict[int, int] = {}
         self._new_schemas: dict[int, int] = {}
         self._unknown = 0
@@ -154,7 +156,7 @@ class _Repair:
             self._take(place)
             chunk = place if place.opcode == CHUNK else chunk
         self._start("", "")
-        for number in self._channels:
+        for number in self._definitions.channels:
             self._register(number)
         if self._unknown:
             self._lose(f"{_count(self._unknown, 'message')} of channels that nothing describes")
@@ -174,14 +176,12 @@ class _Repair:
         """Whether there is an index; channels and schemas are taken from it, for chunks that are damaged."""
         try:
             summary = read_summary(self._file)
-        except Exception:  # whatever damaged bytes lead to
+        except DamagedChunk:
             summary = None
         if summary is None:
             return False
-        self._schemas |= summary.schemas
-        self._channels |= summary.channels
-        self._file.seek(0)
-        return _sound(self._file, self._size) and (bool(summary.chunk_indexes) or not summary.channels)
+        self._definitions = summary.definitions
+        return summary.is_index and _sound(self._file, self._size)
 
     def _places(self) -> Iterator[Place]:
         """The records of the file; where they end in nonsense, on from the next chunk that can be found."""
@@ -246,7 +246,7 @@ class _Repair:
 
     def _take(self, place: Place) -> None:
         """Write what a record holds."""
-        from mcap.records import Attachment, Header, Metadata
+        from mcap.records import Attachment, Header
 
         try:
             if place.opcode == HEADER:
@@ -265,10 +265,10 @@ class _Repair:
                 self._writer.add_attachment(of.create_time, of.log_time, of.name, of.media_type, of.data)
                 self._found.attachments += 1
             elif place.opcode == METADATA:
-                record = parse(Metadata, content(self._file, place))
+                name, values = read_metadata(content(self._file, place))
                 self._start("", "")
                 self._writer.flush()
-                self._writer.add_metadata(record.name, record.metadata)
+                self._writer.add_metadata(name, values)
                 self._found.metadata += 1
             elif place.opcode in (SCHEMA, CHANNEL, MESSAGE):  # outside of chunks
                 self._start("", "")
@@ -288,7 +288,7 @@ class _Repair:
         try:
             inside = unpacked(data)
         except DamagedChunk as error:
-            begin, end, *_ = _CHUNK_TIMES.unpack_from(data)
+            begin, end, *_ = CHUNK_HEAD.unpack_from(data)
             count = self._indexed_after(place)
             messages = f", {_count(count, 'message')}" if count else ""
             span = f"t = {begin / NANOSECONDS:g} to {end / NANOSECONDS:g} s"
@@ -309,8 +309,6 @@ class _Repair:
 
     def _take_inside(self, inside: bytes) -> None:
         """Write the records of a chunk."""
-        from mcap.records import Channel, Schema
-
         for opcode, start, end in records_of(inside):
             if opcode == MESSAGE:
                 number, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(inside, start)
@@ -322,18 +320,14 @@ class _Repair:
                 self._writer.add_message(new, log_time, data, publish_time, sequence)
                 self._found.messages += 1
                 self._last = max(self._last, log_time)
-            elif opcode == SCHEMA:
-                schema = parse(Schema, inside[start:end])
-                self._schemas[schema.id] = schema
-            elif opcode == CHANNEL:
+            elif opcode in (SCHEMA, CHANNEL):
                 # Registered when a message comes: those in chunks, which have checksums, before those outside.
-                channel = parse(Channel, inside[start:end])
-                self._channels[channel.id] = channel
+                self._definitions.take(opcode, inside[start:end])
 
     def _register(self, number: int) -> int | None:
         """The number of a channel in the new file."""
-        channel = self._channels.get(number)
-        if channel is None or channel.schema_id and channel.schema_id not in self._schemas:
+        channel = self._definitions.channels.get(number)
+        if channel is None or channel.schema_id and channel.schema_id not in self._definitions.schemas:
             return None
         if number not in self._new:
             schema = 0
@@ -344,7 +338,7 @@ class _Repair:
         return self._new[number]
 
     def _new_schema(self, number: int) -> int:
-        schema = self._schemas[number]
+        schema = self._definitions.schemas[number]
         self._new_schemas[number] = self._writer.register_schema(schema.name, schema.encoding, schema.data)
         return self._new_schemas[number]
 

@@ -14,17 +14,17 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError, SimulationError, naming
 from bilayer_core.model.friction import COEFFICIENTS
 from bilayer_core.observed.frame import Description
 from bilayer_core.observed.inputs import FRICTION, LOAD, STIMULUS, UNTIL, Input
 from bilayer_core.observed.system import machine, versions
-from bilayer_core.record.cdr import read_float64_multi_array
+from bilayer_core.printable import shortened
+from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
 from bilayer_core.record.encoders import decode_input
 from bilayer_core.record.log_reader import read_head, read_messages, read_state
 from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE
-from bilayer_core.scene.loader import load_scene
-from bilayer_core.scene.text import read_yaml
+from bilayer_core.scene.loader import parse_scene
 from bilayer_core.simulation.simulator import Simulator
 
 Array = np.ndarray
@@ -32,6 +32,10 @@ Shape = tuple[int, ...]
 STATE = f"{LOG_NAMESPACE}/state"
 SEAL = "seal"
 """Part of a state that sums up the others."""
+MOST_INPUTS = 2_000_000
+"""Of a log that is replayed."""
+FAR = 1e9
+"""Later than any state [s]."""
 TIME_ROUNDING = 1e-9
 """Part of a time that may be rounding."""
 
@@ -122,7 +126,15 @@ def verify(path: str | Path, tolerance: float | None = None) -> Verification:
         If the file is no log, or an old one that does not hold what acted.
     """
     path = Path(path)
-    refuse_without_inputs(path)
+    with naming(path):
+        refuse_without_inputs(path)
+        found = _verified(path, tolerance)
+        if not found.states:
+            raise InputError(f"{path}: holds no state; nothing can be compared")
+        return found
+
+
+def _verified(path: Path, tolerance: float | None) -> Verification:
     simulator = simulator_of(path)
     longest = max(rod.path.length for rod in simulator.scene.rods)
     comparison = _Comparison(simulator.description, None if tolerance is None else tolerance * longest)
@@ -145,8 +157,6 @@ def verify(path: str | Path, tolerance: float | None = None) -> Verification:
         until = _apply(simulator, waiting, until)
         result.states += 1
         comparison.add(event, simulator.save_state(), result)
-    if not result.states:
-        raise InputError(f"{path}: holds no state; nothing can be compared")
     return result
 
 
@@ -160,19 +170,32 @@ def simulator_of(path: str | Path, overrides: Sequence[str] = ()) -> Simulator:
         Changes to the scene, ``KEY=VALUE``; those of ``solver`` come before what the run used.
     """
     head = read_head(Path(path))
-    settings, content = head.settings, read_yaml(head.description.scene_text, str(path))
-    scene = load_scene(content, overrides)
+    settings = {key: head.settings.get(key, "") for key in ("model", "dimension", "integrator", "dt", "tolerance")}
+    scene = parse_scene(head.description.scene_text, str(path), overrides)
     asked = {of.partition("=")[0] for of in overrides}
+    tolerance = settings["tolerance"]
     used: dict[str, Any] = {
         "model": settings["model"],
-        "dimension": int(settings["dimension"]),
+        "dimension": int(_number(path, settings, "dimension")),
         "integrator": settings["integrator"],
-        "dt": float(settings["dt"]),
-        "tolerance": None if settings["tolerance"] == "none" else float(settings["tolerance"]),
+        "dt": _number(path, settings, "dt"),
+        "tolerance": None if tolerance == "none" else _number(path, settings, "tolerance"),
     }
     if asked & {"solver.dt", "solver.tolerance"}:
         del used["dt"], used["tolerance"]
-    return Simulator(scene, **{key: value for key, value in used.items() if f"solver.{key}" not in asked})
+    with naming(path):
+        return Simulator(scene, **{key: value for key, value in used.items() if f"solver.{key}" not in asked})
+
+
+def _number(path: str | Path, settings: Mapping[str, str], key: str) -> float:
+    """A setting of a log's run as a number."""
+    try:
+        number = float(settings[key])
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{path}: settings: {key}: found {shortened(settings[key])!r}; must be a finite number")
+    return number
 
 
 def branch(
@@ -204,7 +227,8 @@ def branch(
     stimuli, loads = stimuli or {}, loads or {}
     refuse_without_inputs(Path(path))
     simulator, state = simulator_of(path, overrides), read_state(path, time)[0]
-    simulator.load_state(state)
+    with naming(path):
+        simulator.load_state(state)
     set_from_outside(simulator, stimuli, loads)
     changed = {(STIMULUS, channel) for channel in stimuli} | {(LOAD, name) for name in loads}
     asked = _friction_in(overrides) if simulator.friction else COEFFICIENTS
@@ -255,9 +279,21 @@ def refuse_without_inputs(path: Path) -> None:
 
 def _events(path: Path) -> Iterator[Array | Input]:
     """States, as flat arrays, and inputs in the order in which they came."""
-    for topic, _, _, data in read_messages(path, {STATE, INPUTS.full_name()}):
-        if data is not None:
-            yield read_float64_multi_array(data)[1].copy() if topic == STATE else decode_input(data)
+    size = sum(math.prod(shape) for _, shape in read_head(path).description.state_layout)
+    inputs = 0
+    for topic, _, time, data in read_messages(path, {STATE, INPUTS.full_name()}):
+        if data is None:
+            continue
+        if topic != STATE:
+            inputs += 1
+            if inputs > MOST_INPUTS:
+                raise InputError(f"{path}: has more than {MOST_INPUTS:,} inputs, the most that are replayed")
+            yield decoded(path, topic, time, data, decode_input)
+            continue
+        state = decoded(path, topic, time, data, read_float64_multi_array)[1].copy()
+        if state.size != size or not abs(state[0]) < FAR or nanoseconds(float(state[0])) != time:
+            raise InputError(f"{path}: the state at t = {time / NANOSECONDS:.9g} s is damaged, or of another scene")
+        yield state
 
 
 def _advance(simulator: Simulator, time: float, until: float, waiting: list[Input], loose: bool) -> float:

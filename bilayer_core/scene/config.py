@@ -6,9 +6,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from bilayer_core.printable import shortened
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
-from bilayer_core.scene.faults import Fault, refuse, refuse_all, shortened
+from bilayer_core.scene.faults import Fault, refuse, refuse_all
 from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import Direction, Name, Part

@@ -14,11 +14,13 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
 
+from bilayer_core.printable import shortened
+
 ROUNDING = 1e-9
 """Relative difference of typed numbers that is not taken for a fault."""
 
-LONGEST_VALUE, LONGEST_LIST, LONGEST_TEXT = 60, 600, 120
-"""Characters of a found value, of a list of names and of anything else that somebody wrote, that are shown."""
+LONGEST_VALUE, LONGEST_LIST = 60, 600
+"""Characters of a found value and of a list of names that are shown."""
 MOST_FAULTS = 100
 """That are told; one mistake may be in every item of a long list."""
 
@@ -58,12 +60,6 @@ def one_of(what: str, found: object, allowed: Iterable[str]) -> str:
     """The demand that a name be one of those allowed, with the nearest one suggested."""
     names = [str(name) for name in allowed]
     return f"must be one of the {what} ({listed(names) or 'there are none'}){suggestion(found, names)}"
-
-
-def shortened(text: str, most: int = LONGEST_TEXT) -> str:
-    """Text that can be printed, in one line, cut off where it gets long."""
-    printed = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text[: most + 1])
-    return printed if len(text) <= most else f"{printed[:most]}..."
 
 
 def listed(names: Iterable[str]) -> str:

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from bilayer_core.errors import SceneError
-from bilayer_core.scene.faults import Fault, shortened
+from bilayer_core.printable import shortened
+from bilayer_core.scene.faults import Fault
 
 LARGEST_FILE = 2_000_000
 """Of a scene [bytes]. Long lists of points or values belong into csv files."""

@@ -9,9 +9,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from bilayer_core.errors import SceneError
+from bilayer_core.printable import shortened
 from bilayer_core.scene.bundled import bundled_scene, is_file_name
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.faults import shortened, tell
+from bilayer_core.scene.faults import tell
 from bilayer_core.scene.limits import LARGEST_FILE, check_content, read_text
 from bilayer_core.scene.overrides import Overrides, read_overrides
 from bilayer_core.scene.text import read_yaml, write_yaml

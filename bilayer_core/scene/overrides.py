@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import SceneError
-from bilayer_core.scene.faults import listed, shortened, suggestion
+from bilayer_core.printable import shortened
+from bilayer_core.scene.faults import listed, suggestion
 from bilayer_core.scene.text import read_yaml
 
 Overrides = Sequence[str] | Mapping[str, Any]

@@ -9,7 +9,9 @@ from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from bilayer_core.scene.faults import refuse, shortened
+from bilayer_core.names import LONGEST_NAME, NAME
+from bilayer_core.printable import shortened
+from bilayer_core.scene.faults import refuse
 from bilayer_core.scene.units import (
     Length,
     Number,
@@ -32,8 +34,8 @@ def unit_vector(vector: tuple[float, float, float]) -> tuple[float, float, float
     return tuple(component / length for component in vector)
 
 
-Name = Annotated[str, Field(max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*$")]
-"""Fit for key paths, for ROS topics and for file names."""
+Name = Annotated[str, Field(max_length=LONGEST_NAME, pattern=f"^{NAME}$")]
+"""See `bilayer_core.names`."""
 Point = tuple[Length, Length, Length]
 Direction = Annotated[tuple[Number, Number, Number], AfterValidator(unit_vector)]
 """Unit vector; a file may give any length."""

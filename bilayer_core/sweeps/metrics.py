@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.printable import shortened
 from bilayer_core.record.recorded import Recorded
-from bilayer_core.scene.faults import shortened
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.sweeps.code import load
 from bilayer_core.sweeps.job import Job

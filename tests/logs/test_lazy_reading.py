@@ -41,10 +41,8 @@ def log(tmp_path_factory):
 @pytest.fixture
 def unpacked(monkeypatch):
     """How many chunks have been unpacked."""
-    from bilayer_core.record import log_chunks
-
     counted, unpack = [], log_records.unpacked
-    monkeypatch.setattr(log_chunks, "unpacked", lambda data: counted.append(1) or unpack(data))
+    monkeypatch.setattr(log_records, "unpacked", lambda data: counted.append(1) or unpack(data))
     return counted
 
 

@@ -12,9 +12,8 @@ from rosbags.highlevel import AnyReader
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_reader import read_info, read_messages
-from bilayer_core.record.log_records import CHANNEL, SCHEMA, walk
+from bilayer_core.record.log_records import CHANNEL, CHUNK, SCHEMA, walk
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.repair import repair
 
@@ -41,7 +40,8 @@ def damaged(log, tmp_path):
 
 
 def chunks_of(log):
-    return [chunk.place for chunk in LogFile(log)._chunks]
+    with log.open("rb") as file:
+        return [place for place in walk(file) if place.opcode == CHUNK]
 
 
 def messages_of(path):

@@ -10,14 +10,16 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 # Each part, and the parts that it may import beside itself.
-BASE = {"errors", "jit"}
+BASE = {"names", "printable", "errors", "jit"}
 GEOMETRY = BASE | {"kinematics", "contact"}
 MECHANICS = GEOMETRY | {"scene", "model", "forces"}
 ENGINE = MECHANICS | {"integrators", "engine"}
 RECORDS = BASE | {"kinematics", "observed", "record"}
 NUMERICS = ENGINE | {"observed", "record", "simulation"}
 ALLOWED = {
-    "errors": set(),
+    "names": set(),
+    "printable": set(),
+    "errors": {"printable"},
     "jit": {"errors"},
     "scene": BASE | {"kinematics"},
     "kinematics": BASE,
@@ -33,7 +35,7 @@ ALLOWED = {
     "view": NUMERICS | {"runs"},
     "converge": NUMERICS,
     "fitting": NUMERICS,
-    "beam2d": {"errors", "scene", "model"},
+    "beam2d": {"printable", "errors", "scene", "model"},
     "validate": NUMERICS | {"beam2d"},
     "bench": NUMERICS | {"converge", "validate"},
     "stress": NUMERICS | {"converge", "validate", "bench"},
