@@ -9,7 +9,7 @@ import numpy as np
 
 from bilayer_core.record.log_records import DamagedChunk, Place
 
-MOST_MESSAGES = 16_000_000
+MOST_MESSAGES = 12_000_000
 """Of a file: some hours of a run."""
 MOST_RUNS = 3_000_000
 """Of a file: messages of one channel in one chunk count as one."""
@@ -58,7 +58,7 @@ class ChunkTable:
         self._channel.append(channel)
         self._count.append(len(times))
         self._latest.append(int(times.max()))
-        self._times.frombytes(times.astype(np.uint64).tobytes())
+        self._times.frombytes(memoryview(np.ascontiguousarray(times, np.uint64)).cast("B"))
 
     def forget(self) -> None:
         """Forget the messages of the last chunk."""

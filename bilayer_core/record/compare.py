@@ -87,14 +87,21 @@ def compare(first: Recorded | str | Path, second: Recorded | str | Path) -> Comp
         If they have no time in common, or robots with other nodes.
     """
     one, other = (run if isinstance(run, Recorded) else read_log(run) for run in (first, second))
-    if not (one.times.size and other.times.size):
-        raise InputError("compare: a run without frames has nothing to compare")
+    names = [
+        f"the {place} run" if isinstance(run, Recorded) else str(run)
+        for run, place in ((first, "first"), (second, "second"))
+    ]
+    for run, name in zip((one, other), names, strict=True):
+        if not run.times.size:
+            raise InputError(f"compare: {name} has no frames, so there is nothing to compare")
+        if any((np.diff(times) < 0.0).any() for times in (run.times, run.shape_times)):
+            raise InputError(f"compare: the times of {name} go back, so its frames cannot be found by their times")
     begin, end = max(one.times[0], other.times[0]), min(one.times[-1], other.times[-1])
     if begin > end + SAME_TIME:
-        raise InputError(
-            f"compare: the runs have no time in common: t = {one.times[0]:g} to {one.times[-1]:g} s, and "
-            f"{other.times[0]:g} to {other.times[-1]:g} s"
+        spans = (
+            f"{name} t = {run.times[0]:g} to {run.times[-1]:g} s" for run, name in zip((one, other), names, strict=True)
         )
+        raise InputError(f"compare: the runs have no time in common: {', '.join(spans)}")
     mine, others = one.entries(), other.entries()
     both = [name for name in mine if name in others and name not in OF_MACHINE]
     found: dict[str, QuantityDifference] = {}
@@ -175,7 +182,7 @@ class _Largest:
         extent = max(0.0, self.most - self.least)
         part = self.value / extent if extent else (0.0 if self.value == 0.0 else np.inf)
         time = float(begin) if self.time is None else self.time
-        return QuantityDifference(self.entry.name, self.entry.unit, self.value, time, part, interpolated)
+        return QuantityDifference(self.entry.name, self.entry.unit, self.value, time, part, bool(interpolated))
 
 
 def _compared(one: _Rows, other: _Rows, begin: float, end: float) -> dict[str, QuantityDifference]:

@@ -135,7 +135,7 @@ class DescriptionPart(Part):
     title: str
     node_count: Count
     edge_count: Count
-    strands: Annotated[tuple[StrandPart, ...], Field(max_length=MOST_PARTS)]
+    strands: Annotated[tuple[StrandPart, ...], Field(min_length=1, max_length=MOST_PARTS)]
     bodies: Annotated[tuple[BodyPart, ...], Field(max_length=MOST_PARTS)]
     obstacles: Annotated[tuple[ObstaclePart, ...], Field(max_length=MOST_PARTS)]
     channels: Annotated[tuple[Name, ...], Field(max_length=MOST_PARTS)]
@@ -161,7 +161,8 @@ class DescriptionPart(Part):
                     )
         if any(joint.body >= len(self.bodies) for joint in self.joints):
             raise ValueError(f"joints must be on one of {len(self.bodies)} bodies")
-        if not len(self.channels) == len(self.channel_ranges) == len(self.channel_units or self.channels):
+        units = self.channels if self.channel_units is None else self.channel_units
+        if not len(self.channels) == len(self.channel_ranges) == len(units):
             raise ValueError("channel_ranges and channel_units must have an entry for each of the channels")
         if any(not lower <= upper for lower, upper in self.channel_ranges):
             raise ValueError("channel_ranges must go up")

@@ -9,7 +9,7 @@ from bilayer_core.errors import InputError
 
 MOST_VALUES = 3_000_000
 """Of a text; the description of the largest scene has half as many."""
-MOST_NESTED = 200_000
+MOST_NESTED = 100_000
 """Lists and mappings of a text, each of which takes as much memory as ten values."""
 
 

@@ -8,14 +8,27 @@ from bilayer_core.record.run_data import RunData
 
 DRAWN = ("body_pose", "nodes", "points")
 """Topics without which there is nothing to draw."""
+PLACED = ("positions", "contact_forces", "strain", "curvature", "material_frames", "body_positions", "body_quaternions")
+"""Attributes of a run that decide where things are drawn, and how large."""
+LARGEST = 1e12
+"""Of their values, in SI units."""
 
 
 def refuse_undrawable(run: RunData, name: str) -> None:
-    """Raise InputError, which begins with a name, if a run holds no frame, or its log lacks what is drawn."""
+    """Raise InputError, which begins with a name, if a run lacks a topic that is drawn, holds no frame, or has values
+    that no picture can show.
+    """
     if missing := [topic for topic in run.lacks if any(f"/{drawn}/" in f"{topic}/" for drawn in DRAWN)]:
         raise InputError(f"{name}: the log does not hold {', '.join(missing)}, which is drawn")
     if not len(run.times) or not len(run.shape_times):
         raise InputError(f"{name}: the run holds no frame, there is nothing to show")
+    for attribute in PLACED:
+        values = getattr(run, attribute)
+        if values.size and not (values.min() >= -LARGEST and values.max() <= LARGEST):  # NaN is neither
+            what = attribute.replace("_", " ")
+            raise InputError(
+                f"{name}: its {what} have values that are not finite or above {LARGEST:g}; they cannot be drawn"
+            )
 
 
 def has_sections(layer: Strand) -> bool:

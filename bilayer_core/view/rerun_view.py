@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bilayer_core.errors import InputError
+from bilayer_core.errors import InputError, naming
 from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.record.paths import check_output_path, draft_of
 from bilayer_core.record.run_data import RunData
@@ -35,7 +35,8 @@ def convert_log(mcap_path: str | Path, rrd_path: str | Path, colour: str = STRAI
     """Convert an MCAP log, whole or cut off, to a rerun recording. An existing recording is replaced."""
     from bilayer_core.record.log_reader import read_log
 
-    write_rrd(read_log(mcap_path), rrd_path, colour=colour)
+    with naming(mcap_path):
+        write_rrd(read_log(mcap_path), rrd_path, colour=colour)
 
 
 def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path, force: bool) -> None:

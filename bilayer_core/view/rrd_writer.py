@@ -204,11 +204,8 @@ class RunSender:
                 },
             },
             **energy_groups(run, set(self._curves.get("energy", ())) | set(self._curves.get(GRAVITY, ()))),
+            "solver": _health(run.solver),
         }
-        if solver := run.solver:
-            groups["solver"] = {"iterations per step": solver["iterations"] / np.maximum(solver["substeps"], 1)}
-            if np.isfinite(solver["min_gap"]).all():  # infinite where nothing can touch
-                groups["solver"]["smallest gap [mm]"] = 1e3 * solver["min_gap"]
         for group, series in groups.items():
             for name, values in series.items():
                 self._send_curve(group, name, run.times, values)
@@ -261,6 +258,16 @@ def _chunks(count: int):
 
 def _time(times: np.ndarray) -> list[rr.TimeColumn]:
     return [rr.TimeColumn(TIMELINE, duration=times)]
+
+
+def _health(solver: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Curves of the solver's figures, as far as the log has them."""
+    curves = {}
+    if "iterations" in solver and "substeps" in solver:
+        curves["iterations per step"] = solver["iterations"] / np.maximum(solver["substeps"], 1)
+    if "min_gap" in solver and np.isfinite(solver["min_gap"]).all():  # infinite where nothing can touch
+        curves["smallest gap [mm]"] = 1e3 * solver["min_gap"]
+    return curves
 
 
 def _bytes(colours: np.ndarray) -> np.ndarray:

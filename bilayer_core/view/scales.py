@@ -11,6 +11,7 @@ from bilayer_core.view.geometry import rotated, shape_extent
 
 _STEPS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0])
 SMALLEST_STRAIN = 1e-4
+SMALLEST_SIZE = 1e-9  # of a robot [m]
 ARROW_SHARE = 0.25  # length of the arrow of the reference force, in sizes of the robot
 SHOWN_SHARE = 0.005  # forces below this share of the reference force have no arrow
 VIEW_DIRECTION = np.array([0.62, -0.72, 0.30])  # from what is looked at to the eye
@@ -61,7 +62,7 @@ class Scales:
 
 def choose_scales(run: RunData) -> Scales:
     """Scales that suit a run."""
-    size = float(np.ptp(run.positions[0], axis=0).max())
+    size = max(float(np.ptp(run.positions[0], axis=0).max()), SMALLEST_SIZE)
     strain = max(*(float(np.abs(run.strain_of(layer)).max()) for layer in run.description.layers), SMALLEST_STRAIN)
     reference = reference_of(run.contact_forces)
     metres_per_newton = 1.0 / rounded_up(reference / (ARROW_SHARE * size))

@@ -1,0 +1,114 @@
+"""Files made to fill the memory of their reader are read, or refused, within the memory that is documented."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import hostile_logs
+import pytest
+import synthetic_run
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.observed.frame import Description
+from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.record.state_file import write_state
+
+MORE_OF_INFO = 300e6
+"""Peak memory of ``bilayer info`` above that for a log of no frame [bytes]."""
+MORE_OF_OTHERS = 1.5e9
+"""Likewise of the other commands, which hold arrays of at most a gigabyte [bytes]."""
+MORE_OF_STATES = 50e6
+"""Likewise of going on from a state, above that of a whole one [bytes]."""
+FRAMES, NODES = 150, 100_000
+"""Of a log whose frames take 1.3 GB, and which has a few megabytes as they are all the same."""
+PROGRAM = """
+import os, sys
+from pathlib import Path
+from bilayer_core.cli import main
+
+first, *others = (line.split("\\t") for line in Path(sys.argv[1]).read_text().splitlines())
+main(first)  # which imports what the others need
+for arguments in (first, *others):
+    child = os.fork()
+    if not child:
+        os._exit(main(arguments))
+    _, status, used = os.wait4(child, 0)
+    figures = os.waitstatus_to_exitcode(status), 1024 * used.ru_maxrss, used.ru_utime + used.ru_stime
+    print(*figures, file=sys.stderr, flush=True)
+"""
+
+
+def described() -> Description:
+    """A description of few nodes."""
+    return synthetic_run.description()
+
+
+def measured(folder: Path, commands: list[list[object]]) -> tuple[list[tuple[int, float, float]], str]:
+    """Exit code, peak memory [bytes] and CPU time [s] of commands, each in a process of its own, and what they said."""
+    (folder / "commands").write_text("\n".join("\t".join(map(str, command)) for command in commands))
+    process = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(folder / "commands")], capture_output=True, text=True, timeout=280
+    )
+    assert process.returncode == 0, process.stderr[-3000:]
+    figures = [line.split() for line in process.stderr.splitlines() if re.fullmatch(r"-?\d+ \d+ \S+", line)]
+    assert len(figures) == len(commands), process.stderr[-3000:]
+    return [(int(code), float(peak), float(seconds)) for code, peak, seconds in figures], process.stderr
+
+
+@pytest.fixture(scope="module")
+def hostile(tmp_path_factory):
+    """A log of no frame, and hostile ones."""
+    folder = tmp_path_factory.mktemp("hostile")
+    recorder = McapRecorder(folder / "empty.mcap")
+    recorder.start(described())
+    recorder.close(False)
+    for number, (name, data) in enumerate(hostile_logs.logs(described()).items()):
+        (folder / f"{number:02} {name}.mcap").write_bytes(data)
+    return folder
+
+
+@pytest.mark.slow
+def test_info_takes_no_more_memory_for_a_hostile_log_than_documented(hostile, tmp_path):
+    paths = [hostile / "empty.mcap", *sorted(hostile.glob("[0-9]*.mcap"))]
+    ((_, empty, _), *found), said = measured(tmp_path, [["info", path] for path in paths])
+    for path, (code, peak, seconds) in zip(paths[1:], found, strict=True):
+        print(f"{path.name:60} {code} {(peak - empty) / 1e6:6.0f} MB {seconds:5.1f} s")
+    assert all(code in (0, 2) for code, _, _ in found) and "internal error" not in said
+    assert max(peak for _, peak, _ in found) - empty < MORE_OF_INFO
+
+
+@pytest.mark.slow
+def test_commands_take_no_more_memory_for_a_log_that_unpacks_to_more_than_documented(tmp_path):
+    log = tmp_path / "run.mcap"
+    hostile_logs.write_repeated(log, described(), FRAMES, NODES)
+    commands = [
+        ["info", log],
+        ["export", log, "rod/*/strain", "--npz", tmp_path / "out.npz"],
+        ["plot", log, "com", "--out", tmp_path / "out.svg"],
+        ["view", log, "--save", tmp_path / "out.rrd"],
+        ["replay", log, "--verify"],
+        ["repair", log, tmp_path / "out.mcap"],
+        ["compare", log, log],
+    ]
+    ((_, least, _), *found), said = measured(tmp_path, commands)
+    for command, (code, peak, seconds) in zip(commands[1:], found, strict=True):
+        print(f"{command[0]:10} {code} {(peak - least) / 1e6:6.0f} MB {seconds:5.1f} s")
+    assert "unpacks to more than 1 GB in memory" in said and "internal error" not in said
+    assert all(code in (0, 2) for code, _, _ in found)
+    assert max(peak for _, peak, _ in found) - least < MORE_OF_OTHERS
+
+
+@pytest.mark.slow
+def test_a_saved_state_that_unpacks_to_gigabytes_is_refused_in_little_memory(tmp_path):
+    simulator = Simulator(load_scene("bending"))
+    whole = tmp_path / "whole.npz"
+    write_state(whole, simulator.save_state(), simulator.description)
+    states = hostile_logs.write_states(tmp_path, json.dumps(simulator.description.state_layout))
+    commands = [["run", "bending", "--from-state", path, "--duration", "1e-3", "--quiet"] for path in (whole, *states)]
+    ((code, least, _), *found), said = measured(tmp_path, commands)
+    for path, (_, peak, seconds) in zip(states, found, strict=True):
+        print(f"{path.name:30} {(peak - least) / 1e6:6.0f} MB {seconds:5.1f} s")
+    assert code == 0 and all(code == 2 for code, _, _ in found), said[-3000:]
+    assert max(peak for _, peak, _ in found) - least < MORE_OF_STATES
