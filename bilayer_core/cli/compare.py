@@ -36,8 +36,8 @@ class Compare(Verb):
 
 
 @click.command(cls=Compare)
-@click.argument("first", metavar="A.mcap")
-@click.argument("second", metavar="B.mcap")
+@click.argument("first", metavar="A.mcap|BAG")
+@click.argument("second", metavar="B.mcap|BAG")
 @json_option("Write all differences")
 @click.option("--all", "everything", is_flag=True, help="Also quantities that are equal.")
 def compare(first: str, second: str, json_file: str | None, everything: bool) -> None:

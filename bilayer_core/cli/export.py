@@ -11,7 +11,7 @@ TABLE = "A table FILE{0} of all but nodes of rods, or a directory with a file of
 
 
 @click.command(cls=Verb)
-@click.argument("log", metavar="LOG.mcap")
+@click.argument("log", metavar="LOG.mcap|BAG")
 @click.argument("quantities", metavar="[QUANTITY]...", nargs=-1)
 @click.option("--csv", metavar="OUT", help=TABLE.format(".csv"))
 @click.option("--parquet", metavar="OUT", help=TABLE.format(".parquet"))

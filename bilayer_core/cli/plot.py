@@ -13,7 +13,7 @@ SUFFIX = ".mcap"
 
 
 @click.command(cls=Verb)
-@click.argument("logs_and_quantities", metavar="LOG.mcap... QUANTITY...", nargs=-1, required=True)
+@click.argument("logs_and_quantities", metavar="LOG.mcap|BAG... QUANTITY...", nargs=-1, required=True)
 @click.option("--out", metavar="FIGURE", help="Write a .pdf, .png or .svg instead of opening a window.")
 @click.option("--node", type=int, metavar="N", help="Which node of rods; -1 is the last one, the default.")
 @click.option("--width", default="single", metavar="W", help="Of the figure: single or double column, or millimetres.")
@@ -35,10 +35,12 @@ def plot(
     from bilayer_core.errors import InputError
     from bilayer_core.view.plot import WIDTHS, plot
 
-    logs = [word for word in logs_and_quantities if word.lower().endswith(SUFFIX)]
+    logs = [word for word in logs_and_quantities if _is_log(word)]
     quantities = [word for word in logs_and_quantities if word not in logs]
     if not logs:
-        raise InputError(f"plot: none of {', '.join(logs_and_quantities)} is a log; name at least one ({SUFFIX})")
+        raise InputError(
+            f"plot: none of {', '.join(logs_and_quantities)} is a log ({SUFFIX}) or a bag; name at least one"
+        )
     if not quantities:
         raise InputError(
             f"plot: say which quantities, such as com.z; `bilayer info {logs[0]} --quantities` lists those of the log"
@@ -46,6 +48,14 @@ def plot(
     plot(logs, quantities, out, node, width if width in WIDTHS else _millimetres(width), labels, force)
     if out:
         say(f"figure    {Path(out)}")
+
+
+def _is_log(word: str) -> bool:
+    """Return whether a word names a log or a bag, and not a quantity."""
+    from bilayer_core.record.bag import split_address
+
+    path, _, _ = split_address(word)
+    return path.suffix.lower() == SUFFIX or (path.is_dir() and any(path.glob(f"*{SUFFIX}")))
 
 
 def _millimetres(width: str) -> float:

@@ -40,7 +40,7 @@ class Size(click.ParamType):
 
 
 @click.command(cls=Verb)
-@click.argument("file", metavar="FILE.mcap")
+@click.argument("file", metavar="FILE.mcap|BAG")
 @click.option("--png", metavar="OUT.png", help="One picture, of the end or of --at.")
 @click.option("--sheet", metavar="OUT.png", help=f"{SHEET_PICTURES} pictures in one, with their times.")
 @click.option("--gif", metavar="OUT.gif|OUT.webp", help=f"An animation, {GIF_RATE:g} pictures a second.")

@@ -14,7 +14,7 @@ FOLLOWING = {"node": "--node", "bind": "--bind", "port": "--port", "serve": "--s
 
 
 @click.command(cls=Verb, old_spellings={"--time": "--at"})
-@click.argument("file", metavar="[FILE.mcap|FILE.rrd]", required=False)
+@click.argument("file", metavar="[FILE.mcap|BAG|FILE.rrd]", required=False)
 @click.option("--follow", is_flag=True, help="Show a run while it goes on: of a node, or in a log that is written.")
 @click.option("--node", metavar="NAME", help=f"Which node to follow; default: {NODE}.")
 @click.option("--serve", is_flag=True, help="With --follow: open no window, say only where viewers may connect.")

@@ -23,6 +23,8 @@ MOST_WAITING = 1000
 class Messages:
     """Messages in the order in which they came: what `LogSource` asks of a file."""
 
+    namespace = LOG_NAMESPACE
+
     def __init__(self, topics: dict[str, str], taken: list[tuple[str, int, bytes]]):
         self.topics = topics
         self._taken = taken

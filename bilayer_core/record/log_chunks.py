@@ -33,6 +33,7 @@ from bilayer_core.record.log_records import (
 )
 from bilayer_core.record.log_summary import Summary, read_summary
 from bilayer_core.record.opening import open_log
+from bilayer_core.record.topics import LOG_NAMESPACE
 
 MOST_BARE = 1 << 20
 """Of messages that stand outside of chunks, as many as are read at once [bytes]."""
@@ -58,6 +59,8 @@ class LogFile:
     Attributes
     ----------
     path : Path
+    namespace : str
+        What the names of a run's topics begin with.
     channels : dict
         Number -> `LogChannel`.
     has_index : bool
@@ -70,6 +73,8 @@ class LogFile:
     InputError
         If it is no MCAP file, or is damaged, or has more in it than is read.
     """
+
+    namespace = LOG_NAMESPACE
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
@@ -141,11 +146,12 @@ class LogFile:
 
     def _scan(self, file: BinaryIO) -> None:
         """A file without an index, from record to record."""
-        indexed = True
+        indexed, known = True, False
         for place in walk(file):
             if place.opcode == MESSAGE_INDEX and self._chunks and self._chunks[-1].opcode == CHUNK:
-                if not self._add_index(content(file, place)):
+                if not known and not self._add_index(content(file, place)):
                     self._look_into(file)
+                    known = True  # from the chunk itself; what its other indexes say would count twice
                 indexed = True
             elif place.opcode in (SCHEMA, CHANNEL, MESSAGE) and self._extend(place):
                 indexed = False
@@ -154,7 +160,7 @@ class LogFile:
                     self._look_into(file)
                 bare = place.opcode != CHUNK
                 self._chunks.begin(Place(MESSAGE, place.begin, place.end - place.begin) if bare else place)
-                indexed = False
+                indexed = known = False
             elif place.opcode == DATA_END:
                 break
         if self._chunks:

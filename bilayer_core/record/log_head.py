@@ -30,6 +30,8 @@ _HEAD = ("description", "versions", "settings")
 """Metadata that every log has before its first chunk."""
 
 _READ = (*_HEAD, "machine")
+_OWN = {"description": "state_layout", "versions": DISTRIBUTION}
+"""A key of the metadata records by which a log is known."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,33 @@ class Head:
     machine: dict[str, str]  # empty in older logs
 
 
+def is_log(path: Path) -> bool:
+    """Return whether a file is a log of a run, whole or not, by any of the metadata that only these have.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no MCAP file.
+    """
+    with open_log(path) as file:
+        records = (read_metadata(content(file, place), _OWN) for place in walk(file) if place.opcode == METADATA)
+        return any(_OWN.get(name) in values for name, values in records)
+
+
 def read_head(path: Path) -> Head:
-    """Scene, description, versions and settings: all that comes before the first chunk."""
+    """Scene, description, versions and settings: all that comes before the first chunk.
+
+    Raises
+    ------
+    InputError
+        If the file is no log, with what can be done with a bag of ``ros2 bag record``, or is damaged.
+    """
+    if path.is_dir() or not is_log(path):
+        raise InputError(
+            f"{path}: is no log of a run, so it does not hold the scene, the solver settings and all that acted; "
+            "`bilayer run --log` and the node's parameter `log` write logs. A bag of `ros2 bag record` can be read by "
+            "info, view, plot, export, compare and render"
+        )
     metadata: dict[str, dict[str, str]] = {}
     scene = None
     with open_log(path) as file:

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.observed.frame import Description
+from bilayer_core.record.bag import Bag, BagRun, choose_run, split_address
 from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
 from bilayer_core.record.chain import END, STATE, Link
 from bilayer_core.record.log_chunks import LogFile
@@ -20,6 +22,7 @@ from bilayer_core.record.log_head import Head, read_head
 from bilayer_core.record.log_records import METADATA, content, read_metadata, walk
 from bilayer_core.record.log_source import LogSource
 from bilayer_core.record.logged_run import LoggedRun
+from bilayer_core.record.opened_run import names_log
 from bilayer_core.record.opening import open_log
 from bilayer_core.record.run_data import RunData
 from bilayer_core.record.topics import INPUTS
@@ -42,18 +45,23 @@ REPAIRED = "repair"
 """Metadata record of a log that `repair` has made: what it kept and lost."""
 LATE = (END, REPAIRED)
 """Metadata records that stand after the messages."""
+READ_BAGS = ("view", "render", "plot", "export", "compare")
+"""Verbs that read bags too."""
+FIRST_DATE = 946_684_800 * NANOSECONDS
+"""Of the year 2000: messages that were logged before have no date, but a time of simulation [ns]."""
 
 
 @dataclass(frozen=True)
 class LogInfo:
-    """What a log holds: the content of `bilayer info` (`dataclasses.asdict` gives its JSON).
+    """What a log, a bag or another file holds: the content of `bilayer info` (`dataclasses.asdict` gives its JSON).
 
     Attributes
     ----------
     path, scene, title : str
+        Scene and title are empty where the file does not say.
     versions, settings : dict
     start_time, last_time, duration : float
-        Simulated time of the first and last message, and between them [s].
+        Simulated time of the first and last message, and between them [s]; of a bag, if it holds one run.
     channels : tuple of str
         Stimulus channels.
     topics : dict
@@ -66,6 +74,14 @@ class LogInfo:
         Of the file [bytes].
     lacks : tuple of str
         What a log of this version holds and this one does not, and what cannot be done without.
+    kind : str
+        ``"log"``; ``"bag"``, which a recorder made of the messages of nodes; ``"mcap"`` without any such messages.
+    runs : tuple of BagRun
+        Of a bag.
+    recorded : tuple of str
+        When the first and the last message of a bag were recorded, in UTC; empty where it does not say.
+    commands : tuple of str
+        Verbs of `bilayer` that can read the file beside ``info``.
     """
 
     path: str
@@ -82,17 +98,29 @@ class LogInfo:
     termination: str
     size: int
     lacks: tuple[str, ...] = ()
+    kind: str = "log"
+    runs: tuple[BagRun, ...] = ()
+    recorded: tuple[str, ...] = ()
+    commands: tuple[str, ...] = (*READ_BAGS, "replay", "repair", "run --from-state")
 
 
 def read_info(path: str | Path) -> LogInfo:
-    """What a log holds, from its index or, when it was cut off, by reading it through. InputError if it is no log."""
-    path = Path(path)
+    """What a log holds, from its index or, when it was cut off, by reading it through; what a bag holds, by reading it
+    through once, and any other MCAP file.
+
+    Raises
+    ------
+    InputError
+        If it is no MCAP file, or is damaged.
+    """
+    path, node, number = split_address(path)
+    if not names_log(path, node, number):
+        return _info_of_bag(Bag(path, node), number)
     head, file = read_head(path), LogFile(path)
     spans = file.spans()
-    times = [min(first for _, first, _ in spans.values()), max(last for _, _, last in spans.values())] if spans else []
     metadata = _read_metadata(path)
     ending = metadata.get(END, {})
-    start, last = (time / NANOSECONDS for time in times) if times else (0.0, 0.0)
+    start, last = (time / NANOSECONDS for time in _span(spans))
     return LogInfo(
         path=str(path),
         scene=head.description.scene_name,
@@ -103,15 +131,67 @@ def read_info(path: str | Path) -> LogInfo:
         last_time=last,
         duration=last - start,
         channels=head.description.channels,
-        topics={
-            topic: {"type": file.topics[topic], "count": spans[topic][0] if topic in spans else 0}
-            for topic in sorted(file.topics)
-        },
+        topics=_counts(file.topics, spans),
         complete=ending.get("complete") == "true",
         termination=ending.get("termination", CUT_OFF),
         size=path.stat().st_size,
         lacks=_lacks(head, file, metadata),
     )
+
+
+def _info_of_bag(bag: Bag, number: int) -> LogInfo:
+    """What a file holds that is no log of ours."""
+    files = bag.files
+    spans = files.spans()
+    runs = tuple(run for run in bag.runs if number in (0, run.number))
+    if not runs and (bag.node or number):
+        choose_run(bag, number)  # says which there are
+    lacks, source = [bag.problem] if bag.problem else [], None
+    if len(runs) == 1:
+        try:
+            source = LogSource(f"{files.path}{runs[0].address}", *bag.opened(runs[0]))
+            lacks += [f"{topic}: its quantities are not there" for topic in source.lacks]
+        except InputError as error:
+            lacks.append(str(error))
+    lacks += [f"{part.path}: an index, as it was not finished" for part in files.parts if not part.has_index]
+    uncertain = "messages, and when the others were sent: energy, solver and stimulus_applied may be some frames off"
+    lacks += [f"{run.node}: {uncertain}" for run in runs if not run.certain]
+    lacks += [f"{run.node}: stamps; times are those since its first message" for run in runs if not run.stamped]
+    return LogInfo(
+        path=str(files.path),
+        scene=source.description.scene_name if source else "",
+        title=source.description.title if source else "",
+        versions={},
+        settings=source.description.settings if source else {},
+        start_time=runs[0].start_time if len(runs) == 1 else 0.0,
+        last_time=runs[0].last_time if len(runs) == 1 else 0.0,
+        duration=runs[0].last_time - runs[0].start_time if len(runs) == 1 else 0.0,
+        channels=source.description.channels if source else (),
+        topics=_counts(files.topics, spans),
+        complete=False,
+        termination="",
+        size=sum(part.path.stat().st_size for part in files.parts),
+        lacks=tuple(lacks),
+        kind="bag" if bag.runs else "mcap",
+        runs=runs,
+        recorded=tuple(map(_date, _span(spans))) if _span(spans)[0] >= FIRST_DATE else (),
+        commands=READ_BAGS if bag.runs else (),
+    )
+
+
+def _counts(topics: dict[str, str], spans: dict[str, tuple[int, int, int]]) -> dict[str, dict]:
+    """Type and number of messages of each topic, in the order of their names."""
+    return {topic: {"type": topics[topic], "count": spans.get(topic, (0,))[0]} for topic in sorted(topics)}
+
+
+def _span(spans: dict[str, tuple[int, int, int]]) -> tuple[int, int]:
+    """Times of the first and the last message [ns]; zero if there is none."""
+    times = [time for _, first, last in spans.values() for time in (first, last)] or [0]
+    return min(times), max(times)
+
+
+def _date(time: int) -> str:
+    return datetime.fromtimestamp(time // NANOSECONDS, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 def read_description(path: str | Path) -> Description:
@@ -154,7 +234,8 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
 
 
 def read_log(path: str | Path) -> RunData:
-    """A run as arrays over time, which are read when they are asked for.
+    """A run as arrays over time, which are read when they are asked for: of a log, or of a bag of ``ros2 bag record``
+    (`opened_run.open_run` says how runs in one are named).
 
     ``run["com"]`` reads that quantity alone, so that also logs larger than the memory can be looked into; attributes
     such as ``run.positions`` read all that comes at one rate. Times are those at which the log has all topics of a

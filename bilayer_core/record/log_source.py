@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -16,14 +15,15 @@ from bilayer_core.names import is_name
 from bilayer_core.observed.frame import Description
 from bilayer_core.printable import shortened
 from bilayer_core.record import encoders
+from bilayer_core.record.bag import split_address
 from bilayer_core.record.cdr import NANOSECONDS, Template, decoded, read_float64_multi_array
 from bilayer_core.record.event_messages import decode_event
 from bilayer_core.record.events import Event
-from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.log_head import Head, read_head
+from bilayer_core.record.log_head import Head
 from bilayer_core.record.node_frames import node_order
+from bilayer_core.record.opened_run import MessageSource, open_run
 from bilayer_core.record.quantities import Entry, Quantity, entries
-from bilayer_core.record.topics import EVENTS, LOG_NAMESPACE, Rate, output_topics
+from bilayer_core.record.topics import EVENTS, Rate, output_topics
 
 Array = np.ndarray
 BLOCK = 8 << 20
@@ -32,6 +32,8 @@ LEAST_MEMORY, MOST_EXPANSION = 1e9, 20
 """A log's arrays may take so much memory [bytes], or so many times the size of the file if that is more."""
 PER_EVENT = 500
 """Memory that an event takes beside its text [bytes]."""
+PADDING = 4
+"""Some middlewares fill messages up to a multiple of this [bytes]."""
 TIME, SHAPE_TIME = "time", "shape_time"
 """The two times of a run: of frames, and of shapes of rods."""
 _WIDTHS = {"body_positions": 3, "body_quaternions": 4, "contact_wrenches": 6, "clamp_wrenches": 6}
@@ -71,24 +73,13 @@ class _Queue:
     seen: int = 0
 
 
-class MessageSource(Protocol):
-    """Messages of a run: a file, or what has come of it so far."""
-
-    topics: dict[str, str]
-
-    def times(self, topic: str) -> Array: ...
-
-    def count(self, topic: str) -> int: ...
-
-    def messages(self, topics: set[str] | None = None) -> Iterator[tuple[str, int, bytes]]: ...
-
-
 class LogSource:
     """The quantities of a log.
 
     Parameters
     ----------
     path : str or Path
+        Of a log or a bag, see `open_run`.
     head : Head, optional
     file : MessageSource, optional
         If they are read already.
@@ -109,30 +100,32 @@ class LogSource:
 
     def __init__(self, path: str | Path, head: Head | None = None, file: MessageSource | None = None):
         self.path = Path(path)
-        self.description: Description = (head or read_head(self.path)).description
-        self._file = file or LogFile(self.path)
+        if head is None or file is None:
+            head, file = open_run(path)
+        self.description: Description = head.description
+        self._file = file
         unread = ("/clock", "state", "markers")
         groups: dict[str, list[str]] = {TIME: [], SHAPE_TIME: []}
         for spec in output_topics(self.description):
             if spec.name not in unread:
                 groups[SHAPE_TIME if spec.rate is Rate.DISPLAY else TIME].append(spec.name)
-        counts = {name: self._file.count(_full(name)) for names in groups.values() for name in names}
+        counts = {name: self._file.count(self._full(name)) for names in groups.values() for name in names}
         begun = any(counts.values())  # what comes later does not lack in a log of no frame yet
         self._held = {group: [name for name in names if counts[name] or not begun] for group, names in groups.items()}
         self.lacks = tuple(
-            _full(name)
+            self._full(name)
             for group, names in groups.items()
             for name in names
-            if name not in self._held[group] and (self._held[group] or _full(name) not in self._file.topics)
+            if name not in self._held[group] and (self._held[group] or self._full(name) not in self._file.topics)
         )
         terms, figures = (self._first(name)[0] if counts[name] else () for name in ("energy", "solver"))
         lacking = set(self.lacks)
         self.entries = {
             entry.name: entry
             for entry in entries(self.description, terms, figures)
-            if _full(entry.topic) not in lacking
+            if self._full(entry.topic) not in lacking
         }
-        self._most_memory = max(LEAST_MEMORY, MOST_EXPANSION * size_of(self.path))
+        self._most_memory = max(LEAST_MEMORY, MOST_EXPANSION * size_of(split_address(path)[0]))
         self._memory = 0
 
     @property
@@ -149,7 +142,7 @@ class LogSource:
         """Times of rows, and the topics with those of their messages that are rows."""
         times, topics = {}, {}
         for group, names in self._held.items():
-            of_group = {name: self._layout(name, self._file.times(_full(name))) for name in names}
+            of_group = {name: self._layout(name, self._file.times(self._full(name))) for name in names}
             times[group] = _align(list(of_group.values()))
             topics |= of_group
         return times, topics
@@ -159,7 +152,7 @@ class LogSource:
         held = self.description
         for entry in entries(held, (), ()):
             if entry.name == name and name not in self.entries:
-                return f"{self.path} does not hold it: it has no {_full(entry.topic)}"
+                return f"{self.path} does not hold it: it has no {self._full(entry.topic)}"
         return None
 
     def read(self, entry: Entry) -> Quantity:
@@ -192,7 +185,7 @@ class LogSource:
         return of
 
     def _events(self) -> Iterator[Event]:
-        topic = EVENTS.full_name()
+        topic = self._full(EVENTS.name)
         for _, time, data in self._file.messages({topic}):
             self._take_memory(len(data) + PER_EVENT)
             yield decoded(self.path, topic, time, data, decode_event)
@@ -208,7 +201,7 @@ class LogSource:
         """
         queues: dict[str, _Queue] = {}
         for entry in wanted:
-            queues.setdefault(_full(entry.topic), _Queue(self._topics[entry.topic])).wanted.append(entry)
+            queues.setdefault(self._full(entry.topic), _Queue(self._topics[entry.topic])).wanted.append(entry)
         if not queues:
             return
         rows = max(1, most // sum(queue.topic.size for queue in queues.values()))
@@ -219,12 +212,12 @@ class LogSource:
             queue.seen += 1
             if number >= len(topic.stamps) or topic.stamps[number] != stamp:
                 raise InputError(f"{self.path}: is damaged: its index says another time for {name} than the message")
-            if len(data) != topic.size:
+            if not topic.size <= len(data) < topic.size + PADDING:
                 raise InputError(f"{self.path}: {name}: a message has {len(data)} bytes, expected are {topic.size}")
             if topic.kept is not None and not topic.kept[number]:
                 continue
-            queue.messages.append(data)
-            waiting += len(data)
+            queue.messages.append(data[: topic.size])
+            waiting += topic.size
             if waiting > self._most_memory:
                 raise InputError(f"{self.path}: has its topics one after the other, not by time; this is not read")
             if len(queue.messages) >= rows and all(len(of.messages) >= rows for of in queues.values()):
@@ -234,6 +227,9 @@ class LogSource:
         left = min(len(queue.messages) for queue in queues.values())
         if left:
             yield slice(done, done + left), _taken(queues.values(), left)
+
+    def _full(self, name: str) -> str:
+        return f"{self._file.namespace}/{name}"
 
     def _values(self, wanted: list[Entry]) -> dict[str, Array]:
         """Values of quantities that come at one rate, by name."""
@@ -283,7 +279,9 @@ class LogSource:
                 return _Topic(name, 1, 0, np.dtype(float), channels, stamps)
             _, values, size = self._first(name)
             if name == "stimulus_applied" and values.shape != channels:
-                raise InputError(f"{self.path}: {_full(name)}: has {values.size} values for {channels[0]} channels")
+                raise InputError(
+                    f"{self.path}: {self._full(name)}: has {values.size} values for {channels[0]} channels"
+                )
             return _Topic(name, size, size - values.nbytes, values.dtype, values.shape, stamps)
         template, part = self._template(name)
         offset, dtype, shape = template.fields[part]
@@ -291,7 +289,7 @@ class LogSource:
 
     def _first(self, name: str) -> tuple[tuple[str, ...], Array, int]:
         """Labels and values of a topic's first message, and its size [bytes]."""
-        topic = _full(name)
+        topic = self._full(name)
         for _, time, data in self._file.messages({topic}):
             labels, values = decoded(self.path, topic, time, data, read_float64_multi_array)
             wrong = [label for label in labels if not is_name(label)]
@@ -346,10 +344,6 @@ def _align(topics: list[_Topic]) -> Array:
             topic.kept[np.unique(topic.stamps, return_index=True)[1]] = True
             topic.kept &= np.isin(topic.stamps, common)
     return np.asarray(common, float) / NANOSECONDS
-
-
-def _full(name: str) -> str:
-    return f"{LOG_NAMESPACE}/{name}"
 
 
 def _group(entry: Entry) -> str:

@@ -11,13 +11,23 @@ from typing import BinaryIO
 from bilayer_core.errors import InputError
 from bilayer_core.record.log_records import MAGIC, DamagedChunk
 
+CONVERT = (
+    "convert the bag with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml says "
+    "`output_bags: [{uri: NEW, storage_id: mcap, all: true}]`"
+)
+_OTHER_BAGS = {b"SQLite f": "is a bag stored with sqlite3", b"\x28\xb5\x2f\xfd": "is compressed as a whole"}
+"""First bytes of files of bags that are not read, and what they are."""
+
 
 @contextmanager
 def open_log(path: Path) -> Iterator[BinaryIO]:
     """The open file; what shows that it is not a log, or is damaged, becomes an InputError."""
     try:
         with path.open("rb") as file, damage_told(path):
-            if file.read(len(MAGIC)) != MAGIC:
+            if (begin := file.read(len(MAGIC))) != MAGIC:
+                for magic, what in _OTHER_BAGS.items():
+                    if begin.startswith(magic):
+                        raise InputError(f"{path}: {what}, which is not read; {CONVERT}")
                 raise InputError(f"{path}: is not an MCAP log: it does not begin as one")
             yield file
     except OSError as error:

@@ -248,7 +248,8 @@ def explanation(
         lines.append(f"{colour}: {name.split('_')[1]} of rods on bodies, {size}.")
     if any(obstacle.shape.kind == "plane" for obstacle in description.obstacles):
         lines.append(f"Squares on the ground: {1e3 * scales.cell:g} mm.")
-    lines.append(f"Computed with: {', '.join(settings)}.")
+    if settings:
+        lines.append(f"Computed with: {', '.join(settings)}.")
     return "\n".join(lines)
 
 

@@ -15,7 +15,7 @@ from bilayer_core.record.log_reader import read_log
 from bilayer_core.view.arrows import contact_arrows, reaction_arrows
 from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
 from bilayer_core.view.colouring import STRAIN, choose_colouring
-from bilayer_core.view.drawable import refuse_undrawable
+from bilayer_core.view.drawable import has_sections, refuse_undrawable
 from bilayer_core.view.ground import Ground
 from bilayer_core.view.moments import Moment, Moments
 from bilayer_core.view.scales import choose_scales
@@ -82,6 +82,11 @@ class Studio:
         self._path, self._look = Path(path), look
         self._run = run = read_log(path)
         refuse_undrawable(run, str(path))
+        if not all(map(has_sections, run.description.layers)):
+            raise InputError(
+                f"{path}: does not hold the node's description, so the widths of its rods are not known; "
+                "`bilayer view` shows their nodes as points"
+            )
         self._scales = choose_scales(run)
         self._colouring = choose_colouring(run, look.colour)
         self._moments = Moments(run, [self._colouring.values(run, layer) for layer in run.description.layers])

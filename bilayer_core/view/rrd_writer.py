@@ -15,7 +15,7 @@ from bilayer_core.record.run_data import RunData
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import Arrows, contact_arrows, reaction_arrows
 from bilayer_core.view.colouring import STRAIN, Colouring, choose_colouring
-from bilayer_core.view.drawable import refuse_undrawable
+from bilayer_core.view.drawable import has_sections, refuse_undrawable
 from bilayer_core.view.layout import (
     CHANNEL_COLOURS,
     EVENTS,
@@ -95,7 +95,7 @@ class RunSender:
         recording.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         log_obstacles(recording, description, scales)
         log_bodies(recording, description, scales, BODIES)
-        for layer in description.layers:
+        for layer in filter(has_sections, description.layers):
             triangles = geometry.ribbon_triangles(layer.nodes.stop - layer.nodes.start)
             recording.log(_strand(layer), rr.Mesh3D.from_fields(triangle_indices=triangles), static=True)
         for joint in description.joints:
@@ -139,11 +139,19 @@ class RunSender:
         self._send_events(run)
 
     def _send_strands(self, run: RunData, colouring: Colouring) -> None:
+        """Layers as ribbons, or where their cross-sections are not known, their nodes as points."""
         shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
         for layer, rows in zip(run.description.layers, self._rows, strict=True):
             positions, frames = run.positions[:, layer.nodes], run.material_frames[:, rows]
             values = colouring.values(run, layer)
             for part in _chunks(len(run.shape_times)):
+                if not has_sections(layer):
+                    columns = rr.Points3D.columns(
+                        positions=positions[part].reshape(-1, 3),
+                        colors=_bytes(colouring.colours(values[part])[..., :3]).reshape(-1, 3),
+                    ).partition([positions.shape[1]] * len(positions[part]))
+                    self._recording.send_columns(_strand(layer), _time(run.shape_times[part]), columns)
+                    continue
                 vertices = geometry.ribbon_vertices(layer, positions[part], frames[part])
                 colours = _bytes(colouring.colours(values[part])[:, :, None, :3] * shade)
                 sizes = [positions.shape[1] * geometry.CORNERS] * len(vertices)
