@@ -45,8 +45,9 @@ stress: $(STAMP)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
 # What is found is committed: docs/stability.md with its figures, and docs/data/mutations.jsonl.
-verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scenes, 250 kills, a soak, films, seeded bugs.
-	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz
+verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scenes, 2,000 logs, 250 kills, a soak, films, seeded bugs.
+	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz/test_mutated_scenes.py
+	FUZZ_LOGS=2000 FUZZ_STATES=1000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -s tests/fuzz/test_mutated_logs.py
 	KILLS=200 KILLS_SEED=7 $(BIN)/python -m pytest -m "" -s tests/logs/test_kills.py
 	SWEEP_KILLS=50 SWEEP_KILLS_SEED=7 $(BIN)/python -m pytest -m "" -s tests/sweeps/test_sweep.py -k random_moments
 	SOAK_SECONDS=600 $(BIN)/python -m pytest -m "" -s tests/ros/test_soak.py

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-import yaml
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-from bilayer_core.errors import InputError
+from bilayer_core.errors import InputError, SceneError
+from bilayer_core.scene.limits import check_content
+from bilayer_core.scene.text import read_yaml
 
 DEPTH = 10
 """Where a log does not say it, as in rosbag2."""
@@ -33,9 +34,10 @@ def offered_profile(text: str) -> QoSProfile:
         If that cannot be understood.
     """
     try:
-        entries = [dict(entry) for entry in yaml.safe_load(text) or []]
-        profiles = [_profile(entry) for entry in entries]
-    except (yaml.YAMLError, TypeError, ValueError, LookupError, OverflowError) as error:
+        content = read_yaml(text, "YAML")
+        check_content(content, "YAML")
+        profiles = [_profile(dict(entry)) for entry in content or []]
+    except (SceneError, TypeError, ValueError, LookupError, OverflowError) as error:
         reason = f"there is no {error}" if isinstance(error, KeyError) else " ".join(str(error).split())
         raise InputError(f"its quality of service is not in the form of rosbag2: {reason}") from error
     if not profiles:

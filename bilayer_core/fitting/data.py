@@ -13,6 +13,7 @@ import csv
 import io
 import math
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -218,9 +219,9 @@ def _read_file(path: str | Path) -> tuple[str, list[str], dict[str, Array]]:
     if not rows:
         raise InputError(f"{source}: is empty; its first line must name its columns, such as time,com.z")
     headings = [heading.strip() for heading in rows[0]]
-    for heading in headings:
-        if not heading or headings.count(heading) > 1:
-            wrong = f"{heading!r} is there twice" if heading else "one is without a name"
+    for heading, count in Counter(headings).items():
+        if not heading or count > 1:
+            wrong = f"{shortened(heading)!r} is there twice" if heading else "one is without a name"
             raise InputError(f"{source}: line 1 must name each column once; {wrong}")
     cells: dict[str, list[float]] = {heading: [] for heading in headings}
     lines = []

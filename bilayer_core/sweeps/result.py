@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import pandas
 
 TABLE = "results.parquet"
+MOST_VALUES, LARGEST_HEAD = 20_000_000, 20_000_000
+"""Values of a table that is read, and its description [bytes]: packed well, gigabytes of them fit into a small file."""
 ROWS_AT_ONCE = 1000
 ABOUT = b"bilayer_sweep"
 """Key of the table's metadata under which `Columns` are, as JSON."""
@@ -150,12 +152,15 @@ def read_results(path: str | Path) -> SweepResult:
     parquet = _parquet()
     path = Path(path) / TABLE if Path(path).is_dir() else Path(path)
     try:
+        declared = parquet.ParquetFile(path).metadata
+        if declared.num_rows * declared.num_columns > MOST_VALUES or declared.serialized_size > LARGEST_HEAD:
+            raise InputError(f"{path}: has more than {MOST_VALUES:,} values, the most that are read")
         table = parquet.read_table(path)
         about = Columns.from_text(table.schema.metadata[ABOUT])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        return SweepResult([_row(content, about) for content in table.drop_columns(["summary"]).to_pylist()], about)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         told = " ".join(str(error).split())[:200]
         raise InputError(f"{path}: is no table of a sweep that can be read: {told}") from None
-    return SweepResult((_row(content, about) for content in table.drop_columns(["summary"]).to_pylist()), about)
 
 
 def _row(content: dict[str, Any], about: Columns) -> Row:

@@ -1,7 +1,6 @@
 """Files made to fill the memory of their reader are read, or refused, within the memory that is documented."""
 
 import json
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,23 +20,8 @@ MORE_OF_OTHERS = 1.5e9
 """Likewise of the other commands, which hold arrays of at most a gigabyte [bytes]."""
 MORE_OF_STATES = 50e6
 """Likewise of going on from a state, above that of a whole one [bytes]."""
-FRAMES, NODES = 150, 100_000
-"""Of a log whose frames take 1.3 GB, and which has a few megabytes as they are all the same."""
-PROGRAM = """
-import os, sys
-from pathlib import Path
-from bilayer_core.cli import main
-
-first, *others = (line.split("\\t") for line in Path(sys.argv[1]).read_text().splitlines())
-main(first)  # which imports what the others need
-for arguments in (first, *others):
-    child = os.fork()
-    if not child:
-        os._exit(main(arguments))
-    _, status, used = os.wait4(child, 0)
-    figures = os.waitstatus_to_exitcode(status), 1024 * used.ru_maxrss, used.ru_utime + used.ru_stime
-    print(*figures, file=sys.stderr, flush=True)
-"""
+FRAMES, NODES = 200, 100_000
+"""Of a log whose frames take 1.8 GB, and which has a few megabytes as they are all the same."""
 
 
 def described() -> Description:
@@ -45,16 +29,25 @@ def described() -> Description:
     return synthetic_run.description()
 
 
+RUNNER = """
+import json, os, subprocess, sys
+with open(sys.argv[2], "w") as said:
+    for words in json.load(open(sys.argv[1])):
+        process = subprocess.Popen([sys.executable, "-m", "bilayer_core", *words], stdout=said, stderr=said)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        print(process.returncode, 1024 * used.ru_maxrss, used.ru_utime + used.ru_stime)
+"""
+"""Run commands; a small process, as a child's peak memory counts from that of the process that starts it."""
+
+
 def measured(folder: Path, commands: list[list[object]]) -> tuple[list[tuple[int, float, float]], str]:
     """Exit code, peak memory [bytes] and CPU time [s] of commands, each in a process of its own, and what they said."""
-    (folder / "commands").write_text("\n".join("\t".join(map(str, command)) for command in commands))
-    process = subprocess.run(
-        [sys.executable, "-c", PROGRAM, str(folder / "commands")], capture_output=True, text=True, timeout=280
-    )
-    assert process.returncode == 0, process.stderr[-3000:]
-    figures = [line.split() for line in process.stderr.splitlines() if re.fullmatch(r"-?\d+ \d+ \S+", line)]
-    assert len(figures) == len(commands), process.stderr[-3000:]
-    return [(int(code), float(peak), float(seconds)) for code, peak, seconds in figures], process.stderr
+    (folder / "commands").write_text(json.dumps([list(map(str, command)) for command in commands]))
+    words = [sys.executable, "-c", RUNNER, str(folder / "commands"), str(folder / "said")]
+    figures = subprocess.run(words, capture_output=True, text=True, check=True).stdout.splitlines()
+    found = [(int(code), float(peak), float(seconds)) for code, peak, seconds in map(str.split, figures)]
+    return found, (folder / "said").read_text()
 
 
 @pytest.fixture(scope="module")
