@@ -294,7 +294,7 @@ class LogSource:
         topic = _full(name)
         for _, time, data in self._file.messages({topic}):
             labels, values = decoded(self.path, topic, time, data, read_float64_multi_array)
-            wrong = [label for label in labels if not is_name(label)]
+            wrong = [label for label in labels if not is_name(label.replace(" ", "_"))]
             if wrong or len(set(labels)) != len(labels) or len(labels) != values.size:
                 found = f"{len(labels)} names ({shortened(', '.join(labels))}) for {values.size} values"
                 raise InputError(f"{self.path}: {topic}: found {found}; each value must have a name of its own")
