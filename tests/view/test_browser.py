@@ -115,9 +115,9 @@ def has_plots(picture, colour=CHANNEL_COLOURS[0]):
 
 
 def has_ball(picture):
-    """Whether the ball is in the middle of the view of the robot, as large as in the recording."""
+    """Whether the ball is in the middle of the view of the robot, larger than a thumbnail shows it."""
     rows, columns = places(picture, np.array(BALL_COLOURS[0]))
-    return len(rows) > 2000 and np.ptp(rows) > 0.1 and 0.2 < np.median(columns) < 0.42
+    return len(rows) > 1000 and np.ptp(rows) > 0.1 and 0.2 < np.median(columns) < 0.42
 
 
 @pytest.mark.slow
