@@ -156,9 +156,8 @@ class DescriptionPart(Part):
         for strand in self.strands:
             for of in (strand, *strand.layers):
                 if of.nodes[1] > self.node_count or of.edges[1] > self.edge_count:
-                    raise ValueError(
-                        f"{of.name} must have nodes below {self.node_count}, edges below {self.edge_count}"
-                    )
+                    most = f"node_count ({self.node_count}) and edges below edge_count ({self.edge_count})"
+                    raise ValueError(f"{of.name} must have nodes below {most}")
         if any(joint.body >= len(self.bodies) for joint in self.joints):
             raise ValueError(f"joints must be on one of {len(self.bodies)} bodies")
         units = self.channels if self.channel_units is None else self.channel_units

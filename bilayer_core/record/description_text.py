@@ -73,7 +73,7 @@ def _described(values: Mapping[str, Any], scene_text: str) -> Description:
         key = ".".join(str(step) for step in ("description", *fault["loc"]))
         missing = fault["type"] in ("missing", "value_error")
         found = "" if missing else f", found {shortened(reprlib.repr(fault['input']), LONGEST_VALUE)}"
-        raise InputError(f"{shortened(key)}: {fault['msg']}{found}") from None
+        raise InputError(f"{shortened(key)}: {fault['msg'].removeprefix('Value error, ')}{found}") from None
     return Description(
         scene_text=scene_text,
         **dict(part)

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import synthetic_run
@@ -74,3 +76,9 @@ def test_no_topic_keeps_all_of_a_long_log(depth):
 def test_what_cannot_be_understood_is_refused(text):
     with pytest.raises(InputError, match="not in the form of rosbag2"):
         offered_profile(text)
+
+
+def test_aliases_that_write_out_to_gigabytes_are_refused():
+    lists = "".join(f"- &{name} [{', '.join(['*' + last] * 9)}]\n" for last, name in pairwise("abcdefghij"))
+    with pytest.raises(InputError, match="more than .* values"):
+        offered_profile(f"- &a [1, 1]\n{lists}- history: *j\n")
