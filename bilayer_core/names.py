@@ -13,8 +13,3 @@ NAME = r"[A-Za-z][A-Za-z0-9]*(_[A-Za-z0-9]+)*"
 def is_name(text: str) -> bool:
     """Return whether a text is a name that a part may have."""
     return len(text) <= LONGEST_NAME and re.fullmatch(NAME, text) is not None
-
-
-def is_title(text: str) -> bool:
-    """Return whether a text is one name, or several with spaces between, as the terms of energy have: rod barrier."""
-    return len(text) <= LONGEST_NAME and all(map(is_name, text.split(" ")))

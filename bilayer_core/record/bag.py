@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.names import is_name
 from bilayer_core.observed.frame import BodyInfo, Description, Strand
+from bilayer_core.printable import shortened
 from bilayer_core.record import encoders
 from bilayer_core.record.bag_files import BagFiles
 from bilayer_core.record.bag_index import NodeTracks, Track, index_bag, unknown_run
-from bilayer_core.record.cdr import HEADER, NANOSECONDS, read_float64_multi_array
+from bilayer_core.record.cdr import HEADER, NANOSECONDS, decoded, read_float64_multi_array
 from bilayer_core.record.description_text import from_json
 from bilayer_core.record.log_head import Head
 
@@ -98,14 +100,14 @@ class Bag:
         self._nodes, self._unreadable = index_bag(self.files, node)
         self.runs = [
             BagRun(
-                name,
-                k + 1,
-                len(of.runs),
-                begin / NANOSECONDS,
-                end / NANOSECONDS,
-                bool(of.descriptions),
-                of.stamped,
-                of.certain,
+                node=name,
+                number=k + 1,
+                of=len(of.runs),
+                start_time=begin / NANOSECONDS,
+                last_time=end / NANOSECONDS,
+                described=bool(of.descriptions),
+                stamped=of.stamped,
+                certain=of.certain,
             )
             for name, of in sorted(self._nodes.items())
             for k, (begin, end) in enumerate(of.runs)
@@ -154,7 +156,10 @@ class BaggedRun:
                 self._stamps[f"{run.node}/{name}"] = track.stamps[kept]
         self.topics = {topic: files.topics[topic] for topic in self._kept}
         text = held.description_of(number)
-        self.description = _description(f"{files.path}: {run.node}", text) if text else _unknown(held.tracks, run.node)
+        place = str(files.path)
+        self.description = (
+            _description(f"{place}: {run.node}/description", text) if text else _unknown(place, held.tracks, run.node)
+        )
 
     def times(self, topic: str) -> np.ndarray:
         """Return the simulated time of each message of a topic [ns], in the order of the files."""
@@ -213,16 +218,21 @@ def _description(place: str, message: bytes) -> Description:
     try:
         return from_json(message[start : start + int.from_bytes(message[len(HEADER) : start], "little") - 1].decode())
     except (InputError, UnicodeDecodeError) as error:
-        raise InputError(f"{place}/description: {error}") from error
+        raise InputError(f"{place}: {error}") from error
 
 
-def _unknown(tracks: dict[str, Track], node: str) -> Description:
+def _unknown(place: str, tracks: dict[str, Track], node: str) -> Description:
     """Return what the topics say of a run: names of bodies and channels, and how many nodes rods have."""
     bodies = dict.fromkeys(name.partition("/")[2] for name in tracks if "/" in name)
     infos = tuple(BodyInfo(body, None, False, holds_rods=f"clamp_wrench/{body}" in tracks) for body in bodies)
     channels: list[str] = []
     if "stimulus_applied" in tracks:
-        channels, _ = read_float64_multi_array(tracks["stimulus_applied"].first)
+        topic, first = f"{node}/stimulus_applied", tracks["stimulus_applied"]
+        channels, _ = decoded(place, topic, int(first.stamps[0]), first.first, read_float64_multi_array)
+        if not all(map(is_name, channels)):
+            raise InputError(
+                f"{place}: {topic}: its label has {shortened(', '.join(channels))!r}, which are no channels"
+            )
     template, points = encoders.point_cloud_template, 0
     if "points" in tracks:
         points = _count(tracks["points"].first, len(template(1)), 4 * len(encoders.POINT_FIELDS))

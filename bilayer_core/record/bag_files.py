@@ -65,7 +65,10 @@ class BagFiles:
 def _files_of(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
-    inside = sorted(path.iterdir())
+    try:
+        inside = sorted(path.iterdir())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
     files = [of for of in inside if of.suffix.lower() == SUFFIX]
     for suffix, what in OTHERS.items():
         if any(of.suffix.lower() == suffix for of in inside):

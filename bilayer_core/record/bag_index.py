@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bilayer_core.names import is_name
 from bilayer_core.observed.frame import BodyInfo, Description
 from bilayer_core.record.bag_files import BagFiles
 from bilayer_core.record.cdr import HEADER, NANOSECONDS
@@ -56,7 +57,7 @@ def split_topic(topic: str, ros_type: str) -> tuple[str, str] | None:
     """Return the node that a topic is of and its name there, such as ``body_pose/ball``; None for those of others."""
     owner, _, last = topic.rpartition("/")
     node, _, kind = owner.rpartition("/")
-    if node and kind in _OF_BODIES and _TYPES[kind] == ros_type:
+    if node and kind in _OF_BODIES and _TYPES[kind] == ros_type and is_name(last):
         return node, f"{kind}/{last}"
     return (owner, last) if owner and last not in _OF_BODIES and _TYPES.get(last) == ros_type else None
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError
-from bilayer_core.names import is_title
+from bilayer_core.names import is_name
 from bilayer_core.observed.frame import Description
 from bilayer_core.printable import shortened
 from bilayer_core.record import encoders
@@ -292,7 +292,7 @@ class LogSource:
         topic = self._full(name)
         for _, time, data in self._file.messages({topic}):
             labels, values = decoded(self.path, topic, time, data, read_float64_multi_array)
-            wrong = [label for label in labels if not is_title(label)]
+            wrong = [label for label in labels if not is_name(label.replace(" ", "_"))]
             if wrong or len(set(labels)) != len(labels) or len(labels) != values.size:
                 found = f"{len(labels)} names ({shortened(', '.join(labels))}) for {values.size} values"
                 raise InputError(f"{self.path}: {topic}: found {found}; each value must have a name of its own")

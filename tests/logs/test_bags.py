@@ -12,6 +12,8 @@ from rosbags.rosbag2 import StoragePlugin
 from bilayer_core import compare, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
+from bilayer_core.record.cdr import HEADER
+from bilayer_core.record.encoders import multi_array_template
 from bilayer_core.record.log_reader import read_info
 from bilayer_core.record.mcap_log import McapRecorder
 
@@ -253,3 +255,17 @@ def test_a_log_is_named_by_its_node_as_a_bag_is(log):
     assert compare(log, f"{log}:/bilayer_sim").equal
     with pytest.raises(InputError, match="holds no messages of /other"):
         read_log(f"{log}:/other")
+
+
+def test_names_of_strangers_lead_to_no_file_outside_of_an_export(messages, tmp_path, capsys):
+    topic, kind = f"{ROBOT}/stimulus_applied", "std_msgs/msg/Float64MultiArray"
+    bodies = [
+        (f"{ROBOT}/body_pose/{name}", *of[1:]) for of in messages if "pose/hub" in of[0] for name in ("..", "a b")
+    ]
+    bag = write_mcap(tmp_path / "bodies.mcap", [*without(messages, "description"), *bodies])
+    assert not [name for name in read_log(bag).quantities if ".." in name or " " in name]
+    for number, data in enumerate((multi_array_template(["../../x"]).to_bytes(), HEADER + bytes([9] * 8))):
+        few = [of for of in messages if not of[0].endswith(("/description", "/stimulus_applied"))]
+        bag = write_mcap(tmp_path / f"{number}.mcap", [(topic, kind, EPOCH, data), *few])
+        assert f"{bag}: {topic}: " in refused(["export", bag, "--csv", tmp_path / "out"], capsys)
+        assert not (tmp_path / "out").exists() and main(["info", str(bag)]) == 0

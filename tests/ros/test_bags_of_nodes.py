@@ -74,16 +74,17 @@ def recorded(start, connect, domain_of_module, tmp_path_factory):
 
 
 def assert_same_values(bag, log):
-    """All quantities of the bag are those of the log at the same times, and these are nearly all."""
+    """All quantities of the bag are those of the log at the same times: all frames, and most shapes, whose rate begins
+    with the first frame that is sent.
+    """
     found, whole = read_log(bag), read_log(log)
     assert list(found.quantities) == list(whole.quantities)
+    assert np.isin(found.times, whole.times).all() and np.ptp(found.times) > 0.2
     for name, quantity in found.quantities.items():
         stored = whole[name]
-        rows = np.searchsorted(stored.times, quantity.times)
-        np.testing.assert_array_equal(stored.times[rows], quantity.times, err_msg=name)
-        np.testing.assert_array_equal(stored.values[rows], quantity.values, err_msg=name)
-        assert len(rows) >= 5
-    assert np.ptp(found["stimulus/swelling"].times) > 0.2
+        times, rows, places = np.intersect1d(stored.times, quantity.times, return_indices=True)
+        np.testing.assert_array_equal(stored.values[rows], quantity.values[places], err_msg=name)
+        assert len(times) >= len(quantity.times) - 2 > 2
 
 
 @pytest.mark.parametrize(
@@ -97,7 +98,7 @@ def test_a_bag_holds_what_the_node_logged_of_the_same_run(bag, log, recorded):
 def test_a_bag_is_described_by_its_runs_in_simulated_time(recorded, capsys):
     assert main(["info", str(recorded / "both")]) == 0
     told = capsys.readouterr().out
-    for run in (":/bilayer_sim@1, simulated 0 s to 0.", ":/bilayer_sim@2, simulated 0 s to 0.", f":{OTHER}, simulated"):
+    for run in (":/bilayer_sim@1, simulated 0", ":/bilayer_sim@2, simulated 0", f":{OTHER}, simulated 0"):
         assert f"{recorded / 'both'}{run}" in told
     assert f"recorded  {time.strftime('%Y-%m-%d', time.gmtime())}" in told
     info = read_info(recorded / "other")
