@@ -109,9 +109,7 @@ def test_the_former_name_of_a_parameter_works_at_the_start(values, capfd):
     file = "/**:\n  ros__parameters:\n    friction: 1\n"
     assert values("-p friction.coefficient:=0.3 --params-file 0.yaml", [file])["friction.coefficient"] == 0.3
     overrides = [Parameter("friction", value=0.1)]
-    with pytest.raises(
-        InputError, match=r"'friction.coefficient' is given twice: .*0\.1.* the former name 'friction'"
-    ):
+    with pytest.raises(InputError, match=r"'friction.coefficient' is given twice: .*0\.1.* the former name 'friction'"):
         values("-p friction.coefficient:=0.3", parameter_overrides=overrides)
 
 
