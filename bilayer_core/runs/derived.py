@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import STIMULUS
 from bilayer_core.record.cdr import nanoseconds, seconds_text
+from bilayer_core.record.clouds import CloudEncoder
 from bilayer_core.record.encoders import FrameEncoder, decode_input, encode_float64
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.markers import deleting_all_first
@@ -49,9 +50,10 @@ class DerivedComparison:
         transforms = next(file.messages({TF.full_name()}), None)
         prefix = read_prefix(description, transforms[2]) if transforms else ""
         self._encoder = FrameEncoder(description, prefix or LOG_NAMESPACE.strip("/"))
+        self._clouds = CloudEncoder(description)
         self._specs = {
             spec.full_name(): spec
-            for spec in self._encoder.topics
+            for spec in (*self._encoder.topics, *self._clouds.topics)
             if spec.full_name() in file.topics and spec.name not in NOT_COMPARED
         }
         self._in_every_frame = {topic for topic, spec in self._specs.items() if spec.rate is Rate.OUTPUT}
@@ -69,11 +71,13 @@ class DerivedComparison:
             return
         stored, stamp = next(self._frames, []), nanoseconds(frame.time)
         loaded, self._begun = not self._begun and frame.step > 0, True
+        display = any(self._specs[topic].rate is Rate.DISPLAY for topic, *_ in stored)
+        clouds = dict(self._clouds.encode(frame)) if display else {}
         for topic, time, data in stored:
             if time != stamp:
                 self._differs(topic, time, "is there, but no state of that time")
             elif not loaded:
-                self._compare_encoded(topic, time, data, frame)
+                self._compare_encoded(topic, time, data, frame, clouds)
         for topic in sorted(self._in_every_frame - {topic for topic, *_ in stored}):
             self._incomplete = self._incomplete or _at(topic, stamp, "is missing")
 
@@ -93,10 +97,10 @@ class DerivedComparison:
         for topic, time, _ in expected:
             self._differs(topic, time, "is missing")
 
-    def _compare_encoded(self, topic: str, time: int, data: bytes, frame: Frame) -> None:
-        name = self._specs[topic].name
-        again = self._encoder.encode(name, frame)
-        if name == MARKERS and len(data) > len(again):  # the first of a log
+    def _compare_encoded(self, topic: str, time: int, data: bytes, frame: Frame, clouds: dict[str, bytes]) -> None:
+        spec = self._specs[topic]
+        again = clouds.get(spec.name) if spec in self._clouds.topics else self._encoder.encode(spec.name, frame)
+        if spec.name == MARKERS and len(data) > len(again):  # the first of a log
             again = deleting_all_first(again)
         self._compare(topic, time, data, again)
 

@@ -254,7 +254,7 @@ def test_a_log_without_a_hash_is_verified_and_said_to_be_of_an_older_version(log
 # derived messages
 
 
-DERIVED = ("markers", "nodes", "points", "energy", "com", "contact_wrench/hand", "body_pose/hand", "stimulus/heat")
+DERIVED = "markers nodes points body_points energy com contact_wrench/hand body_pose/hand stimulus/heat".split()
 
 
 def test_all_derived_messages_of_a_run_come_out_byte_for_byte(log):
