@@ -11,6 +11,7 @@ import click
 
 from bilayer_core.cli.options import Verb, scene_argument, set_option
 from bilayer_core.cli.report import choices
+from bilayer_core.cli.terminal import say
 
 WIDTH = 100
 """Of the text beside a name [characters]."""
@@ -29,10 +30,10 @@ def check(scene: str, overrides: tuple[str, ...], as_json: bool) -> None:
 
     report = _report(Simulator(load_scene(scene, overrides)))
     if as_json:
-        click.echo(json.dumps(report, indent=2, ensure_ascii=False))
+        click.echo(json.dumps(report, indent=2))
         return
     for line in _lines(report):
-        click.echo(line)
+        say(line)
 
 
 def _report(simulator) -> dict[str, Any]:

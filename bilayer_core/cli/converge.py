@@ -10,6 +10,7 @@ import click
 
 from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Duration, Verb, scene_argument, set_option
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import compile_kernels
 
 
@@ -42,15 +43,15 @@ def converge(
         nonlocal done
         done += 1
         if not quiet:
-            click.echo(f"  run {done} of {runs} done: {name}", err=True)
+            say(f"  run {done} of {runs} done: {name}", err=True)
 
     with json_to(json_file) as write_json:
         compile_kernels(quiet)
         found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
-        click.echo(f"{config.name}: {found.integrator}, steps {found.stepping}")
+        say(f"{config.name}: {found.integrator}, steps {found.stepping}")
         _print_table(found.rows)
         for name, reason in found.missing.items():
-            click.echo(f"  {name}: {reason}")
+            say(f"  {name}: {reason}")
         write_json(json.dumps(_content(config.name, found), indent=2))
 
 

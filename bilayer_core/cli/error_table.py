@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import click
-
+from bilayer_core.cli.terminal import say
 from bilayer_core.converge.order import ROUNDING
 from bilayer_core.converge.quantities import unit_of
 from bilayer_core.converge.study import BASE, FINER_STEP, Row, Study
@@ -41,10 +40,10 @@ def print_errors(study: Study) -> None:
         table.add_row(row.name, *values, f"± {factor * row.time.bar:.2g} {unit}", _order(row))
     Console(width=120).print(table)
     for name, reason in study.missing.items():
-        click.echo(f"  {name}: {reason}")
-    click.echo("  Of the time steps alone; `bilayer converge` adds the mesh. Contact begins and ends within a step.")
+        say(f"  {name}: {reason}")
+    say("  Of the time steps alone; `bilayer converge` adds the mesh. Contact begins and ends within a step.")
     if any(_order(row) == NO_ORDER for row in study.rows):
-        click.echo(
+        say(
             "  Where no order is seen, runs at twice, once and half the step do not close in on a limit: the error is\n"
             "  six times their last change, and no bound where motion is chaotic or can go two ways."
         )

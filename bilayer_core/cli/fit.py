@@ -9,6 +9,7 @@ import click
 
 from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Verb, output_directory, scene_argument, set_option
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import compile_kernels
 
 if TYPE_CHECKING:
@@ -70,13 +71,13 @@ def fit(
             written = outputs.write_files(found, directory, report, force)
             write_picture(found, directory / outputs.PICTURE, force)
             for path in (*written, directory / outputs.PICTURE):
-                click.echo(f"wrote {path}")
+                say(f"wrote {path}")
         write_json(report)
     return 0 if found.converged else NOT_CONVERGED
 
 
 def _tell(text: str) -> None:
-    click.echo(f"  {text}", err=True)
+    say(f"  {text}", err=True)
 
 
 def _print(found: FitResult) -> None:
@@ -84,7 +85,7 @@ def _print(found: FitResult) -> None:
     from rich.table import Table
 
     values = f"{int(found.data.present.sum())} values of {found.data.source}"
-    click.echo(f"{found.scene.name}: {values}, {found.iterations} iterations, {found.runs} runs; {found.termination}")
+    say(f"{found.scene.name}: {values}, {found.iterations} iterations, {found.runs} runs; {found.termination}")
     table = Table(box=None, padding=(0, 2, 0, 0))
     for title in ("parameter", "fitted", "95 % from", "to", "start", "bounds"):
         table.add_column(title, justify="left" if title == "parameter" else "right")
@@ -112,9 +113,9 @@ def _print(found: FitResult) -> None:
         noise.add_row(column.name, *(f"{v / column.factor:.4g}{unit}" for v in (found.sigma[column.name], rms)))
     console.print(noise)
     if found.chi_squared is not None:
-        click.echo(f"  chi squared {found.chi_squared:.4g} of {found.freedom} degrees of freedom")
+        say(f"  chi squared {found.chi_squared:.4g} of {found.freedom} degrees of freedom")
     if found.refused:
         count = len(found.refused)
-        click.echo(f"  {count} runs could not be made on the way; the first: {found.refused[0]}")
+        say(f"  {count} runs could not be made on the way; the first: {found.refused[0]}")
     for warning in found.warnings:
-        click.echo(f"  WARNING {warning}")
+        say(f"  WARNING {warning}")

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from bilayer_core.cli.options import Verb
+from bilayer_core.cli.terminal import say
 
 
 class NewVerb(Verb):
@@ -37,5 +38,5 @@ def new(file: str, template: str | None, origin: str | None, force: bool) -> Non
     text = new_scene(path, template or DEFAULT_TEMPLATE, origin)
     check_output_path(path, force)
     write_text(path, text, force)
-    click.echo(f"{path}: a scene to start from, like {origin or template or DEFAULT_TEMPLATE}")
-    click.echo(f"next: bilayer check {path}")
+    say(f"{path}: a scene to start from, like {origin or template or DEFAULT_TEMPLATE}")
+    say(f"next: bilayer check {path}")

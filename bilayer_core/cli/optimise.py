@@ -8,6 +8,7 @@ import click
 
 from bilayer_core.cli.options import Verb
 from bilayer_core.cli.sweep import processes_options, teller
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import compile_kernels, runs_bar
 
 DEFAULT_DIRECTORY = "runs/optimise"
@@ -73,12 +74,12 @@ def optimise(
             tell=teller(quiet),
         )
     for line in lines(optimum):
-        click.echo(line)
-    click.echo(f"wrote {Path(out) / search.BEST}")
-    click.echo(f"wrote {Path(out) / 'results.parquet'}")
+        say(line)
+    say(f"wrote {Path(out) / search.BEST}")
+    say(f"wrote {Path(out) / 'results.parquet'}")
     if plotted:
         for path in draw(read_results(out), Path(out)):
-            click.echo(f"wrote {path}")
+            say(f"wrote {path}")
     return 0 if optimum.is_confirmed else NOT_CONFIRMED
 
 

@@ -15,7 +15,6 @@ from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar, progress_bar
 from bilayer_core.errors import InputError
-from bilayer_core.record.topics import LOG_NAMESPACE
 
 if TYPE_CHECKING:
     from bilayer_core.runs.replay import Verification
@@ -178,6 +177,8 @@ def _tell(found: Verification) -> None:
 
 def _short(topics: tuple[str, ...]) -> list[str]:
     """Return topics as a run names them, those of all bodies or channels as one."""
+    from bilayer_core.record.topics import LOG_NAMESPACE
+
     return list(dict.fromkeys(topic.removeprefix(f"{LOG_NAMESPACE}/").split("/")[0] or topic for topic in topics))
 
 

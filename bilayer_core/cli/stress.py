@@ -11,6 +11,7 @@ import click
 
 from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Verb, output_directory
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import compile_kernels, count_bar
 
 FAILED = 1
@@ -67,13 +68,13 @@ def stress(
         with count_bar(len(cases) - len(journal.records), quiet) as show:
             measure(cases, journal, workers, lambda record: _tell(record, show))
         for path in write(cases, journal, directory, shrink, workers):
-            click.echo(f"wrote {path}")
+            say(f"wrote {path}")
         records = list(journal.records.values())
         write_json(_as_json(journal))
         for line in report.summary_lines(records):
-            click.echo(line)
+            say(line)
         for line in report.shortfalls(records):
-            click.echo(line)
+            say(line)
     return FAILED if any(record.outcome == "FAILED" for record in records) else 0
 
 
@@ -87,30 +88,30 @@ def _judge_seeded_bugs(
     chosen = chosen_mutants(only)
     if listed:
         for mutant in chosen.values():
-            click.echo(f"{mutant.name}  {mutant.file}: {mutant.bug}")
+            say(f"{mutant.name}  {mutant.file}: {mutant.bug}")
         return 0
 
     def tell(result: Any) -> None:
         show(result.name)
         if not result.caught:
-            click.echo(f"lives  {result.name}: {chosen[result.name].bug}")
+            say(f"lives  {result.name}: {chosen[result.name].bug}")
 
     with count_bar(len(chosen), quiet) as show:
         results = run_mutations(only, directory, tell, resume=resume, workers=workers)
     lives = [name for name in chosen if not results[name].caught]
-    click.echo(f"{len(chosen) - len(lives)} of {len(chosen)} seeded bugs were noticed")
+    say(f"{len(chosen) - len(lives)} of {len(chosen)} seeded bugs were noticed")
     return FAILED if lives else 0
 
 
 def _tell(record: Any, show: Any) -> None:
     show(record.name)
     if record.outcome == "FAILED":
-        click.echo(f"FAILED  {record.name}: {record.reason.splitlines()[0]}")
+        say(f"FAILED  {record.name}: {record.reason.splitlines()[0]}")
 
 
 def _list(cases: dict) -> None:
     for name, case in cases.items():
-        click.echo(f"{name}  [outside: {'; '.join(case.outside)}]" if case.outside else name)
+        say(f"{name}  [outside: {'; '.join(case.outside)}]" if case.outside else name)
 
 
 def _as_json(journal: Any) -> str:

@@ -11,7 +11,9 @@ from typing import Any
 import click
 
 from bilayer_core.cli.options import Verb
+from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import compile_kernels, runs_bar
+from bilayer_core.printable import shortened
 
 DEFAULT_DIRECTORY = "runs/sweep"
 
@@ -78,7 +80,7 @@ def _list_bundled(context: click.Context, _: click.Parameter, wanted: bool) -> N
     from bilayer_core.cli.scenes import titles
     from bilayer_core.scene.bundled import bundled_sweeps
 
-    click.echo(titles(bundled_sweeps()))
+    say(titles(bundled_sweeps()))
     context.exit()
 
 
@@ -134,7 +136,7 @@ def sweep(
         keys = read.keys()
         there = len(journal.keys() & keys)
         if resume and not quiet:
-            click.echo(f"{there} of {len(keys)} runs are there", err=True)
+            say(f"{there} of {len(keys)} runs are there", err=True)
         try:
             with ExitStack() as stack, runs_bar(count_of(read.spec), there, quiet) as show:
                 for rows in run_missing(read, journal, stack, Processes(**processes), teller(quiet)):
@@ -143,15 +145,15 @@ def sweep(
         finally:
             table = write_table(journal, keys, read.about, directory)
         result = read.result(journal)
-        click.echo(", ".join(f"{count} {outcome}" for outcome, count in result.outcomes.items()) or "no runs")
+        say(", ".join(f"{count} {outcome}" for outcome, count in result.outcomes.items()) or "no runs")
         for line in reasons(result):
-            click.echo(f"  {line}")
-        click.echo(f"wrote {table}")
+            say(f"  {line}")
+        say(f"wrote {table}")
         if plotted:
             from bilayer_core.sweeps.plots import draw
 
             for path in draw(result, directory):
-                click.echo(f"wrote {path}")
+                say(f"wrote {path}")
 
 
 def teller(quiet: bool) -> Any:
@@ -160,18 +162,18 @@ def teller(quiet: bool) -> Any:
     def tell(engine: Any) -> None:
         if not quiet:
             dashboard = f"; dashboard {engine.dashboard}" if engine.dashboard else ""
-            click.echo(f"{engine.where}, {engine.threads} runs side by side{dashboard}", err=True)
+            say(f"{engine.where}, {engine.threads} runs side by side{dashboard}", err=True)
         for notice in engine.notices:
-            click.echo(notice, err=True)
+            say(notice, err=True)
 
     return tell
 
 
 def _list(read: Any) -> None:
     names = [name + (f" [{read.job.units[name]}]" if name in read.job.units else "") for name in read.job.paths]
-    click.echo("\t".join(["number", *names]))
+    click.echo("\t".join(["number", *map(shortened, names)]))
     for point in read.points():
-        click.echo("\t".join([str(point.number), *(f"{value}" for value in point.parameters.values())]))
+        click.echo("\t".join([str(point.number), *(shortened(f"{value}") for value in point.parameters.values())]))
 
 
 def reasons(result: Any, most: int = 5) -> list[str]:

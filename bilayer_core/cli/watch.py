@@ -9,9 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from types import FrameType
 
-import click
-
 from bilayer_core.cli.signals import WORDS
+from bilayer_core.cli.terminal import say
 
 COMPILING_NOTICE = "compiling kernels, once for this version on this machine (about a minute) ..."
 TELL_EVERY = 10.0
@@ -67,7 +66,7 @@ def compile_kernels(quiet: bool) -> None:
 
     def report(done: int, total: int) -> None:
         if not shown:
-            click.echo(COMPILING_NOTICE, err=True)
+            say(COMPILING_NOTICE, err=True)
             shown.append(stack.enter_context(pieces_bar(total)))
         shown[0](done, total)
 
@@ -187,7 +186,7 @@ def runs_bar(total: int, there: int, quiet: bool) -> Iterator[Callable[[str], No
                 told = clock.perf_counter()
                 rate, left, _ = state()
                 text = f"{there + count} of {total} runs, {rate:.3g} a second, {left:.0f} s left, {failed} not done"
-                click.echo(text, err=True)
+                say(text, err=True)
 
         yield tell
         return

@@ -5,10 +5,12 @@ import json
 import click
 import pytest
 import synthetic_run
+import yaml
 
 from bilayer_core.cli import main
 from bilayer_core.cli.program import program
 from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.scene.bundled import bundled_scenes
 
 TO_STANDARD_OUTPUT = {"check", "info"}
 """Whose --json is a flag."""
@@ -88,3 +90,16 @@ def test_old_spellings_work_on_with_a_note(logs, capsys, monkeypatch):
 def test_an_old_spelling_is_not_in_the_help(capsys):
     assert main(["view", "--help"]) == 0
     assert "--at" in (said := capsys.readouterr().out) and "--time" not in said
+
+
+@pytest.mark.parametrize("verb", ["check", "sweep"])
+def test_text_of_a_strangers_file_is_printed_as_escapes(tmp_path, capsys, verb):
+    hostile = "\x1b]0;title\x07 \u202etxt.exe"
+    scene = yaml.safe_load(bundled_scenes()["bending"].read_text()) | {"title": hostile}
+    sweep = {"schema": 1, "scene": "bending", "parameters": {"title": {"path": "title", "values": [hostile]}}}
+    file = tmp_path / f"{verb}.yaml"
+    file.write_text(yaml.safe_dump({"check": scene, "sweep": sweep}[verb]))
+    assert main({"check": ["check", str(file)], "sweep": ["sweep", str(file), "--list"]}[verb]) == 0
+    told = capsys.readouterr().out
+    assert "\\x1b]0;title\\x07 \\u202etxt.exe" in told
+    assert told.replace("\n", "").replace("\t", "").isprintable()
