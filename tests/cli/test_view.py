@@ -1,9 +1,9 @@
 """`bilayer view`: what it hands to the viewer's functions."""
 
-import click
 import pytest
 
 from bilayer_core.cli import main
+from bilayer_core.cli.terminal import say
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def viewer(monkeypatch, tmp_path):
     ("arguments", "asked"),
     [
         (["run.mcap"], [("open_viewer", "run.mcap", "strain")]),
-        (["run.rrd", "--web"], [("open_browser", "run.rrd", click.echo, "strain")]),
+        (["run.rrd", "--web"], [("open_browser", "run.rrd", say, "strain")]),
         (["run.mcap", "--colour", "contact"], [("open_viewer", "run.mcap", "contact")]),
         (["run.mcap", "--save", "run.rrd"], [("convert_log", "run.mcap", "run.rrd", "strain")]),
         (["run.mcap", "--screenshot", "run.png"], [("screenshot", "run.mcap", "run.png", None, "strain")]),

@@ -11,6 +11,7 @@ from bilayer_core.cli import main
 from bilayer_core.record.chain import CHAIN, END, check_chain
 from bilayer_core.record.log_chunks import LogFile
 from bilayer_core.record.log_reader import read_description, read_info
+from bilayer_core.record.log_records import CHUNK, walk
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.record.repair import repair
 from bilayer_core.runs.replay import verify
@@ -180,10 +181,15 @@ def test_the_command_ends_with_1_where_the_last_states_are_missing_though_all_ot
     assert read_info(new).lacks == ("3 states, which were taken out of it or lost",)
 
 
+def chunks(path):
+    """Places of the chunks of a log."""
+    with path.open("rb") as file:
+        return [place for place in walk(file) if place.opcode == CHUNK]
+
+
 def test_a_log_that_was_cut_off_is_compared_as_far_as_it_goes_and_said_to_have_no_end(log, tmp_path, capsys):
     cut, new = tmp_path / "cut.mcap", tmp_path / "new.mcap"
-    (last,) = [chunk.place for chunk in LogFile(log)._chunks][-1:]
-    cut.write_bytes(log.read_bytes()[: last.end + 10])
+    cut.write_bytes(log.read_bytes()[: chunks(log)[-1].end + 10])
     repair(cut, new)
     for path in (cut, new):
         assert main(["replay", str(path), "--verify", "--derived"]) == 1
@@ -196,9 +202,8 @@ def test_a_repaired_log_without_a_chunk_in_the_middle_says_so(tmp_path, monkeypa
     monkeypatch.setattr("bilayer_core.record.mcap_log.CHUNK_SIZE", 4000)
     log, damaged, new = (tmp_path / name for name in ("run.mcap", "damaged.mcap", "new.mcap"))
     Simulator(load_scene(pushed())).run(0.1, observers=[McapRecorder(log, rate=100.0)])
-    places, data = [chunk.place for chunk in LogFile(log)._chunks], bytearray(log.read_bytes())
-    place = places[len(places) // 2]
-    data[place.end - 100] ^= 1
+    places, data = chunks(log), bytearray(log.read_bytes())
+    data[places[len(places) // 2].end - 100] ^= 1
     damaged.write_bytes(data)
     assert len(repair(damaged, new).lost) == 1
     found = verify(new)

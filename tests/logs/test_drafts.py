@@ -7,15 +7,16 @@ import subprocess
 import sys
 
 import pytest
-from processes import environment
+from processes import TIMEOUT, environment
 
 from bilayer_core.record import private_directory as module
 from bilayer_core.record.paths import draft_of, write_text
 from bilayer_core.record.private_directory import LOCK, OLD, PREFIX, private_directory
 
 HOLDER = """
-import sys, time
+import signal, sys, time
 from bilayer_core.record.paths import draft_of
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which who runs in the background does not have
 with draft_of(sys.argv[1], force=False) as draft:
     draft.write_text("half")
     print(draft, flush=True)
@@ -60,7 +61,7 @@ def test_the_draft_of_a_killed_program_is_removed_by_the_next_one_and_a_live_one
     write_text(tmp_path / "other.csv", "whole", force=False)
     assert left.is_dir()
     process.send_signal(signal.SIGKILL)
-    process.wait()
+    process.wait(TIMEOUT)
     write_text(tmp_path / "third.csv", "whole", force=False)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other.csv", "third.csv"]
 
@@ -68,7 +69,7 @@ def test_the_draft_of_a_killed_program_is_removed_by_the_next_one_and_a_live_one
 def test_a_program_that_is_ended_removes_its_draft(holder, tmp_path):
     process, _ = holder
     process.send_signal(signal.SIGINT)
-    process.wait()
+    process.wait(TIMEOUT)
     assert list(tmp_path.iterdir()) == []
 
 

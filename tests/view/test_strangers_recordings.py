@@ -27,7 +27,7 @@ ODD_NAME = "-a #1%41? ü.rrd"
 def run(tmp_path_factory):
     path = tmp_path_factory.mktemp("strange") / "run.mcap"
     recorder = McapRecorder(path)
-    recorder.start(replace(synthetic_run.description(), title=PICTURE, scene_name=PICTURE))
+    recorder.start(replace(synthetic_run.description(), title=PICTURE))
     for moment in (0.0, 2.0, 4.0):
         recorder.observe(synthetic_run.frame(moment))
     recorder.close(True)
