@@ -29,6 +29,7 @@ demo: $(STAMP)  ## Run the gripper: simulation node, controller, log, picture.
 	$(BIN)/python -m bilayer_sim_ros.demo
 
 test: $(STAMP)  ## Run every test, the slow ones as well.
+	command -v chromium >/dev/null || $(BIN)/playwright install --with-deps chromium
 	$(BIN)/python -m pytest -m "" -n $(JOBS) --dist worksteal
 
 lint: $(STAMP)  ## Check the code's style, and the types of what programs call.
@@ -78,7 +79,7 @@ kernels: $(STAMP)  ## Compile the kernels, once for each state of the sources.
 
 # What the system must supply: Python's module venv, and Mesa's software drivers, which need no graphics card: of OpenGL for
 # pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`). `make test` needs
-# the browser Chromium as well, for `bilayer view --web`.
+# the browser Chromium as well, for `bilayer view --web`: the package of Debian, or where there is none that of Playwright.
 # Debian and Ubuntu packages are installed where this command may, else the line to paste is printed.
 system:
 	@command -v $(PYTHON) >/dev/null || { \
@@ -95,7 +96,7 @@ system:
 	PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL.so.1 && \
 	    PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL_ || \
 	    missing="$$missing libegl1 libegl-mesa0 libgl1-mesa-dri"; \
-	$(if $(filter test,$(MAKECMDGOALS)),command -v chromium >/dev/null || missing="$$missing chromium";) \
+	$(if $(filter test,$(MAKECMDGOALS)),! grep -qx ID=debian /etc/os-release || command -v chromium >/dev/null || missing="$$missing chromium";) \
 	test -n "$$missing" || exit 0; \
 	if test "$$(id -u)" = 0; then sudo=; elif sudo -n true 2>/dev/null; then sudo=sudo; else sudo=no; fi; \
 	if test "$$sudo" != no && command -v apt-get >/dev/null; then \
