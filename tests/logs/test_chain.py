@@ -172,7 +172,7 @@ def test_a_changed_scene_or_description_is_noticed(log, tmp_path, name):
     assert not found.whole and "scene, versions, machine, settings or description were changed" in found.reason
 
 
-def test_the_command_ends_with_1_where_the_last_states_are_missing_though_all_others_are_equal(log, tmp_path, capsys):
+def test_missing_last_states_end_verify_with_1_though_all_others_are_equal(log, tmp_path, capsys):
     new = rewritten(log, tmp_path / "new.mcap", without(STATE, -3, last=True))
     assert main(["replay", str(new), "--verify"]) == 1
     told = capsys.readouterr().out

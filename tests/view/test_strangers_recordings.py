@@ -110,7 +110,7 @@ def test_a_recording_with_an_odd_name_is_drawn(run, tmp_path, monkeypatch):
     assert (tmp_path / "a.png").stat().st_size > 50_000
 
 
-def test_reruns_importer_draws_surfaces_and_forces_and_the_page_says_how_it_shows_durations(run, tmp_path, root):
+def test_reruns_importer_draws_surfaces_and_forces_as_the_page_says(run, tmp_path, root):
     synthetic_run.run(McapRecorder(tmp_path / "run.mcap"), [0.0, 2.0, 4.0])
     line = next(text for text in (root / "docs/logs.md").read_text().splitlines() if "rerun mcap convert" in text)
     words = shlex.split(line.strip("`"))
