@@ -69,10 +69,8 @@ def _read(path: Path, size: int) -> tuple[tuple, np.ndarray]:
             state = _array(members, "state", 8 * size + LARGEST_LAYOUT)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (KeyError, ValueError, NotImplementedError, RuntimeError, EOFError, zlib.error, zipfile.BadZipFile) as error:
-        reason = " ".join(
-            str(error).split()
-        )  # NotImplementedError and RuntimeError: ways to pack that numpy never uses
+    except (KeyError, ValueError, *DAMAGED_ZIP) as error:
+        reason = " ".join(str(error).split())
         raise InputError(f"{path}: is not a saved state, or is damaged: {shortened(reason)}") from error
     if state.dtype != np.float64 or state.ndim != 1:
         raise InputError(f"{path}: state: found {state.dtype} of shape {state.shape}; must be float64 of one axis")

@@ -146,7 +146,7 @@ def test_a_parameter_without_its_flag_is_refused_with_what_to_write(words, said)
 
 @pytest.mark.parametrize("words", ["com:=/c", "--ros-args -r com:=/c -p scene:=x --param dt:=1", "run.mcap --debug"])
 def test_remappings_and_parameters_with_their_flag_are_let_through(words):
-    refuse_bare_parameters(["sim_node", *words.split()], NAMES)
+    assert refuse_bare_parameters(["sim_node", *words.split()], NAMES) is None
 
 
 BOTH = section("/**", "2") + "/bilayer_simm:\n  ros__parameters:\n    rate: 50\n"

@@ -281,7 +281,8 @@ def test_a_fault_of_a_schedule_is_told_without_its_type_in_the_key_path(schedule
     ids=str,
 )
 def test_a_schedule_that_passes_its_range_by_rounding_only_is_allowed(schedule):
-    load_scene(changed("stimuli.humidity.schedule", schedule))
+    scene = load_scene(changed("stimuli.humidity.schedule", schedule))
+    assert scene.stimuli["humidity"].schedule.type == schedule["type"]
 
 
 @pytest.mark.parametrize("value", [1.00000001, -1e-8])

@@ -137,10 +137,12 @@ def test_branches_in_the_browser_have_their_layout(log, browser, tmp_path):
     branches = [SimpleNamespace(value=0.1, run=run, stopped="")]
     write_branches(branches, "stimulus.humidity", tmp_path / "branches.rrd", force=False)
     with shown(tmp_path, "--web", "branches.rrd") as viewing:
-        look(browser, viewing.address, tmp_path, lambda p: has_robot(p) and has_plots(p, FIRST))
+        picture, _ = look(browser, viewing.address, tmp_path, lambda p: has_robot(p) and has_plots(p, FIRST))
+    assert has_robot(picture) and has_plots(picture, FIRST)
 
 
 @pytest.mark.slow
 def test_a_run_that_goes_on_has_its_layout_in_the_browser(log, browser):
     with shown(log.parent, "--follow", "--serve", "run.mcap") as viewing:
-        look(browser, viewing.address, log.parent, lambda p: has_robot(p) and has_plots(p))
+        picture, _ = look(browser, viewing.address, log.parent, lambda p: has_robot(p) and has_plots(p))
+    assert has_robot(picture) and has_plots(picture)
