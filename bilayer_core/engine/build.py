@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ..contact.broad_phase import RodSearch
-from ..forces.added_mass import fluid_momentum
 from ..forces.restitution import damping_of
 from ..model.force_slots import slot_of
 from ..model.friction import contact_point_friction
@@ -331,7 +330,6 @@ def fluid_of(model: Model, sizes: dict[str, int]) -> Fluid:
         edge_node=model.edge_node,
         mass=model.fluid_mass,
         joined=model.joined_node,
-        fluid_momentum=fluid_momentum.address,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..forces.rod_arms import place_rod_points
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..kinematics.copying import copy, copy_matrix, copy_row
 from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
 from ..kinematics.rotating import compose_quaternion, rotate_by, rotated_by, rotation_vector_between
@@ -198,9 +198,9 @@ def move(p, base, alpha, stage, at):
         v0, v1, v2 = alpha * body_step[b, 3], alpha * body_step[b, 4], alpha * body_step[b, 5]
         rotate_by(v0, v1, v2, base.body_rotation, b, at.body_rotation, b)
         compose_quaternion(v0, v1, v2, base.body_departure_quaternion, at.body_departure_quaternion, b)
-    call(p.calls.update_attached, (p, at))
+    update_attached(p, at)
     departure_of_constrained(p.constrained, stage, at)
-    call(p.calls.transport_frames, (p, base, at))
+    transport_frames(p, base, at)
     return READY
 
 
@@ -262,7 +262,7 @@ def take_state(p, state, at):
         copy_row(state.body_position, bodies.body_of_free[f], at.body_position, f)
         copy_matrix(state.body_rotation, bodies.body_of_free[f], at.body_rotation, f)
     copy_prescribed(bodies, state.body_position, state.body_rotation, at)
-    call(p.calls.update_attached, (p, at))
+    update_attached(p, at)
     edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
     second_director(at.tangent, at.director1, at.director2)
     place_rod_points(p.surfaces, at)

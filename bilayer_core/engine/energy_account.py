@@ -38,8 +38,9 @@ The account is part of the state, so that a run that is continued makes the same
 
 from __future__ import annotations
 
+from ..forces.added_mass import fluid_momentum
 from ..forces.inertia import second_moment_beyond
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..jit.stack import stack_matrix
 from ..kinematics.copying import copy
 from ..kinematics.vector import row
@@ -102,7 +103,7 @@ def _kinetic(p, state, at):
     if fluid.exists:
         copy(state.velocity, fluid.node_velocity)
         copy(state.spin, fluid.spin)
-        energy += call(fluid.fluid_momentum, (fluid, at))
+        energy += fluid_momentum(fluid, at)
         for i in range(fluid.momentum.shape[0]):
             for c in range(3):
                 energy += fluid.momentum[i, c] * fluid.velocity[c]
@@ -240,7 +241,7 @@ def close_step_account(p, state, work, h, beyond, end):
     account, done = state.account, work.account
     p.outcome.figures[CONTACT_ERROR] = 0.0
     if account[OPEN] == 0.0:
-        call(p.calls.open_account, (p, state, work.stage, end))
+        open_account(p, state, work.stage, end)
         return NONE
     write_forces_of_laws(p, end, work.stage, work.end_force)
     grows, unsure = done[STRAINED] != 0.0, 0.0

@@ -96,13 +96,6 @@ class Engine:
         self._storage.take_scene(model)
         self._state = self._integration = None
 
-    def load(self) -> None:
-        """Compile the kernels of steps and frames, or read them from the cache: those that records refer to are when
-        they are made, so these are the others.
-        """
-        for piece in (integrate, treat_state, add_forces, expand_to_unknowns, observe, open_account, count_shape):
-            _ = piece.address
-
     def start_over(self, height: float) -> None:
         """Forget the extrema of the run; the mass centre is at `height` [m]."""
         extrema = self.extrema

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 
-from ..jit import call, piece
+from ..forces.friction_limit import limit_by_friction
+from ..forces.rod_contact import find_rod_contacts
+from ..forces.surface_pairs import list_surface_pairs
+from ..jit import piece
 from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, STATUS
 from ..model.records.problem import Problem
 from ..model.records.status import READY, ROD_CAPACITY_EXCEEDED
 from ..model.records.step import Configuration, Stage
 from .configuration import measure_departure
-from .newton import correction_speed, predicted_decrease
+from .newton import bound, correction_speed, predicted_decrease
+from .potential import add_forces, expand_to_unknowns
 
 
 @piece(int, Problem, Configuration, Stage, bool, bool)
@@ -34,16 +38,16 @@ def evaluate_at(p, at, stage, with_hessian, expands):
     """
     status, energy, gap = READY, 0.0, math.inf
     if p.surfaces.exists:
-        status = call(p.calls.list_surface_pairs, (p.surfaces, at, 0.0))
-    if status == READY and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, at)):
+        status = list_surface_pairs(p.surfaces, at, 0.0)
+    if status == READY and p.rod_contact.exists and not find_rod_contacts(p, at):
         status = ROD_CAPACITY_EXCEEDED
     if status == READY:
         measure_departure(p.bodies, stage, at)
-        gap = call(p.calls.add_forces, (p, at, stage, with_hessian, False))
+        gap = add_forces(p, at, stage, with_hessian, False)
         for k in range(p.sums.energy.shape[0]):
             energy += p.sums.energy[k]
         if expands:
-            call(p.calls.expand_to_unknowns, (p, at))
+            expand_to_unknowns(p, at)
     p.outcome.figures[ENERGY], p.outcome.figures[GAP] = energy, gap
     return status
 
@@ -65,8 +69,8 @@ def bound_step(p, at, stage):
         which friction holds the step up.
     """
     slope, _ = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
-    fraction = friction_fraction = call(p.calls.bound, (p, at))
+    fraction = friction_fraction = bound(p, at)
     if p.slips.exists:
-        friction_fraction = call(p.calls.limit_by_friction, (p, at, stage, slope, fraction))
+        friction_fraction = limit_by_friction(p, at, stage, slope, fraction)
     p.outcome.figures[FRACTION], p.outcome.figures[FRICTION_FRACTION] = fraction, friction_fraction
     return p.outcome.counts[STATUS]

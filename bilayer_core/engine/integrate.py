@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from ..jit import call, kernel, piece, record_at
+from ..jit import kernel, piece, record_at
 from ..jit.record import Indices, Vector, record
 from ..kinematics.copying import copy
 from ..model.records.outcome import (
@@ -33,9 +33,11 @@ from ..model.records.outcome import (
 from ..model.records.problem import Problem
 from ..model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
 from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
-from .actuation import Actuation, stimulus_has_jumped, take_first_stimuli
+from .actuation import Actuation, corner_after, drive_step, jumps_at, stimulus_has_jumped, take_first_stimuli
 from .energy_account import LARGEST, NONE, SOME
-from .error_norm import ErrorNorm, fastest
+from .error_norm import ErrorNorm, fastest, step_defect
+from .run_extrema import count_end
+from .step import make_step
 from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, NUMBER_ROUNDING, after_rejection, after_success, fit, next_end
 
 configuration_at = record_at(Configuration)
@@ -131,12 +133,12 @@ def _jump_before(run, end):
 
     The work of a jump within a step would depend on where stages happen to lie (`engine.energy_account`).
     """
-    calls, same, time = run.problem.calls, run.control.same, run.clock.time[0]
+    same, time = run.control.same, run.clock.time[0]
     while True:
-        time = call(calls.corner_after, (run.actuation, time, same))
+        time = corner_after(run.actuation, time, same)
         if time >= end - same:
             return end
-        if call(calls.jumps_at, (run.actuation, time, same)):
+        if jumps_at(run.actuation, time, same):
             return time
 
 
@@ -146,7 +148,7 @@ def _end_of_adaptive(run, until):
     control, begin = run.control, run.clock.time[0]
     output = next_end(begin + control.same, control.output_rate)
     end = output if output < until - TIME_ROUNDING / control.output_rate else until
-    corner = call(run.problem.calls.corner_after, (run.actuation, begin, control.same))
+    corner = corner_after(run.actuation, begin, control.same)
     return corner if corner < end - control.same else end
 
 
@@ -154,7 +156,7 @@ def _end_of_adaptive(run, until):
 def _begin_again_after_jump(run):
     """Where something jumps, start with the first step's length, and without a history that a load's jump ends."""
     control, clock = run.control, run.clock
-    jumped = call(run.problem.calls.jumps_at, (run.actuation, clock.time[0], control.same))
+    jumped = jumps_at(run.actuation, clock.time[0], control.same)
     if jumped > 0:
         clock.next_step[0], clock.last_error[0] = min(clock.next_step[0], control.first), 0.0
     if jumped > 1 and run.method.history:
@@ -254,21 +256,9 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             h = fit(h, goal - begin)
             time = goal if h == goal - begin else begin + h
             h = time - begin
-            call(p.calls.drive_step, (run.actuation, method.nodes, begin, h, control.same, inputs))
-            status = call(
-                p.calls.make_step,
-                (
-                    p,
-                    state,
-                    start_state,
-                    method,
-                    run.method.history,
-                    inputs,
-                    work,
-                    h,
-                    newton_tolerance,
-                    max_iterations,
-                ),
+            drive_step(run.actuation, method.nodes, begin, h, control.same, inputs)
+            status = make_step(
+                p, state, start_state, method, run.method.history, inputs, work, h, newton_tolerance, max_iterations
             )
             pair, end, iterations = found[PAIR], found[CONFIGURATION], found[ITERATIONS]
             residual, gap = figures[RESIDUAL], figures[GAP]
@@ -282,7 +272,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             if status == CONVERGED:
                 error = 0.0
                 if not fixed:
-                    defect = call(p.calls.step_defect, (run.error_norm, start_state, state, h))
+                    defect = step_defect(run.error_norm, start_state, state, h)
                     error = max(method.estimate * defect, figures[LIGHT_ERROR]) / control.tolerance
                     of_contact = figures[CONTACT_ERROR] / (CONTACT_SHARE * state.account[LARGEST] * control.tolerance)
                 gains = found[GAINS]
@@ -323,10 +313,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         clock.time[0] = time
         whole = not fixed or time == grid
         clock.step[0] += whole
-        call(
-            p.calls.count_end,
-            (p, state, configuration_at(work.configurations[end]), work.stage, gap, time, run.extrema),
-        )
+        count_end(p, state, configuration_at(work.configurations[end]), work.stage, gap, time, run.extrema)
         last = time == until or fixed and whole and time > until - 0.5 * control.dt
         if last or time >= due:
             return _leave(run, k + 1, CONVERGED, -1, end, gap)

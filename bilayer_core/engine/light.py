@@ -23,9 +23,10 @@ from __future__ import annotations
 import math
 
 from ..contact.light import brightness
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..kinematics.copying import copy
 from ..model import lit  # noqa: F401 (declares `shine`)
+from ..model.lit import shine
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import StageInputs, StateArrays
@@ -57,7 +58,7 @@ def _see(light, rate, elapsed, column):
 def begin_light(p, state):
     """Look at light at the start of a step."""
     _take_state(p.light, state)
-    call(p.calls.shine, (p.light, 0))
+    shine(p.light, 0)
     _see(p.light, state.light_rate, 0.0, 0)
     return READY
 
@@ -80,7 +81,7 @@ def end_light(p, state, inputs, n, h):
     light, drives, rate = p.light, p.drives, state.light_rate
     _see(light, rate, h, 1)
     _take_state(light, state)
-    call(p.calls.shine, (light, 1))
+    shine(light, 1)
     square = 0.0
     for k in range(light.law.shape[0]):
         i = light.law[k]

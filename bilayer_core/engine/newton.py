@@ -11,7 +11,10 @@ from __future__ import annotations
 
 import math
 
-from ..jit import call, kernel, piece
+from ..forces.friction_limit import limit_by_friction
+from ..forces.rod_contact import bound_between_rods, find_rod_contacts
+from ..forces.surface_pairs import bound_at_surfaces
+from ..jit import kernel, piece
 from ..jit.record import Matrix, Stack
 from ..kinematics.copying import copy
 from ..kinematics.rotating import compose_quaternion, rotate_by, rotation_vector_between
@@ -38,9 +41,10 @@ from ..model.records.status import (
     UNSETTLED,
 )
 from ..model.records.step import Configuration, Stage
-from .configuration import copy_prescribed, departure_of_constrained
+from .configuration import copy_prescribed, departure_of_constrained, move, transport_frames, update_attached
+from .linear.newton_matrix import factorise, solve
 from .modes import NEGATIVE, VALUE
-from .potential import evaluate
+from .potential import evaluate, settle_forces, update_lagged
 
 ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 2006, ch. 3)
 KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
@@ -112,10 +116,10 @@ def bound(p, at):
     counts[PAIR], counts[STATUS] = -1, READY
     fraction = 1.0
     if p.surfaces.exists:
-        fraction = call(p.calls.bound_at_surfaces, (p, at))
+        fraction = bound_at_surfaces(p, at)
     if counts[STATUS] != READY or not p.rod_contact.exists:
         return fraction
-    between = call(p.calls.bound_between_rods, (p, at))
+    between = bound_between_rods(p, at)
     if between < fraction:
         counts[PAIR] = -1
         return between
@@ -171,7 +175,7 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
                 system.node_step[i, c] = fraction * stage.predicted_shift[i, c]
         for k in range(p.strands.edge_count):
             system.angle_step[k] = fraction * stage.predicted_angle[k]
-        alpha = call(p.calls.bound, (p, start))
+        alpha = bound(p, start)
         if counts[STATUS] != READY:
             counts[PAIR] = -1
             return counts[STATUS]
@@ -210,10 +214,10 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
             guess.body_departure_quaternion,
             f,
         )
-    call(p.calls.update_attached, (p, guess))
+    update_attached(p, guess)
     departure_of_constrained(p.constrained, stage, guess)
     copy(guess.total_angle, guess.angle)
-    call(p.calls.transport_frames, (p, start, guess))
+    transport_frames(p, start, guess)
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]
     counts[PAIR] = -1
@@ -247,7 +251,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         the speed of the last correction [m/s], and the smallest gap to a surface or another rod [m].
     """
     counts, figures = p.outcome.counts, p.outcome.figures
-    call(p.calls.update_lagged, (p, at, stage))
+    update_lagged(p, at, stage)
     swapped, fresh, short, task = False, True, False, FACTORISE
     settled = False  # whether what is left to do is the last correction
     checked = False  # whether forces were settled at `at`
@@ -257,7 +261,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     energy = alpha = slope = noise = 0.0
     while True:
         if task == SEARCH:
-            call(p.calls.move, (p, at, alpha, stage, trial))
+            move(p, at, alpha, stage, trial)
             if settled:
                 copy(at.joint_strain, trial.joint_strain)  # twists, by which turns are counted, are near enough
                 swapped, status = not swapped, CONVERGED
@@ -265,7 +269,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             found, curved = False, short or factorisations > 1
         if task != FACTORISE or not curved:
             configuration = trial if task == SEARCH else at
-            if not found and p.rod_contact.exists and not call(p.calls.find_rod_contacts, (p, configuration)):
+            if not found and p.rod_contact.exists and not find_rod_contacts(p, configuration):
                 status = ROD_CAPACITY_EXCEEDED
                 break
             found, curved = True, curved or task == FACTORISE and wanted != VALUE
@@ -288,7 +292,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             iterations += not fresh
             fresh, checked, previous = False, False, residual
             at, trial, swapped = trial, at, not swapped
-            if call(p.calls.update_lagged, (p, at, stage)):
+            if update_lagged(p, at, stage):
                 curved, task = False, UPDATE_LAGGED
             if short or halvings > 0:
                 task = FACTORISE
@@ -301,14 +305,14 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
                     status = NOT_FINITE
                     break
                 factorisations += 1
-                status = call(p.calls.factorise, (p, at, stage, wanted == NEGATIVE))
+                status = factorise(p, at, stage, wanted == NEGATIVE)
                 if wanted == NEGATIVE and status == READY:
                     status = CONVERGED
                 if status != READY:
                     break
                 iterations += 1
                 fresh = True
-        call(p.calls.solve, (p,))
+        solve(p)
         residual = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
         if not math.isfinite(residual):
             status = NOT_FINITE
@@ -317,7 +321,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         settled = residual <= enough or residual <= rounding_speed(at, stage.lengths[0])
         if settled and not checked:
             checked = True
-            if call(p.calls.settle_forces, (p, at, stage)):
+            if settle_forces(p, at, stage):
                 settlings += 1
                 if settlings > MAX_SETTLINGS:
                     status = UNSETTLED
@@ -335,13 +339,13 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             alpha, halvings, task = 1.0, 0, SEARCH  # two points that move towards each other keep a gap
             continue
         slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
-        alpha = call(p.calls.bound, (p, at))
+        alpha = bound(p, at)
         status = counts[STATUS]
         if status != READY:
             break
         halvings, task = 0, SEARCH
         if fresh and not settled and p.slips.exists:
-            alpha = call(p.calls.limit_by_friction, (p, at, stage, slope, alpha))
+            alpha = limit_by_friction(p, at, stage, slope, alpha)
         short = alpha < 1.0
     counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
     counts[SETTLINGS], figures[RESIDUAL], figures[GAP], figures[FRACTION] = settlings, residual, gap, alpha

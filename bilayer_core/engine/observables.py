@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..forces.added_mass import fluid_momentum
 from ..forces.bend_twist import bending_strain
 from ..forces.joints import Joints
-from ..jit import call, kernel, piece, record, shapes_of, zeros_in_one
+from ..jit import kernel, piece, record, shapes_of, zeros_in_one
 from ..jit.record import Flags, IndexTable, Indices, Matrix, Vector
 from ..kinematics.copying import copy
 from ..kinematics.rotating import quaternion_of
@@ -79,7 +80,7 @@ def observe(p, joints, state, at, out):
     if out.fluid.exists:
         copy(state.velocity, out.fluid.node_velocity)
         copy(state.spin, out.fluid.spin)
-        out.kinetic[1] = call(out.fluid.fluid_momentum, (out.fluid, at))
+        out.kinetic[1] = fluid_momentum(out.fluid, at)
     return READY
 
 

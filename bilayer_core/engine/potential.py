@@ -7,7 +7,7 @@ import math
 from numba import types
 
 from ..forces.contact_on_bodies import condense_contact
-from ..jit import call, caller, kernel, piece
+from ..jit import caller, kernel, piece
 from ..kinematics.copying import copy
 from ..model.records.problem import Problem
 from ..model.records.status import READY
@@ -22,9 +22,9 @@ def _signature(result, *more):
     return result(types.int64, *records, *more)
 
 
-call_add = caller("a force", lambda _: _signature(types.float64, types.boolean))
-call_briefly = caller("the start or end of a force", lambda _: _signature(types.int64))
-call_update_lagged = caller("a force that follows", lambda _: _signature(types.boolean))
+call_add = caller("a force", lambda: _signature(types.float64, types.boolean))
+call_briefly = caller("the start or end of a force", lambda: _signature(types.int64))
+call_update_lagged = caller("a force that follows", lambda: _signature(types.boolean))
 
 
 @kernel
@@ -80,8 +80,8 @@ def evaluate(p, at, stage, with_hessian, again):
     `again` the configuration is that of the last evaluation; only what `update_lagged` has changed since is found anew,
     without second derivatives and the gap.
     """
-    gap = call(p.calls.add_forces, (p, at, stage, with_hessian, again))
-    call(p.calls.expand_to_unknowns, (p, at))
+    gap = add_forces(p, at, stage, with_hessian, again)
+    expand_to_unknowns(p, at)
     energy = 0.0
     for k in range(p.sums.energy.shape[0]):
         energy += p.sums.energy[k]

@@ -6,7 +6,7 @@ import math
 
 from ..forces.bend_twist import bending_strain
 from ..forces.rod_arms import node_of
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, RunExtrema, Stage, StateArrays
@@ -43,7 +43,7 @@ def count_end(p, state, at, stage, gap, time, extrema):
     figures[0], figures[1] = max(figures[0], height / extrema.mass), min(figures[1], gap)
     figures[2] = max(figures[2], math.sqrt(largest))
     _count_contacts(p.surfaces, time, extrema)
-    return call(p.calls.count_shape, (p, state, at, stage, extrema))
+    return count_shape(p, state, at, stage, extrema)
 
 
 @kernel

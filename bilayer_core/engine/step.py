@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ..contact.crossing import crossing, note_start
-from ..jit import call, kernel, piece, record_at
+from ..jit import kernel, piece, record_at
 from ..kinematics.copying import copy
 from ..model.records.outcome import (
     CONFIGURATION,
@@ -24,9 +24,15 @@ from ..model.records.problem import Problem
 from ..model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, CROSSED, MAX_ITERATIONS, READY
 from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
 from ..scene.transduction import eigenstrain_of, lagged
-from .ends import write_twist
-from .light import see_light
+from .configuration import take_state
+from .ends import distance, end_stage, keep_stage_derivatives, write_end, write_shape, write_twist
+from .energy_account import begin_step_account, close_step_account
+from .light import begin_light, end_light, see_light
 from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, VALUE, WITHOUT_INERTIA
+from .newton import first_guess_of, minimise_potential
+from .potential import end_forces, start_stage
+from .powers import add_powers
+from .stages import add_history_to_origin, predict_end, predict_stage, set_origin, stand_still_stage, start_step_point
 
 configuration_at = record_at(Configuration)
 LEAST_LENGTH = 0.01
@@ -98,7 +104,7 @@ def _solve(p, work, at, scratch, tolerance, max_iterations, wanted):
     before = counts[ITERATIONS], counts[FACTORISATIONS], counts[SETTLINGS]
     first, second = configuration_at(work.configurations[at]), configuration_at(work.configurations[scratch])
     arguments = p, first, second, work.stage, tolerance, max_iterations, wanted
-    status = call(p.calls.minimise_potential, arguments)
+    status = minimise_potential(*arguments)
     counts[ITERATIONS] += before[0]
     counts[FACTORISATIONS] += before[1]
     counts[SETTLINGS] += before[2]
@@ -148,27 +154,27 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     s, e, t = 0, 1, 2
     ends, stages = method.couplings.shape
     _clear(p.outcome)
-    call(p.calls.take_state, (p, state, configuration_at(work.configurations[s])))
+    take_state(p, state, configuration_at(work.configurations[s]))
     if p.surfaces.exists:
         note_start(p.surfaces, configuration_at(work.configurations[s]))
-    call(p.calls.start_step_point, (p, state, configuration_at(work.configurations[s]), work.first))
-    call(p.calls.begin_step_account, (p, state, inputs, work, method.works[0] * h))
+    start_step_point(p, state, configuration_at(work.configurations[s]), work.first)
+    begin_step_account(p, state, inputs, work, method.works[0] * h)
     if p.light.exists:
-        call(p.calls.begin_light, (p, state))
+        begin_light(p, state)
     stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
     work.start_angle[:] = 0.0
     worst = 0.0
     for n in range(stages):
         start, guess = configuration_at(work.configurations[s]), configuration_at(work.configurations[e])
-        call(p.calls.set_origin, (work, method, n))
-        call(p.calls.drive_stage, (p, state, inputs, n, work))
+        set_origin(work, method, n)
+        drive_stage(p, state, inputs, n, work)
         if with_history and method.history:
-            call(p.calls.add_history_to_origin, (p, state, work, method, n, h))
-        call(p.calls.predict_stage, (p, state, work, inputs, n, previous, start))
-        status = call(p.calls.start_stage, (p, start, stage))
+            add_history_to_origin(p, state, work, method, n, h)
+        predict_stage(p, state, work, inputs, n, previous, start)
+        status = start_stage(p, start, stage)
         if status != READY:
             return _leave(p, status, -1, e)
-        status = call(p.calls.first_guess_of, (p, start, inputs.position[n], inputs.rotation[n], stage, guess, False))
+        status = first_guess_of(p, start, inputs.position[n], inputs.rotation[n], stage, guess, False)
         if status != READY:
             figures[RESIDUAL] = math.inf
             return _leave(p, status, p.outcome.counts[PAIR], e)
@@ -177,8 +183,8 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
             return _leave(p, status, -1, e)
         worst = max(worst, figures[RESIDUAL])
         solved = configuration_at(work.configurations[e])
-        call(p.calls.end_stage, (p, state, work, inputs, n, solved))
-        call(p.calls.add_powers, (p, work, inputs, n, method.works[1 + n] * h, solved))
+        end_stage(p, state, work, inputs, n, solved)
+        add_powers(p, work, inputs, n, method.works[1 + n] * h, solved)
         if n + 1 < ends:
             previous = work.end
             copy(work.end.angle, work.start_angle)
@@ -191,9 +197,9 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
             return _leave(p, status, -1, e)
     else:
         end = configuration_at(work.configurations[e])
-        call(p.calls.write_end, (p, state, work.end, end, inputs, stages - 1))
+        write_end(p, state, work.end, end, inputs, stages - 1)
         if with_history:  # for the step after, which can take them if nothing touches anew
-            call(p.calls.keep_stage_derivatives, (state, work.origin, work.end, stage.lengths[1], method.carry))
+            keep_stage_derivatives(state, work.origin, work.end, stage.lengths[1], method.carry)
             if not method.history:  # a first step may begin with velocities, but with no rates of strains
                 state.strain_acceleration[:] = 0.0
             state.has_history[0] = _compare_touched(p.sums, state.touched)
@@ -209,16 +215,16 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
             copy(start_state.values, state.values)
             figures[RESIDUAL] = math.inf
             return _leave(p, CROSSED, crossed, e)
-    status = call(p.calls.end_forces, (p, configuration_at(work.configurations[e]), stage))
+    status = end_forces(p, configuration_at(work.configurations[e]), stage)
     copy(p.memory, state.memory)
     if status != READY:
         copy(start_state.values, state.values)
         return _leave(p, status, -1, e)
     figures[RESIDUAL], figures[LIGHT_ERROR] = worst, 0.0
     if p.light.exists:
-        figures[LIGHT_ERROR] = call(p.calls.end_light, (p, state, inputs, ends - 1, h))
+        figures[LIGHT_ERROR] = end_light(p, state, inputs, ends - 1, h)
     last = configuration_at(work.configurations[e])
-    p.outcome.counts[GAINS] = call(p.calls.close_step_account, (p, state, work, h, ends > stages, last))
+    p.outcome.counts[GAINS] = close_step_account(p, state, work, h, ends > stages, last)
     return _leave(p, CONVERGED, -1, e)
 
 
@@ -238,13 +244,13 @@ def _end_beyond(p, state, start_state, method, inputs, work, s, e):
     """
     n, stage = method.couplings.shape[1], work.stage
     start, end = configuration_at(work.configurations[s]), configuration_at(work.configurations[e])
-    call(p.calls.set_origin, (work, method, n))
-    call(p.calls.drive_stage, (p, state, inputs, n, work))
-    call(p.calls.predict_end, (p, state, work, inputs, n, work.end, start))
-    status = call(p.calls.first_guess_of, (p, start, inputs.position[n], inputs.rotation[n], stage, end, True))
+    set_origin(work, method, n)
+    drive_stage(p, state, inputs, n, work)
+    predict_end(p, state, work, inputs, n, work.end, start)
+    status = first_guess_of(p, start, inputs.position[n], inputs.rotation[n], stage, end, True)
     if status != READY:
         return BEYOND if status == BLOCKED else status, e
-    call(p.calls.write_end, (p, state, work.origin, end, inputs, n))
+    write_end(p, state, work.origin, end, inputs, n)
     end.total_angle[:] = 0.0
     stage.lengths[:] = EVALUATION_TIME
     status, e = _evaluate_at_rest(p, state, work, e, s, False)
@@ -264,8 +270,8 @@ def _evaluate_at_rest(p, state, work, at, scratch, counts):
     many eigenvalues of its Hessian are negative; the status, and the number of the configuration.
     """
     here = configuration_at(work.configurations[at])
-    call(p.calls.stand_still_stage, (p, state, here, counts, work.stage))
-    status = call(p.calls.start_stage, (p, here, work.stage))
+    stand_still_stage(p, state, here, counts, work.stage)
+    status = start_stage(p, here, work.stage)
     if status != READY:
         return status, at
     status, at, _ = _solve(p, work, at, scratch, 0.0, 1, NEGATIVE if counts else VALUE)
@@ -303,7 +309,7 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
     s, e, t = 0, 1, 2
     start, guess, stage = configuration_at(work.configurations[s]), configuration_at(work.configurations[e]), work.stage
     _clear(p.outcome)
-    call(p.calls.take_state, (p, state, start))
+    take_state(p, state, start)
     if mode != SETTLE:
         if mode == EVALUATE_STATE:
             length = EVALUATION_TIME
@@ -315,11 +321,11 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
     if p.surfaces.exists:
         note_start(p.surfaces, start)
     stage.lengths[:] = length
-    call(p.calls.stand_still_stage, (p, state, start, True, stage))
-    status = call(p.calls.start_stage, (p, start, stage))
+    stand_still_stage(p, state, start, True, stage)
+    status = start_stage(p, start, stage)
     if status != READY:
         return _leave(p, status, -1, e)
-    status = call(p.calls.first_guess_of, (p, start, state.body_position, state.body_rotation, stage, guess, False))
+    status = first_guess_of(p, start, state.body_position, state.body_rotation, stage, guess, False)
     if status != READY:
         p.outcome.figures[RESIDUAL] = math.inf
         return _leave(p, status, p.outcome.counts[PAIR], e)
@@ -330,6 +336,6 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
         if crossed >= 0:
             p.outcome.figures[RESIDUAL] = math.inf
             return _leave(p, CROSSED, crossed, e)
-        work.moved[0] = call(p.calls.distance, (p, start, end))
-        call(p.calls.write_shape, (p, end, state))
+        work.moved[0] = distance(p, start, end)
+        write_shape(p, end, state)
     return _leave(p, status, -1, e)

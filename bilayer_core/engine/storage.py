@@ -37,7 +37,6 @@ from .capacity import (
     rod_pairs_for,
     surface_pairs_for,
 )
-from .dispatch import calls_of
 
 Array = np.ndarray
 FIRST = ("node", "edge", "pair", "body", "contact_point", "contact")
@@ -102,7 +101,7 @@ class Storage:
 
     @property
     def problem(self) -> Problem:
-        """Its records; the pieces that it calls are compiled, or read from the cache, when first asked for."""
+        """Its records."""
         if self._problem is None:
             self._problem = self._make()
         return self._problem
@@ -138,7 +137,7 @@ class Storage:
         self._sums = {
             name: getattr(records["sums"], name) for name in Sums.names if not name.startswith(("link", "arm"))
         }
-        return Problem(**records, calls=calls_of(model), outcome=self.outcome, forces=force_table(model, records))
+        return Problem(**records, outcome=self.outcome, forces=force_table(model, records))
 
     def _sliding(self, before: Problem | None, sizes: dict[str, int]) -> Sliding:
         sliding = sliding_of(self._model, sizes, friction_law(self._model.scene, self._model.forces, self._friction))

@@ -48,7 +48,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..kinematics.copying import copy
 from ..model.force_slots import slot_of
 from ..model.records.parts import Fluid
@@ -92,7 +92,7 @@ def momentum_at(fluid, at, velocity, momentum_out):
     if not fluid.exists:
         return
     copy(velocity, fluid.node_velocity)
-    call(fluid.fluid_momentum, (fluid, at))
+    fluid_momentum(fluid, at)
     copy(fluid.momentum, momentum_out)
 
 
@@ -173,7 +173,7 @@ def update_fluid(fluid, p, at, stage):
     for i in range(velocity.shape[0]):
         for c in range(3):
             velocity[i, c] = (position[i, c] - origin[i, c]) / h
-    call(fluid.fluid_momentum, (fluid, at))
+    fluid_momentum(fluid, at)
     for k in range(fluid.direction1.shape[0]):
         for c in range(3):
             fluid.direction1[k, c], fluid.direction2[k, c] = at.director1[k, c], at.director2[k, c]

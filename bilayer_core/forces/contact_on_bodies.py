@@ -14,7 +14,7 @@ a rod has an arm from the node, x is the contact point at its end, and what it d
 
 from __future__ import annotations
 
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..jit.record import Matrix, Vector
 from ..jit.stack import stack_matrix
 from ..model.records.problem import Problem
@@ -72,7 +72,7 @@ def add_second_derivative(p, m, g, arm, lever, turning, i, r, a, b):
                     p.sums.arm_matrix[r, c, d] = m[c, d]
     free = p.surfaces.free_index
     if free.shape[0] > 0 and (free[b] >= 0 or (a >= 0 and free[a] >= 0)):
-        call(p.calls.add_contact_to_bodies, (p, m, g, arm, lever, turning, i, r, a, b))
+        add_contact_to_bodies(p, m, g, arm, lever, turning, i, r, a, b)
 
 
 @kernel

@@ -39,11 +39,12 @@ from __future__ import annotations
 import math
 
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
+from ..contact.broad_phase import near_pairs
 from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from ..contact.rod_bound import rod_step_bound
 from ..contact.rod_list import FIRST, PATH, begin_list, end_list, list_serves, reachable
 from ..contact.segment import facing_contacts
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..jit.record import Matrix
 from ..jit.stack import stack_vector
 from ..model.force_slots import slot_of
@@ -65,7 +66,7 @@ def list_near_rods(p, position, step, fraction, move):
     if list_serves(rods, position, step, fraction, move):
         return True
     margin = begin_list(rods, position, step, fraction, move)
-    call(p.calls.near_pairs, (rods.search, rods.d_hat, rods.d_hat + margin))
+    near_pairs(rods.search, rods.d_hat, rods.d_hat + margin)
     return end_list(rods)
 
 
@@ -73,7 +74,7 @@ def list_near_rods(p, position, step, fraction, move):
 def find_rod_contacts(p, at):
     """Find where rods are nearer to each other than the barrier distance; false if there is no capacity for that."""
     rods = p.rod_contact
-    if not call(p.calls.list_near_rods, (p, at.position, rods.no_step, 0.0, 0.0)):
+    if not list_near_rods(p, at.position, rods.no_step, 0.0, 0.0):
         return False
     found, gap = rods.contacts.count, math.inf
     found[0] = 0
@@ -89,7 +90,7 @@ def bound_between_rods(p, at):
     rods, step, status = p.rod_contact, p.system.node_step, p.outcome.counts
     status[STATUS] = READY
     move, limit = reachable(step, rods.unit)
-    if not call(p.calls.list_near_rods, (p, at.position, step, limit, limit * move)):
+    if not list_near_rods(p, at.position, step, limit, limit * move):
         status[STATUS] = ROD_CAPACITY_EXCEEDED
         return 0.0
     return rod_step_bound(rods, at.position, step, limit, 2.0 * limit * move)
@@ -98,7 +99,7 @@ def bound_between_rods(p, at):
 @piece(int, RodContact, Problem, Configuration, Stage)
 def start_rod_barrier(rods, p, start, stage):
     """Find the contacts at the start of a stage."""
-    return READY if call(p.calls.find_rod_contacts, (p, start)) else ROD_CAPACITY_EXCEEDED
+    return READY if find_rod_contacts(p, start) else ROD_CAPACITY_EXCEEDED
 
 
 @kernel

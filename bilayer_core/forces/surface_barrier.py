@@ -25,7 +25,7 @@ import math
 from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
 from ..contact.near import gap_normal
 from ..contact.shapes import shape_curvature
-from ..jit import call, kernel, piece
+from ..jit import kernel, piece
 from ..jit.stack import stack_matrix, stack_vector
 from ..model.force_slots import slot_of
 from ..model.records.contacts import Surfaces
@@ -34,6 +34,7 @@ from ..model.records.step import Configuration, Stage
 from .contact_on_bodies import add_force, add_second_derivative
 from .restitution import RESTITUTION, damping_at
 from .rod_arms import add_to_edges, has_arm, new_arm, node_of, write_curvature, write_material_rate
+from .surface_pairs import list_surface_pairs
 
 BARRIER = slot_of("barrier")
 
@@ -122,4 +123,4 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
 @piece(int, Surfaces, Problem, Configuration, Stage)
 def start_surface_barrier(surfaces, p, start, stage):
     """List the pairs that are near at the start of a stage; returns a status."""
-    return call(p.calls.list_surface_pairs, (surfaces, start, 0.0))
+    return list_surface_pairs(surfaces, start, 0.0)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..contact.near import list_near, moved_since
 from ..contact.step_bound import motion_of_points, motion_of_surfaces, step_bound
-from ..jit import call, piece
+from ..jit import piece
 from ..model.records.contacts import Surfaces
 from ..model.records.outcome import PAIR, STATUS
 from ..model.records.problem import Problem
@@ -45,7 +45,7 @@ def bound_at_surfaces(p, at):
     surfaces, counts = p.surfaces, p.outcome.counts
     of_points = motion_of_points(surfaces, p.bodies, p.strands, p.system, at)
     closing = of_points + motion_of_surfaces(surfaces, p.system)
-    counts[PAIR], counts[STATUS] = -1, call(p.calls.list_surface_pairs, (surfaces, at, closing))
+    counts[PAIR], counts[STATUS] = -1, list_surface_pairs(surfaces, at, closing)
     if counts[STATUS] != READY:
         return 0.0
     closing = of_points + motion_of_surfaces(surfaces, p.system)  # extents of surfaces are those of the list

@@ -5,8 +5,7 @@ Three kinds of functions are compiled:
 `kernel`
     Called by other kernels, and by tests: compiled within each piece that calls it, and kept nowhere.
 `piece`
-    Compiled by itself for declared types, kept on disk, and called through its address: by other pieces, which find it
-    in a record of addresses, or by the interpreter.
+    Compiled by itself for declared types when it is first called, by other pieces or by the interpreter; kept on disk.
 `entry`
     Called by the interpreter with arrays, where a model is built: kept on disk.
 """
@@ -14,8 +13,8 @@ Three kinds of functions are compiled:
 from __future__ import annotations
 
 from .kernel import entry, kernel
-from .piece import addresses, call, caller, piece
-from .record import Address, Record, record, record_at, shapes_of, zeros_in_one
+from .piece import caller, piece
+from .record import Record, record, record_at, shapes_of, zeros_in_one
 
-__all__ = ["Address", "Record", "record", "record_at", "shapes_of", "zeros_in_one"]
-__all__ += ["addresses", "call", "caller", "entry", "kernel", "piece"]
+__all__ = ["Record", "record", "record_at", "shapes_of", "zeros_in_one"]
+__all__ += ["caller", "entry", "kernel", "piece"]

@@ -1,52 +1,61 @@
-"""Pieces of the engine: each compiled by itself, once, for declared types, and called through its address.
+"""Pieces of the engine: each compiled by itself, once, for declared types, and called by name.
 
 Numba compiles a function with all that it calls, and what this calls, and optimises every level again; each new
-combination of types is another function. A piece ends that: who calls it knows its address alone, so it is compiled
-once for all scenes, by any process, and an absent force is an address that nobody calls.
+combination of types is another function. A piece ends that: it is compiled once for all scenes, by any process.
 
     @piece(float, Problem, Configuration)
     def smallest_gap(problem, at): ...
 
-The interpreter calls it with records and numbers, without the GIL: ``smallest_gap(problem, at)``. Kernels call it
-through a record of addresses:
+The interpreter calls it with records and numbers, without the GIL, and kernels by the same line:
+``gap = smallest_gap(problem, at)``. In compiled code that line goes through the piece's *slot*, a word of memory that
+holds its address, or 0 until something calls it: the first call has the piece compiled, or read from the cache. So what
+a scene does not reach is neither compiled nor loaded.
 
-    @record
-    class Calls:
-        smallest_gap: Address
-
-    gap = call(problem.calls.smallest_gap, (problem, at))
-
-A call with other types than those declared is an error of compilation.
+A call with other types than those declared is an error of compilation. What is chosen at run time, as forces are,
+stands in a table of addresses, and `caller` makes the function that calls it.
 """
 
 from __future__ import annotations
 
 import ctypes
+import inspect
+import os
+import threading
 import time
-from collections.abc import Callable, Iterable
+import traceback
+from collections.abc import Callable
 from typing import Any
 
 import numba
-from llvmlite import ir
+from llvmlite import binding, ir
 from numba import errors
 from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.extending import intrinsic, lower_builtin, type_callable
+from numba.types import Any as AnyType
+from numba.types import VarArg
 
 from .cache import cache_folder, cached
 from .kernel import FASTMATH, OPTIONS
 from .record import NUMBERS, Record, type_in_kernels
 
 IN_C = {int: ctypes.c_int64, float: ctypes.c_double, bool: ctypes.c_bool}
+FIND = "bilayer_find_piece"
+"""Symbol of the function that kernels call for the address of a piece whose slot is empty."""
+MOST_CALLS = 1000
+"""Of a piece that cannot be compiled; who goes on calling it would never end."""
+_word = ir.IntType(64)
 
 
 class Piece:
-    """A function with an address.
+    """A function that is compiled by itself.
 
     Attributes
     ----------
     name : str
     function : callable
         As it is written.
+    slot : ctypes.c_int64
+        Its address, as kernels find it; 0 as long as none has called it.
     seconds : float
         CPU time that its compilation, or its reading from the cache, took [s]; 0 before.
     """
@@ -55,7 +64,8 @@ class Piece:
         self.name, self.function = function.__name__, function
         self._result, self._arguments = result, arguments
         self._compiled = self._callable = None
-        self.seconds = 0.0
+        self.slot, self.seconds = ctypes.c_int64(0), 0.0
+        declare_calls_of(self)
 
     @property
     def signature(self):
@@ -66,13 +76,14 @@ class Piece:
     def address(self) -> int:
         """Where it is in memory; compiled, or read from the cache, when first asked for."""
         if self._compiled is None:
-            begin = time.thread_time()
+            begin, wall = time.thread_time(), time.perf_counter()
             with cached():
                 compiler = numba.cfunc(
                     self.signature, nopython=True, **OPTIONS, fastmath=FASTMATH, cache=cache_folder() is not None
                 )
                 self._compiled = compiler(self.function)
             self.seconds = time.thread_time() - begin
+            loading.cpu, loading.wall = loading.cpu + self.seconds, loading.wall + time.perf_counter() - wall
         return self._compiled.address
 
     def __call__(self, *arguments: Any):
@@ -80,11 +91,63 @@ class Piece:
         if self._callable is None:
             kinds = [IN_C.get(kind, ctypes.c_void_p) for kind in self._arguments]
             self._callable = ctypes.CFUNCTYPE(IN_C[self._result], *kinds)(self.address)
-        return self._callable(*[of.address if isinstance(of, Record) else of for of in arguments])
+        result = self._callable(*[of.address if isinstance(of, Record) else of for of in arguments])
+        if loading.errors:
+            loading.raise_error()
+        return result
+
+
+class Loading(threading.local):
+    """What the loading of pieces took in this thread, and how it failed.
+
+    Attributes
+    ----------
+    cpu, wall : float
+        Time for pieces so far [s].
+    errors : list of BaseException
+        What could not be raised where compiled code waited for a piece.
+    """
+
+    def __init__(self) -> None:
+        self.cpu = self.wall = 0.0
+        self.errors: list[BaseException] = []
+        self._failed: dict[int, int] = {}
+
+    def find(self, slot: int) -> int:
+        """Return the address of the piece with a slot, and put it there; 0 if there is none.
+
+        It is compiled code that asks, and it goes on whatever happens: with a piece that cannot be had, as if that had
+        returned 0. The interpreter, which called it, raises the error when it returns.
+        """
+        piece = _by_slot[slot]
+        while slot not in self._failed:
+            try:
+                piece.slot.value = piece.address
+                return piece.slot.value
+            except KeyboardInterrupt as interruption:
+                self.errors.append(interruption)  # and what compiled code is at is done, so that its state is whole
+            except BaseException as error:
+                self.errors.append(error)
+                self._failed[slot] = 0
+        self._failed[slot] += 1
+        if self._failed[slot] > MOST_CALLS:
+            traceback.print_exception(self.errors[-1])
+            os._exit(70)
+        return 0
+
+    def raise_error(self) -> None:
+        """Raise the first error; a next call of what has failed tries it again."""
+        first = self.errors[0]
+        self.errors, self._failed = [], {}
+        raise first
 
 
 PIECES: dict[str, Piece] = {}
 """All that were declared, by name."""
+loading = Loading()
+_by_slot: dict[int, Piece] = {}
+_find = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(loading.find)
+binding.add_symbol(FIND, ctypes.cast(_find, ctypes.c_void_p).value)
 
 
 def piece(result: type, *arguments) -> Callable[[Callable], Piece]:
@@ -107,6 +170,45 @@ def piece(result: type, *arguments) -> Callable[[Callable], Piece]:
     return declare
 
 
+def declare_calls_of(of: Piece) -> None:
+    """Tell numba what a call of a piece is: of the address in its slot, with the declared types."""
+    parameters, symbol = inspect.signature(of.function), f"bilayer_slot_of_{of.name}"
+    _by_slot[ctypes.addressof(of.slot)] = of
+    binding.add_symbol(symbol, ctypes.addressof(of.slot))
+
+    @type_callable(of)
+    def type_call(context):
+        def check(*given, **named):
+            check_types(context, of.name, of.signature.args, parameters.bind(*given, **named).args)
+            return of.signature
+
+        check.__signature__ = parameters
+        return check
+
+    @lower_builtin(of, VarArg(AnyType))
+    def call_slot(context, builder, signature, arguments):
+        known = builder.module.globals
+        slot = known.get(symbol) or ir.GlobalVariable(builder.module, _word, symbol)
+        find = known.get(FIND) or ir.Function(builder.module, ir.FunctionType(_word, [_word]), FIND)
+        before, missing, there, after = builder.block, *(builder.append_basic_block() for _ in range(3))
+        present = builder.load(slot)
+        builder.cbranch(cgutils.is_not_null(builder, present), there, missing).set_weights([99, 1])
+        builder.position_at_end(missing)
+        found = builder.call(find, [builder.ptrtoint(slot, _word)])
+        builder.cbranch(cgutils.is_not_null(builder, found), there, after).set_weights([99, 1])
+        builder.position_at_end(there)
+        target = builder.phi(_word)
+        target.add_incoming(present, before)
+        target.add_incoming(found, missing)
+        result = builder.call(builder.inttoptr(target, pointer_to(context, signature)), arguments)
+        builder.branch(after)
+        builder.position_at_end(after)
+        returned = builder.phi(result.type)
+        returned.add_incoming(ir.Constant(result.type, None), missing)
+        returned.add_incoming(result, there)
+        return returned
+
+
 def caller(name: str, signature: Callable):
     """A function for kernels that calls what is at an address.
 
@@ -115,19 +217,13 @@ def caller(name: str, signature: Callable):
     name : str
         For messages.
     signature : callable
-        Signature of what is called, from the type of the address.
+        Returns the signature of what is called.
     """
-
-    def check(typing_context, wanted: tuple, given: tuple) -> None:
-        fits = len(wanted) == len(given)
-        if not fits or any(typing_context.can_convert(*kinds) is None for kinds in zip(given, wanted, strict=True)):
-            listed = [", ".join(map(str, kinds)) for kinds in (wanted, given)]
-            raise errors.TypingError(f"{name}: is called with ({listed[1]}); it takes ({listed[0]})")
 
     @intrinsic
     def call_at(typing_context, address, arguments):
-        called = signature(address)
-        check(typing_context, called.args, arguments.types)
+        called = signature()
+        check_types(typing_context, name, called.args, arguments.types)
 
         def generate(context, builder, of_call, values):
             items = cgutils.unpack_tuple(builder, values[1], len(called.args))
@@ -135,20 +231,22 @@ def caller(name: str, signature: Callable):
                 context.cast(builder, item, of, to)
                 for item, of, to in zip(items, arguments.types, called.args, strict=True)
             ]
-            kinds = [context.get_value_type(of) for of in called.args]
-            function = ir.FunctionType(context.get_value_type(called.return_type), kinds)
-            return builder.call(builder.inttoptr(values[0], function.as_pointer()), items)
+            return builder.call(builder.inttoptr(values[0], pointer_to(context, called)), items)
 
         return called.return_type(address, arguments), generate
 
     return call_at
 
 
-call = caller("call", lambda address: PIECES[address.piece].signature)
-"""For kernels: ``call(address, arguments)``, with the address of a piece from a record and a tuple."""
+def check_types(typing_context, name: str, wanted: tuple, given: tuple) -> None:
+    """Raise the error of compilation of a call with other types than those declared."""
+    fits = len(wanted) == len(given)
+    if not fits or any(typing_context.can_convert(*kinds) is None for kinds in zip(given, wanted, strict=True)):
+        listed = [", ".join(map(str, kinds)) for kinds in (wanted, given)]
+        raise errors.TypingError(f"{name}: is called with ({listed[1]}); it takes ({listed[0]})")
 
 
-def addresses(declared: type[Record], needed: Iterable[str]) -> Record:
-    """A record of addresses, filled with those of the pieces that are needed; the others are 0."""
-    needed = set(needed)
-    return declared(**{name: PIECES[name].address if name in needed else 0 for name in declared.names})
+def pointer_to(context, signature) -> ir.PointerType:
+    """LLVM's type of the address of a function."""
+    kinds = [context.get_value_type(of) for of in signature.args]
+    return ir.FunctionType(context.get_value_type(signature.return_type), kinds).as_pointer()

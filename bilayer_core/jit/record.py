@@ -95,18 +95,6 @@ class RecordType(types.Type):
         super().__init__(f"{declared.__module__}.{declared.__qualname__}")
 
 
-class AddressType(types.Type):
-    """Type of the address of a piece, which knows whose it is: that of the name of its field."""
-
-    def __init__(self, piece: str):
-        self.piece = piece
-        super().__init__(f"address of {piece}")
-
-
-class Address:
-    """Declares a field of a record as the address of the piece of the same name."""
-
-
 class Record:
     """Base of the classes that `record` makes.
 
@@ -189,10 +177,7 @@ class Record:
             hints = typing.get_type_hints(cls)
             cls._numba_type = RecordType(
                 cls,
-                {
-                    name: AddressType(name) if hints[name] is Address else type_in_kernels(hints[name])
-                    for name in cls.names
-                },
+                {name: type_in_kernels(hints[name]) for name in cls.names},
             )
             for name in ("exists", *cls.names):
                 add_field(RecordType, name, _type_of_field, _read_field)
@@ -317,14 +302,6 @@ def _words(value: Any, of: types.Type, dtype: np.dtype | None, name: tuple[str, 
 @register_model(RecordType)
 class _RecordModel(models.OpaqueModel):
     """In kernels a record is its address."""
-
-
-@register_model(AddressType)
-class _AddressModel(models.PrimitiveModel):
-    """An integer."""
-
-    def __init__(self, manager, of):
-        super().__init__(manager, of, _WORD_TYPE)
 
 
 def _type_of_field(of: RecordType, name: str) -> types.Type | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from ..errors import InputError, SimulationError
 from ..forces.register import memory_size
 from ..integrators.register import INTEGRATORS
 from ..jit.compile_all import ensure_compiled
+from ..jit.piece import loading
 from ..model.build import build_model
 from ..model.fingerprint import conditions_of, fingerprint_of
 from ..model.model import Model
@@ -39,6 +41,11 @@ from .stepper import Stepper, StepReport
 from .summary import summarise
 
 Array = np.ndarray
+
+
+def wall_time() -> float:
+    """Return elapsed seconds without those for the loading of kernels; differences count."""
+    return clock.perf_counter() - loading.wall
 
 
 class Simulator(Controls):
@@ -136,15 +143,15 @@ class Simulator(Controls):
             self._stepper.ledger = self._ledger
 
     def compile(self) -> float:
-        """Compile the kernels of this scene, or load them from the cache; return the CPU seconds that took.
+        """Compile all kernels that are not in the cache, and prepare the start; return the CPU seconds for this scene.
 
-        Whatever needs them calls it; calling it first keeps its time apart from that of the simulation.
+        Others are read from the cache when the simulation first needs them, and their time is counted here as well, not
+        in `cpu_time`. Whatever needs kernels calls it.
         """
         if self._compile_time is None:
             ensure_compiled()
             begin = clock.thread_time()
             self._compile_time = 0.0
-            self._stepper.engine.load()
             self._stepper.evaluate(self._state)
             self.statistics.take_shape(self._stepper, self._state)
             self._begin_budget()
@@ -192,15 +199,13 @@ class Simulator(Controls):
         if self.plane_watch is not None:
             most = min(most, self.plane_watch.steps_left)
         due = min([due, *(attached.next_due() for attached in self._attached)])
-        begin, wall = clock.thread_time(), clock.perf_counter()
-        try:
-            found = self._stepper.integrate(state, most, until, due)
-        except SimulationError:
-            self.termination = Termination.FAILED.value
-            raise
-        self.statistics.update(found, int(state.step[0] - before), self._stepper)
-        self.cpu_time += clock.thread_time() - begin
-        self.wall_time += clock.perf_counter() - wall
+        with self._timed():
+            try:
+                found = self._stepper.integrate(state, most, until, due)
+            except SimulationError:
+                self.termination = Termination.FAILED.value
+                raise
+            self.statistics.update(found, int(state.step[0] - before), self._stepper)
         self._look_out(found.done)
         for attached in self._attached:
             attached.observe_due()
@@ -210,15 +215,22 @@ class Simulator(Controls):
         """Look out of the plane now and then, after so many more steps; the first look needs more of the program."""
         if self.plane_watch is None or not self.plane_watch.is_due(steps, last):
             return
-        begin, wall = clock.thread_time(), clock.perf_counter()
-        surroundings, started = self._stepper.surroundings, self.plane_watch.started
-        rest = surroundings.rest_strains_of(self._state.transduction)
-        self.plane_watch.look(self._state, rest, surroundings.load_factor(self._state))
-        if started:
-            self.cpu_time += clock.thread_time() - begin
-            self.wall_time += clock.perf_counter() - wall
-        else:
-            self._compile_time = (self._compile_time or 0.0) + clock.thread_time() - begin
+        with self._timed():
+            surroundings = self._stepper.surroundings
+            rest = surroundings.rest_strains_of(self._state.transduction)
+            self.plane_watch.look(self._state, rest, surroundings.load_factor(self._state))
+
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        """Count what is done meanwhile as time of the simulation, and the loading of kernels as that of compilation."""
+        cpu, wall, loaded = clock.thread_time(), wall_time(), loading.cpu
+        try:
+            yield
+        finally:
+            loaded = loading.cpu - loaded
+            self._compile_time += loaded
+            self.cpu_time += clock.thread_time() - cpu - loaded
+            self.wall_time += wall_time() - wall
 
     def run(
         self,
@@ -290,7 +302,7 @@ class Simulator(Controls):
             output = self.scene.output
             observers = [McapRecorder(log, output.rate, output.marker_rate), *observers]
         self.compile()
-        begin, cpu, wall, before = self.time, self.cpu_time, clock.perf_counter(), self._state.step[0]
+        begin, cpu, wall, before = self.time, self.cpu_time, wall_time(), self._state.step[0]
         end = begin + steps * self.dt if fixed else self._stepper.end_near(begin + left if until is None else until)
         last = end - 0.5 * self.dt if fixed else end
         callbacks = Callbacks(stop, interrupted, progress, each_step)
@@ -315,9 +327,7 @@ class Simulator(Controls):
         self.termination = termination.value
         schedule.finish(termination is not Termination.INTERRUPTED, termination.value)
         done = int(self._state.step[0] - before)
-        return RunResult(
-            termination, self.time, self.time - begin, done, self.cpu_time - cpu, clock.perf_counter() - wall
-        )
+        return RunResult(termination, self.time, self.time - begin, done, self.cpu_time - cpu, wall_time() - wall)
 
     def attach(self, observer: Observer) -> Callable[[], None]:
         """Show frames to an observer from now on, at its rate, whoever makes steps; returns what ends that.
@@ -358,16 +368,14 @@ class Simulator(Controls):
             If none is found; nothing is changed then.
         """
         self.compile()
-        begin, wall = clock.thread_time(), clock.perf_counter()
-        try:
-            in_space = (lambda: self._in_dimension(3)) if self.plan.dimension == 2 else None
-            return solve_static(self._stepper, self._state, tolerance, in_space)
-        finally:
-            self._stepper.evaluate(self._state)
-            self.statistics.take_shape(self._stepper, self._state)
-            self._begin_budget()
-            self.cpu_time += clock.thread_time() - begin
-            self.wall_time += clock.perf_counter() - wall
+        with self._timed():
+            try:
+                in_space = (lambda: self._in_dimension(3)) if self.plan.dimension == 2 else None
+                return solve_static(self._stepper, self._state, tolerance, in_space)
+            finally:
+                self._stepper.evaluate(self._state)
+                self.statistics.take_shape(self._stepper, self._state)
+                self._begin_budget()
 
     def save_state(self) -> Array:
         """Flat copy of the state; `load_state` continues from it bit for bit.

@@ -1,4 +1,4 @@
-"""Records that kernels read, pieces that are called through their addresses, and arrays on the stack of a kernel."""
+"""Records that kernels read, pieces that call each other, and arrays on the stack of a kernel."""
 
 import os
 import subprocess
@@ -9,8 +9,9 @@ import numba
 import numpy as np
 import pytest
 
-from bilayer_core.jit import Address, addresses, call, caller, kernel, piece, record, record_at
+from bilayer_core.jit import caller, kernel, piece, record, record_at
 from bilayer_core.jit.kernel import exact_kernel
+from bilayer_core.jit.piece import Piece, loading
 from bilayer_core.jit.record import Flags, IndexTable, Indices, Vector
 from bilayer_core.jit.stack import stack_matrix, stack_vector
 
@@ -64,12 +65,11 @@ def read_for_a_test(o, which, out):
 class Reading:
     outer: Outer
     out: Vector
-    read_for_a_test: Address
 
 
 @piece(float, Reading, int)
-def read_through_an_address(r, which):
-    return call(r.read_for_a_test, (r.outer, which, r.out))
+def read_for_another_piece(r, which):
+    return read_for_a_test(r.outer, which=which, out=r.out)
 
 
 @piece(float, Outer)
@@ -80,14 +80,19 @@ def change_for_a_test(o):
 
 def _read(which):
     outer, other = _outer()
-    reading = Reading(outer=outer, out=np.zeros(8), read_for_a_test=read_for_a_test.address)
-    assert read_through_an_address(reading, which) == 0.25
+    reading = Reading(outer=outer, out=np.zeros(8))
+    assert read_for_another_piece(reading, which) == 0.25
     return reading.out.tolist(), other
 
 
 def test_a_piece_reads_every_kind_of_field_through_another_piece():
     assert _read(0)[0] == [1, 5, 9, 4, 1, 2, 2, 0]
     assert _read(1)[0] == [1, 5, 9, 4, 1, 2, 8, 0]
+
+
+def _environment():
+    """For a program that imports this module."""
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), str(Path(__file__).parent)])}
 
 
 def test_what_a_piece_writes_is_seen_by_all_who_hold_the_array():
@@ -152,35 +157,87 @@ def test_a_record_takes_the_fields_of_its_class_with_their_types_and_nothing_els
     with pytest.raises(TypeError, match="Inner.values: float64, shape .* is not a contiguous array of 1 indices"):
         Inner(values=np.zeros((4, 2))[:, 0], scale=1.0)
     with pytest.raises(TypeError, match="Reading.outer: a Inner is no Outer"):
-        Reading(outer=Inner.absent(), out=np.zeros(1), read_for_a_test=0)
-
-
-@record
-class Wrong:
-    change_for_a_test: Address
-    inner: Inner
+        Reading(outer=Inner.absent(), out=np.zeros(1))
 
 
 def test_a_call_with_other_types_than_declared_is_an_error_of_compilation():
-    @piece(float, Wrong)
-    def call_with_the_wrong_record(w):
-        return call(w.change_for_a_test, (w.inner,))
+    @piece(float, Inner)
+    def call_with_the_wrong_record(inner):
+        return change_for_a_test(inner)
 
-    with pytest.raises(numba.errors.TypingError, match="is called with .*Inner.*; it takes .*Outer"):
+    with pytest.raises(numba.errors.TypingError, match="change_for_a_test: is called with .*Inner.*; it takes .*Outer"):
         _ = call_with_the_wrong_record.address
 
 
-def test_addresses_are_those_of_the_needed_pieces_alone():
-    @record
-    class Calls:
-        read_for_a_test: Address
-        change_for_a_test: Address
-
-    calls = addresses(Calls, ["change_for_a_test"])
-    assert calls.read_for_a_test == 0 and calls.change_for_a_test == change_for_a_test.address
+@piece(int, int)
+def double_for_a_test(n):
+    return 2 * n
 
 
-call_reading = caller("call_reading", lambda address: read_through_an_address.signature)
+@piece(int, int)
+def double_odd_numbers(n):
+    return double_for_a_test(n) if n % 2 else n
+
+
+def test_a_piece_is_compiled_when_something_first_calls_it():
+    assert double_odd_numbers(4) == 4 and double_for_a_test.seconds == 0.0 == double_for_a_test.slot.value
+    before = loading.cpu
+    assert double_odd_numbers(5) == 10 and loading.cpu - before >= double_for_a_test.seconds > 0.0
+    assert double_for_a_test.slot.value == double_for_a_test.address
+
+
+BROKEN = """
+@piece(bool, int)
+def broken(n):
+    return n.nothing
+
+@piece(int, int)
+def count_until_broken(n):
+    while not broken(n):
+        n += not ENDLESS
+        if n > 3:
+            return n
+    return -1
+"""
+
+
+def test_where_a_piece_cannot_be_compiled_who_called_it_ends_and_the_error_is_raised(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(f"from bilayer_core.jit import piece\nENDLESS = False\n{BROKEN}\ncount_until_broken(0)")
+    run = subprocess.run([sys.executable, script], env=_environment(), capture_output=True, text=True, check=False)
+    assert run.returncode == 1 and "numba.core.errors.TypingError" in run.stderr and "n.nothing" in run.stderr
+    script.write_text(script.read_text().replace("= False", "= True"))  # compiled code that would never end
+    run = subprocess.run([sys.executable, script], env=_environment(), capture_output=True, text=True, check=False)
+    assert run.returncode == 70 and "numba.core.errors.TypingError" in run.stderr and "n.nothing" in run.stderr
+
+
+@piece(int, int)
+def triple_for_a_test(n):
+    return 3 * n
+
+
+@piece(int, int)
+def add_the_triple(n):
+    return n + triple_for_a_test(n)
+
+
+def test_an_interruption_while_a_piece_is_compiled_is_raised_when_compiled_code_is_done(monkeypatch):
+    compiled, tries = Piece.address.fget, []
+
+    def interrupted(of):
+        if of is triple_for_a_test and not tries:
+            tries.append(of)
+            raise KeyboardInterrupt
+        return compiled(of)
+
+    monkeypatch.setattr(Piece, "address", property(interrupted))
+    with pytest.raises(KeyboardInterrupt):
+        add_the_triple(1)
+    assert tries == [triple_for_a_test] and triple_for_a_test.slot.value != 0
+    assert add_the_triple(1) == 4
+
+
+call_reading = caller("call_reading", lambda: read_for_another_piece.signature)
 
 
 @record
@@ -199,8 +256,8 @@ def sum_of_a_table(t):
 
 def test_pieces_in_a_table_are_called_by_their_common_signature():
     outer, _ = _outer()
-    reading = Reading(outer=outer, out=np.zeros(8), read_for_a_test=read_for_a_test.address)
-    table = Table(addresses=np.full(2, read_through_an_address.address), reading=reading)
+    reading = Reading(outer=outer, out=np.zeros(8))
+    table = Table(addresses=np.full(2, read_for_another_piece.address), reading=reading)
     assert sum_of_a_table(table) == 0.5
 
 
@@ -239,10 +296,7 @@ def test_importing_and_compiling_leaves_numba_as_it_was():
 
 def test_the_documented_ways_of_numba_alone_give_the_same():
     program = "import test_jit as t; print(t._read(1)[0])"
-    environment = os.environ | {
-        "BILAYER_JIT_PUBLIC": "1",
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), str(Path(__file__).parent)]),
-    }
+    environment = _environment() | {"BILAYER_JIT_PUBLIC": "1"}
     run = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
     assert run.stdout.strip() == str(_read(1)[0])
 
@@ -261,9 +315,6 @@ def beyond_the_end(inner, index):
 
 
 def test_with_bounds_checked_an_index_beyond_the_end_is_an_error():
-    environment = os.environ | {
-        "NUMBA_BOUNDSCHECK": "1",
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parents[2]), str(Path(__file__).parent)]),
-    }
+    environment = _environment() | {"NUMBA_BOUNDSCHECK": "1"}
     run = subprocess.run([sys.executable, "-c", BEYOND], env=environment, capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "IndexError"

@@ -163,23 +163,3 @@ def _runs(values, n, present_out):
             end = j + 1
             present_out[2 * count - 1] = end
     return count
-
-
-@kernel
-def forward_any(band, n, right):
-    """`forward_band` for a half-bandwidth that only the band knows."""
-    for j in range(n):
-        for r in range(1, band.shape[1]):
-            right[j + r] -= band[j, r] * right[j]
-    for j in range(n, right.shape[0]):
-        right[j] = 0.0
-
-
-@kernel
-def backward_any(band, n, right):
-    """`backward_band` for a half-bandwidth that only the band knows."""
-    for j in range(n - 1, -1, -1):
-        value = right[j] / band[j, 0]
-        for r in range(1, band.shape[1]):
-            value -= band[j, r] * right[j + r]
-        right[j] = value

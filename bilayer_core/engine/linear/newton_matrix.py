@@ -15,30 +15,27 @@ multiples of the mass matrix are added until it is, so that the step is a descen
 from __future__ import annotations
 
 import numpy as np
-from numba import types
 
 from ...forces.rod_contact import rods_touch
-from ...jit import call, caller, piece
-from ...jit.record import Matrix, Vector
+from ...jit import piece
 from ...model.records.outcome import REGULARISED, SHIFT, SIMPLIFIED
-from ...model.records.problem import BorderedSystem, Problem
+from ...model.records.problem import Problem
 from ...model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
 from ...model.records.step import Configuration, Stage
 from ..modes import SLOWEST_GROWTH, WITHOUT_INERTIA
-from . import arms, bordered_system, planar_assembly  # noqa: F401 (declare pieces)
-from .assembly import hold_unknowns
-from .contact_columns import gather_columns, scatter_columns
-from .joins import gather_joins, scatter_joins
+from .arms import assemble_arms
+from .assembly import assemble_in_space, hold_unknowns
+from .bordered_system import assemble_bodies, count_border, factor_border, restrict_bodies, solve_bordered
+from .contact_columns import gather_columns, move_to_border, scatter_columns, take_rod_contacts
+from .joins import gather_joins, move_joins_to_border, scatter_joins
+from .planar_assembly import assemble_in_plane, gradient_in_plane, step_in_plane
+from .widths import eliminate, factorise_band, go_backward, go_forward
 
 FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
 SHIFT_GROWTH = 10.0
 LARGEST_SHIFT = 1e8
 
 
-call_factor = caller("factor_band", lambda _: types.int64(Matrix, types.int64, types.boolean))
-call_solve = caller("forward_band", lambda _: types.int64(Matrix, types.int64, Vector))
-call_eliminate = caller("eliminate_band", lambda _: types.int64(Matrix, types.int64, BorderedSystem.numba_type()))
-"""What depends on the half-bandwidth; see `engine.linear.band`."""
 EXACT = np.int64(0)
 """How far contacts of rods are simplified at first. (The literal 0 has a type of its own, for which numba would compile
 all that takes it once more.)"""
@@ -52,17 +49,17 @@ def assemble(p, at, factor, simplified):
     strands, band = p.strands, p.system.band
     band[:] = 0.0
     if p.space.exists:
-        call(p.calls.assemble_in_space, (p, factor))
+        assemble_in_space(p, factor)
     else:
-        call(p.calls.assemble_in_plane, (p, at, factor))
+        assemble_in_plane(p, at, factor)
     if p.surfaces.exists and p.sums.arms[0] > 0:
-        call(p.calls.assemble_arms, (p,))
+        assemble_arms(p)
     if p.rod_contact.exists:
-        call(p.calls.take_rod_contacts, (p, simplified))
+        take_rod_contacts(p, simplified)
     if p.bordered.exists:
         p.bordered.coupled[0], p.bordered.width[0] = 0, p.bodies.freedom.shape[1]
     if p.border.exists:
-        call(p.calls.assemble_bodies, (p, at))
+        assemble_bodies(p, at)
     hold_unknowns(p.constrained.row, strands.dimension, strands.bandwidth, band)
     return READY
 
@@ -91,24 +88,24 @@ def factorise(p, at, stage, counts):
     if at_rest:
         factor = SLOWEST_GROWTH * SLOWEST_GROWTH
     while True:
-        call(p.calls.assemble, (p, at, factor * (1.0 + shift), simplified))
+        assemble(p, at, factor * (1.0 + shift), simplified)
         figures[SHIFT], figures[SIMPLIFIED] = shift, simplified
         of_bodies = factor if at_rest else shift * factor
         if p.border.exists:
-            call(p.calls.restrict_bodies, (p, of_bodies))
+            restrict_bodies(p, of_bodies)
         if p.joins.exists:
-            call(p.calls.move_joins_to_border, (p,))
-        if p.contact_columns.exists and not call(p.calls.move_to_border, (p,)):
+            move_joins_to_border(p)
+        if p.contact_columns.exists and not move_to_border(p):
             return BORDER_CAPACITY_EXCEEDED
-        negative = call_factor(p.calls.factor_band, (band, strands.size, counts))
+        negative = factorise_band(band, strands.size, counts)
         if counts or negative < 0:
             if p.bordered.exists and p.bordered.coupled[0] == 1:
-                call_eliminate(p.calls.eliminate_band, (band, strands.size, p.bordered))
+                eliminate(band, strands.size, p.bordered)
             if counts:
-                of_border = call(p.calls.count_border, (p,)) if p.bordered.exists else 0
+                of_border = count_border(p) if p.bordered.exists else 0
                 p.system.negative[0] = negative + of_border
                 return READY if of_border >= 0 else NOT_FINITE
-            if not p.bordered.exists or call(p.calls.factor_border, (p,)):
+            if not p.bordered.exists or factor_border(p):
                 p.outcome.counts[REGULARISED] += shift > 0.0 or simplified > EXACT
                 return READY
         if simplified < 2 and rods_touch(p.rod_contact):
@@ -128,22 +125,22 @@ def solve(p):
         for j in range(p.sums.gradient.shape[0]):
             right[j] = p.sums.gradient[j]
     else:
-        call(p.calls.gradient_in_plane, (p,))
+        gradient_in_plane(p)
     for j in range(size):
         right[j] = -right[j]
     for j in range(size, right.shape[0]):
         right[j] = 0.0
     gather_joins(p.joins, p.bodies.freedom, p.bordered, right)
     gather_columns(p.contact_columns, p.bordered, right)
-    call_solve(p.calls.forward_band, (system.band, size, right))
+    go_forward(system.band, size, right)
     if p.bordered.exists:
-        call(p.calls.solve_bordered, (p,))
-    call_solve(p.calls.backward_band, (system.band, size, right))
+        solve_bordered(p)
+    go_backward(system.band, size, right)
     scatter_joins(p.joins, p.bodies.freedom, p.bordered, right)
     scatter_columns(p.contact_columns, p.bordered, right)
     if p.space.exists:
         for j in range(system.step.shape[0]):
             system.step[j] = right[j]
     else:
-        call(p.calls.step_in_plane, (p,))
+        step_in_plane(p)
     return READY

@@ -1,7 +1,7 @@
-"""The band solver as pieces, one set for each half-bandwidth that models have, and one for any other.
+"""The band solver as pieces, one set for each half-bandwidth that models have (`model.layout.HALF_BANDWIDTH`).
 
 With the half-bandwidth known to the compiler inner loops have fixed lengths, and what the next row needs stays in
-registers: for 200 nodes in space two to three times as fast as the set for any width.
+registers: for 200 nodes in space two to three times as fast as one set for all widths.
 """
 
 from __future__ import annotations
@@ -9,27 +9,14 @@ from __future__ import annotations
 from ...jit import kernel, piece
 from ...jit.piece import Piece
 from ...jit.record import Matrix, Vector
-from ...model.layout import HALF_BANDWIDTH
 from ...model.records.problem import BorderedSystem
 from ...model.records.status import READY
-from .band import (
-    backward_any,
-    backward_band,
-    eliminate_band,
-    factor_band,
-    forward_any,
-    forward_band,
-    width,
-)
-
-NAMES = ("factor_band", "forward_band", "backward_band", "eliminate_band")
-KNOWN = tuple(sorted({b for of_layers in HALF_BANDWIDTH.values() for b in of_layers.values()}))
-"""Half-bandwidths that have a set of their own."""
+from .band import backward_band, eliminate_band, factor_band, forward_band, width
 
 
-def _declare(function, suffix: str, result: type, *arguments) -> Piece:
+def _declare(function, suffix: str, *arguments) -> Piece:
     function.__name__ = f"{function.__name__}_{suffix}"
-    return piece(result, *arguments)(function)
+    return piece(int, *arguments)(function)
 
 
 @kernel
@@ -38,9 +25,9 @@ def _eliminate(band, n, half_bandwidth, bordered):
     eliminate_band(band, n, half_bandwidth, bordered.width[0], columns, scaled, corner, present)
 
 
-def _of_width(half_bandwidth: int) -> dict[str, Piece]:
+def _of_width(half_bandwidth: int) -> tuple[Piece, ...]:
     """The set for a half-bandwidth."""
-    bandwidth, suffix = width(half_bandwidth), str(half_bandwidth)
+    bandwidth = width(half_bandwidth)
 
     def factor(band, n, counts):
         return factor_band(band, n, half_bandwidth, counts)
@@ -57,44 +44,73 @@ def _of_width(half_bandwidth: int) -> dict[str, Piece]:
         _eliminate(band, n, half_bandwidth, bordered)
         return READY
 
-    return _set(factor, forward, backward, eliminate, suffix)
+    return _set(factor, forward, backward, eliminate, str(half_bandwidth))
 
 
-def _set(factor, forward, backward, eliminate, suffix: str) -> dict[str, Piece]:
-    pieces = (
-        _declare(factor, suffix, int, Matrix, int, bool),
-        _declare(forward, suffix, int, Matrix, int, Vector),
-        _declare(backward, suffix, int, Matrix, int, Vector),
-        _declare(eliminate, suffix, int, Matrix, int, BorderedSystem),
+def _set(factorises, goes_forward, goes_backward, eliminates, suffix: str) -> tuple[Piece, ...]:
+    return (
+        _declare(factorises, suffix, Matrix, int, bool),
+        _declare(goes_forward, suffix, Matrix, int, Vector),
+        _declare(goes_backward, suffix, Matrix, int, Vector),
+        _declare(eliminates, suffix, Matrix, int, BorderedSystem),
     )
-    return dict(zip(NAMES, pieces, strict=True))
 
 
-def _of_any_width() -> dict[str, Piece]:
-    """The set that takes the half-bandwidth from the band itself."""
-
-    def factor(band, n, counts):
-        return factor_band(band, n, band.shape[1] - 1, counts)
-
-    def forward(band, n, right):
-        forward_any(band, n, right)
-        return READY
-
-    def backward(band, n, right):
-        backward_any(band, n, right)
-        return READY
-
-    def eliminate(band, n, bordered):
-        _eliminate(band, n, band.shape[1] - 1, bordered)
-        return READY
-
-    return _set(factor, forward, backward, eliminate, "any")
+factor_5, forward_5, backward_5, eliminate_5 = _of_width(5)
+factor_9, forward_9, backward_9, eliminate_9 = _of_width(9)
+factor_10, forward_10, backward_10, eliminate_10 = _of_width(10)
+factor_18, forward_18, backward_18, eliminate_18 = _of_width(18)
 
 
-_SETS = {half_bandwidth: _of_width(half_bandwidth) for half_bandwidth in KNOWN}
-_ANY = _of_any_width()
+@kernel
+def factorise_band(band, n, counts):
+    """Factorise a band of any of these widths, as `band.factor_band`."""
+    b = band.shape[1] - 1
+    if b == 5:
+        return factor_5(band, n, counts)
+    if b == 9:
+        return factor_9(band, n, counts)
+    if b == 10:
+        return factor_10(band, n, counts)
+    if b == 18:
+        return factor_18(band, n, counts)
+    return 0  # no width of a model: as if the first pivot were not positive
 
 
-def addresses_for(half_bandwidth: int) -> dict[str, int]:
-    """Addresses of the set for a half-bandwidth, by the names of their fields in `problem.Calls`."""
-    return {name: found.address for name, found in _SETS.get(half_bandwidth, _ANY).items()}
+@kernel
+def go_forward(band, n, right):
+    """Overwrite `right` with L⁻¹ times it, as `band.forward_band`."""
+    b = band.shape[1] - 1
+    if b == 5:
+        return forward_5(band, n, right)
+    if b == 9:
+        return forward_9(band, n, right)
+    if b == 10:
+        return forward_10(band, n, right)
+    return forward_18(band, n, right)
+
+
+@kernel
+def go_backward(band, n, right):
+    """Overwrite `right` with what `band.backward_band` finds."""
+    b = band.shape[1] - 1
+    if b == 5:
+        return backward_5(band, n, right)
+    if b == 9:
+        return backward_9(band, n, right)
+    if b == 10:
+        return backward_10(band, n, right)
+    return backward_18(band, n, right)
+
+
+@kernel
+def eliminate(band, n, bordered):
+    """Eliminate the band from the border, as `band.eliminate_band`."""
+    b = band.shape[1] - 1
+    if b == 5:
+        return eliminate_5(band, n, bordered)
+    if b == 9:
+        return eliminate_9(band, n, bordered)
+    if b == 10:
+        return eliminate_10(band, n, bordered)
+    return eliminate_18(band, n, bordered)

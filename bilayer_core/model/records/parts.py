@@ -6,7 +6,7 @@ program serves all scenes of a dimension.
 
 from __future__ import annotations
 
-from ...jit.record import Address, Flags, IndexTable, Indices, Matrix, Stack, Vector, record
+from ...jit.record import Flags, IndexTable, Indices, Matrix, Stack, Vector, record
 
 
 @record
@@ -212,7 +212,6 @@ class Fluid:
     shape_gradient: Matrix = ("edge", 4)  # ∂T/∂(ε, θ) of edges [N, N m]
     inertia: Stack = ("node", 3, 3)  # m + ∂P/∂v of nodes [kg]
     joined: IndexTable  # nodes that closed rods have twice, each with its copy, shape (n_joined, 2)
-    fluid_momentum: Address
 
 
 @record

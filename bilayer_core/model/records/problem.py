@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...jit.record import Address, Flags, Indices, Matrix, Stack, Vector, record
+from ...jit.record import Flags, Indices, Matrix, Stack, Vector, record
 from .contacts import ContactColumns, Restitution, RodContact, Sliding, Slips, Surfaces
 from .light import Light
 from .parts import (
@@ -119,79 +119,6 @@ class ForceTable:
 
 
 @record
-class Calls:
-    """Addresses of the pieces of the engine; see `engine.dispatch`."""
-
-    take_state: Address
-    move: Address
-    update_attached: Address
-    transport_frames: Address
-    list_surface_pairs: Address
-    bound_at_surfaces: Address
-    add_contact_to_bodies: Address
-    bound_between_rods: Address
-    find_rod_contacts: Address
-    list_near_rods: Address
-    near_pairs: Address
-    limit_by_friction: Address
-    first_guess_of: Address
-    start_stage: Address
-    update_lagged: Address
-    settle_forces: Address
-    add_forces: Address
-    end_forces: Address
-    expand_to_unknowns: Address
-    assemble: Address
-    factorise: Address
-    solve: Address
-    bound: Address
-    assemble_in_space: Address
-    assemble_in_plane: Address
-    assemble_arms: Address
-    take_rod_contacts: Address
-    assemble_bodies: Address
-    restrict_bodies: Address
-    move_joins_to_border: Address
-    move_to_border: Address
-    solve_bordered: Address
-    gradient_in_plane: Address
-    step_in_plane: Address
-    factor_border: Address
-    count_border: Address
-    minimise_potential: Address
-    start_step_point: Address
-    set_origin: Address
-    add_history_to_origin: Address
-    drive_stage: Address
-    begin_light: Address
-    shine: Address
-    end_light: Address
-    predict_stage: Address
-    predict_end: Address
-    stand_still_stage: Address
-    end_stage: Address
-    write_end: Address
-    write_shape: Address
-    distance: Address
-    keep_stage_derivatives: Address
-    open_account: Address
-    begin_step_account: Address
-    add_powers: Address
-    close_step_account: Address
-    make_step: Address
-    jumps_at: Address
-    corner_after: Address
-    drive_step: Address
-    step_defect: Address
-    count_shape: Address
-    count_end: Address
-    factor_band: int  # those of the scene's half-bandwidth
-    forward_band: int
-    backward_band: int
-    eliminate_band: int
-
-
-@record
 class Outcome:
     """What a piece found beside the number that it returns; slots in `model.records.outcome`."""
 
@@ -237,5 +164,4 @@ class Problem:
     memory: Vector  # what forces carry from step to step; see `forces.register`
     system: System
     forces: ForceTable
-    calls: Calls
     outcome: Outcome
