@@ -1,6 +1,6 @@
 """What acts from outside over time: stimuli, loads and prescribed paths, evaluated at the stages of steps.
 
-Each schedule is given as its next pieces (`scene.piece.Piece`), as far as a horizon. Two times that differ by less than
+Each schedule is given as its next spans (`scene.spans.Span`), as far as a horizon. Two times that differ by less than
 `same` [s] count as one. Where a schedule jumps, a step that ends there has its value from before, to its end.
 """
 
@@ -14,7 +14,8 @@ from ..jit.stack import stack_vector
 from ..kinematics.rotating import rotate_by, spin_of
 from ..model.records.status import READY
 from ..model.records.step import StageInputs
-from ..scene.piece import ROUNDING, Piece, value_of_piece
+from ..scene.spans import ROUNDING, Span
+from .laws import value_of_span
 
 
 @record
@@ -36,16 +37,16 @@ class Paths:
 
 @record
 class Actuation:
-    """Schedules as far as `horizon`, one row of `PARTS` for each piece."""
+    """Schedules as far as `horizon`, one row of `PARTS` for each span."""
 
-    stimulus: Stack  # shape (n_channel, n_piece, len(PARTS))
-    load: Stack  # shape (n_load, n_piece, len(PARTS))
+    stimulus: Stack  # shape (n_channel, n_span, len(PARTS))
+    load: Stack  # shape (n_load, n_span, len(PARTS))
     ranges: Vector  # of channels, in their units, shape (n_channel,)
-    horizon: Vector  # the first end of all last pieces [s], shape (1,)
+    horizon: Vector  # the first end of all last spans [s], shape (1,)
     paths: Paths
 
 
-PARTS = Piece._fields
+PARTS = Span._fields
 UNTIL, LEVEL, BEGIN, RATE, AMPLITUDE, FREQUENCY, PHASE = range(len(PARTS))
 AT_ONCE = 1e-2
 """Part of a step below which the lag of a layer makes no difference to a jump of its stimulus."""
@@ -54,32 +55,32 @@ NO_JUMP = 1e-9
 
 
 @kernel
-def _value(pieces, row, k, time):
-    """`Piece.value`"""
-    level, begin, rate = pieces[row, k, LEVEL], pieces[row, k, BEGIN], pieces[row, k, RATE]
-    wave = pieces[row, k, AMPLITUDE], pieces[row, k, FREQUENCY], pieces[row, k, PHASE]
-    return value_of_piece(time, level, begin, rate, wave[0], wave[1], wave[2])
+def _value(spans, row, k, time):
+    """`Span.value`"""
+    level, begin, rate = spans[row, k, LEVEL], spans[row, k, BEGIN], spans[row, k, RATE]
+    wave = spans[row, k, AMPLITUDE], spans[row, k, FREQUENCY], spans[row, k, PHASE]
+    return value_of_span(time, level, begin, rate, wave[0], wave[1], wave[2])
 
 
 @kernel
-def _piece_until(pieces, row, time):
-    """The first piece that ends at `time` or later."""
+def _span_until(spans, row, time):
+    """The first span that ends at `time` or later."""
     k = 0
-    while k + 1 < pieces.shape[1] and pieces[row, k, UNTIL] < time:
+    while k + 1 < spans.shape[1] and spans[row, k, UNTIL] < time:
         k += 1
     return k
 
 
 @kernel
-def _any_jumps(pieces, time, same):
-    """Whether a schedule jumps at a time; see `Piece.jump_to`."""
-    for row in range(pieces.shape[0]):
-        k = _piece_until(pieces, row, time - same)
-        end = pieces[row, k, UNTIL]
-        if end > time + same or k + 1 == pieces.shape[1]:
+def _any_jumps(spans, time, same):
+    """Whether a schedule jumps at a time; see `Span.jump_to`."""
+    for row in range(spans.shape[0]):
+        k = _span_until(spans, row, time - same)
+        end = spans[row, k, UNTIL]
+        if end > time + same or k + 1 == spans.shape[1]:
             continue
-        before, after = _value(pieces, row, k, end), _value(pieces, row, k + 1, end)
-        largest = max(abs(pieces[row, k, LEVEL]), abs(pieces[row, k, AMPLITUDE]), abs(before), abs(after))
+        before, after = _value(spans, row, k, end), _value(spans, row, k + 1, end)
+        largest = max(abs(spans[row, k, LEVEL]), abs(spans[row, k, AMPLITUDE]), abs(before), abs(after))
         if abs(after - before) > ROUNDING * largest:
             return True
     return False
@@ -96,10 +97,10 @@ def corner_after(actuation, time, same):
     """The first time after `time` at which a schedule or a path has a corner or jumps [s]; infinity without one."""
     first, paths = math.inf, actuation.paths
     for row in range(actuation.stimulus.shape[0]):
-        k = _piece_until(actuation.stimulus, row, time + same)
+        k = _span_until(actuation.stimulus, row, time + same)
         first = min(first, actuation.stimulus[row, k, UNTIL])
     for row in range(actuation.load.shape[0]):
-        k = _piece_until(actuation.load, row, time + same)
+        k = _span_until(actuation.load, row, time + same)
         first = min(first, actuation.load[row, k, UNTIL])
     if paths.exists:
         for k in range(paths.time.shape[0]):
@@ -112,7 +113,7 @@ def corner_after(actuation, time, same):
 def take_first_stimuli(actuation, begin, same, inputs):
     """Stimuli at the start of a step, after any jump there."""
     for c in range(actuation.stimulus.shape[0]):
-        inputs.first[c] = _value(actuation.stimulus, c, _piece_until(actuation.stimulus, c, begin + same), begin)
+        inputs.first[c] = _value(actuation.stimulus, c, _span_until(actuation.stimulus, c, begin + same), begin)
 
 
 @piece(int, Actuation, Vector, float, float, float, StageInputs)
@@ -122,10 +123,10 @@ def drive_step(actuation, nodes, begin, h, same, inputs):
         inputs.elapsed[n] = nodes[n] * h
         time = begin + nodes[n] * h
         for c in range(actuation.stimulus.shape[0]):
-            k = _piece_until(actuation.stimulus, c, time - same)
+            k = _span_until(actuation.stimulus, c, time - same)
             inputs.stimulus[n, c] = _value(actuation.stimulus, c, k, time)
         for i in range(actuation.load.shape[0]):
-            k = _piece_until(actuation.load, i, time - same)
+            k = _span_until(actuation.load, i, time - same)
             inputs.load_factor[n, i] = _value(actuation.load, i, k, time)
         _follow_paths(actuation.paths, time, inputs.position[n], inputs.rotation[n], inputs.rates[n])
     return READY

@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 from ..forces.added_mass import momentum_at, write_inertia
+from ..forces.elements import measure_strains
 from ..forces.inertia import moment_of_rotation
 from ..forces.mechanisms import measure_mechanisms, remember_mechanisms
 from ..forces.restitution import measure_gaps
-from ..forces.viscosity import measure_strains
 from ..jit import kernel, piece
 from ..jit.flat import flat
 from ..jit.stack import stack_matrix

@@ -50,8 +50,8 @@ from ..model.records.outcome import CONTACT_ERROR, FRACTION, GAINED
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
-from ..scene.transduction import eigenstrain_of
 from .kinetic import kinetic_energy
+from .laws import eigenstrain_of
 from .powers import (
     BY_FLOW,
     DRIVEN,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..forces.elements import start_elements
 from ..forces.register import memory_size
-from ..forces.viscosity import start_elements
 from ..model.force_slots import NAMES
 from ..model.model import Model
 from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, PAIR, SHIFT, SIMPLIFIED

@@ -30,7 +30,7 @@ from ..model.lit import shine
 from ..model.records.problem import Problem
 from ..model.records.status import READY
 from ..model.records.step import StageInputs, StateArrays
-from ..scene.transduction import lagged
+from .laws import lagged
 
 
 @kernel

@@ -16,9 +16,9 @@ Positions and momenta advance as `integrators.method` says. What is no vector ne
 from __future__ import annotations
 
 from ..forces.added_mass import momentum_at
+from ..forces.elements import measure_strains
 from ..forces.mechanisms import measure_mechanisms
 from ..forces.restitution import measure_gaps
-from ..forces.viscosity import measure_strains
 from ..jit import kernel, piece
 from ..jit.stack import stack_matrix
 from ..kinematics.copying import add_scaled, copy, copy_matrix, copy_row

@@ -23,10 +23,10 @@ from ..model.records.outcome import (
 from ..model.records.problem import Problem
 from ..model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, CROSSED, MAX_ITERATIONS, READY
 from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
-from ..scene.transduction import eigenstrain_of, lagged
 from .configuration import take_state
 from .ends import distance, end_stage, keep_stage_derivatives, write_end, write_shape, write_twist
 from .energy_account import begin_step_account, close_step_account
+from .laws import eigenstrain_of, lagged
 from .light import begin_light, end_light, see_light
 from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, VALUE, WITHOUT_INERTIA
 from .newton import first_guess_of, minimise_potential

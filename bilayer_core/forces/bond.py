@@ -73,7 +73,7 @@ from ..model.force_slots import slot_of
 from ..model.records.parts import Space
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
-from .viscosity import acts_viscously
+from .elements import acts_viscously
 
 BENDING, TWISTING, BOND = map(slot_of, ("bending", "twisting", "bond"))
 

@@ -33,7 +33,7 @@ from ..model.records.parts import Plane
 from ..model.records.problem import Problem
 from ..model.records.step import Configuration, Stage
 from .bend_twist import bend_by_strains
-from .viscosity import acts_viscously
+from .elements import acts_viscously
 
 STRETCHING, BENDING, BOND = map(slot_of, ("stretching", "bending", "bond"))
 

@@ -20,6 +20,7 @@ from .added_mass import add_added_mass, update_fluid
 from .bend_twist import add_bending
 from .bond import add_bonds
 from .drag import add_drag, update_directions_of_drag
+from .elements import start_elements
 from .inertia import add_inertial_forces
 from .joints import add_joints, joints_of
 from .loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
@@ -36,7 +37,7 @@ from .rod_contact import (
 from .stretch import add_stretching
 from .surface_barrier import add_surface_barrier, start_surface_barrier
 from .surface_friction import add_surface_friction, settle_surface_friction, start_surface_friction
-from .viscosity import add_viscosity, start_elements
+from .viscosity import add_viscosity
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,9 @@ from __future__ import annotations
 import math
 
 from ..jit import kernel
+from . import rotation
+
+quaternion_of = kernel(rotation.quaternion_of)
 
 
 @kernel
@@ -131,22 +134,6 @@ def inertia_tensor(second_moment, f, rotation, b, out):
                 for m in range(3):
                     total -= rotation[b, i, k] * second_moment[f, k, m] * rotation[b, j, m]
             out[i, j] = total
-
-
-@kernel
-def quaternion_of(m00, m01, m02, m10, m11, m12, m20, m21, m22):
-    """Unit quaternion x y z w of a rotation matrix by its largest component (Shepperd 1978), as a tuple."""
-    trace = m00 + m11 + m22
-    if trace >= max(m00, m11, m22):
-        x, y, z, w = m21 - m12, m02 - m20, m10 - m01, 1.0 + trace
-    elif m00 >= max(m11, m22):
-        x, y, z, w = 1.0 + m00 - m11 - m22, m10 + m01, m20 + m02, m21 - m12
-    elif m11 >= m22:
-        x, y, z, w = m10 + m01, 1.0 + m11 - m22 - m00, m21 + m12, m02 - m20
-    else:
-        x, y, z, w = m20 + m02, m21 + m12, 1.0 + m22 - m00 - m11, m10 - m01
-    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
-    return scale * x, scale * y, scale * z, scale * w
 
 
 @kernel

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from .rotating import quaternion_of
+import numpy as np
 
 
 def skew(vector: np.ndarray) -> np.ndarray:
@@ -48,9 +48,24 @@ def matrix_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
     )
 
 
+def quaternion_of(m00, m01, m02, m10, m11, m12, m20, m21, m22):
+    """Return the unit quaternion x y z w of a rotation matrix by its largest component (Shepperd 1978), as a tuple."""
+    trace = m00 + m11 + m22
+    if trace >= max(m00, m11, m22):
+        x, y, z, w = m21 - m12, m02 - m20, m10 - m01, 1.0 + trace
+    elif m00 >= max(m11, m22):
+        x, y, z, w = 1.0 + m00 - m11 - m22, m10 + m01, m20 + m02, m21 - m12
+    elif m11 >= m22:
+        x, y, z, w = m10 + m01, 1.0 + m11 - m22 - m00, m21 + m12, m02 - m20
+    else:
+        x, y, z, w = m20 + m02, m21 + m12, 1.0 + m22 - m00 - m11, m10 - m01
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    return scale * x, scale * y, scale * z, scale * w
+
+
 def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Unit quaternion x y z w (w ≥ 0) of a rotation matrix, shape (4,); see `rotating.quaternion_of`."""
-    quaternion = np.array(quaternion_of.py_func(*(entry for row in matrix.tolist() for entry in row)))
+    """Unit quaternion x y z w (w ≥ 0) of a rotation matrix, shape (4,)."""
+    quaternion = np.array(quaternion_of(*(entry for row in matrix.tolist() for entry in row)))
     return quaternion if quaternion[3] >= 0.0 else -quaternion
 
 

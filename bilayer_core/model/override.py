@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..scene.piece import Piece
+from ..scene.spans import Span
 
 Array = np.ndarray
 VALUE, START, BEGIN, END = range(4)
@@ -39,14 +39,14 @@ def acts(row: Sequence[float]) -> bool:
     return not math.isnan(row[VALUE])
 
 
-def pieces_of(row: Sequence[float]) -> list[Piece]:
-    """What is set, as pieces of a schedule: a ramp, if there is one, and the value that it reaches."""
+def spans_of(row: Sequence[float]) -> list[Span]:
+    """What is set, as spans of a schedule: a ramp, if there is one, and the value that it reaches."""
     value, start, begin, end = row
-    reached = Piece(math.inf, value)
-    return [Piece(end, start, begin, (value - start) / (end - begin)), reached] if end > begin else [reached]
+    reached = Span(math.inf, value)
+    return [Span(end, start, begin, (value - start) / (end - begin)), reached] if end > begin else [reached]
 
 
 def value_at(row: Sequence[float], time: float) -> float:
     """What is set at a time [s]; NaN if nothing is."""
-    pieces = pieces_of(row)
-    return pieces[-1 if time >= row[END] else 0].value(time)
+    spans = spans_of(row)
+    return spans[-1 if time >= row[END] else 0].value(time)

@@ -57,7 +57,7 @@ def _gain_or_law(schema: dict[str, Any]) -> None:
 class Eigenstrain(BaseModel):
     """Free strain of a layer: gain times the stimulus, which the material follows with a first-order lag."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_gain_or_law)
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True, json_schema_extra=_gain_or_law)
 
     stimulus: str
     """One of the channels in `stimuli`."""

@@ -8,8 +8,8 @@ from pydantic import model_validator
 
 from bilayer_core.scene.faults import Fault, refuse_all
 from bilayer_core.scene.part import Name, Part
-from bilayer_core.scene.piece import Pieces
 from bilayer_core.scene.schedule import Hold, Schedule
+from bilayer_core.scene.spans import Spans
 from bilayer_core.scene.units import Force, Moment, NonNegativeLength, PositiveMass
 
 ALWAYS = Hold(type="hold", value=1.0)
@@ -55,7 +55,7 @@ class Load(Part):
         return self
 
     @property
-    def factor(self) -> Pieces:
+    def factor(self) -> Spans:
         """What force and moment are multiplied with."""
         return ALWAYS if self.schedule is None else self.schedule
 

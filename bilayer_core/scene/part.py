@@ -65,7 +65,7 @@ def _bare(part: Derived) -> Derived:
 class Part(BaseModel):
     """Unknown keys are faults, and nothing changes after validation."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @cached_property
     def _kept(self) -> _Kept:

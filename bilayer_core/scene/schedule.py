@@ -9,29 +9,29 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 
 from bilayer_core.scene.faults import Fault, refuse_all
-from bilayer_core.scene.piece import ROUNDING, Piece, Pieces
+from bilayer_core.scene.spans import ROUNDING, Span, Spans
 from bilayer_core.scene.table_file import TableFile, read_table_file
 from bilayer_core.scene.units import NonNegativeTime, PlainNumber, PositiveTime, Time
 from bilayer_core.scene.waveform import PulseTrain, Sine, Square
 
 
-class Hold(Pieces):
+class Hold(Spans):
     """One value at all times."""
 
     type: Literal["hold"]
     held_value: PlainNumber = Field(alias="value")
     """In the unit of the channel."""
 
-    def piece(self, t: float) -> Piece:
+    def span(self, t: float) -> Span:
         """The only one."""
-        return Piece(math.inf, self.held_value)
+        return Span(math.inf, self.held_value)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
         return {("value",): self.held_value}
 
 
-class Ramp(Pieces):
+class Ramp(Spans):
     """From one value to another at a constant rate."""
 
     type: Literal["ramp"]
@@ -50,21 +50,21 @@ class Ramp(Pieces):
             refuse_all("Ramp", [(("end",), self.end, f"must be later than `start` ({self.start:g} s)")])
         return self
 
-    def piece(self, t: float) -> Piece:
+    def span(self, t: float) -> Span:
         """Before, on, or after the ramp."""
         if t < self.start:
-            return Piece(self.start, self.from_value)
+            return Span(self.start, self.from_value)
         if t < self.end:
             rate = (self.to_value - self.from_value) / (self.end - self.start)
-            return Piece(self.end, self.from_value, self.start, rate)
-        return Piece(math.inf, self.to_value)
+            return Span(self.end, self.from_value, self.start, rate)
+        return Span(math.inf, self.to_value)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
         return {("from",): self.from_value, ("to",): self.to_value}
 
 
-class Table(Pieces):
+class Table(Spans):
     """Values at given times, linear between them and constant outside."""
 
     type: Literal["table"]
@@ -78,16 +78,16 @@ class Table(Pieces):
         refuse_all("Table", faults_of_times(self.times, ("values",), self.values))
         return self
 
-    def piece(self, t: float) -> Piece:
+    def span(self, t: float) -> Span:
         """Between two of the times, before the first, or after the last."""
         right = bisect_right(self.times, t)
         if right == 0:
-            return Piece(self.times[0], self.values[0])
+            return Span(self.times[0], self.values[0])
         before = self.values[right - 1]
         if right == len(self.times):
-            return Piece(math.inf, before)
+            return Span(math.inf, before)
         begin, until = self.times[right - 1 : right + 1]
-        return Piece(until, before, begin, (self.values[right] - before) / (until - begin))
+        return Span(until, before, begin, (self.values[right] - before) / (until - begin))
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
@@ -97,7 +97,7 @@ class Table(Pieces):
 class SequencePart(BaseModel):
     """A part of a sequence."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     duration: PositiveTime
     """After which the next part follows."""
@@ -105,7 +105,7 @@ class SequencePart(BaseModel):
     """Its time begins with the part."""
 
 
-class Sequence(Pieces):
+class Sequence(Spans):
     """Schedules one after the other; after the last, its value at its end, or from the beginning again."""
 
     type: Literal["sequence"]
@@ -114,20 +114,20 @@ class Sequence(Pieces):
     repeat: bool = False
     """Whether it begins again after the last part."""
 
-    def piece(self, t: float) -> Piece:
+    def span(self, t: float) -> Span:
         """One of the present part; the next part begins with a corner."""
         if t < 0.0:
-            return Piece(0.0, self.parts[0].schedule.value(0.0))
+            return Span(0.0, self.parts[0].schedule.value(0.0))
         total = sum(part.duration for part in self.parts)
         early = ROUNDING * total
         begin = math.floor(t / total + ROUNDING) * total if self.repeat else 0.0
         for part in self.parts:
             end = begin + part.duration
             if t < end - early:
-                inside = part.schedule.piece(max(t - begin, 0.0) + early).later(begin, end)
+                inside = part.schedule.span(max(t - begin, 0.0) + early).later(begin, end)
                 return inside if inside.until < end - early else inside._replace(until=end)
             begin = end
-        return Piece(math.inf, part.schedule.value(part.duration))
+        return Span(math.inf, part.schedule.value(part.duration))
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""

@@ -21,7 +21,7 @@ class TableFile(BaseModel):
     It is read when the scene is, and is a `Table` from then on.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     type: Literal["csv"]
     file: str

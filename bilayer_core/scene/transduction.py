@@ -1,4 +1,7 @@
-"""Transduction: how fast a material follows its stimulus, and by how much it grows."""
+"""Transduction: how fast a material follows its stimulus, and by how much it grows.
+
+The engine compiles these formulas (`engine.laws`).
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,7 @@ import math
 
 import numpy as np
 
-from ..jit import kernel
 
-
-@kernel
 def lagged(filtered, first, last, rising, falling, dt):
     """First-order lag over a time, exact for a stimulus that is linear over it.
 
@@ -43,7 +43,6 @@ def lagged(filtered, first, last, rising, falling, dt):
     return filtered + part * (first - filtered) + (1.0 - part / x) * (last - first)
 
 
-@kernel
 def eigenstrain_of(filtered, gain, reference, saturation):
     """Eigenstrain of a law: linear near the reference, with a smooth limit.
 
@@ -68,4 +67,4 @@ def eigenstrain_of(filtered, gain, reference, saturation):
 def free_strain(filtered: np.ndarray, gain, reference, saturation) -> np.ndarray:
     """`eigenstrain_of` for each of some laws, shape (n,)."""
     laws = np.broadcast(filtered, gain, reference, saturation)
-    return np.array([eigenstrain_of.py_func(*(float(value) for value in law)) for law in laws], dtype=float)
+    return np.array([eigenstrain_of(*(float(value) for value in law)) for law in laws], dtype=float)

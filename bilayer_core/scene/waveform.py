@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 from pydantic import model_validator
 
 from bilayer_core.scene.faults import Fault, refuse_all
-from bilayer_core.scene.piece import ROUNDING, Piece, Pieces
+from bilayer_core.scene.spans import ROUNDING, Span, Spans
 from bilayer_core.scene.units import Angle, DutyCycle, NonNegativeTime, PlainNumber, PositiveTime, Time, whole
 
 
-class Sine(Pieces):
+class Sine(Spans):
     """``mean + amplitude sin(2π (t − start)/period + phase)``; before `start` its value there."""
 
     type: Literal["sine"]
@@ -27,15 +27,15 @@ class Sine(Pieces):
     start: Time = 0.0
     """Until then the value at the start."""
 
-    def piece(self, t: float) -> Piece:
+    def span(self, t: float) -> Span:
         """The start is a corner, and so is every quarter of a period: a longer step would not see the wave."""
         quarter = self.period / 4.0
         number = math.floor((t - self.start) / quarter + ROUNDING)
         if number < 0:
-            return Piece(self.start, self.mean + self.amplitude * math.sin(self.phase))
+            return Span(self.start, self.mean + self.amplitude * math.sin(self.phase))
         begin, until = (self.start + quarter * k for k in (number, number + 1))
         phase = self.phase + 0.5 * math.pi * (number % 4)
-        return Piece(until, self.mean, begin, 0.0, self.amplitude, 0.5 * math.pi / quarter, phase)
+        return Span(until, self.mean, begin, 0.0, self.amplitude, 0.5 * math.pi / quarter, phase)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
         """Values between which all others lie, by their keys."""
@@ -45,7 +45,7 @@ class Sine(Pieces):
         }
 
 
-class _Pulses(Pieces):
+class _Pulses(Spans):
     """From `low` to `high` at the beginning of each period, and back; at once, or linearly over `rise_time`."""
 
     low: PlainNumber
@@ -59,22 +59,22 @@ class _Pulses(Pieces):
     rise_time: NonNegativeTime = 0.0
     """Of each flank, up and down; 0 switches at once."""
 
-    def _piece(self, t: float, width: float, last: float) -> Piece:
-        """Piece at time `t` of pulses that begin to fall after `width` [s]; they end after `last` periods."""
+    def _span(self, t: float, width: float, last: float) -> Span:
+        """Span at time `t` of pulses that begin to fall after `width` [s]; they end after `last` periods."""
         cycle, early = math.floor((t - self.start) / self.period + ROUNDING), ROUNDING * self.period
         if cycle < 0:
-            return Piece(self.start, self.low)
+            return Span(self.start, self.low)
         if cycle >= last:
-            return Piece(math.inf, self.low)
+            return Span(math.inf, self.low)
         begin = self.start + cycle * self.period
         top, fall, bottom = begin + self.rise_time, begin + width, begin + width + self.rise_time
         if t < top - early:
-            return Piece(top, self.low, begin, (self.high - self.low) / self.rise_time)
+            return Span(top, self.low, begin, (self.high - self.low) / self.rise_time)
         if t < fall - early:
-            return Piece(fall, self.high)
+            return Span(fall, self.high)
         if t < bottom - early:
-            return Piece(bottom, self.high, fall, (self.low - self.high) / self.rise_time)
-        return Piece(self.start + (cycle + 1) * self.period if cycle + 1 < last else math.inf, self.low)
+            return Span(bottom, self.high, fall, (self.low - self.high) / self.rise_time)
+        return Span(self.start + (cycle + 1) * self.period if cycle + 1 < last else math.inf, self.low)
 
     def _faults(self, width: float, where: str) -> list[Fault]:
         """Whether both flanks fit into the period."""
@@ -101,9 +101,9 @@ class Square(_Pulses):
         refuse_all("Square", self._faults(self.duty * self.period, "duty"))
         return self
 
-    def piece(self, t: float) -> Piece:
-        """The piece that time `t` [s] lies in."""
-        return self._piece(t, self.duty * self.period, math.inf)
+    def span(self, t: float) -> Span:
+        """The span that time `t` [s] lies in."""
+        return self._span(t, self.duty * self.period, math.inf)
 
 
 class PulseTrain(_Pulses):
@@ -122,6 +122,6 @@ class PulseTrain(_Pulses):
         refuse_all("PulseTrain", self._faults(self.width, "width"))
         return self
 
-    def piece(self, t: float) -> Piece:
-        """The piece that time `t` [s] lies in."""
-        return self._piece(t, self.width, self.count)
+    def span(self, t: float) -> Span:
+        """The span that time `t` [s] lies in."""
+        return self._span(t, self.width, self.count)

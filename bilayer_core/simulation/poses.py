@@ -22,7 +22,7 @@ from ..kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix
 from ..model.model import Model
 from ..model.state import OUT_OF_PLANE, POSE_GOAL, State
 from ..scene.body import Prescribed
-from ..scene.piece import ROUNDING
+from ..scene.spans import ROUNDING
 
 Array = np.ndarray
 BEGIN, DURATION = 0, 1

@@ -8,16 +8,16 @@ import numpy as np
 
 from ..engine.actuation import Actuation, Paths
 from ..model.model import Model
-from ..model.override import acts, no_overrides, pieces_of, value_at
+from ..model.override import acts, no_overrides, spans_of, value_at
 from ..model.rest_strains import RestStrains
 from ..model.state import POSE_GOAL, State
 from ..scene.body import Prescribed
-from ..scene.piece import Piece, Pieces
+from ..scene.spans import Span, Spans
 from ..scene.transduction import free_strain
 from .poses import BEGIN, DURATION, MOVE, POSITION, ROTATION, ROTATION_VECTOR, SPIN, VELOCITY
 
 Array = np.ndarray
-PIECES_AT_ONCE = 8
+SPANS_AT_ONCE = 8
 """Of each schedule, that steps are given at least."""
 
 
@@ -47,7 +47,7 @@ class Surroundings:
         self._pose_goal = np.zeros((len(model.bodies.controlled), POSE_GOAL))
         self._paths = paths_of(model, self._pose_goal)
         self.actuation: Actuation | None = None
-        self.actuation = self._pieces_about(0.0)
+        self.actuation = self._spans_about(0.0)
 
     def stimulus_at(self, state: State, time: float) -> Array:
         """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's."""
@@ -98,15 +98,15 @@ class Surroundings:
         overriding = override.tobytes()  # several times as fast to compare as arrays
         if moved or not known or overriding != self._overriding:
             self._begin, self._override, self._overriding = time, override.copy(), overriding
-            self.actuation = self._pieces_about(time, afresh=moved)
+            self.actuation = self._spans_about(time, afresh=moved)
 
-    def _pieces_about(self, time: float, afresh: bool = False) -> Actuation:
+    def _spans_about(self, time: float, afresh: bool = False) -> Actuation:
         schedules = zip([*self._channels, *self._loads], self._override.tolist(), strict=True)
-        rows = [_next_pieces(*of, time - self._ahead, time + self._ahead) for of in schedules]
+        rows = [_next_spans(*of, time - self._ahead, time + self._ahead) for of in schedules]
         size = max((len(row) for row in rows), default=0)
-        size = max(size, PIECES_AT_ONCE)  # so that it seldom changes
+        size = max(size, SPANS_AT_ONCE)  # so that it seldom changes
         padded = [row + [row[-1]] * (size - len(row)) for row in rows]
-        table = np.array(padded).reshape(len(rows), size, len(Piece._fields))
+        table = np.array(padded).reshape(len(rows), size, len(Span._fields))
         stimulus, load = np.split(table, [len(self._channels)])
         horizon = min((row[-1].until for row in rows), default=math.inf)
         present = self.actuation
@@ -124,16 +124,16 @@ def _overridden(scheduled: list[float], override: Array, time: float) -> Array:
     return np.array([value if math.isnan(by) else by for value, by in zip(scheduled, given, strict=True)], dtype=float)
 
 
-def _next_pieces(schedule: Pieces, override: list[float], begin: float, end: float) -> list[Piece]:
-    """The pieces of what is set from outside, or else those of a schedule from the one that ends at `begin` or later to
+def _next_spans(schedule: Spans, override: list[float], begin: float, end: float) -> list[Span]:
+    """The spans of what is set from outside, or else those of a schedule from the one that ends at `begin` or later to
     one that does not end before `end`.
     """
     if acts(override):
-        return pieces_of(override)
-    pieces = [schedule.piece(begin)]
-    while math.isfinite(pieces[-1].until) and (len(pieces) < PIECES_AT_ONCE or pieces[-1].until <= end):
-        pieces.append(schedule.piece(pieces[-1].until))
-    return pieces
+        return spans_of(override)
+    spans = [schedule.span(begin)]
+    while math.isfinite(spans[-1].until) and (len(spans) < SPANS_AT_ONCE or spans[-1].until <= end):
+        spans.append(schedule.span(spans[-1].until))
+    return spans
 
 
 def paths_of(model: Model, pose_goal: Array) -> Paths:

@@ -1,4 +1,4 @@
-"""Schedules piece by piece: between two corners or jumps each is one formula, which the engine evaluates, too."""
+"""Schedules as spans: between two corners or jumps each is one formula, which the engine evaluates, too."""
 
 from __future__ import annotations
 
@@ -8,19 +8,16 @@ from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
-from ..jit import kernel
-
 ROUNDING = 1e-9
 """Part of a period by which a wave switches early, so that rounding of the time never delays it by a step."""
 NEARLY = 1e-3
-"""Part of a step by which one looks back from its end for the piece that it lies in; more than any early switch."""
+"""Part of a step by which one looks back from its end for the span that it lies in; more than any early switch."""
 SAME = 1e-6
 """Part of a step by which two times are the same."""
 
 
-@kernel
-def value_of_piece(t, level, begin, rate, amplitude, frequency, phase):
-    """Value of a `Piece` at time t [s], for the engine as well."""
+def value_of_span(t, level, begin, rate, amplitude, frequency, phase):
+    """Return the value of a `Span` at time t [s]; the engine compiles it."""
     s = max(t - begin, 0.0)
     value = level + rate * s
     if amplitude != 0.0:
@@ -28,7 +25,7 @@ def value_of_piece(t, level, begin, rate, amplitude, frequency, phase):
     return value
 
 
-class Piece(NamedTuple):
+class Span(NamedTuple):
     """``level + rate s + amplitude sin(frequency s + phase)``, s = t − begin ≥ 0, until a corner or a jump.
 
     Attributes
@@ -56,54 +53,54 @@ class Piece(NamedTuple):
 
     def value(self, t: float) -> float:
         """Value at time `t` [s]; at the end, where the schedule may jump, that from before."""
-        return value_of_piece.py_func(t, *self[1:])
+        return value_of_span(t, *self[1:])
 
-    def later(self, delay: float, until: float) -> Piece:
+    def later(self, delay: float, until: float) -> Span:
         """The same `delay` [s] later, cut off at `until` [s]."""
         return self._replace(begin=self.begin + delay, until=min(self.until + delay, until))
 
-    def jump_to(self, following: Piece) -> bool:
-        """Whether the value jumps, beyond rounding, where this piece ends and another follows."""
+    def jump_to(self, following: Span) -> bool:
+        """Whether the value jumps, beyond rounding, where this span ends and another follows."""
         before, after = self.value(self.until), following.value(self.until)
         largest = max(abs(self.level), abs(before), abs(self.amplitude), abs(after))
         return abs(after - before) > ROUNDING * largest
 
 
-class Pieces(BaseModel):
-    """Something that goes from one piece to the next."""
+class Spans(BaseModel):
+    """Something that goes from one span to the next."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @abstractmethod
-    def piece(self, t: float) -> Piece:
-        """The piece that time `t` [s] lies in; where two meet, that which begins."""
+    def span(self, t: float) -> Span:
+        """The span that time `t` [s] lies in; where two meet, that which begins."""
 
     def value(self, t: float) -> float:
         """Value at time `t` [s], in the unit of the channel."""
-        return self.piece(t).value(t)
+        return self.span(t).value(t)
 
     def breakpoint_after(self, t: float) -> float:
         """First corner or jump after `t` [s], infinity if there is none."""
-        return self.piece(t).until
+        return self.span(t).until
 
     def value_before(self, t: float, h: float) -> float:
         """Value at the end `t` [s] of a step of length `h` [s]: the limit from within the step where it jumps at `t`.
 
         A step that ends at a jump has its own value to its end; the next one begins with the new value.
         """
-        piece = self.piece(t - NEARLY * h)
-        return piece.value(t) if abs(piece.until - t) <= SAME * h else self.value(t)
+        span = self.span(t - NEARLY * h)
+        return span.value(t) if abs(span.until - t) <= SAME * h else self.value(t)
 
     def jumps_at(self, t: float, h: float) -> bool:
         """Whether the value jumps at time `t` [s], where a step of length `h` [s] ends."""
-        piece = self.piece(t - NEARLY * h)
-        return abs(piece.until - t) <= SAME * h and piece.jump_to(self.piece(piece.until))
+        span = self.span(t - NEARLY * h)
+        return abs(span.until - t) <= SAME * h and span.jump_to(self.span(span.until))
 
     def values_at(self, times: list[float], h: float) -> list[float]:
         """`value` at increasing times about `h` [s] apart."""
-        found, piece = [], self.piece(times[0])
+        found, span = [], self.span(times[0])
         for t in times:
-            if t >= piece.until - NEARLY * h:
-                piece = self.piece(t)
-            found.append(piece.value(t))
+            if t >= span.until - NEARLY * h:
+                span = self.span(t)
+            found.append(span.value(t))
         return found
