@@ -24,7 +24,7 @@ from bilayer_core.errors import BilayerError, SimulationError
 from bilayer_core.record.log_reader import read_log
 from bilayer_core.record.run_data import RunData
 from bilayer_core.view.rerun_view import convert_log, screenshot
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.publishing.conversions import to_seconds
 
 INTERRUPTED = 130
 """Exit code after SIGINT."""

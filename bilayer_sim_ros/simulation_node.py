@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.configured_node import ConfiguredNode
-from bilayer_sim_ros.parameters import SIM_NODE
-from bilayer_sim_ros.signals import Stop
-from bilayer_sim_ros.simulation_run import SimulationRun
+from bilayer_sim_ros.node.configured_node import ConfiguredNode
+from bilayer_sim_ros.node.parameters import SIM_NODE
+from bilayer_sim_ros.node.signals import Stop
+from bilayer_sim_ros.node.simulation_run import SimulationRun
 
 STOPPED = "stopped"
 DESTROYED = "ended with its node"

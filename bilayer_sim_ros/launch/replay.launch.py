@@ -5,8 +5,8 @@
 
 from launch import LaunchDescription
 
-from bilayer_sim_ros.launch_description import node_description
-from bilayer_sim_ros.parameters import REPLAY_NODE
+from bilayer_sim_ros.node.launch_description import node_description
+from bilayer_sim_ros.node.parameters import REPLAY_NODE
 
 
 def generate_launch_description() -> LaunchDescription:

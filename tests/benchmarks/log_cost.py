@@ -72,12 +72,12 @@ def run(scene: str, log: Path | None) -> tuple[list[float], float]:
 
 def node(scene: str, log: Path | None) -> tuple[list[float], float]:
     """The same of the thread of the node, from `SETTLED` on; what start and end cost is not measured."""
-    from bilayer_sim_ros.commands import Commands
-    from bilayer_sim_ros.control import Control
-    from bilayer_sim_ros.pacing import Pacer
-    from bilayer_sim_ros.recording import Recording
-    from bilayer_sim_ros.stimulus import Channel, StimulusInputs
-    from bilayer_sim_ros.worker import SimulationWorker
+    from bilayer_sim_ros.control.control_ticks import Control
+    from bilayer_sim_ros.control.pacing import Pacer
+    from bilayer_sim_ros.control.pending_changes import Commands
+    from bilayer_sim_ros.control.stimulus import Channel, StimulusInputs
+    from bilayer_sim_ros.node.worker import SimulationWorker
+    from bilayer_sim_ros.publishing.run_files import Recording
 
     class Nobody:
         """Subscribes to nothing."""

@@ -33,7 +33,7 @@ from rclpy.qos import QoSProfile  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
 
 from bilayer_core.record.mcap_log import McapRecorder  # noqa: E402
-from bilayer_sim_ros.message_types import message_class  # noqa: E402
+from bilayer_sim_ros.node.message_types import message_class  # noqa: E402
 
 NODE = "/bilayer_replay"
 PLAYED = 10.0

@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.record.log_reader import read_info
-from bilayer_sim_ros.message_types import message_class
+from bilayer_sim_ros.node.message_types import message_class
 
 PARAMETERS = {"scene": "bending", "start_paused": True, "rate": 50.0}
 OTHER = "/lab/robot1"

@@ -13,7 +13,7 @@ from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
 from bilayer_core.record.log_reader import read_info, read_log
-from bilayer_sim_ros import simulation_run
+from bilayer_sim_ros.node import simulation_run
 from bilayer_sim_ros.simulation_node import SimulationNode
 
 LIMIT = 60.0

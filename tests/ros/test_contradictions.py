@@ -12,9 +12,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from bilayer_core.scene.schedule import Hold
-from bilayer_sim_ros.contradictions import Contradictions, Source
+from bilayer_sim_ros.control.contradictions import Contradictions, Source
+from bilayer_sim_ros.control.stimulus import Channel
 from bilayer_sim_ros.simulation_node import SimulationNode
-from bilayer_sim_ros.stimulus import Channel
 
 HEAT = Channel("heat", 0.0, 1.0, Hold(type="hold", value=0.0))
 A, B, C = (Source("/stimulus_stamped", name) for name in (b"a", b"b", b"c"))

@@ -11,9 +11,9 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.observed.inputs import STIMULUS
 from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.runs.replay import verify
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.control import Control
-from bilayer_sim_ros.stimulus import Channel, StimulusInputs
+from bilayer_sim_ros.control.control_ticks import Control
+from bilayer_sim_ros.control.pending_changes import Commands
+from bilayer_sim_ros.control.stimulus import Channel, StimulusInputs
 
 PERIOD = 0.02
 CHANNEL = "swelling"

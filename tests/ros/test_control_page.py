@@ -11,7 +11,7 @@ from logged_commands import stimuli_taken
 from rosgraph_msgs.msg import Clock
 
 from bilayer_core.record.log_reader import read_info
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.publishing.conversions import to_seconds
 
 PERIOD = 0.02
 

@@ -1,9 +1,9 @@
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from bilayer_sim_ros.conversions import to_diagnostics, to_seconds, to_time
-from bilayer_sim_ros.recording import LogStatus
-from bilayer_sim_ros.status import Status
+from bilayer_sim_ros.node.run_status import Status
+from bilayer_sim_ros.publishing.conversions import to_diagnostics, to_seconds, to_time
+from bilayer_sim_ros.publishing.run_files import LogStatus
 
 LEFT_OUT = "and 2 frames were left out of the log: the disk is too slow"
 

@@ -9,14 +9,14 @@ from types import SimpleNamespace
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_sim_ros import subscriptions
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.control import Control
-from bilayer_sim_ros.pacing import CONTROLLERS, LOG, OTHERS, PHYSICS, SUBSCRIBERS, Pacer
-from bilayer_sim_ros.recording import Recording
-from bilayer_sim_ros.stimulus import StimulusInputs
-from bilayer_sim_ros.subscriptions import LONGEST_REST, ROUND, Rest
-from bilayer_sim_ros.worker import SimulationWorker
+from bilayer_sim_ros.control import subscriptions
+from bilayer_sim_ros.control.control_ticks import Control
+from bilayer_sim_ros.control.pacing import CONTROLLERS, LOG, OTHERS, PHYSICS, SUBSCRIBERS, Pacer
+from bilayer_sim_ros.control.pending_changes import Commands
+from bilayer_sim_ros.control.stimulus import StimulusInputs
+from bilayer_sim_ros.control.subscriptions import LONGEST_REST, ROUND, Rest
+from bilayer_sim_ros.node.worker import SimulationWorker
+from bilayer_sim_ros.publishing.run_files import Recording
 
 NAP = 0.05
 """Longer than the period of frames, 0.02 s."""

@@ -3,11 +3,11 @@
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_sim_ros import status as of_status
-from bilayer_sim_ros.conversions import to_diagnostics
-from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.recording import Recording
-from bilayer_sim_ros.status import StatusReporter
+from bilayer_sim_ros.control.pacing import Pacer
+from bilayer_sim_ros.node import run_status as of_status
+from bilayer_sim_ros.node.run_status import StatusReporter
+from bilayer_sim_ros.publishing.conversions import to_diagnostics
+from bilayer_sim_ros.publishing.run_files import Recording
 
 
 class Reports:

@@ -5,7 +5,7 @@ from rcl_interfaces.msg import Log
 from std_msgs.msg import Float64
 
 from bilayer_core import read_log
-from bilayer_sim_ros.stimulus import Channel, StimulusInputs
+from bilayer_sim_ros.control.stimulus import Channel, StimulusInputs
 
 
 class Silent:

@@ -16,13 +16,13 @@ from rosgraph_msgs.msg import Clock
 from bilayer_core import Simulator, load_scene
 from bilayer_core.record.log_reader import read_messages
 from bilayer_core.record.topics import INPUTS
-from bilayer_sim_ros import worker
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.control import Control
-from bilayer_sim_ros.conversions import to_seconds
-from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.recording import Recording
-from bilayer_sim_ros.stimulus import StimulusInputs
+from bilayer_sim_ros.control.control_ticks import Control
+from bilayer_sim_ros.control.pacing import Pacer
+from bilayer_sim_ros.control.pending_changes import Commands
+from bilayer_sim_ros.control.stimulus import StimulusInputs
+from bilayer_sim_ros.node import worker
+from bilayer_sim_ros.publishing.conversions import to_seconds
+from bilayer_sim_ros.publishing.run_files import Recording
 
 LOCKSTEP = {"lockstep": True, "real_time_factor": 0.0}
 BEAT = {"period": 0.08, "tolerance": 1e-5, "axis": [0.0, 0.0, -1.0], "goal": [0.0, 0.0, -0.01]}

@@ -8,11 +8,11 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.configured_node import ConfiguredNode
-from bilayer_sim_ros.parameters import SIM_NODE
-from bilayer_sim_ros.ros_arguments import matches
+from bilayer_sim_ros.node.configured_node import ConfiguredNode
+from bilayer_sim_ros.node.parameters import SIM_NODE
+from bilayer_sim_ros.node.ros_arguments import matches
+from bilayer_sim_ros.node.unread_arguments import refuse_bare_parameters, unread_arguments
 from bilayer_sim_ros.simulation_node import SimulationNode
-from bilayer_sim_ros.unread_arguments import refuse_bare_parameters, unread_arguments
 
 NAMES = [parameter.name for parameter in SIM_NODE]
 

@@ -7,8 +7,8 @@ from types import ModuleType, SimpleNamespace
 import pytest
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.launch_arguments import argument_name, near_misses, parameters_of
-from bilayer_sim_ros.parameters import REPLAY_NODE, SIM_NODE, accept_all
+from bilayer_sim_ros.node.launch_arguments import argument_name, near_misses, parameters_of
+from bilayer_sim_ros.node.parameters import REPLAY_NODE, SIM_NODE, accept_all
 
 DECLARED = ["name", "namespace", "params_file", *map(argument_name, SIM_NODE)]
 
@@ -81,9 +81,9 @@ def warnings(monkeypatch):
         module = ModuleType(name)
         vars(module).update(content)
         monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.delitem(sys.modules, "bilayer_sim_ros.launch_description", raising=False)
+    monkeypatch.delitem(sys.modules, "bilayer_sim_ros.node.launch_description", raising=False)
     yield said
-    sys.modules.pop("bilayer_sim_ros.launch_description", None)
+    sys.modules.pop("bilayer_sim_ros.node.launch_description", None)
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ from bilayer_core.runs.replay import verify
 from bilayer_core.scene.loader import scene_text
 from bilayer_core.validate.friction import FAR, GRAVITY, SIZE, at_rest, block
 from bilayer_core.validate.parts import GROUND, contact, fixed, layer, rod, scene
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.live_friction import LiveFriction, friction_overrides
-from bilayer_sim_ros.parameters import FRICTION, FRICTION_OF_SCENE
+from bilayer_sim_ros.control.pending_changes import Commands
+from bilayer_sim_ros.node.live_friction import LiveFriction, friction_overrides
+from bilayer_sim_ros.node.parameters import FRICTION, FRICTION_OF_SCENE
 
 SLOPE = 0.3
 

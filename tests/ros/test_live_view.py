@@ -14,7 +14,7 @@ from std_msgs.msg import String
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.record.description_text import from_json
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.publishing.conversions import to_seconds
 
 SERVED = {"scene": "bending", "rerun": "serve"}
 ADDRESS = r"following (\S+): rerun rerun\+http://127\.0\.0\.1:(\d+)/proxy  or in a browser  http://127\.0\.0\.1:(\d+)/"
@@ -28,7 +28,7 @@ def followers(node):
     (follower,) = (
         of
         for of in psutil.process_iter(["cmdline", "ppid"])
-        if of.info["ppid"] == node.pid and "bilayer_sim_ros.follower" in (of.info["cmdline"] or ())
+        if of.info["ppid"] == node.pid and "bilayer_sim_ros.publishing.follower" in (of.info["cmdline"] or ())
     )
     return [follower, *follower.children()]
 

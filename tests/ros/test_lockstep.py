@@ -7,12 +7,12 @@ import pytest
 
 from bilayer_core.errors import InputError
 from bilayer_core.scene.schedule import Hold
-from bilayer_sim_ros.answers import DUPLICATE, LATE, Answers, mount
-from bilayer_sim_ros.commands import POSE, Commands
-from bilayer_sim_ros.control import Control, tick_rate
-from bilayer_sim_ros.lockstep import Lockstep, channels_that_answer, refuse_without_clock
-from bilayer_sim_ros.periods import Periods
-from bilayer_sim_ros.stimulus import Channel, StimulusInputs
+from bilayer_sim_ros.control.control_ticks import Control, tick_rate
+from bilayer_sim_ros.control.lockstep import Lockstep, channels_that_answer, refuse_without_clock
+from bilayer_sim_ros.control.pending_changes import POSE, Commands
+from bilayer_sim_ros.control.periods import Periods
+from bilayer_sim_ros.control.stimulus import Channel, StimulusInputs
+from bilayer_sim_ros.control.tick_answers import DUPLICATE, LATE, Answers, mount
 
 PERIOD = 0.1
 TICK = 100_000_000

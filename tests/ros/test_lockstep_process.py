@@ -17,7 +17,7 @@ from std_msgs.msg import Float64
 
 from bilayer_core.jit.compile_all import compile_all, is_complete
 from bilayer_core.record.log_reader import read_info
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.publishing.conversions import to_seconds
 
 CHANNEL = "/bilayer_sim/stimulus/swelling"
 LOCKSTEP = {"scene": "bending", "real_time_factor": 0, "lockstep": True}

@@ -1,6 +1,6 @@
 import pytest
 
-from bilayer_sim_ros.log_clock import LogClock
+from bilayer_sim_ros.replay.log_clock import LogClock
 
 SECOND = 1_000_000_000
 

@@ -13,9 +13,9 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros import graph_watch
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.parameters import SIM_NODE, accept_all
+from bilayer_sim_ros.control.pending_changes import Commands
+from bilayer_sim_ros.node import graph_watch
+from bilayer_sim_ros.node.parameters import SIM_NODE, accept_all
 from bilayer_sim_ros.simulation_node import SimulationNode
 
 LONG = "\x1b[31m" + "x" * 500_000

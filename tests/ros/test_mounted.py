@@ -15,7 +15,7 @@ from bilayer_core.record.encoders import decode_input
 from bilayer_core.record.log_reader import read_log, read_messages
 from bilayer_core.record.topics import INPUTS
 from bilayer_core.runs.replay import verify
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.publishing.conversions import to_seconds
 
 TOP_SPEED, HEIGHT, GRAVITY = 0.2, 0.3, 9.81
 LIFT, BEGIN = 0.05, 0.1

@@ -11,9 +11,9 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float32, Float64, Float64MultiArray
 
-from bilayer_sim_ros import graph_watch
-from bilayer_sim_ros.near_misses import of_topics
-from bilayer_sim_ros.ros_arguments import remap_sources
+from bilayer_sim_ros.node import graph_watch
+from bilayer_sim_ros.node.near_misses import of_topics
+from bilayer_sim_ros.node.ros_arguments import remap_sources
 from bilayer_sim_ros.simulation_node import SimulationNode
 
 PREFIX = "/bilayer_sim/"

@@ -1,6 +1,6 @@
 import pytest
 
-from bilayer_sim_ros.pacing import LARGEST_LAG, LOG, OTHERS, PHYSICS, Pacer, cause_of_delay
+from bilayer_sim_ros.control.pacing import LARGEST_LAG, LOG, OTHERS, PHYSICS, Pacer, cause_of_delay
 
 
 class SetClock:

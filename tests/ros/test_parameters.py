@@ -2,7 +2,7 @@ import pytest
 import yaml
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.parameters import BUILT_IN, REPLAY_NODE, SIM_NODE, NodeParameter, accept_all
+from bilayer_sim_ros.node.parameters import BUILT_IN, REPLAY_NODE, SIM_NODE, NodeParameter, accept_all
 
 RATE = NodeParameter("rate", 50.0, "messages per second [Hz]", minimum=0.0, above_minimum=True)
 MODE = NodeParameter("mode", "hold", "what acts", choices=("hold", "zero"))

@@ -11,11 +11,11 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.parameter_client import AsyncParameterClient
 
-from bilayer_sim_ros.configured_node import ConfiguredNode
 from bilayer_sim_ros.controllers.gait_controller import GaitController
 from bilayer_sim_ros.controllers.goal_controller import GoalController
 from bilayer_sim_ros.controllers.ramp_controller import RampController
-from bilayer_sim_ros.parameters import REPLAY_NODE, SIM_NODE
+from bilayer_sim_ros.node.configured_node import ConfiguredNode
+from bilayer_sim_ros.node.parameters import REPLAY_NODE, SIM_NODE
 
 LIMIT, PATIENCE = 60.0, 3.0
 

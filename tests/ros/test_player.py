@@ -10,7 +10,7 @@ from written_logs import LATCHED, damage, number, value_of, write_log
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.indexed_log import IndexedLog
-from bilayer_sim_ros.player import Playback, Player
+from bilayer_sim_ros.replay.player import Playback, Player
 
 FAST = 1e6
 """A rate at which any of these logs takes no time."""

@@ -23,8 +23,8 @@ from written_logs import LATCHED, number, value_of, write_log
 from bilayer_core.record.indexed_log import IndexedLog
 from bilayer_core.record.log_reader import read_messages
 from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_sim_ros.parameters import REPLAY_NODE
-from bilayer_sim_ros.replay import playback_of
+from bilayer_sim_ros.node.parameters import REPLAY_NODE
+from bilayer_sim_ros.replay.log_replay import playback_of
 
 NODE = "/bilayer_replay"
 PAUSED = {"play.start_paused": True}

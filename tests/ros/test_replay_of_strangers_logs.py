@@ -6,8 +6,8 @@ from std_msgs.msg import Float64
 from written_logs import number, value_of, write_log
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.message_types import installed_message_class
-from bilayer_sim_ros.stored_qos import offered_profile
+from bilayer_sim_ros.node.message_types import installed_message_class
+from bilayer_sim_ros.replay.stored_qos import offered_profile
 
 PLANTED = """
 from pathlib import Path
@@ -58,7 +58,7 @@ def test_types_of_installed_packages_are_found_with_and_without_a_sourced_enviro
         index.mkdir(parents=True)
         (index / "std_msgs").write_text("msg/Float64.idl\nmsg/Float64.msg\n")
         monkeypatch.setenv("AMENT_PREFIX_PATH", f"/nowhere:{tmp_path}")
-        monkeypatch.setattr("bilayer_sim_ros.message_types._prefix_of_rclpy", lambda: tmp_path / "none")
+        monkeypatch.setattr("bilayer_sim_ros.node.message_types._prefix_of_rclpy", lambda: tmp_path / "none")
     assert installed_message_class("std_msgs/msg/Float64") is Float64
 
 

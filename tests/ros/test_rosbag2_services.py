@@ -8,7 +8,7 @@ import pytest
 from builtin_interfaces.msg import Time
 
 from bilayer_core.errors import InputError
-from bilayer_sim_ros.rosbag2_services import rosbag2_services
+from bilayer_sim_ros.services.rosbag2_services import rosbag2_services
 
 TYPES = "Pause Resume TogglePaused IsPaused GetRate SetRate Play PlayNext Burst Seek Stop".split()
 
@@ -55,7 +55,7 @@ def call(player, warnings, monkeypatch):
         setattr(types, name, name)
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces", package)
     monkeypatch.setitem(sys.modules, "rosbag2_interfaces.srv", types)
-    monkeypatch.setattr("bilayer_sim_ros.rosbag2_services.check_is_valid_srv_type", lambda _: None)
+    monkeypatch.setattr("bilayer_sim_ros.services.rosbag2_services.check_is_valid_srv_type", lambda _: None)
     logger = SimpleNamespace(warning=warnings.append)
     services = rosbag2_services(SimpleNamespace(get_logger=lambda: logger), player)
     by_name = {service.name: service for service in services}

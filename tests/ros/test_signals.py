@@ -27,7 +27,7 @@ class Finder:
 sys.meta_path.insert(0, Finder())
 """
 WHILE_COMPILING = """
-from bilayer_sim_ros import simulation_run
+from bilayer_sim_ros.node import simulation_run
 def compile_for_long(report):
     send()
     time.sleep(60.0)
@@ -80,7 +80,7 @@ def send_and_wait(self, *arguments, **named):
 Simulator.step, SingleThreadedExecutor.wait_for_ready_callbacks = count_steps, send_and_wait
 """
 WHILE_SIGNALS_ARE_HANDLED = """
-from bilayer_sim_ros.signals import Signals
+from bilayer_sim_ros.node.signals import Signals
 
 sent = 0
 

@@ -15,7 +15,7 @@ from std_msgs.msg import Float64, Float64MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
 from bilayer_core import Simulator, load_scene
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.publishing.conversions import to_seconds
 
 SCENE = "bending"
 PERIOD = 0.02

@@ -15,9 +15,9 @@ from std_msgs.msg import Header
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_sim_ros import simulator_services as module
-from bilayer_sim_ros import steps_action
-from bilayer_sim_ros.requests import Requests
+from bilayer_sim_ros.services import simulator_services as module
+from bilayer_sim_ros.services import steps_action
+from bilayer_sim_ros.services.requests import Requests
 
 MESSAGES = {
     "Result": {"result": int, "error_message": str},

@@ -21,13 +21,13 @@ from bilayer_core.record.mcap_log import QUEUE_LENGTH
 from bilayer_core.record.topics import INPUTS
 from bilayer_core.runs.replay import verify
 from bilayer_core.scene.schedule import Hold
-from bilayer_sim_ros.commands import Commands
-from bilayer_sim_ros.control import Control
-from bilayer_sim_ros.conversions import to_diagnostics
-from bilayer_sim_ros.pacing import Pacer
-from bilayer_sim_ros.recording import Recording
-from bilayer_sim_ros.stimulus import Channel, StimulusInputs
-from bilayer_sim_ros.worker import SimulationWorker
+from bilayer_sim_ros.control.control_ticks import Control
+from bilayer_sim_ros.control.pacing import Pacer
+from bilayer_sim_ros.control.pending_changes import Commands
+from bilayer_sim_ros.control.stimulus import Channel, StimulusInputs
+from bilayer_sim_ros.node.worker import SimulationWorker
+from bilayer_sim_ros.publishing.conversions import to_diagnostics
+from bilayer_sim_ros.publishing.run_files import Recording
 
 RATE, DURATION, STALL = 200.0, 2.4, 1.5
 

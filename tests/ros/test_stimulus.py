@@ -4,7 +4,7 @@ import pytest
 
 from bilayer_core.errors import InputError
 from bilayer_core.scene.schedule import Hold, Ramp
-from bilayer_sim_ros.stimulus import Channel, StimulusInputs
+from bilayer_sim_ros.control.stimulus import Channel, StimulusInputs
 
 HUMIDITY = Channel("humidity", 0.0, 1.0, Ramp(**{"type": "ramp", "start": 0.0, "end": 10.0, "from": 0.25, "to": 0.75}))
 CURRENT = Channel("current", 2.0, 8.0, Hold(**{"type": "hold", "value": 4.0}))

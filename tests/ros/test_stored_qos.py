@@ -9,7 +9,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from bilayer_core.errors import InputError
 from bilayer_core.record.indexed_log import IndexedLog
 from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_sim_ros.stored_qos import LARGEST_DEPTH, offered_profile
+from bilayer_sim_ros.replay.stored_qos import LARGEST_DEPTH, offered_profile
 
 INFINITE = "{sec: 9223372036, nsec: 854775807}"
 

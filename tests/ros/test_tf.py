@@ -9,8 +9,8 @@ import synthetic_run
 
 from bilayer_core.errors import InputError
 from bilayer_core.record.encoders import FrameEncoder
-from bilayer_sim_ros.publishing import FramePublisher
-from bilayer_sim_ros.tf import tf_prefix
+from bilayer_sim_ros.publishing.tf_topic import tf_prefix
+from bilayer_sim_ros.publishing.topic_publishers import FramePublisher
 
 
 class FakeNode:

@@ -21,7 +21,7 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-from bilayer_sim_ros.conversions import to_seconds
+from bilayer_sim_ros.publishing.conversions import to_seconds
 
 DURATION = 0.4
 LONGEST_DELAY = 0.02

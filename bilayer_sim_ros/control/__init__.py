@@ -1,0 +1,1 @@
+"""What controllers ask for, and when it acts."""

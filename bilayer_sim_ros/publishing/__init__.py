@@ -1,0 +1,1 @@
+"""What a run says on topics, in files and to viewers."""

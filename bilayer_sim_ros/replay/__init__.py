@@ -1,0 +1,1 @@
+"""A log as a node that plays it."""

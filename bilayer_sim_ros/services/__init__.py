@@ -1,0 +1,1 @@
+"""Services and actions, ours and those of other packages."""
