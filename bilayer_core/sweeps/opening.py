@@ -87,6 +87,7 @@ def open_engine(job: Job, processes: Processes, memory: float | None = None) -> 
     """
     require("sweep", "dask", "distributed", "cryptography")
     import dask
+    import distributed  # noqa: F401 (fills the configuration; from an empty one, `set` would remove it all at its end)
 
     with ExitStack() as stack:
         if processes.scheduler is None:
