@@ -9,6 +9,8 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from ..processes import usable_cores
+
 LIBRARIES = ("bilayer_sim_ros", "numpy", "scipy", "numba", "llvmlite", "pyelastica", "mujoco")
 CPU_FILE = Path("/proc/cpuinfo")
 
@@ -17,7 +19,7 @@ def record() -> dict[str, object]:
     """Machine and versions; a library that is not installed is None."""
     return {
         "cpu": cpu_model(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": usable_cores(),
         "system": f"{platform.system()} {platform.release()}",
         "python": sys.version.split()[0],
         "versions": {name: installed_version(name) for name in LIBRARIES},
@@ -25,8 +27,15 @@ def record() -> dict[str, object]:
 
 
 def now() -> dict[str, object]:
-    """Date and load averages over 1, 5 and 15 minutes: how much others were at work."""
-    return {"date": datetime.now(UTC).isoformat(timespec="seconds"), "load": [round(x, 2) for x in os.getloadavg()]}
+    """Return the date, and the load averages."""
+    return {"date": datetime.now(UTC).isoformat(timespec="seconds"), "load": load_averages()}
+
+
+def load_averages() -> list[float]:
+    """Return how much all programs were at work in the last 1, 5 and 15 minutes; empty on Windows, which has no such
+    figures.
+    """
+    return [round(load, 2) for load in os.getloadavg()] if hasattr(os, "getloadavg") else []
 
 
 def cpu_model() -> str:

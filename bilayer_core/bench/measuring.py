@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, replace
 from operator import itemgetter
 
@@ -13,6 +12,7 @@ from ..errors import SceneError, SimulationError
 from ..simulation.result import Termination
 from ..simulation.simulator import Simulator
 from .configurations import Configuration
+from .machine import load_averages
 from .problems import Problem
 from .track import Track
 
@@ -35,7 +35,8 @@ class Run:
     values : Array or None
         As its problem's measure gives them.
     cost : dict
-        CPU time [s], numbers of steps, Newton iterations, refused attempts, unknowns; 1-minute load average.
+        CPU time [s], numbers of steps, Newton iterations, refused attempts, unknowns; 1-minute load average, where
+        the system has one.
     """
 
     outcome: str
@@ -71,7 +72,7 @@ def simulator_of(problem: Problem, configuration: Configuration) -> Simulator:
 def _run(problem: Problem, configuration: Configuration, longest: float, watched: bool = False) -> Run:
     simulator = simulator_of(problem, configuration)
     simulator.compile()
-    track, load = Track(simulator), os.getloadavg()[0]
+    track, load = Track(simulator), load_averages()[:1]
     look, limit = (track.look, lambda: simulator.cpu_time > longest) if watched else (None, None)
     for end in sorted({*problem.measure.stops, problem.duration}):
         result = simulator.run(end - simulator.time, interrupted=limit, each_step=look)
@@ -84,6 +85,6 @@ def _run(problem: Problem, configuration: Configuration, longest: float, watched
         "rejected": statistics.rejected,
         "newton_iterations": statistics.iterations,
         "dof": simulator.model.unknowns,
-        "load": load,
+        "load": load[0] if load else None,
     }
     return Run("done", problem.measure.values(track) if watched else None, cost)

@@ -64,10 +64,10 @@ def _where(content: dict) -> str:
     machine, began = content["machine"], content["began"]
     ended = content.get("ended", began)
     versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items() if number)
-    load = f"Load average {began['load'][0]:g} at the start, {ended['load'][0]:g} at the end."
+    load = f" Load average {began['load'][0]:g} at the start, {ended['load'][0]:g} at the end." if began["load"] else ""
     return (
         f"{began['date'][:10]}, {machine['cpu']}, {machine['cores']} cores, {machine['system']}, Python "
-        f"{machine['python']}, {versions}. {load}\n"
+        f"{machine['python']}, {versions}.{load}\n"
     )
 
 

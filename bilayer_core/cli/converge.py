@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from typing import Any
 
 import click
@@ -33,6 +32,7 @@ def converge(
 ) -> None:
     """Run SCENE at twice and half its time step, with half and twice its edges: observed orders and error bars."""
     from bilayer_core.converge import study
+    from bilayer_core.processes import usable_cores
     from bilayer_core.scene.loader import load_scene
 
     config = load_scene(scene, overrides)
@@ -47,7 +47,7 @@ def converge(
 
     with json_to(json_file) as write_json:
         compile_kernels(quiet)
-        found = study.converge(config, duration, quantities, min(workers or len(os.sched_getaffinity(0)), runs), tell)
+        found = study.converge(config, duration, quantities, min(workers or usable_cores(), runs), tell)
         say(f"{config.name}: {found.integrator}, steps {found.stepping}")
         _print_table(found.rows)
         for name, reason in found.missing.items():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from contextlib import nullcontext, redirect_stdout
 from pathlib import Path
@@ -128,6 +127,7 @@ class _Judge:
     def estimate(self) -> None:
         """Make the runs. One that stops is this command's failure, and so is Ctrl-C, once the outputs are written."""
         from bilayer_core.converge.study import estimate_error
+        from bilayer_core.processes import usable_cores
 
         def tell(name: str) -> None:
             if not self._quiet:
@@ -137,7 +137,7 @@ class _Judge:
             self.study = estimate_error(
                 self._scene,
                 self._duration,
-                workers=min(2, len(os.sched_getaffinity(0))),
+                workers=min(2, usable_cores()),
                 progress=tell,
                 own=self._watch.figures(),
                 start=self._start,

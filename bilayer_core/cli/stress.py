@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +47,9 @@ def stress(
     Each case ends accurate, stable, refused with a reason, or FAILED. Writes DIR/results.jsonl as results come, then
     a report (stability.md), figures, and the scenes of failures and of the worst cases. Exit code 1 if one fails.
     """
-    workers = workers or len(os.sched_getaffinity(0))
+    from bilayer_core.processes import usable_cores
+
+    workers = workers or usable_cores()
     if mutations:
         return _judge_seeded_bugs(only, listed, resume, output_directory(out), workers, quiet)
     from bilayer_core.extras import require

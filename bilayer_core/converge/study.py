@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bilayer_core.converge.order import Estimate, estimate
-from bilayer_core.converge.processes import side_by_side
 from bilayer_core.converge.quantities import check_names, headline, is_event, measure
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.register import INTEGRATORS
 from bilayer_core.model.plan import make_plan
+from bilayer_core.processes import side_by_side
 from bilayer_core.scene.config import LARGEST_TOLERANCE, SceneConfig
 from bilayer_core.scene.loader import load_scene, parse_scene, scene_text
 from bilayer_core.simulation.simulator import Simulator

@@ -78,6 +78,8 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     RuntimeError
         If one cannot be compiled; the message has what the process printed.
     """
+    from ..processes import usable_cores  # its imports are for who compiles
+
     folder = cache_folder()
     if folder is None:
         return
@@ -88,8 +90,7 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     for name in names:
         left.put(name)
     done: queue.SimpleQueue[str | Exception] = queue.SimpleQueue()
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    workers = [_Worker(left, done) for _ in range(min(MOST_PROCESSES, cores))]
+    workers = [_Worker(left, done) for _ in range(min(MOST_PROCESSES, usable_cores()))]
     try:
         for worker in workers:
             worker.start()

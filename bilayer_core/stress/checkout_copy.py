@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -18,6 +17,11 @@ from ..errors import InputError
 from ..jit.cache import CACHE_DIR, FOLDERS
 from .mutants import PACKAGE, Mutant
 from .reached import reached
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 COPIED = (PACKAGE, "config", "docs", "tests", "pyproject.toml")
 """Of the checkout: what tests of the package need."""
@@ -42,8 +46,10 @@ def checkout() -> Path:
     Raises
     ------
     InputError
-        If it is run from none, so that there are no tests.
+        If it is run from none, so that there are no tests, or not on Linux.
     """
+    if not hasattr(resource, "prlimit"):
+        raise InputError("mutations: only Linux limits the CPU time of another process; run them there")
     root = Path(__file__).resolve().parents[2]
     missing = [name for name in COPIED if not (root / name).exists()]
     if missing:

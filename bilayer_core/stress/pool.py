@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
-import resource
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, wait
 from multiprocessing import get_context
+from pathlib import Path
 
 from ..extras import require
 from .case import Outcome, Record, StressCase
 
 MEMORY = 3 * 2**30
-"""Address space that a worker may take beyond what it has when it begins [bytes]."""
+"""Address space that a worker may take beyond what it has when it begins, on Linux [bytes]."""
+MEMORY_FILE = Path("/proc/self/statm")
+"""Linux says there what a process has; other systems do not, and most of them heed no such limit."""
 CASES_A_WORKER = 100
 """Then another takes its place: memory that cases gave back is not always of use to the next one."""
 GRACE, LEAST_TIME = 12.0, 120.0
@@ -77,8 +79,13 @@ def _begin() -> None:
     """What each worker does first: numpy and scipy are loaded, and then its address space is limited."""
     from . import execute  # noqa: F401 (loads all that cases need)
 
-    with open("/proc/self/statm", encoding="ascii") as file:
-        present = int(file.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    try:
+        import resource
+    except ImportError:
+        return
+    if not MEMORY_FILE.exists():
+        return
+    present = int(MEMORY_FILE.read_text(encoding="ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
     resource.setrlimit(resource.RLIMIT_AS, (present + MEMORY, present + MEMORY))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import socket
 import threading
 import time as clock
 from collections.abc import Sequence
@@ -192,4 +193,4 @@ def prepare(job: Job, token: str) -> dict[str, Any]:
         warm()
     sees = not token or Path(job.directory, LOGS, token).exists()
     writes = sees and (not token or os.access(Path(job.directory, LOGS), os.W_OK))
-    return {"versions": found, "sees": sees, "writes": writes, "host": os.uname().nodename}
+    return {"versions": found, "sees": sees, "writes": writes, "host": socket.gethostname()}

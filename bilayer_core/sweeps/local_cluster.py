@@ -8,15 +8,12 @@ user of the machine; they do not here, but for the dashboard if it is asked for.
 from __future__ import annotations
 
 import logging
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
-from multiprocessing import get_context
 from typing import Any
 
 from distributed import Nanny, Scheduler, Security, SpecCluster, Worker
 
 from bilayer_core.extras import require
+from bilayer_core.processes import keyboard_unheard
 
 HOST = "127.0.0.1"
 
@@ -68,24 +65,10 @@ def start_cluster(workers: int, memory: float | None, folder: str, dashboard: bo
         "silence_logs": logging.CRITICAL,
         "worker_class": QuietWorker,
     }
-    with _keyboard_unheard():
+    with keyboard_unheard():
         return SpecCluster(
             scheduler={"cls": Scheduler if dashboard else QuietScheduler, "options": common | served},
             workers={number: {"cls": Nanny, "options": options} for number in range(workers)},
             security=common["security"],
             silence_logs=logging.CRITICAL,
         )
-
-
-@contextmanager
-def _keyboard_unheard() -> Iterator[None]:
-    """Block SIGINT in threads and processes that are started meanwhile: Ctrl-C is for the thread that waits."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    get_context("spawn").Lock()  # starts Python's tracker of resources, which would unblock the signal later
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,6 +13,7 @@ from urllib.request import urlopen
 
 from bilayer_core.errors import EngineError, InputError, OutputError
 from bilayer_core.extras import require
+from bilayer_core.processes import usable_cores
 from bilayer_core.record.private_directory import private_directory
 from bilayer_core.sweeps.certificates import check_certificates, is_encrypted, security_of
 from bilayer_core.sweeps.engine import Engine, refuse_other_versions
@@ -87,10 +87,11 @@ def open_engine(job: Job, processes: Processes, memory: float | None = None) -> 
     """
     require("sweep", "dask", "distributed", "cryptography")
     import dask
+    import distributed  # noqa: F401 (fills the configuration; from an empty one, `set` would remove it all at its end)
 
     with ExitStack() as stack:
         if processes.scheduler is None:
-            workers = processes.workers or len(os.sched_getaffinity(0))
+            workers = processes.workers or usable_cores()
             stack.enter_context(dask.config.set(CONFIG))
             engine = _embedded(stack, job, workers, memory, processes.dashboard)
             _get_ready(engine, job, workers)

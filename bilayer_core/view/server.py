@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
-import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time as clock
 import webbrowser
 from collections.abc import Callable
@@ -16,6 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from bilayer_core.errors import InputError, OutputError
+from bilayer_core.view.bound_process import BoundProcess
 from bilayer_core.view.viewer_process import viewer_environment, viewer_executable
 
 LOCAL = "127.0.0.1"
@@ -25,15 +23,13 @@ PORTS_TRIED = 50
 MEMORY_LIMIT = "1GB"
 """Of what is kept for viewers that come late; beyond it the oldest is dropped."""
 START_LIMIT = 30.0  # longest wait for the server to answer [s]
-EXIT_LIMIT = 5.0  # longest wait for it to end before it is killed [s]
 CHECK_PERIOD = 0.5  # between two looks at whether the server still runs [s]
-_PR_SET_PDEATHSIG = 1
 
 
 class ViewServer:
     """Takes what is sent to it, and hands it to all viewers that connect, from its beginning on.
 
-    It ends with the ``with`` block, and is ended by the system if this process dies.
+    It ends with the ``with`` block, and with this process, however that ends.
 
     Parameters
     ----------
@@ -86,17 +82,7 @@ class ViewServer:
         command += ["--web-viewer-port", str(self.web_port), "--server-memory-limit", MEMORY_LIMIT]
         command += ["--cors-allow-origin", f"http://{_bracketed(self._host)}:{self.web_port}"]
         command += [str(self._recording)] if self._recording else []
-        libc = ctypes.CDLL(None) if sys.platform == "linux" else None
-        self._output = tempfile.TemporaryFile()
-        self._process = subprocess.Popen(
-            command,
-            env=viewer_environment(),
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            preexec_fn=(lambda: libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)) if libc else None,
-        )
+        self._process = BoundProcess(command, viewer_environment())
         try:
             self._wait()
         except BaseException:
@@ -105,23 +91,13 @@ class ViewServer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(EXIT_LIMIT)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._output.close()
+        self._process.end()
 
     def check(self) -> None:
         """Raise OutputError if it has ended."""
-        if self._process.poll() is not None:
-            self._output.seek(0)
-            said = self._output.read().decode(errors="replace").strip().splitlines()
-            raise OutputError(
-                f"the viewer's server ended with exit code {self._process.returncode}; it said:\n"
-                + "\n".join(said[-5:])
-            )
+        if (code := self._process.exit_code) is not None:
+            last = "\n".join(self._process.said().splitlines()[-5:])
+            raise OutputError(f"the viewer's server ended with exit code {code}; it said:\n{last}")
 
     def _wait(self) -> None:
         deadline = clock.monotonic() + START_LIMIT
@@ -185,7 +161,8 @@ def _free_port(bind: str, first: int, option: str, but: int | None = None) -> in
         if port == but:
             continue
         with socket.socket(socket.AF_INET6 if ":" in bind else socket.AF_INET) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if os.name == "posix":  # on Windows this option takes ports from other programs
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 probe.bind((bind, port))
                 probe.listen(1)

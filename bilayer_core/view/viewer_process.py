@@ -6,11 +6,9 @@ import ctypes.util
 import importlib.util
 import logging
 import os
-import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time as clock
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -19,13 +17,13 @@ from typing import TypeVar
 
 from bilayer_core.errors import InputError
 from bilayer_core.extras import missing_library
+from bilayer_core.view.bound_process import BoundProcess
 from bilayer_core.view.layout import TIMELINE
 
 WINDOW_SIZE = "1920x1080"
 START_LIMIT = 60.0  # longest wait for the viewer to answer [s]; a software driver on a busy machine is slow
 DRAW_LIMIT = 120.0  # longest wait for a finished picture [s]
 DRAW_PERIOD = 1.0  # between two looks at whether the picture still changes [s]
-EXIT_LIMIT = 5.0  # longest wait for the viewer to end before it is killed [s]
 DRIVER_DIRECTORIES = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 DRIVER_VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
 MISSING_DRIVER = (
@@ -34,7 +32,6 @@ MISSING_DRIVER = (
 )
 DRIVER_FAILURES = ("No graphics adapter", "Failed to get render context")  # what the viewer says without a driver
 SHOWN_LINES = 5  # of what the viewer said before it failed
-_PR_SET_PDEATHSIG = 1
 _log = logging.getLogger(__name__)
 Answer = TypeVar("Answer")
 
@@ -88,14 +85,12 @@ def drawing_environment() -> dict[str, str]:
 
 
 class HeadlessViewer:
-    """A viewer without a window, ended with the ``with`` block, and by the system if this process dies.
+    """A viewer without a window, which ends with the ``with`` block, and with this process, however that ends.
 
     Attributes
     ----------
     client : rerun.experimental.ViewerClient
         For anything else that can be asked of it.
-    pid : int
-        Of the viewer's process.
     """
 
     def __init__(self, window_size: str = WINDOW_SIZE):
@@ -104,23 +99,12 @@ class HeadlessViewer:
     def __enter__(self) -> HeadlessViewer:
         from rerun.experimental import ViewerClient
 
-        self._output = tempfile.TemporaryFile()
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
         command = [str(viewer_executable()), "--headless", "--hide-welcome-screen", "--window-size", self._window_size]
         command += ["--bind", "127.0.0.1", "--port", str(port)]
-        libc = ctypes.CDLL(None) if sys.platform == "linux" else None
-        self._process = subprocess.Popen(
-            command,
-            env=drawing_environment(),
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-            preexec_fn=(lambda: libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)) if libc else None,
-        )
-        self.pid = self._process.pid
+        self._process = BoundProcess(command, drawing_environment())
         with ExitStack() as undo:
             undo.callback(self.__exit__, None, None, None)
             self._wait_for(port)
@@ -129,13 +113,7 @@ class HeadlessViewer:
         return self
 
     def __exit__(self, exception_type, exception, traceback) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(EXIT_LIMIT)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._output.close()
+        self._process.end()
 
     def open(self, recording: Path) -> None:
         """Load a recording and wait until all of it has arrived."""
@@ -208,10 +186,9 @@ class HeadlessViewer:
     def _check(self, deadline: float, what: str, wait: float = DRAW_PERIOD) -> None:
         """Wait a little; raise if the viewer has ended or the time is over."""
         clock.sleep(wait)
-        if self._process.poll() is None and clock.monotonic() < deadline:
+        if self._process.exit_code is None and clock.monotonic() < deadline:
             return
-        self._output.seek(0)
-        said = self._output.read().decode(errors="replace").partition("stack backtrace:")[0].strip()
+        said = self._process.said().partition("stack backtrace:")[0].strip()
         last = "\n".join(said.splitlines()[-SHOWN_LINES:])
         if any(sign in said for sign in DRIVER_FAILURES):
             raise InputError(f"{MISSING_DRIVER}\nThe viewer said:\n{last}")

@@ -1,12 +1,14 @@
 """Pareto fronts, costs, errors of trajectories, slopes."""
 
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.bench import pareto, scaling
+from bilayer_core.bench import pareto, scaling, start
 from bilayer_core.bench.configurations import Family
 from bilayer_core.bench.independent import SplineRod
 from bilayer_core.bench.track import Track, Trajectory, rms_distance
@@ -124,3 +126,9 @@ def test_the_force_of_the_independent_rod_is_the_slope_of_its_energy():
     direction = rng.standard_normal(at.shape)
     slope = (energy(at + 1e-8 * direction) - energy(at - 1e-8 * direction)) / 2e-8
     assert slope == pytest.approx(-np.sum(rod.potential_force(at, 0.0) * direction), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_start_takes_at_least_the_cpu_time_of_its_kernels_and_imports():
+    found = start.first_step("cantilever", "laminate", 2, Path(os.environ["NUMBA_CACHE_DIR"]))
+    assert found["compile_time"] < found["cpu_time"] and found["import_time"] < found["wall_time"]

@@ -24,13 +24,13 @@ the processor in any phase."""
 
 
 def followers(node):
-    """The processes that show a node: its follower, and the follower's server."""
+    """The processes that show a node: its follower, the follower's server, and what ends that one."""
     (follower,) = (
         of
         for of in psutil.process_iter(["cmdline", "ppid"])
         if of.info["ppid"] == node.pid and "bilayer_sim_ros.publishing.follower" in (of.info["cmdline"] or ())
     )
-    return [follower, *follower.children()]
+    return [follower, *follower.children(recursive=True)]
 
 
 def gone(process):
@@ -54,7 +54,7 @@ def test_a_served_node_says_where_at_this_machine_and_its_viewers_end_with_it(st
     assert frames[-1] > 0.5 and len(frames) > 0.5 * 50 * frames[-1] and len(shapes) > 0.5 * 20 * shapes[-1]
     below = process.children(recursive=True)
     lower = min(process.nice() + 10, 19)
-    assert len(below) == 2 and all(of.nice() == lower for of in below)
+    assert len(below) == 3 and all(of.nice() == lower for of in below)
     node.send(signal.SIGINT)
     assert node.wait() == 0, node.output
     psutil.wait_procs(below, 10)
@@ -69,7 +69,7 @@ def test_the_viewers_of_a_killed_node_end_as_well(start, domain):
     below = psutil.Process(node.pid).children(recursive=True)
     node.send(signal.SIGKILL)
     psutil.wait_procs(below, 15)
-    assert len(below) == 2 and all(map(gone, below))
+    assert len(below) == 3 and all(map(gone, below))
 
 
 @pytest.mark.slow

@@ -11,6 +11,7 @@ import time
 
 import pytest
 import yaml
+from processes import TIMEOUT, environment
 from sweep_programs import address_in, await_workers, dask, end, start_scheduler, wait_until
 
 from bilayer_core import read_results
@@ -139,6 +140,23 @@ def test_of_pieces_given_ahead_nothing_is_lost_with_the_process_they_wait_for(st
     found = sweep(many, workers=workers, functions={"there": die})
     assert found.outcomes == {"done": 200, "killed": 1}
     assert [row.parameters for row in found.rows if row.outcome is not Outcome.DONE] == [{"gain": 1.0}]
+
+
+TWICE = """
+from sweep_programs import STRIP
+from bilayer_core import sweep
+if __name__ == "__main__":
+    for duration in ("0.01 s", "0.02 s"):
+        print(sweep(STRIP | {"set": {"duration": duration}}, workers=1).outcomes)
+"""
+
+
+@pytest.mark.slow
+def test_one_program_makes_two_sweeps(tmp_path):
+    (tmp_path / "twice.py").write_text(TWICE)
+    run = [sys.executable, tmp_path / "twice.py"]
+    done = subprocess.run(run, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=TIMEOUT)
+    assert done.stdout == 2 * "{'done': 8}\n", done.stderr
 
 
 def test_a_scheduler_that_is_not_there_is_told_within_ten_seconds(strip):

@@ -1,9 +1,10 @@
-"""Processes beside this one that end with it, however it ends."""
+"""Processes beside this one: how many can work at once, and a pool whose processes end with this one in any case."""
 
 from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -12,17 +13,26 @@ from multiprocessing import active_children, get_context, parent_process
 from typing import Any
 
 
+def usable_cores() -> int:
+    """Return how many cores this process may use; where the system does not tell that, how many the machine has."""
+    if sys.version_info >= (3, 13):
+        return os.process_cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 class _Pool(ProcessPoolExecutor):
     """Its processes are started where work is handed over, and do not hear Ctrl-C, which is for who started them."""
 
     def submit(self, *arguments: Any, **named: Any) -> Future:
-        with _keyboard_unheard():
+        with keyboard_unheard():
             return super().submit(*arguments, **named)
 
 
 @contextmanager
 def side_by_side(count: int) -> Iterator[ProcessPoolExecutor]:
-    """As many processes; those that still work when the block ends, or raises, are ended."""
+    """Yield a pool of as many processes; those that still work when the block ends, or raises, are ended."""
     before = set(active_children())
     with _Pool(count, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
         try:
@@ -34,11 +44,15 @@ def side_by_side(count: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def _keyboard_unheard() -> Iterator[None]:
-    """Processes that are started meanwhile have SIGINT blocked; a SIGINT to this one comes afterwards."""
+def keyboard_unheard() -> Iterator[None]:
+    """Block SIGINT in threads and processes that are started meanwhile; a SIGINT to this thread comes afterwards.
+
+    Windows cannot block it: processes of its console all hear Ctrl-C.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    get_context("spawn").Lock()  # starts Python's tracker of resources, which would unblock the signal later
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
