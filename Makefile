@@ -45,7 +45,7 @@ bounds: $(STAMP)  ## Run tests of all kernels with the bounds of arrays checked.
 stress: $(STAMP)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
-# What is found is committed: docs/stability.md with its figures, and docs/data/mutations.jsonl.
+# What is found is committed: docs/stability.md with its figures, and the notes in docs/data that it shows.
 verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scenes, 2,000 logs, 250 kills, a soak, films, seeded bugs.
 	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz/test_mutated_scenes.py
 	FUZZ_LOGS=2000 FUZZ_STATES=1000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -s tests/fuzz/test_mutated_logs.py
@@ -55,7 +55,7 @@ verify: $(STAMP)  ## Run what takes hours: all stress cases, 10,000 mutated scen
 	$(BIN)/python tests/benchmarks/films.py
 	$(BIN)/python tests/benchmarks/sweeps.py
 	$(BIN)/bilayer stress --out runs/stress
-	$(BIN)/bilayer stress --mutations --out runs/mutations
+	SEEDED_BUGS='*' $(BIN)/python -m pytest -m "" -v -n $(JOBS) tests/mutations
 
 # The commands are those of the page.
 gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.

@@ -85,7 +85,6 @@ setup(
         "bilayer_core": ["py.typed"],
         "bilayer_sim_ros": ["py.typed"],
         "bilayer_core.bench": ["references.json"],
-        "bilayer_core.stress": ["mutants.toml"],
     },
     data_files=data_files,
     zip_safe=False,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import click
@@ -26,7 +25,6 @@ DEFAULT_DIRECTORY = "runs/stress"
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
 @json_option("Write all results to one file")
 @click.option("--workers", type=click.IntRange(1), help="Cases side by side; default: one a core.")
-@click.option("--mutations", is_flag=True, help="Put bugs into copies of this checkout, and see what notices them.")
 @click.option("--shrink/--no-shrink", default=True, show_default=True, help="Make the scenes of failures smaller.")
 @click.option("--quiet", is_flag=True, help="No progress.")
 def stress(
@@ -38,7 +36,6 @@ def stress(
     out: str,
     json_file: str | None,
     workers: int | None,
-    mutations: bool,
     shrink: bool,
     quiet: bool,
 ) -> int:
@@ -50,8 +47,6 @@ def stress(
     from bilayer_core.processes import usable_cores
 
     workers = workers or usable_cores()
-    if mutations:
-        return _judge_seeded_bugs(only, listed, resume, output_directory(out), workers, quiet)
     from bilayer_core.extras import require
     from bilayer_core.stress import report
     from bilayer_core.stress.journal import Journal, head_of
@@ -77,31 +72,6 @@ def stress(
         for line in report.shortfalls(records):
             say(line)
     return FAILED if any(record.outcome == "FAILED" for record in records) else 0
-
-
-def _judge_seeded_bugs(
-    only: tuple[str, ...], listed: bool, resume: bool, directory: Path, workers: int, quiet: bool
-) -> int:
-    """Run the seeded bugs; exit code 1 if one lives."""
-    from bilayer_core.stress.mutants import chosen_mutants
-    from bilayer_core.stress.mutations import run_mutations
-
-    chosen = chosen_mutants(only)
-    if listed:
-        for mutant in chosen.values():
-            say(f"{mutant.name}  {mutant.file}: {mutant.bug}")
-        return 0
-
-    def tell(result: Any) -> None:
-        show(result.name)
-        if not result.caught:
-            say(f"lives  {result.name}: {chosen[result.name].bug}")
-
-    with count_bar(len(chosen), quiet) as show:
-        results = run_mutations(only, directory, tell, resume=resume, workers=workers)
-    lives = [name for name in chosen if not results[name].caught]
-    say(f"{len(chosen) - len(lives)} of {len(chosen)} seeded bugs were noticed")
-    return FAILED if lives else 0
 
 
 def _tell(record: Any, show: Any) -> None:

@@ -141,6 +141,7 @@ class FrameEncoder:
         self.topics = output_topics(description, bool(tf))
         self._node_frames = NodeFrames(description)
         self._energy: tuple[tuple[str, ...], SmallMessage] = ((), SmallMessage(multi_array_template(())))
+        self._markers = MarkerEncoder(description, self._node_frames)
         self._encoders: dict[str, Callable[[Frame], bytes]] = {
             "/clock": SmallMessage(clock_template()),
             "stimulus_applied": SmallMessage(multi_array_template(description.channels), lambda frame: frame.stimulus),
@@ -151,9 +152,12 @@ class FrameEncoder:
                 lambda frame: [getattr(frame, name) for name in SOLVER_LABELS],
             ),
             "state": SmallMessage(state_template(description), lambda frame: frame.state),
-            "nodes": self._nodes_encoder(),
-            "points": self._points_encoder(description),
-            MARKERS: MarkerEncoder(description, self._node_frames).encode,
+            "nodes": SmallMessage(pose_array_template(len(self._node_frames.order)), self._poses),
+            "points": SmallMessage(
+                point_cloud_template(description.node_count),
+                lambda frame: np.column_stack([frame.positions, frame.strain, frame.curvature, frame.contact_forces]),
+            ),
+            MARKERS: self._markers.encode,
         }
         if tf:
             self._encoders[TF.name] = TfEncoder(description, self._node_frames, tf).encode
@@ -174,6 +178,13 @@ class FrameEncoder:
         """The message of topic `name` (a `TopicSpec.name`) for `frame`; give it to ``publish`` as it is."""
         return self._encoders[name](frame)
 
+    def least_size(self, name: str) -> int:
+        """Return the size of the messages of a topic but `TF` [bytes]: of energies without terms, of markers without
+        contacts.
+        """
+        templates = {"energy": self._energy[1].template, MARKERS: self._markers.template}
+        return len(templates.get(name) or self._encoders[name].template)
+
     def small_messages(self, frame: Frame) -> dict[str, SmallMessage]:
         """Encoders of all topics of `Rate.OUTPUT` but `TF` by name, in order; of the run of which `frame` is one."""
         names = [spec.name for spec in self.topics if spec.rate is Rate.OUTPUT and spec is not TF]
@@ -189,37 +200,13 @@ class FrameEncoder:
             self._energy = (tuple(frame.energy), message)
         return self._energy[1]
 
-    def _nodes_encoder(self) -> Callable[[Frame], bytes]:
-        nodes = self._node_frames
-        template = pose_array_template(len(nodes.order))
-        poses = template.views()["poses"]
-
-        def encode(frame: Frame) -> bytes:
-            nodes.update(frame)
-            poses[:, :3] = nodes.positions
-            poses[:, 3:] = nodes.quaternions
-            template.set_time(frame.time)
-            return template.to_bytes()
-
-        return encode
-
-    def _points_encoder(self, description: Description) -> Callable[[Frame], bytes]:
-        template = point_cloud_template(description.node_count)
-        points = template.views()["points"]
-
-        def encode(frame: Frame) -> bytes:
-            points[:, :3] = frame.positions
-            points[:, 3] = frame.strain
-            points[:, 4] = frame.curvature
-            points[:, 5:] = frame.contact_forces
-            template.set_time(frame.time)
-            return template.to_bytes()
-
-        return encode
+    def _poses(self, frame: Frame) -> np.ndarray:
+        self._node_frames.update(frame)
+        return np.hstack([self._node_frames.positions, self._node_frames.quaternions])
 
 
 class SmallMessage:
-    """Encoder of a message with stamps and at most one array, ``data``.
+    """Encoder of a message with stamps and at most one array.
 
     Parameters
     ----------
@@ -230,7 +217,7 @@ class SmallMessage:
 
     def __init__(self, template: Template, values: Callable[[Frame], np.ndarray | list[float]] | None = None):
         self.template, self.values = template, values
-        self._data = template.views().get("data")
+        self._data = next(iter(template.views().values()), None)
 
     def __call__(self, frame: Frame) -> bytes:
         """The message for `frame`."""

@@ -128,6 +128,11 @@ class MarkerEncoder:
     description : Description
     node_frames : NodeFrames
         Of the same model.
+
+    Attributes
+    ----------
+    template : Template
+        The message without contact forces.
     """
 
     def __init__(self, description: Description, node_frames: NodeFrames):
@@ -183,7 +188,7 @@ class MarkerEncoder:
         self._arrows_start = len(template)
         template.put("<u4", 0)  # colours: none, the marker's own counts
         _tail(template)
-        self._template = template
+        self.template = template
 
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
@@ -200,14 +205,14 @@ class MarkerEncoder:
         positions, quaternions = frame.body_positions, frame.body_quaternions
         for body, carried, pose in self._carried:
             carried.place(positions[body], quaternions[body], pose)
-        self._template.set_time(frame.time)
+        self.template.set_time(frame.time)
 
         forces = frame.contact_forces
         touching = np.flatnonzero(np.einsum("ij,ij->i", forces, forces) > ARROW_SHOWN**2)
         self._arrow_action[0] = ADD if len(touching) else DELETE
         self._arrow_count[0] = 6 * len(touching)
         arrows = self._arrows(frame, touching)
-        message = self._template.to_bytes()
+        message = self.template.to_bytes()
         if not len(touching):
             return message[: self._arrows_offset] + message[self._arrows_start :]
         return message[: self._arrows_start] + arrows.astype("<f8").tobytes() + message[self._arrows_start :]

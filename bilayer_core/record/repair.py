@@ -1,18 +1,20 @@
 """A log that strict readers open, of one that was cut off or is damaged: every chunk that is whole is kept.
 
-Chunks are found by walking from record to record. Where that ends in nonsense before the end of the file, the next
-chunk is looked for by its bytes; what lies between is told as lost. Each chunk is held against its checksum, and
-what it holds is written anew by the library's own writer, with an index.
+Records are found by walking from one to the next. Where that leads to something else, the next whole chunk is looked
+for by its bytes, and what lies between is named as lost. Each chunk is held against its checksum, and what it holds is
+written anew by the library's own writer, with an index.
 """
 
 from __future__ import annotations
 
 import io
+import re
 import shutil
 import struct
 import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -23,7 +25,6 @@ from bilayer_core.record.log_records import (
     ATTACHMENT,
     CHANNEL,
     CHUNK,
-    CHUNK_HEAD,
     DATA_END,
     FOOTER,
     HEAD,
@@ -39,7 +40,6 @@ from bilayer_core.record.log_records import (
     Place,
     content,
     parse,
-    read_index,
     read_metadata,
     records_of,
     unpacked,
@@ -54,10 +54,14 @@ if TYPE_CHECKING:
     from _typeshed import ReadableBuffer as Buffer
 
 SUFFIX = ".mcap"
-_KNOWN = set(range(HEADER, DATA_END + 1))
-_COMPRESSIONS = (b"\x03\x00\x00\x00lz4", b"\x04\x00\x00\x00zstd")
-_CHUNK_TIMES = struct.Struct("<QQQI")
-"""Begin and end [ns], size and checksum, before the name of the compression."""
+_KNOWN = range(HEADER, DATA_END + 1)
+_TAKEN = {CHUNK: "chunk", ATTACHMENT: "attachment", METADATA: "metadata record"}
+_TAKEN |= dict.fromkeys((SCHEMA, CHANNEL, MESSAGE), "record")
+"""What is taken into the new log, by opcode."""
+_COMPRESSION = re.compile(rb"\x03\x00\x00\x00lz4|\x04\x00\x00\x00zstd")
+"""In the head of a chunk."""
+_BEFORE_COMPRESSION = HEAD.size + 3 * 8 + 4
+"""Of a chunk: opcode and length, first and last time, size and checksum [bytes]."""
 _WINDOW = 1 << 20
 """In which the next chunk is looked for [bytes]."""
 
@@ -153,185 +157,129 @@ class _Repair:
 
         self._file, self._size = file, file.seek(0, 2)
         self._writer = Writer(output, chunk_size=16 * CHUNK_SIZE, compression=CompressionType.LZ4)  # as they were
+        self._register_schema = cache(self._writer.register_schema)
         self._found = Repaired()
-        self._started = False
-        self._last = 0
+        self._last = self._unknown = 0
         self._definitions = Definitions()
         self._new: dict[int, int] = {}
-        self._new_schemas: dict[int, int] = {}
-        self._unknown = 0
-        self._unfinished = True
 
     def run(self) -> Repaired:
         """Take all records; returns what was kept and lost."""
-        summary = self._summary()
-        chunk: Place | None = None
-        for place in self._places():
-            if place.opcode == MESSAGE_INDEX:
-                continue
-            if place.opcode in (DATA_END, FOOTER):
-                self._unfinished = False
-                break
-            self._take(place)
-            chunk = place if place.opcode == CHUNK else chunk
-        self._start("", "")
-        for number in self._definitions.channels:
-            self._register(number)
-        if self._unknown:
-            self._lose(f"{_count(self._unknown, 'message')} of channels that nothing describes")
-        found = self._found
-        if found.messages:
-            found.last_time = self._last / NANOSECONDS
-        if not (found.messages or found.attachments or found.metadata):
-            raise InputError(f"{self._file.name}: nothing in it can be kept: {'; '.join(found.lost) or 'it is empty'}")
-        found.whole = not found.lost and not self._unfinished and summary
-        if not found.whole:
-            self._writer.flush()
-            self._writer.add_metadata(REPAIRED, {"kept": found.kept, "lost": "; ".join(found.lost)})
-        self._writer.finish()
-        return found
-
-    def _summary(self) -> bool:
-        """Whether there is an index; channels and schemas are taken from it, for chunks that are damaged."""
+        self._writer.start(*self._profile_and_library())
         try:
             summary = read_summary(self._file)
         except DamagedChunk:
             summary = None
-        if summary is None:
-            return False
-        self._definitions = summary.definitions
-        return summary.is_index and _sound(self._file, self._size)
+        if summary is not None:  # it describes channels, for chunks that are damaged
+            self._definitions = summary.definitions
+        ended, last, begin = False, 0, len(MAGIC)
+        while not ended and begin < self._size:
+            place = next(walk(self._file, begin), None)
+            if place is None or place.opcode not in _KNOWN or self._is_damaged_index(place):
+                begin = self._resume(last, begin)
+                continue
+            self._take(place)
+            ended, last, begin = place.opcode in (DATA_END, FOOTER), place.begin, place.end
+        for number in self._definitions.channels:
+            self._new_number(number)
+        found = self._found
+        if self._unknown:
+            found.lost.append(f"{_count(self._unknown, 'message')} of channels that nothing describes")
+        if found.messages:
+            found.last_time = self._last / NANOSECONDS
+        if not (found.messages or found.attachments or found.metadata):
+            raise InputError(f"{self._file.name}: nothing in it can be kept: {'; '.join(found.lost) or 'it is empty'}")
+        found.whole = bool(ended and not found.lost and summary and summary.is_index and _sound(self._file, self._size))
+        if not found.whole:
+            self._writer.add_metadata(REPAIRED, {"kept": found.kept, "lost": "; ".join(found.lost)})
+        self._writer.finish()
+        return found
 
-    def _places(self) -> Iterator[Place]:
-        """The records of the file; where they end in nonsense, on from the next chunk that can be found."""
-        begin = len(MAGIC)
-        while True:
-            for place in walk(self._file, begin):
-                if place.opcode not in _KNOWN or not self._is_consistent(place):
-                    break
-                begin = place.end
-                yield place
-                if place.opcode == FOOTER:
-                    return
-            if begin >= self._size:
-                return
-            following = self._next_chunk(begin + 1)
-            if following is None:
-                self._lose(f"the last {_bytes(self._size - begin)}, from byte {begin} on, which hold no whole chunk")
-                return
-            self._lose(f"{_bytes(following - begin)} from byte {begin} on, which make no record")
-            begin = following
+    def _profile_and_library(self) -> tuple[str, str]:
+        """What the header says."""
+        from mcap.records import Header
 
-    def _is_consistent(self, place: Place) -> bool:
-        """Whether a chunk or an index is as long as its own parts say: nothing else protects these lengths."""
-        if place.opcode not in (CHUNK, MESSAGE_INDEX):
-            return True
-        self._file.seek(place.offset)
-        head = self._file.read(min(place.length, _CHUNK_TIMES.size + 32))
-        before = 2 if place.opcode == MESSAGE_INDEX else _CHUNK_TIMES.size  # bytes before the next length
-        if len(head) < before + 4:
-            return False
-        (length,) = struct.unpack_from("<I", head, before)
-        if place.opcode == MESSAGE_INDEX:
-            return place.length == before + 4 + length
-        before += 4 + length
-        return before + 8 <= len(head) and place.length == before + 8 + struct.unpack_from("<Q", head, before)[0]
-
-    def _next_chunk(self, begin: int) -> int | None:
-        """Where the next chunk begins that is whole, from an offset on."""
-        overlap = HEAD.size + _CHUNK_TIMES.size + 16
-        while begin < self._size:
-            self._file.seek(begin)
-            window = self._file.read(_WINDOW + overlap)
-            for compression in _COMPRESSIONS:
-                at = window.find(compression)
-                while at >= 0:
-                    start = at - _CHUNK_TIMES.size - HEAD.size
-                    if start >= 0 and window[start] == CHUNK and self._is_chunk(begin + start):
-                        return begin + start
-                    at = window.find(compression, at + 1)
-            begin += _WINDOW
-        return None
-
-    def _is_chunk(self, offset: int) -> bool:
-        place = next(walk(self._file, offset), None)
-        if place is None:
-            return False
+        first = next(walk(self._file), None)
         try:
-            unpacked(content(self._file, place))
+            header = parse(Header, content(self._file, first)) if first and first.opcode == HEADER else Header("", "")
+        except DamagedChunk as error:
+            self._found.lost.append(f"the header: {error}")
+            return "ros2", ""
+        return header.profile or "ros2", header.library
+
+    def _is_damaged_index(self, place: Place) -> bool:
+        """Whether an index of messages has not the length that its entries have: no checksum protects it."""
+        if place.opcode != MESSAGE_INDEX:
+            return False
+        self._file.seek(place.offset + 2)
+        return place.length != 6 + int.from_bytes(self._file.read(4), "little")
+
+    def _resume(self, last: int, damage: int) -> int:
+        """Where to go on after what is no record: at the next chunk that is whole, or at the end of the file.
+
+        It is looked for from the last record on, as the length of that may be what is damaged.
+        """
+        for start in range(last + 1, self._size, _WINDOW):
+            self._file.seek(start)
+            for found in _COMPRESSION.finditer(self._file.read(_WINDOW + 8)):
+                begin = start + found.start() - _BEFORE_COMPRESSION
+                if begin > last and self._is_chunk(begin):
+                    first = damage if begin > damage else last
+                    self._found.lost.append(f"{_bytes(begin - first)} from byte {first} on, which make no record")
+                    return begin
+        lost = f"the last {_bytes(self._size - damage)}, from byte {damage} on, which hold no whole chunk"
+        self._found.lost.append(lost)
+        return self._size
+
+    def _is_chunk(self, begin: int) -> bool:
+        place = next(walk(self._file, begin), None)
+        try:
+            return place is not None and place.opcode == CHUNK and bool(unpacked(content(self._file, place)))
         except DamagedChunk:
             return False
-        return True
 
     def _take(self, place: Place) -> None:
-        """Write what a record holds."""
-        from mcap.records import Attachment, Header
+        """Write what a record holds, or name it as lost."""
+        from mcap.records import Attachment
 
+        if place.opcode not in _TAKEN:
+            return
         try:
-            if place.opcode == HEADER:
-                header = parse(Header, content(self._file, place))
-                self._start(header.profile, header.library)
-            elif place.opcode == CHUNK:
-                self._start("", "")
-                self._take_chunk(place)
+            data = content(self._file, place)
+            if place.opcode == CHUNK:
+                self._take_records(unpacked(data))
+                self._writer.flush()
+                self._found.chunks += 1
             elif place.opcode == ATTACHMENT:
-                data = content(self._file, place)
                 if zlib.crc32(data[:-4]) != int.from_bytes(data[-4:], "little") and any(data[-4:]):
                     raise DamagedChunk("its checksum is another one")
                 of = parse(Attachment, data)
-                self._start("", "")
-                self._writer.flush()
                 self._writer.add_attachment(of.create_time, of.log_time, of.name, of.media_type, of.data)
                 self._found.attachments += 1
             elif place.opcode == METADATA:
-                name, values = read_metadata(content(self._file, place))
-                self._start("", "")
-                self._writer.flush()
-                self._writer.add_metadata(name, values)
+                self._writer.add_metadata(*read_metadata(data))
                 self._found.metadata += 1
-            elif place.opcode in (SCHEMA, CHANNEL, MESSAGE):  # outside of chunks
-                self._start("", "")
-                self._take_inside(HEAD.pack(place.opcode, place.length) + content(self._file, place))
+            else:  # outside of chunks
+                self._take_records(HEAD.pack(place.opcode, place.length) + data)
         except DamagedChunk as error:
-            what = {HEADER: "header", ATTACHMENT: "attachment", METADATA: "metadata record"}.get(place.opcode, "record")
-            self._lose(f"the {what} at byte {place.begin}: {error}")
+            held = self._held(place) if place.opcode == CHUNK else ""
+            self._found.lost.append(f"the {_TAKEN[place.opcode]} at byte {place.begin}{held}: {error}")
 
-    def _start(self, profile: str, library: str) -> None:
-        """Begin the new file, as the old one does."""
-        if not self._started:
-            self._writer.start(profile or "ros2", library)
-            self._started = True
+    def _held(self, chunk: Place) -> str:
+        """Of when a chunk is, and how many messages the indexes behind it speak of, in words."""
+        self._file.seek(chunk.offset)
+        begin, end = struct.unpack("<QQ", self._file.read(16).ljust(16, b"\0"))
+        behind = takewhile(lambda place: place.opcode == MESSAGE_INDEX, walk(self._file, chunk.end))
+        count = sum(place.length // 16 for place in behind)  # an entry has 16 bytes, what is before them 6
+        messages = f", {_count(count, 'message')}" if count else ""
+        return f" (t = {begin / NANOSECONDS:g} to {end / NANOSECONDS:g} s{messages})"
 
-    def _take_chunk(self, place: Place) -> None:
-        data = content(self._file, place)
-        try:
-            inside = unpacked(data)
-        except DamagedChunk as error:
-            begin, end, *_ = CHUNK_HEAD.unpack_from(data)
-            count = self._indexed_after(place)
-            messages = f", {_count(count, 'message')}" if count else ""
-            span = f"t = {begin / NANOSECONDS:g} to {end / NANOSECONDS:g} s"
-            self._lose(f"the chunk at byte {place.begin} ({span}{messages}): {error}")
-            return
-        self._take_inside(inside)
-        self._writer.flush()
-        self._found.chunks += 1
-
-    def _indexed_after(self, place: Place) -> int:
-        """How many messages the indexes behind a chunk speak of."""
-        count = 0
-        for following in walk(self._file, place.end):
-            if following.opcode != MESSAGE_INDEX:
-                break
-            count += len(read_index(content(self._file, following))[1])
-        return count
-
-    def _take_inside(self, inside: bytes) -> None:
+    def _take_records(self, inside: bytes) -> None:
         """Write the records of a chunk."""
         for opcode, start, end in records_of(inside):
             if opcode == MESSAGE:
                 number, sequence, log_time, publish_time = MESSAGE_HEAD.unpack_from(inside, start)
-                new = self._new.get(number) or self._register(number)
+                new = self._new.get(number) or self._new_number(number)
                 if new is None:
                     self._unknown += 1
                     continue
@@ -343,36 +291,26 @@ class _Repair:
                 # Registered when a message comes: those in chunks, which have checksums, before those outside.
                 self._definitions.take(opcode, inside[start:end])
 
-    def _register(self, number: int) -> int | None:
+    def _new_number(self, number: int) -> int | None:
         """The number of a channel in the new file."""
         channel = self._definitions.channels.get(number)
         if channel is None or channel.schema_id and channel.schema_id not in self._definitions.schemas:
             return None
         if number not in self._new:
-            schema = 0
-            if channel.schema_id:
-                schema = self._new_schemas.get(channel.schema_id) or self._new_schema(channel.schema_id)
+            of = self._definitions.schemas.get(channel.schema_id)
+            schema = self._register_schema(of.name, of.encoding, of.data) if of else 0
             encoding = channel.message_encoding
             self._new[number] = self._writer.register_channel(channel.topic, encoding, schema, channel.metadata)
         return self._new[number]
 
-    def _new_schema(self, number: int) -> int:
-        schema = self._definitions.schemas[number]
-        self._new_schemas[number] = self._writer.register_schema(schema.name, schema.encoding, schema.data)
-        return self._new_schemas[number]
-
-    def _lose(self, what: str) -> None:
-        self._found.lost.append(what)
-
 
 def _sound(file: BinaryIO, size: int) -> bool:
     """Whether the index of a finished file is as it was written, by the checksum in its footer."""
-    length = 20
-    file.seek(size - len(MAGIC) - length)
-    summary_start, _, checksum = struct.unpack("<QQI", file.read(length))
+    footer = struct.Struct("<QQI")
+    file.seek(size - len(MAGIC) - footer.size)
+    summary_start, _, checksum = footer.unpack(file.read(footer.size))
     file.seek(summary_start)
-    data = file.read(size - len(MAGIC) - 4 - summary_start)
-    return not checksum or zlib.crc32(data) == checksum
+    return not checksum or zlib.crc32(file.read(size - len(MAGIC) - 4 - summary_start)) == checksum
 
 
 def _count(number: int, what: str) -> str:

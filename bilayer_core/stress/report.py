@@ -10,13 +10,16 @@ from ..record.paths import write_text
 from .case import Outcome, Record
 from .journal import Journal
 from .judge import LARGEST_RESIDUAL, MOST_GAIN, MOST_ITERATIONS, MOST_MADE, MOST_REJECTED
-from .mutations import markdown
 from .region import LARGEST_BEND, LARGEST_MACH, LARGEST_STRAIN
 from .torture import NOT_EXPRESSIBLE, TORTURES
 
 PAGE = "stability.md"
 DATA = Path(__file__).resolve().parents[2] / "docs" / "data"
-SEEDED_BUGS, MUTATED_SCENES = DATA / "mutations.jsonl", DATA / "mutated_scenes.md"
+NOTES = (
+    ("Mutated scenes", "mutated_scenes.md", 'FUZZ_SCENES=10000 pytest -m "" tests/fuzz'),
+    ("Seeded bugs", "seeded_bugs.md", "SEEDED_BUGS='*' pytest -m \"\" tests/mutations"),
+)
+"""Of what is tried in a checkout alone: title, file in `DATA`, and command."""
 LEAST_ACCURATE, MOST_REFUSED, LEAST_REMEDIES = 0.70, 0.05, 0.90
 """Parts of the cases inside the region, and of the remedies tried."""
 
@@ -118,8 +121,7 @@ def _page(journal: Journal) -> Iterator[str]:
     yield from _extremes(records)
     yield from _worst_cases(records)
     yield from _torture_cases(records)
-    yield from _mutated_scenes()
-    yield from _seeded_bugs()
+    yield from _notes()
 
 
 def _outcomes(records: Sequence[Record]) -> Iterator[str]:
@@ -191,26 +193,13 @@ def _torture_cases(records: Sequence[Record]) -> Iterator[str]:
     yield ""
 
 
-def _mutated_scenes() -> Iterator[str]:
-    """What came of scenes with random mutations, as it was noted where they were tried, if this is a checkout."""
-    yield "## Mutated scenes"
-    yield ""
-    if MUTATED_SCENES.exists():
-        yield from MUTATED_SCENES.read_text(encoding="utf-8").splitlines()
-    else:
-        yield '`FUZZ_SCENES=10000 pytest -m "" tests/fuzz` has not been run.'
-    yield ""
-
-
-def _seeded_bugs() -> Iterator[str]:
-    """The results of seeded bugs that the checkout has, if it is one."""
-    yield "## Seeded bugs"
-    yield ""
-    if SEEDED_BUGS.exists():
-        yield from markdown(SEEDED_BUGS)
-    else:
-        yield "`bilayer stress --mutations` has not been run."
+def _notes() -> Iterator[str]:
+    """What came of what is tried in a checkout alone, as it was noted there."""
+    for title, file, command in NOTES:
+        path = DATA / file
+        yield f"## {title}"
         yield ""
+        yield path.read_text(encoding="utf-8") if path.exists() else f"`{command}` has not been run.\n"
 
 
 def _table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> Iterator[str]:

@@ -44,7 +44,6 @@ COMMANDS = [
     (["optimise", "sweep.yaml", "--maximise", "curvature", "--trials", "1", "--out", "best", "--workers", "1"], 0),
     (["fit", "cantilever", "--data", "data.csv", "--parameter", "gravity.2=-20:-1", "--out", "fit"], 0),
     (["stress", "--only", CASE, "--out", "stress", "--workers", "1", "--no-shrink"], 0),
-    (["stress", "--mutations", "--out", "mutations"], 2),  # says that it is for Linux
     (["bench", "--quick", "--only", "scaling", "--out", "bench"], 0),
 ]
 """Arguments and exit codes."""

@@ -231,6 +231,13 @@ def test_an_array_that_deletes_all_first_shows_the_same_markers_after_that(time,
     assert bytes(typestore.serialize_cdr(message, kind)) == plain
 
 
+@pytest.mark.parametrize("name", [name for name in TOPICS if name not in ("energy", TF.name)])
+def test_the_least_size_of_a_message_is_that_without_contacts(name, encoder):
+    frame = synthetic_run.frame(0.0)
+    free = replace(frame, contact_forces=np.zeros_like(frame.contact_forces))
+    assert FrameEncoder(DESCRIPTION).least_size(name) == len(encoder.encode(name, free))
+
+
 def test_display_topics_come_once_in_each_of_their_periods():
     gate = DisplayGate(50.0, 20.0)
     due = [round(time, 2) for time in np.arange(0, 0.3, 0.02) if gate.is_due(float(time))]

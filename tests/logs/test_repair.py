@@ -119,19 +119,27 @@ def test_a_log_with_a_hole_has_only_whole_frames(log, damaged):
     np.testing.assert_array_equal(run.material_frames, whole.material_frames[kept])
 
 
-@pytest.mark.parametrize("what", ["length of a chunk", "length of an index", "zeros", "its first chunk"])
+@pytest.mark.parametrize(
+    "what",
+    ["length of a chunk", "longer chunk", "length of an index", "length in an index", "zeros", "its first chunk"],
+)
 def test_what_comes_after_damage_is_found_again(what, log, damaged):
     data, places = bytearray(log.read_bytes()), chunks_of(log)
     if what == "length of a chunk":
         data[places[1].begin + 4] ^= 0xFF
+    elif what == "longer chunk":
+        length = (places[1].length + 1000).to_bytes(8, "little")
+        data[places[1].begin + 1 : places[1].offset] = length
     elif what == "length of an index":
         data[places[1].end + 2] ^= 0x10
+    elif what == "length in an index":
+        data[places[1].end + 9 + 2] ^= 0x10
     elif what == "zeros":
         data[places[1].begin : places[1].begin + 5000] = bytes(5000)
     else:
         data[places[0].offset + 300] ^= 0xFF
     found, new = damaged(bytes(data))
-    lost_chunks = 0 if what == "length of an index" else 1
+    lost_chunks = 0 if what.startswith("longer") or what.endswith("index") else 1
     assert len(found.lost) == 1 and found.chunks == len(places) - lost_chunks
     assert_strict_readers_open(new, found.messages)
 
