@@ -1,4 +1,4 @@
-"""The source distribution and what it says of itself: files, version, licences."""
+"""The source distribution and what it says of itself: files, version, licences, citation."""
 
 import email
 import re
@@ -9,6 +9,9 @@ import tarfile
 from xml.etree import ElementTree
 
 import pytest
+import yaml
+
+import bilayer_core
 
 LEFT_OUT = {".ci/run", ".gitignore"}
 """Files that only a clone needs."""
@@ -69,9 +72,26 @@ def test_the_notice_has_the_licences_of_what_compiled_kernels_contain(root):
     assert "LLVM (Apache-2.0 WITH LLVM-exception)" in notice and "embedded into an Object form" in notice
 
 
+def test_the_installation_the_citation_and_the_release_notes_name_the_version_of_package_xml(root, version):
+    citation = yaml.safe_load((root / "CITATION.cff").read_text(encoding="utf-8"))
+    released = re.search(r"^## (\S+)$", (root / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)[1]
+    assert citation["version"] == released == bilayer_core.__version__ == version
+
+
 def test_a_link_to_setup_py_finds_the_version_as_well(root, version, tmp_path):
     """colcon's symlink install runs one in a directory of its own."""
     (tmp_path / "setup.py").symlink_to(root / "setup.py")
     command = [sys.executable, "-W", "ignore", "setup.py", "--version"]
     told = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True)
     assert told.stdout.strip() == version
+
+
+def test_the_citation_has_the_keys_of_its_format_and_the_paper(root):
+    citation = yaml.safe_load((root / "CITATION.cff").read_text(encoding="utf-8"))
+    assert citation["cff-version"] == "1.2.0" and citation["license"] == "Apache-2.0"
+    assert citation["message"] and citation["title"] and citation["authors"]
+    (paper,) = citation["references"]
+    assert paper["type"] == "article" and paper["title"] and paper["journal"] == "Advanced Intelligent Systems"
+    assert paper["doi"] == "10.1002/aisy.202500141"
+    names = [author["family-names"] for author in paper["authors"]]
+    assert names == ["Li", "Tong", "Hao", "Zhu", "Wu", "Liu", "Huang"]
