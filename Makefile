@@ -67,7 +67,7 @@ gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.
 clean:  ## Remove .venv and what runs and tests left.
 	rm -rf $(VENV) build install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
 
-$(STAMP): setup.py pyproject.toml | system
+$(STAMP): setup.py pyproject.toml package.xml | system
 	@test -z "$$(ls $(VENV)/installed-with-ros-* 2>/dev/null | grep -vx '$(STAMP)')" || rm -rf $(VENV)
 	$(PYTHON) -m venv $(VENV_OPTIONS) $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip

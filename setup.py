@@ -6,12 +6,15 @@ Used by pip (wheel, editable) and by colcon (``ament_python``, plain and ``--sym
 import sys
 from glob import glob
 from pathlib import Path
+from xml.etree import ElementTree
 
 from setuptools import Distribution, find_packages, setup
 
 NAME = "bilayer_sim_ros"
 # colcon's symlink install runs a link to this file in a directory that has no README.
-README = Path(__file__).resolve().parent / "README.md"
+ROOT = Path(__file__).resolve().parent
+PACKAGE = ElementTree.parse(ROOT / "package.xml").getroot()
+MAINTAINER = PACKAGE.find("maintainer")
 
 # ROS 2 Kilted as wheels. Every distribution is pinned, those that come along as well: wheels of two ROS releases in
 # one environment end in "Caught an unknown exception!" at the first call.
@@ -72,13 +75,26 @@ class WithData(Distribution):
 setup(
     distclass=WithData,
     name=NAME,
-    version="0.1.0",
-    description="Simulator of bilayer soft robots: discrete elastic rods, contact, stimuli; for Python and ROS 2",
-    long_description=README.read_text(encoding="utf-8"),
+    version=PACKAGE.findtext("version"),
+    description=PACKAGE.findtext("description"),
+    long_description=(ROOT / "README.md").read_text(encoding="utf-8"),
     long_description_content_type="text/markdown",
-    license="Apache-2.0",
-    maintainer="bilayer_sim_ros maintainers",
-    maintainer_email="maintainers@bilayer-sim.example",
+    keywords="soft-robotics, bilayer, discrete-elastic-rods, simulation, contact, friction, ros2, mcap",
+    license=PACKAGE.findtext("license"),
+    maintainer=MAINTAINER.text,
+    maintainer_email=MAINTAINER.get("email"),
+    project_urls={"Paper": "https://doi.org/10.1002/aisy.202500141"},
+    classifiers=[
+        "Development Status :: 4 - Beta",
+        "Environment :: Console",
+        "Intended Audience :: Science/Research",
+        "Operating System :: OS Independent",
+        "Programming Language :: Python :: 3 :: Only",
+        "Programming Language :: Python :: 3.11",
+        "Topic :: Scientific/Engineering :: Physics",
+        "Topic :: Scientific/Engineering :: Visualization",
+        "Typing :: Typed",
+    ],
     python_requires=">=3.11",
     packages=find_packages(include=["bilayer_core*", "bilayer_sim_ros*"]),
     package_data={

@@ -44,14 +44,13 @@ def stress(
     Each case ends accurate, stable, refused with a reason, or FAILED. Writes DIR/results.jsonl as results come, then
     a report (stability.md), figures, and the scenes of failures and of the worst cases. Exit code 1 if one fails.
     """
-    from bilayer_core.processes import usable_cores
-
-    workers = workers or usable_cores()
     from bilayer_core.extras import require
+    from bilayer_core.processes import usable_cores
     from bilayer_core.stress import report
     from bilayer_core.stress.journal import Journal, head_of
     from bilayer_core.stress.run import chosen_cases, measure, write
 
+    workers = workers or usable_cores()
     cases = chosen_cases(only, quick, scenes)
     if listed:
         _list(cases)

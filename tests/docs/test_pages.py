@@ -87,6 +87,14 @@ def test_every_decision_of_the_design_is_short(root):
         assert decision.startswith(f"{number}. ") and len(decision.splitlines()) <= 6, decision
 
 
+def test_the_notes_of_every_release_are_short(root):
+    _, *releases = re.split(r"^## ", (root / "CHANGELOG.md").read_text(encoding="utf-8"), flags=re.M)
+    assert releases
+    for notes in releases:
+        lines = notes.splitlines()
+        assert len(lines) <= 30 and max(map(len, lines)) <= 210, lines[0]
+
+
 @pytest.mark.slow
 def test_the_programs_of_the_readme_run(root, tmp_path):
     programs = [block.text for block in blocks(root / "README.md") if block.info == "python"]

@@ -96,6 +96,11 @@ def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
         assert (prefix / "share/bilayer_sim_ros" / name).is_file()
 
 
+def test_an_installation_has_its_licence_and_those_of_compiled_kernels(prefix):
+    (information,) = prefix.glob("lib/python3*/site-packages/bilayer_sim_ros-*.dist-info")
+    assert {"LICENSE", "NOTICE"} <= {path.name for path in information.rglob("*")}
+
+
 @pytest.mark.parametrize("name", EXECUTABLES)
 def test_executables_are_where_ros2_run_looks_for_them(prefix, run, name):
     shown = run(prefix / "lib/bilayer_sim_ros" / name, "--help")
