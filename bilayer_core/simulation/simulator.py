@@ -228,7 +228,7 @@ class Simulator(Controls):
             yield
         finally:
             loaded = loading.cpu - loaded
-            self._compile_time += loaded
+            self._compile_time = (self._compile_time or 0.0) + loaded
             self.cpu_time += clock.thread_time() - cpu - loaded
             self.wall_time += wall_time() - wall
 
