@@ -7,7 +7,6 @@ import math
 import os
 import socket
 import threading
-import time as clock
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from bilayer_core.record.recorder import Recorder
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content
 from bilayer_core.simulation.result import Termination
-from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.simulation.simulator import Simulator, wall_time
 from bilayer_core.sweeps.code import load
 from bilayer_core.sweeps.job import Job, Outcome, Point, Row
 from bilayer_core.sweeps.metrics import FinishedRun, MetricError, measure, name_and_component, quantities_of
@@ -95,7 +94,7 @@ def row_of(job: Job, point: Point) -> Row:
 
 
 def _run(job: Job, point: Point) -> Row:
-    begin = clock.perf_counter()
+    begin = wall_time()
     row = row_of(job, point)
     log = None if job.logs == "none" else Path(job.directory, LOGS, f"{point.number:06d}.mcap")
     try:
@@ -113,7 +112,7 @@ def _run(job: Job, point: Point) -> Row:
         _local.__dict__.clear()  # a simulator in an unknown state is not used again
     if log is not None and log.exists():
         _keep_or_drop(job, log, row)
-    row.wall_time = clock.perf_counter() - begin
+    row.wall_time = wall_time() - begin
     return row
 
 
@@ -124,7 +123,7 @@ def _simulate(job: Job, point: Point, row: Row, begin: float, log: Path | None) 
     observers = [] if log is None else [_recorder(simulator, log)]
     recording = recording_of(job, simulator)
     try:
-        ended = simulator.run(observers=observers, interrupted=lambda: clock.perf_counter() > deadline)
+        ended = simulator.run(observers=observers, interrupted=lambda: wall_time() > deadline)
     finally:
         if recording is not None:
             recording.stop()

@@ -112,7 +112,7 @@ def hang(run):
     ("function", "limits", "told"),
     [
         (hog, {"memory": "700 MB"}, "its process died 2 times; processes are killed beyond 0.7 GB"),
-        (hang, {"wall_time": "2 s"}, "it did not stop within 5 s, and was killed"),
+        (hang, {"wall_time": "4 s"}, "it did not stop within 9 s, and was killed"),
     ],
     ids=["memory", "time"],
 )
