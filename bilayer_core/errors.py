@@ -70,7 +70,7 @@ class ForceError(BilayerError):
 
 @dataclass(frozen=True)
 class Remedy:
-    """What a user can change for a run to go on.
+    """Change that a user can make for a run to go on.
 
     Attributes
     ----------

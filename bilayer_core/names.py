@@ -1,4 +1,4 @@
-"""What names of parts may be: of scenes, and so of rods, bodies, channels and topics in logs."""
+"""Valid names of parts of scenes, and so of rods, bodies, channels and topics in logs."""
 
 from __future__ import annotations
 

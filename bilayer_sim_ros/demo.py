@@ -39,7 +39,7 @@ COMPILATION = 600.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What happened to the ball.
+    """Contact and lift of the ball, and the speed of the simulation.
 
     Attributes
     ----------

@@ -78,7 +78,7 @@ class SimulationNode(ConfiguredNode):
 
     @property
     def ended(self) -> bool:
-        """Whether the simulation has ended, and its files are finished."""
+        """True if the simulation has ended and its files are finished."""
         return self._run.over
 
     @property
@@ -88,7 +88,7 @@ class SimulationNode(ConfiguredNode):
 
     @property
     def compiling(self) -> bool:
-        """Whether kernels are being compiled or loaded."""
+        """True if kernels are being compiled or loaded."""
         return self._run.compiling
 
     def start(self) -> None:

@@ -1,4 +1,4 @@
-"""What a benchmark varies: model, dimension, integrator, and the step or the tolerance, and the mesh.
+"""Parameters that a benchmark varies: model, dimension, integrator, step or tolerance, and mesh.
 
 Models, dimensions and integrators are those that the simulator has; what a scene refuses is left out with its reason.
 """
@@ -20,7 +20,7 @@ FREE_MOTION = "implicit_midpoint"
 
 @dataclass(frozen=True, order=True)
 class Family:
-    """What a user chooses once: all runs of a family differ in step and mesh alone."""
+    """Choices that a user makes once: all runs of a family differ in step and mesh alone."""
 
     model: str
     dimension: int
@@ -34,7 +34,7 @@ class Family:
 
     @classmethod
     def of(cls, record: dict) -> Family:
-        """That of a recorded run."""
+        """Return the family of a recorded run."""
         return cls(*(record[field.name] for field in fields(cls)))
 
 
@@ -62,11 +62,11 @@ class Configuration:
 
     @property
     def tolerance(self) -> float | None:
-        """Of adaptive steps."""
+        """Tolerance of adaptive steps, in lengths of the longest rod; None if steps are fixed."""
         return self.step if self.family.adaptive else None
 
     def identity(self) -> dict[str, object]:
-        """As it stands in records."""
+        """Return the values that identify the configuration in records."""
         return {**vars(self.family), "stations": self.stations, "dt": self.dt, "tolerance": self.tolerance}
 
 

@@ -1,4 +1,4 @@
-"""What figures were measured on: processor, cores, load, versions."""
+"""Machine on which figures were measured: processor, cores, load, versions."""
 
 from __future__ import annotations
 

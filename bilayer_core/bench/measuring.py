@@ -26,7 +26,7 @@ LONGEST = 40.0
 
 @dataclass(frozen=True)
 class Run:
-    """What came of a run.
+    """Result of a run.
 
     Attributes
     ----------

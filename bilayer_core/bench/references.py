@@ -85,14 +85,14 @@ def stored(problem: Problem, model: str) -> Reference:
 
 
 def sharp(problem: str, models: Iterable[str]) -> bool:
-    """Whether the references of a problem for these models are good enough to compare families."""
+    """Return whether the references of a problem for these models are good enough to compare families."""
     entries = read_file()[problem]
     return all(entries[model]["bar"] <= BLURRED for model in models)
 
 
 def fingerprint(problem: Problem) -> str:
-    """Of all that a reference depends on: the scene file without its words and solver settings, the changes, what is
-    measured.
+    """Return a hash of everything that a reference depends on: the scene file without its title, description and solver
+    settings, the changes, the duration and the measure.
     """
     path = bundled_scene(problem.scene)
     scene = read_yaml(read_scene_file(path), str(path))

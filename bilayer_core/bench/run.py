@@ -20,7 +20,7 @@ def names() -> list[str]:
 
 
 def chosen_names(only: Sequence[str], quick: bool) -> list[str]:
-    """What to do, in order.
+    """Return the names of the parts to run, in order.
 
     Raises
     ------

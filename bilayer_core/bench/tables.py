@@ -142,7 +142,7 @@ def _of(content: dict, problem: str) -> list[dict]:
 
 
 def _beside(run: dict | None, tried: list[dict]) -> str:
-    """What a run costs, and its step or tolerance; where none is accurate enough, how near the best comes."""
+    """Return the cost of a run with its step or tolerance; if none is accurate enough, how near the best comes."""
     if run is not None:
         step = f"tolerance {run['tolerance']:g}" if run["dt"] is None else f"{1e3 * run['dt']:g} ms"
         return f"{_seconds(run['cpu_time'])} ({step}, {run['stations']} stations)"
@@ -151,7 +151,7 @@ def _beside(run: dict | None, tried: list[dict]) -> str:
 
 
 def references_table(content: dict) -> list[str]:
-    """What errors are measured against."""
+    """Return the table of the references that errors are measured against."""
     stored = read_file()
     rows = []
     used = dict.fromkeys((run["problem"], run["model"]) for run in content[work_precision.PART])

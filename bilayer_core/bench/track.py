@@ -1,4 +1,4 @@
-"""What is recorded of a run, and the figures by which its error is judged."""
+"""Records of a run, and the figures by which its error is judged."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Trajectory:
 
     @property
     def error_label(self) -> str:
-        """What the error is, in words."""
+        """Description of the error in words."""
         name = {"com": "mass centre"}.get(self.point, self.point)
         return f"rms error of the {name} / length of the rod"
 
@@ -90,7 +90,7 @@ class Trajectory:
         return way[way[:, 0] <= self.until * (1.0 + 1e-9)]
 
     def error(self, found: Array, reference: Array) -> float:
-        """Of `values` against those of a reference."""
+        """Return the error of `found` against `reference`: the rms distance over `length`."""
         return rms_distance(found, reference) / self.length
 
 
@@ -117,7 +117,7 @@ class Headline:
 
     @property
     def error_label(self) -> str:
-        """What the error is, in words."""
+        """Description of the error in words."""
         return f"relative error of {self.name}"
 
     def values(self, track: Track) -> Array:
@@ -125,7 +125,7 @@ class Headline:
         return np.array([[self.figure(track)]])
 
     def error(self, found: Array, reference: Array) -> float:
-        """Of `values` against those of a reference."""
+        """Return the error of `found` relative to `reference`."""
         return float(abs(found[0, 0] - reference[0, 0]) / abs(reference[0, 0]))
 
 

@@ -37,7 +37,7 @@ def check(scene: str, overrides: tuple[str, ...], as_json: bool) -> None:
 
 
 def _report(simulator) -> dict[str, Any]:
-    """What will be computed, as the content of ``check --json``."""
+    """Return a description of the planned computation, as the content of ``check --json``."""
     from bilayer_core.model.findings import told
     from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
@@ -82,7 +82,7 @@ def _report(simulator) -> dict[str, Any]:
 
 
 def _parts(scene) -> dict[str, list[str]]:
-    """What the robot and its surroundings are made of, by name."""
+    """Return descriptions of the parts of the robot and of its surroundings, by name."""
     from bilayer_core.model.findings import few
     from bilayer_core.model.validity import edge_figures
     from bilayer_core.scene.mechanism import resistance

@@ -13,7 +13,7 @@ NO_ORDER = "none seen"
 
 
 def errors_of(study: Study) -> dict[str, Any]:
-    """As it stands in the summary, in SI units; an order that was not seen is None."""
+    """Return the global error as it stands in the summary, in SI units; an order that was not seen is None."""
     figures = {
         row.name: {
             "value": row.values[BASE],

@@ -84,7 +84,7 @@ def optimise(
 
 
 def lines(optimum: Any) -> list[str]:
-    """What a search found, in words."""
+    """Return the result of a search as lines of text."""
     told = [f"best of {optimum.trials} runs: {optimum.metric} {optimum.value:.6g} (run {optimum.best.number})"]
     if optimum.start is not None:
         ratio = f", {optimum.value / optimum.start:.3g} times that" if optimum.start > 0.0 < optimum.value else ""

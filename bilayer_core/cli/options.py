@@ -1,4 +1,4 @@
-"""What the verbs share: the option --debug, types of times, directories of results."""
+"""Parts that the verbs share: the option --debug, types of times, directories of results."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from bilayer_core.errors import InputError
 
 @dataclass
 class Settings:
-    """What holds for the whole program."""
+    """Settings of the whole program."""
 
     debug: bool = False
 

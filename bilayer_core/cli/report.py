@@ -15,7 +15,7 @@ def choices(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
-    """What a user wants to know first.
+    """Yield the lines that a user wants to know first.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def _say_if_too_often(simulator: Simulator, rate: float | None) -> None:
 
 
 def _is_stdout(key: str, options: dict[str, Any]) -> bool:
-    """Whether an output goes to standard output, which then has nothing else."""
+    """Return whether an output goes to standard output, which then has nothing else."""
     return key == "summary" and options[key] == STANDARD_OUTPUT
 
 

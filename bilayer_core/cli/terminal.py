@@ -1,4 +1,4 @@
-"""What verbs print: their own words, with names and texts from files in them."""
+"""Output of verbs: their own words, with names and texts from files in them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What goes on beside a run: signals that ask it to end, its progress, a word about compilation."""
+"""Signals that ask a run to end, its progress, and a notice about compilation."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Interrupt:
             signal.signal(number, handler)
 
     def grant(self) -> bool:
-        """Whether to end now; asked between steps."""
+        """Return whether to end now, and note it in `granted`; called between steps."""
         self.granted = self.wished is not None
         return self.granted
 

@@ -66,8 +66,10 @@ def _square_distance(position, i, s, j):
 
 @kernel
 def _sees(search, a, p, k, touch):
-    """Whether a point p of edge a may touch the segment k of a rod that its own meets: it is far enough along that rod,
-    if this is its own, and where bodies join the two they do not touch by construction.
+    """Return whether a point p of edge a may touch segment k of a rod that its own rod can meet.
+
+    On its own rod, the segment must be far enough along it. If bodies join the two rods, the point and the segment must
+    not touch by construction: their gap at the start of the run must be above `touch` [m].
     """
     own, other, arc = search.edge_rod[a], search.edge_rod[k], search.point_arc[p]
     if own == other and _arc_between(search, own, arc, arc, k) < search.rod_exclusion[own]:
@@ -88,7 +90,7 @@ def _arc_between(search, rod, first, last, k):
 
 
 def scratch(edges: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a search among so many edges writes to: shapes (2 n_leaf, 6), (n_edge, 7), and (2, n_edge), int64."""
+    """Return scratch arrays of a search among edges: shapes (2 n_leaf, 6), (n_edge, 7), and (2, n_edge), int64."""
     leaves = 1 << max(edges - 1, 0).bit_length()
     return np.empty((2 * leaves, 6)), np.empty((edges, 7)), np.empty((2, edges), dtype=np.int64)
 
@@ -99,7 +101,7 @@ GROUP = 4
 
 @kernel
 def _come_near(box, a, b, distance):
-    """Whether two boxes of the tree are nearer than `distance` along each axis."""
+    """Return whether two boxes of the tree are nearer than `distance` [m] along each axis."""
     for c in range(3):
         if box[b, c] >= box[a, 3 + c] + distance or box[b, 3 + c] <= box[a, c] - distance:
             return False
@@ -118,7 +120,7 @@ def _along(position, i, d0, d1, d2):
 
 @kernel
 def _goes_on(search, k, d0, d1, d2, share):
-    """Whether an edge goes by `share` of its arc length at least along a unit vector, at either end of its motion."""
+    """Return whether an edge goes `share` of its arc length or more along a unit vector, at both ends of its motion."""
     i, least = search.edge_node[k], share * (search.edge_arc[k, 1] - search.edge_arc[k, 0])
     return _along(search.base, i, d0, d1, d2) >= least and _along(search.tip, i, d0, d1, d2) >= least
 

@@ -88,7 +88,7 @@ def _seen_from(position, axes, s, x, a):
 
 @kernel
 def _crosses_within_step(surfaces, at, a, s):
-    """Whether the edge behind node a goes through surface s at the end of a step, or at a moment within it."""
+    """Return whether the edge behind node a goes through surface s at the end of a step, or at a moment within it."""
     x, position, axes = surfaces.first_position, surfaces.first_surface_position, surfaces.first_surface_rotation
     a0, b0 = _seen_from(position, axes, s, x, a), _seen_from(position, axes, s, x, a + 1)
     x, position, axes = at.position, at.surface_position, at.surface_rotation
@@ -129,7 +129,7 @@ def _distance(surfaces, s, a, b, t):
 
 @kernel
 def _goes_through(surfaces, s, a, b):
-    """Whether what is between points a and b of the frame of surface s, which are outside, is inside of it."""
+    """Return whether the line between points a and b, outside of surface s and in its frame, enters the surface."""
     first, last = 0.0, 1.0
     low, fall = _distance(surfaces, s, a, b, first)
     high, rise = _distance(surfaces, s, a, b, last)

@@ -55,7 +55,7 @@ def _step(z):
 
 @kernel
 def _covered_by_edge(light, e, x, toward, soft):
-    """What edge e hides from x."""
+    """Return the part of the light from the direction `toward` that edge e hides from x."""
     i = light.edge_node[e]
     a, b = row(light.node_position, i), row(light.node_position, i + 1)
     r = 0.5 * (a[0] + b[0]) - x[0], 0.5 * (a[1] + b[1]) - x[1], 0.5 * (a[2] + b[2]) - x[2]
@@ -85,7 +85,7 @@ def _covered_by_edge(light, e, x, toward, soft):
 
 @kernel
 def _covered_by_shape(light, s, x, toward, soft):
-    """What the surface s hides from x."""
+    """Return the part of the light from the direction `toward` that the surface s hides from x."""
     b, kind, rounding = light.body[s], light.kind[s], light.rounding[s]
     p, axes = light.position[s], light.body_rotation
     r = (

@@ -84,7 +84,7 @@ def _stray(search, position, step, fraction):
 
 @kernel
 def list_serves(rods, position, step, fraction, move):
-    """Whether the list holds all pairs nearer than the barrier distance at x + β step, 0 ≤ β ≤ `fraction`.
+    """Return whether the list holds all pairs nearer than the barrier distance at x + β step, 0 ≤ β ≤ `fraction`.
 
     Parameters
     ----------

@@ -25,7 +25,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Estimate:
-    """Of the run in the middle, that which the user asked for.
+    """Error estimate of the run in the middle, the one that the user asked for.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ NEGLIGIBLE = 1e-3
 
 
 class Watch:
-    """What has to be seen of a run at every step, for its figures.
+    """Observer that collects the data for a run's figures at every step.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Watch:
 
 
 def is_event(name: str) -> bool:
-    """Whether a quantity is the time of a contact, which is known to within a step."""
+    """Return whether a quantity is the time of a contact, which is known to within a step."""
     return name.endswith(("take_off", "first_contact"))
 
 

@@ -230,7 +230,7 @@ def _run(text: str, overrides: Sequence[str], duration: float, start: np.ndarray
 
 
 def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run], resolution: float) -> Row:
-    """What the runs say of a quantity that no single one of them knows better than to its `resolution`."""
+    """Return the row of a quantity from all runs, none of which alone knows it better than to its `resolution`."""
     values = {run: figures[name] for run, figures in found.items() if name in figures}
 
     def judge(coarser: str, finer: str, size: Callable[[Run], float]) -> Estimate:

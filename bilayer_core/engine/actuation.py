@@ -1,4 +1,4 @@
-"""What acts from outside over time: stimuli, loads and prescribed paths, evaluated at the stages of steps.
+"""Actuation from outside over time: stimuli, loads and prescribed paths, evaluated at the stages of steps.
 
 Each schedule is given as its next spans (`scene.spans.Span`), as far as a horizon. Two times that differ by less than
 `same` [s] count as one. Where a schedule jumps, a step that ends there has its value from before, to its end.
@@ -73,7 +73,7 @@ def _span_until(spans, row, time):
 
 @kernel
 def _any_jumps(spans, time, same):
-    """Whether a schedule jumps at a time; see `Span.jump_to`."""
+    """Return whether any schedule jumps at a time [s]; see `Span.jump_to`."""
     for row in range(spans.shape[0]):
         k = _span_until(spans, row, time - same)
         end = spans[row, k, UNTIL]
@@ -118,7 +118,9 @@ def take_first_stimuli(actuation, begin, same, inputs):
 
 @piece(int, Actuation, Vector, float, float, float, StageInputs)
 def drive_step(actuation, nodes, begin, h, same, inputs):
-    """What acts at the stages of a step of length `h` [s] that begins at `begin` [s]."""
+    """Write to `inputs` the stimuli, load factors and prescribed motions at the stages of a step of length `h` [s] that
+    begins at `begin` [s].
+    """
     for n in range(nodes.shape[0]):
         inputs.elapsed[n] = nodes[n] * h
         time = begin + nodes[n] * h
@@ -176,7 +178,7 @@ def _follow_paths(paths, time, position, rotation, rates):
 
 @kernel
 def stimulus_has_jumped(drives, state, first, ranges, h):
-    """Whether a stimulus has jumped that some layer follows at once in a step of length `h` [s]."""
+    """Return whether a stimulus has jumped that some layer follows at once in a step of length `h` [s]."""
     for k in range(drives.law_channel.shape[0]):
         channel = drives.law_channel[k]
         change = first[channel] - state.transduction[k]

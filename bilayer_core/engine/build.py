@@ -115,14 +115,14 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
 
 
 def _least_energy(model: Model) -> float:
-    """That of a small fall of everything, and of strains that are rounding [J]."""
+    """Return the energy of a small fall of everything, plus that of strains that are rounding [J]."""
     fall = LEAST_FALL * max(rod.path.length for rod in model.scene.rods)
     weight = (model.node_mass.sum() + model.bodies.mass.sum()) * np.linalg.norm(model.scene.gravity)
     return float(fall * weight + ROUNDING_STRAIN**2 * (model.axial_stiffness @ model.rest_length))
 
 
 def plane_of(model: Model, sizes: dict[str, int], hessians: dict[str, Array]) -> Plane:
-    """What dimension 2 has, with its second derivatives."""
+    """Return the record of the parts that only dimension 2 has, with its second derivatives."""
     plane = model.plane
     return Plane.zeros(sizes, normal=plane.normal, side=plane.side, joint_after=plane.joint_after, **hessians)
 

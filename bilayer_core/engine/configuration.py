@@ -107,7 +107,7 @@ def _update_surfaces(surfaces, at):
 
 @piece(int, Problem, Configuration)
 def update_attached(p, at):
-    """What bodies carry, to where these are: free ones take their place in the list of all first."""
+    """Move the parts that bodies carry to where these are; free bodies take their place in the list of all first."""
     bodies = p.bodies
     for f in range(bodies.body_of_free.shape[0]):
         b = bodies.body_of_free[f]

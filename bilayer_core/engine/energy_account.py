@@ -221,7 +221,7 @@ def _inertial(p, stage, at):
 
 @kernel
 def _after_last_correction(p, stage, at):
-    """What V has more at the minimum, `at`, than where it was evaluated, before Newton's last correction δ [J].
+    """Return V at the minimum, `at`, less V where it was evaluated, before Newton's last correction δ [J].
 
     With the gradient g there, Hδ = −g: the potential falls by −(1 − α/2) α g·δ if the part α of δ was gone, and what
     inertia does not have of that, V has, or forces of friction do.
@@ -286,7 +286,7 @@ def close_step_account(p, state, work, h, beyond, end):
 
 @kernel
 def _too_much(p, made, gain, allowed, small):
-    """What a step makes that gains so much, and with the steps before it so much [J]."""
+    """Return NONE, SOME or MUCH for a step that gains `gain` [J], and with the steps before it `made` [J]."""
     if made <= allowed or gain <= small * allowed:
         return NONE
     p.outcome.figures[GAINED] = made / allowed

@@ -127,7 +127,7 @@ class Engine:
         )
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
-        """What is asked of a state at rest (`engine.modes`), with what acts set before."""
+        """Carry out a request (`engine.modes`) on a state at rest, with the drive set before, and return its report."""
         self._storage.set_friction(state.friction)
         while True:
             run = self._parts_for(state)
@@ -141,7 +141,7 @@ class Engine:
         return IntegrationReport(1, status, counts[PAIR], *numbers, float(figures[RESIDUAL]))
 
     def _parts_for(self, state: State) -> Integration:
-        """What compiled steps take; the same object as long as all parts are."""
+        """Return the record that compiled steps take; the same object as long as all its parts are the same."""
         problem, parts = self._storage.problem, self._integration
         known = parts is not None and parts.problem is problem and parts.actuation is self.actuation
         if not known or state is not self._state:
@@ -187,7 +187,7 @@ class Engine:
 
     @property
     def sums(self) -> Sums:
-        """What forces added at the configuration evaluated last."""
+        """Sums that forces added at the configuration evaluated last."""
         return self._storage.problem.sums
 
     @property
@@ -216,7 +216,7 @@ class Engine:
         return np.any(self.sums.contact_point != 0.0, axis=1)
 
     def who_blocks(self, pair: int) -> str:
-        """What a message says of the near pair that blocks prescribed motion."""
+        """Return the clause of a message that names the near pair which blocks prescribed motion."""
         if pair < 0:
             return "a rod would reach another"
         near = self._storage.problem.surfaces
@@ -234,7 +234,7 @@ class Engine:
         return int(self._storage.problem.system.negative[0])
 
     def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
-        """What acts on the state in modes other than steps."""
+        """Set the rest strains and load factors that act on the state in modes other than steps."""
         stage = self._work.stage
         stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
 
@@ -277,7 +277,7 @@ def new_inputs(model: Model, sizes: dict[str, int], ends: int) -> StageInputs:
 
 
 def error_norm_of(model: Model) -> ErrorNorm:
-    """What the defect of a model's steps is measured on."""
+    """Return the error norm that measures the defect of a model's steps."""
     ends = [strand.first_node for strand in model.strands] + [model.node_count]
     shares = np.array(model.node_length)
     return ErrorNorm(

@@ -35,7 +35,7 @@ from ..model.records.step import StateArrays
 
 @record
 class ErrorNorm:
-    """What the defect of a step is measured on, and with."""
+    """Nodes, edges and bodies on which the defect of a step is measured, with weights and lengths."""
 
     length: float  # of the longest rod [m]
     first_node: Indices  # of each strand, last the number of nodes, shape (n_strand + 1,)
@@ -103,7 +103,7 @@ def _of_nodes(weight, before, after, half, first, last):
 
 @kernel
 def _of_edges(half_width, weight, before, after, half, first, last, strand):
-    """That of the borders of its edges by their turn [m²]."""
+    """Return the mean square of D along a strand for the borders of its edges, by their turn [m²]."""
     if half_width.shape[0] == 0:
         return 0.0
     total = 0.0

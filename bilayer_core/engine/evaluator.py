@@ -80,7 +80,7 @@ class Evaluator:
 
     @property
     def sums(self) -> Sums:
-        """What forces added in the last evaluation."""
+        """Sums that forces added in the last evaluation."""
         return self.problem.sums
 
     def _grow(self, status: int) -> None:

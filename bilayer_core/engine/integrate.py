@@ -61,7 +61,7 @@ class Clock:
 
 @record
 class StepControl:
-    """What decides on lengths of steps."""
+    """Settings that decide on the lengths of steps."""
 
     dt: float  # length of fixed steps; 0 for adaptive ones [s]
     order: int  # of the integrator
@@ -76,7 +76,7 @@ class StepControl:
 
 @record
 class Counts:
-    """What came of steps, added up until they are cleared."""
+    """Counts and figures of steps, added up until they are cleared."""
 
     numbers: (
         Indices  # iterations, factorisations, settlings, attempts refused, of these for errors, restarts, for energy;
@@ -165,7 +165,7 @@ def _begin_again_after_jump(run):
 
 @kernel
 def _has_to_start(run, h):
-    """Whether the method needs stage derivatives of the step before, and there are none that hold."""
+    """Return whether the method needs stage derivatives of the step before, and there are none that hold."""
     if not run.method.history:
         return False
     no_history, drives = run.state.has_history[0] == 0.0, run.problem.drives

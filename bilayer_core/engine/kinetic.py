@@ -10,7 +10,7 @@ from ..kinematics.vector import row
 
 @kernel
 def kinetic_energy(p, state):
-    """Of nodes, of edges about their tangents, and of free bodies [J]."""
+    """Return the kinetic energy of nodes, of edges about their tangents, and of free bodies [J]."""
     strands, bodies, energy = p.strands, p.bodies, 0.0
     for i in range(strands.node_mass.shape[0]):
         v0, v1, v2 = row(state.velocity, i)

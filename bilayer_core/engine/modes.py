@@ -1,4 +1,4 @@
-"""What may be asked of a state at rest, and of Newton's method."""
+"""Requests that can be made of a state at rest, and of Newton's method."""
 
 from __future__ import annotations
 

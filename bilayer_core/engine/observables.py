@@ -1,4 +1,4 @@
-"""What an observer sees at the end of a step that a state does not say: strains, contact, clamps, kinetic energy.
+"""Quantities seen at the end of a step beyond the state: strains, contact, clamps, kinetic energy.
 
 All of it is computed at once by the thread that makes steps, into one piece of memory: that costs less than to copy
 for another thread what it is computed of.
@@ -86,7 +86,7 @@ def observe(p, joints, state, at, out):
 
 @kernel
 def _observe_strains(p, at, out):
-    """Of nodes."""
+    """Write the strains and the curvatures [1/m] of nodes to `out`."""
     strands, strain, curvature = p.strands, out.strain, out.curvature
     for k in range(out.node.shape[0]):
         a, b = out.edges[k, 0], out.edges[k, 1]
@@ -104,7 +104,10 @@ def _observe_strains(p, at, out):
 
 @kernel
 def _observe_contact(p, joints, out):
-    """Of nodes, points and bodies; joints and mechanisms are in the sums of bodies too."""
+    """Write the contact forces on nodes and points [N] and the contact wrenches on bodies [N, N m] to `out`.
+
+    The sums of bodies include joints and mechanisms, so these are taken out.
+    """
     for i in range(out.contact_force.shape[0]):
         for c in range(3):
             out.contact_force[i, c] = -p.sums.contact_point[i, c]
@@ -151,7 +154,7 @@ def _observe_clamps(p, at, out):
 
 @kernel
 def _observe_touching(p, out):
-    """What is nearer to something else than the barrier distance; each pair of owners once."""
+    """Write the pairs of owners that are nearer to each other than the barrier distance to `out`, each pair once."""
     surfaces, rods, of_point, count = p.surfaces, p.rod_contact, out.owner_of_point, 0
     if surfaces.exists:
         for k in range(surfaces.near_count[0]):

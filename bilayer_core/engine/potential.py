@@ -17,7 +17,7 @@ from .linear.attachments import condense_gradient
 
 
 def _signature(result, *more):
-    """Of a piece of a force, which takes its own record first."""
+    """Return the signature of a piece of a force, which takes its own record first."""
     records = (record.numba_type() for record in (Problem, Configuration, Stage))
     return result(types.int64, *records, *more)
 

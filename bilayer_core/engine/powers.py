@@ -65,7 +65,9 @@ def _turning_power(gradient, b, rates):
 
 @kernel
 def _power_of_prescribed(p, at, rates):
-    """What prescribed bodies supply [W]: forces and moments that they take, ∂Φ/∂(X, φ), times their velocities."""
+    """Return the power that prescribed bodies supply [W]: forces and moments that they take, ∂Φ/∂(X, φ), times their
+    velocities.
+    """
     sums, constrained, power = p.sums, p.constrained, 0.0
     for i in range(p.bodies.prescribed.shape[0]):
         b = p.bodies.prescribed[i]
@@ -114,7 +116,9 @@ def _add_velocity(rates, b, x, at, sign, velocity_out):
 
 @kernel
 def _power_of_barriers(p, at, point, rates):
-    """What barriers and limits take up at the velocities of a stage's end [W]: ∂V/∂d times the rates of gaps."""
+    """Return the power that barriers and limits take up at the velocities of a stage's end [W]: ∂V/∂d times the rates
+    of gaps.
+    """
     surfaces, rods, sums, mechanisms, power = p.surfaces, p.rod_contact, p.sums, p.mechanisms, 0.0
     for k in range(mechanisms.slides.shape[0]):
         power += mechanisms.limit_slope[k] * point.strain_rate[mechanisms.first + k]

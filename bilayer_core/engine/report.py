@@ -37,7 +37,7 @@ FAILURES = {
 
 @dataclass(frozen=True)
 class IntegrationReport:
-    """What some steps took, and why there were no more.
+    """Account of some steps, with the reason why there were no more.
 
     Attributes
     ----------
@@ -102,12 +102,12 @@ class IntegrationReport:
 
     @property
     def converged(self) -> bool:
-        """Whether all that was asked for was done."""
+        """True if everything that was asked for was done."""
         return self.status == CONVERGED
 
     @property
     def failed(self) -> bool:
-        """Whether the step after those made failed."""
+        """True if the step after those made failed."""
         return self.status in FAILURES
 
 

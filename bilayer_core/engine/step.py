@@ -68,7 +68,7 @@ def _compare_touched(sums, touched):
 
 @piece(int, Problem, StateArrays, StageInputs, int, Work)
 def drive_stage(p, state, inputs, n, work):
-    """What acts from outside at stage n of a step."""
+    """Write the drive from outside at stage n of a step to `work`: strains of laws, rest strains and load factors."""
     drives, stage, transduction, strain = p.drives, work.stage, work.transduction, work.strain
     if p.light.exists:
         see_light(p.light, state, inputs.elapsed[n])

@@ -339,7 +339,7 @@ def _si(unit: str) -> str:
 
 
 def _name(match: re.Match[str]) -> str:
-    """Of the quantity with node and component, without the unit."""
+    """Return the name of the quantity with node and component, without the unit."""
     node, label = match["node"], match["label"]
     return match["name"].strip() + (f"[{node}]" if node is not None else "") + (f".{label}" if label else "")
 

@@ -287,7 +287,9 @@ _TERMINATIONS = {
 
 
 def _weights(data: Data) -> Array:
-    """Of residuals, shape (times, columns), 0 where data are missing: 1/σ, or if that is not known 1/spread of all."""
+    """Return the weights of residuals, shape (times, columns), 0 where data are missing: 1/σ, or if that is not known
+    1/spread of all.
+    """
     observed, present = data.observed, data.present
     if data.sigma is not None:
         return np.where(present, 1.0 / np.where(present, data.sigma, 1.0), 0.0)

@@ -65,7 +65,7 @@ class Step:
 
 @dataclass(frozen=True)
 class _Roughness:
-    """What a table tells: its spacing, the noise, and the size of the third derivative or a bound of it."""
+    """Roughness of a table: its spacing, the noise, and the size of the third derivative or a bound of it."""
 
     spacing: float
     noise: float
@@ -122,7 +122,7 @@ def _row(start: Array, k: int, spacing: float, places: Sequence[int]) -> list[Ar
 
 
 def _of_table(values: Array, spacing: float, weights: Array) -> _Roughness:
-    """What a table of shape (points, times, columns) tells."""
+    """Return the roughness of a table of shape (points, times, columns)."""
     table = _weighted(values, weights)
     order = len(TABLE) - 1
     noise = _root_mean_square(np.diff(table, n=order, axis=0)) / sqrt(comb(2 * order, order))

@@ -168,14 +168,14 @@ def _change(path: str, bound: Any) -> Override:
 
 
 def _at(content: dict[str, Any], change: Override) -> Any:
-    """What a scene has at a path; SceneError if there is no such path."""
+    """Return the value at a path in a scene, or raise SceneError if there is no such path."""
     marked, mark = copy.deepcopy(content), object()
     Override(change.keys, mark, change.text).apply(marked)
     return _found(content, marked, mark)
 
 
 def _found(content: Any, marked: Any, mark: object) -> Any:
-    """What stands in `content` where `marked` has the mark."""
+    """Return the value in `content` at the place where `marked` has the mark; `_NOWHERE` if it has none."""
     pairs = content.items() if isinstance(content, dict) else enumerate(content)
     for key, held in pairs:
         if marked[key] is mark:

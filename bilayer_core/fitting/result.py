@@ -1,4 +1,4 @@
-"""What a fit found."""
+"""Result of a fit."""
 
 from __future__ import annotations
 

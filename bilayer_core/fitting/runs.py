@@ -35,7 +35,7 @@ def known_quantities(simulator: Simulator) -> tuple[dict[str, Entry], dict[str, 
 
 
 def value_of(column: Column, frame: Frame) -> float:
-    """What a frame has of a column, in double precision."""
+    """Return the value of a column in a frame, in double precision."""
     held = getattr(frame, column.entry.attribute)
     values = held[column.entry.index]
     return float(values[column.place] if column.place else values)
@@ -69,7 +69,7 @@ class Runs:
         self.refused: list[tuple[Array, BilayerError]] = []
 
     def evaluate_many(self, points: Sequence[Array]) -> list[Outcome]:
-        """What runs come to.
+        """Return the outcomes of runs at several points.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class Runs:
         return [self._made(point) for point in points]
 
     def evaluate(self, point: Array) -> Array:
-        """What one run comes to.
+        """Return the values of one run at the times of the data, shape (times, columns).
 
         Raises
         ------
@@ -109,7 +109,7 @@ class Runs:
         return self.demand([point])[0]
 
     def demand(self, points: Sequence[Array]) -> list[Array]:
-        """What runs come to that a fit cannot do without; errors are those of `evaluate`."""
+        """Return the values of runs that a fit cannot do without; raise the errors of `evaluate`."""
         found = []
         for point, outcome in zip(points, self.evaluate_many(points), strict=True):
             if isinstance(outcome, BilayerError):

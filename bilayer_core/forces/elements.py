@@ -24,7 +24,7 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def acts_viscously(p):
-    """Whether viscosity is there, and selected."""
+    """Return whether viscosity exists and is selected."""
     return p.viscosity.exists and p.sums.selected[VISCOSITY]
 
 
@@ -89,7 +89,7 @@ def slot_of_pair(strands, k, c):
 
 @kernel
 def act_together(elastic, beta, rest, origin):
-    """Of elasticity, if selected, and viscosity: 1 + β, and the strain from which they act together."""
+    """Return 1 + β for elasticity, if selected, and viscosity, and the strain from which they act together."""
     weight = beta + elastic
     if weight == 0.0:
         return 0.0, 0.0

@@ -1,4 +1,4 @@
-"""What joints and mechanisms have in common: second derivatives of two bodies, and how stiff they are by default."""
+"""Functions common to joints and mechanisms: second derivatives of two bodies, and default stiffnesses."""
 
 from __future__ import annotations
 

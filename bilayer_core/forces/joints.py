@@ -219,7 +219,7 @@ def joints_of(model: Model) -> Joints:
 
 
 def _directions(joint: Joint) -> np.ndarray:
-    """Of either body: the axis, which of a weld or a pin may be any, and two across, shape (2, 3, 3)."""
+    """Return for either body the axis, any for a weld or a pin, and two directions across it, shape (2, 3, 3)."""
     first = np.array(joint.axis if joint.axis is not None else (1.0, 0.0, 0.0))
     second = np.array(joint.second_axis if joint.second_axis is not None else first)
     return np.stack([[axis, across(axis), np.cross(axis, across(axis))] for axis in (first, second)])

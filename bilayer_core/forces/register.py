@@ -82,7 +82,7 @@ class Term:
 
     @property
     def lasts(self) -> bool:
-        """Whether it stays as it is while others are made anew."""
+        """True if the term stays as it is while others are made anew."""
         return self.update_lagged is None and self.settle is None
 
 

@@ -34,7 +34,7 @@ def node_of(surfaces, i):
 
 @kernel
 def has_arm(surfaces, i):
-    """Whether a contact point is a rod's with an arm from a node."""
+    """Return whether contact point i is that of a rod with an arm from a node."""
     return surfaces.rod_points.exists and i >= surfaces.rod_points.first
 
 
@@ -122,7 +122,7 @@ def add_to_edges(surfaces, strands, i, g, k, rate, gradient_out):
 
 @kernel
 def _moved(rate, k, first, c, x, y, z, angle):
-    """What an edge moves component c of an arm by."""
+    """Return the displacement of component c of an arm by the motion of an edge [m]."""
     return rate[k, c, first] * x + rate[k, c, first + 1] * y + rate[k, c, first + 2] * z + rate[k, c, first + 3] * angle
 
 

@@ -153,7 +153,7 @@ def add_rod_friction(rods, p, at, stage, with_hessian):
 
 @kernel
 def rods_touch(rods):
-    """Whether any contacts were found."""
+    """Return whether any contacts of rods were found."""
     return rods.exists and rods.contacts.count[0] > 0
 
 

@@ -44,7 +44,7 @@ from .elements import (
 
 @kernel
 def _energies(stiffness, elastic, beta, strain, rest, origin):
-    """What elasticity has less than was counted for both together, and what viscosity has [J]."""
+    """Return the elastic energy less the energy counted for both together, and the viscous energy [J]."""
     weight, neutral = act_together(elastic, beta, rest, origin)
     of_elasticity = 0.5 * elastic * stiffness * (strain - rest) ** 2
     of_viscosity = 0.5 * beta * stiffness * (strain - origin) ** 2

@@ -1,4 +1,4 @@
-"""What an integrator is here: a diagonally implicit method, whose stages are minima of incremental potentials.
+"""Integrators: diagonally implicit methods, whose stages are minima of incremental potentials.
 
 For ẏ = f(t, y) over a step of length h, with y a position or a momentum,
 

@@ -46,7 +46,7 @@ _log = logging.getLogger(__name__)
 
 @cache
 def fingerprint() -> str:
-    """Of all that compiled code depends on."""
+    """Return a hash of everything that compiled code depends on."""
     digest = hashlib.blake2b(digest_size=12)
     settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] != CACHE_DIR)
     settings.append(("BILAYER_JIT_PUBLIC", os.environ.get("BILAYER_JIT_PUBLIC", "0")))

@@ -42,7 +42,7 @@ LONGEST = {
 
 
 def is_complete() -> bool:
-    """Whether all pieces are in the cache, or nothing is kept at all."""
+    """Return whether the cache holds all pieces, or nothing is kept at all."""
     folder = cache_folder()
     return folder is None or (folder / COMPLETE).exists()
 
@@ -119,7 +119,7 @@ class _Worker(threading.Thread):
         self._ended = False
 
     def run(self) -> None:
-        """Until nothing is left, or something fails, which `done` takes."""
+        """Have the process compile until nothing is left or something fails; `done` takes each name, or the failure."""
         path = os.pathsep.join([str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])])
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", WORKER],  # -P: not what has the package's name in the present folder

@@ -98,7 +98,7 @@ class Piece:
 
 
 class Loading(threading.local):
-    """What the loading of pieces took in this thread, and how it failed.
+    """Time and errors of loading pieces in this thread.
 
     Attributes
     ----------

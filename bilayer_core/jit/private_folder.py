@@ -1,4 +1,4 @@
-"""Whether other users can put files into a folder.
+"""Exposure of a folder: whether other users can put files into it.
 
 numba's index of compiled code is a pickle, and reading a pickle runs the code that it names. Whoever can write to the
 folder of the cache can therefore run programs as the user who reads it.

@@ -64,7 +64,7 @@ _WORD_TYPE, _BYTES = ir.IntType(8 * WORD), ir.IntType(8).as_pointer()
 
 
 def _word_count(kind: types.Type) -> int:
-    """Of a field."""
+    """Return the number of words that a field takes."""
     return 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
 
 
@@ -127,7 +127,7 @@ class Record:
 
     @property
     def exists(self) -> bool:
-        """Whether the scene has it."""
+        """True if the scene has the part that the record describes."""
         return bool(self._memory[0])
 
     @classmethod
@@ -283,7 +283,7 @@ def _address(array: np.ndarray) -> int:
 
 
 def _words(value: Any, of: types.Type, dtype: np.dtype | None, name: tuple[str, str]) -> list[int]:
-    """What stands in memory for a value, of an array's `dtype`."""
+    """Return the words in memory for a value, which must be an array of type `dtype` unless that is None."""
     if dtype is not None:
         if isinstance(value, np.ndarray) and value.ndim == of.ndim and value.dtype == dtype:
             memory = value.__array_interface__

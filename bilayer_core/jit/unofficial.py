@@ -1,4 +1,4 @@
-"""What is used of numba beyond its documentation: two shortcuts, each with what it is worth.
+"""Uses of numba beyond its documentation: two shortcuts, each with the time that it saves.
 
 ``BILAYER_JIT_PUBLIC=1`` runs without them; the tests do so once.
 

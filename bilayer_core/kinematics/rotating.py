@@ -77,7 +77,7 @@ def compose_quaternion(v0, v1, v2, turned, out, f):
 
 @kernel
 def real_part(turned, f):
-    """Of the unit quaternion with the vector part turned[f], by less than half a turn."""
+    """Return the real part of the unit quaternion with vector part turned[f], a rotation by less than half a turn."""
     return math.sqrt(max(1.0 - turned[f, 0] ** 2 - turned[f, 1] ** 2 - turned[f, 2] ** 2, 0.0))
 
 

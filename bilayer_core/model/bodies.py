@@ -80,7 +80,7 @@ def _bounding_radii(
 
 
 def guided_motions(motion: Guided, motions: np.ndarray) -> np.ndarray:
-    """What a rail, a hinge and a pin leave of the motions (X, φ) of a body, a column each, shape (6, ·)."""
+    """Return the motions (X, φ) of a body that a rail, a hinge and a pin leave, a column each, shape (6, ·)."""
     columns = []
     if motion.axis is not None:
         columns.append([*motion.axis, 0.0, 0.0, 0.0])

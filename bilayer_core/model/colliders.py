@@ -24,7 +24,7 @@ class Mobility(IntEnum):
 
 @dataclass(frozen=True)
 class Collider:
-    """What carries points, a surface, or both.
+    """Object of a scene that carries points, a surface, or both.
 
     Attributes
     ----------
@@ -64,13 +64,13 @@ def colliders(scene: SceneConfig) -> tuple[list[Collider], list[Collider]]:
 
 
 def points_can_collide(point: Collider, surface: Collider) -> bool:
-    """Whether nodes or contact points of one can meet the surface of another: one of the two must move."""
+    """Return whether nodes or contact points of one can meet the surface of another: one of the two must move."""
     return surface.kind != "" and point.order != surface.order and max(point.mobility, surface.mobility) > 0
 
 
 def shapes_can_collide(point: Collider, surface: Collider) -> bool:
-    """Whether the centre of a ball, corners or rims of one are to meet the surface of another: one of them must be
-    free.
+    """Return whether the centre of a ball, corners or rims of one are to meet the surface of another: one of them must
+    be free.
 
     Against a ball its own centre is all that is needed, and of two balls the first of the bodies has it.
     """
@@ -121,7 +121,7 @@ def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[ContactPair, ...
 
 
 def is_ribbon(rod: Rod) -> bool:
-    """Whether a rod is wider than thick somewhere."""
+    """Return whether a rod is wider than thick somewhere."""
     return rod.keep("ribbon", (), lambda: _is_ribbon(rod))
 
 

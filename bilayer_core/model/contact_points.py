@@ -207,7 +207,7 @@ def _from_clamp(node: int, strand: StrandArrays, gap: np.ndarray, clear: float) 
 
 
 def contact_point_names(model: Model) -> list[str]:
-    """What each contact point is called in messages."""
+    """Return the name of each contact point in messages."""
     names = [f"node {k} of {s.name}" for s in model.strands for k in range(s.node_count)]
     parts = [*model.bodies.names, "an obstacle"]
     contact_points = model.contact_points

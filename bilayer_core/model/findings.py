@@ -1,4 +1,4 @@
-"""What is said of a scene, a line for each kind: where its worst case is, and how many others there are."""
+"""Findings about a scene, a line for each kind: where its worst case is, and how many others there are."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ class Told(Protocol):
 
     @property
     def superlative(self) -> str:
-        """What the one with the largest severity is among several."""
+        """Word for the one with the largest severity among several."""
         ...
 
     def line(self, where: str) -> str:
-        """What is said, with the text that names the place."""
+        """Return the message about a place, in which the text `where` names the place."""
         ...
 
 
@@ -48,7 +48,7 @@ class Finding:
     superlative = "worst"
 
     def line(self, where: str) -> str:
-        """What is said, with the text that names the place."""
+        """Return the message about a place, in which the text `where` names the place."""
         return f"{self.before}{where}{self.after}"
 
 

@@ -22,7 +22,7 @@ from .rod_pairs import RodPair, rod_pairs
 
 
 class Kind(Enum):
-    """What the energy of a force means, and on which side of the energy budget its work stands."""
+    """Meaning of the energy of a force, and the side of the energy budget on which its work stands."""
 
     CONSERVATIVE = "energy of the configuration"
     DISSIPATIVE = "potential of the velocity; its work is lost"
@@ -50,7 +50,7 @@ class Question:
 
     @property
     def rods_touch(self) -> bool:
-        """Whether the contact of any rods is computed."""
+        """True if the contact of any rods is computed."""
         return any(rod_pair.active for rod_pair in self.rod_pairs)
 
     def loads(self, frame: str) -> list[Load]:
@@ -212,7 +212,7 @@ _ON_NODES = frozenset(force.name for force in FORCES if force.on_nodes)
 
 
 def planned(scene: SceneConfig, model: str, dimension: int) -> dict[str, str]:
-    """What becomes of each force: ``"active"`` or ``"skipped: reason"``."""
+    """Return the status of each force by name: ``"active"`` or ``"skipped: reason"``."""
     return dict(
         scene.keep(("forces", model, dimension), (FORCES,), lambda: _planned(Question(scene, model, dimension)))
     )
@@ -230,12 +230,12 @@ def active_forces(scene: SceneConfig, model: str, dimension: int) -> tuple[str, 
 
 
 def on_nodes(forces: Iterable[str]) -> bool:
-    """Whether any of some forces has second derivatives by positions of nodes."""
+    """Return whether any of some forces has second derivatives by positions of nodes."""
     return not _ON_NODES.isdisjoint(forces)
 
 
 def kinds() -> dict[str, Kind]:
-    """Of all forces that have an energy, by name."""
+    """Return the kinds of all forces that have an energy, by name."""
     return {force.name: force.kind for force in FORCES if force.kind is not None}
 
 

@@ -19,12 +19,12 @@ FRICTION, ROD_FRICTION, ROD_BARRIER = "friction", "rod friction", "rod barrier"
 
 
 def acts(forces: tuple[str, ...]) -> bool:
-    """Whether friction is among the forces of a model."""
+    """Return whether friction is among the forces of a model."""
     return FRICTION in forces or ROD_FRICTION in forces
 
 
 def none_given() -> Array:
-    """What a state has where nothing is set, shape (4,)."""
+    """Return the coefficients of a state in which none is set from outside, shape (4,)."""
     return np.full(len(COEFFICIENTS), OF_SCENE)
 
 

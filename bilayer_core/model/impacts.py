@@ -1,4 +1,4 @@
-"""Whether a barrier can hold what will meet it: its energy down to a tenth of its distance, against that of motion.
+"""Checks of barriers against impacts: their energy down to a tenth of their distance, against that of motion.
 
 A barrier K_c b(d) w, w the length of rod that a contact point stands for, takes up K_c w b(d̂/10) while nine tenths of
 its distance close, b(d̂/10) = 0.81 ln 10 d̂². What comes with more energy along the normal turns where the gap is a tiny
@@ -41,8 +41,9 @@ def heaviest(model: Model) -> float:
 
 
 def impact_warnings(model: Model) -> Iterator[Finding]:
-    """Of bodies and free rods that fly or fall towards planes with more than the barrier holds, as far as velocities
-    and heights at the start tell.
+    """Yield warnings of bodies and free rods that fly or fall towards planes with more energy than the barrier holds.
+
+    The energies are estimated from velocities and heights at the start.
     """
     contact = model.scene.contact
     for what, mass, length, speed in _approaching(model):

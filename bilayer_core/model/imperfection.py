@@ -51,7 +51,7 @@ def departure(rod: Rod, arc: Array) -> tuple[Array, Array]:
 
 
 def _weights(imperfection: Imperfection) -> Array:
-    """Of each mode in the two directions, shape (MODES, 2)."""
+    """Return the weight of each mode in the two directions, shape (MODES, 2)."""
     directed = np.array([imperfection.direction != "across", imperfection.direction != "normal"], dtype=float)
     if imperfection.shape == "bow":
         return np.outer(np.arange(MODES) == 0, directed)
@@ -93,7 +93,7 @@ def advice(scene: SceneConfig) -> Iterator[Finding]:
 
 
 def _symmetry(scene: SceneConfig, copy: RodCopy) -> str:
-    """What leaves the buckling of a rod to rounding; empty if nothing does."""
+    """Return the reason why rounding decides the buckling of a rod, in words; empty if there is none."""
     rod = copy.rod
     bodies = {body.name: body.motion for body in scene.bodies}
     holders = [bodies.get(name) for name in (rod.clamp_start, rod.clamp_end)]

@@ -184,7 +184,7 @@ class WholeSection:
 
 
 def _at_nodes(of_halves: Array) -> Array:
-    """What halves of successive edges have, at the nodes next to them, shape (n_copy, n_edge + 1)."""
+    """Sum the values of halves of successive edges at the nodes next to them, shape (n_copy, n_edge + 1)."""
     of_nodes = np.zeros((len(of_halves), of_halves.shape[1] + 1))
     of_nodes[:, :-1] += of_halves[..., 0]
     of_nodes[:, 1:] += of_halves[..., 1]

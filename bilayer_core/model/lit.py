@@ -21,7 +21,7 @@ Array = np.ndarray
 
 
 def is_light(scene: SceneConfig, law: Eigenstrain) -> bool:
-    """Whether a law follows a light."""
+    """Return whether a law follows a light."""
     return scene.stimuli[law.stimulus].light is not None
 
 
@@ -56,7 +56,9 @@ def add_lit_elements(
 
 
 def light_of(model: Model) -> Light:
-    """What a light shines on, and where it is at the start; absent if no layer follows one."""
+    """Return the elements that lights shine on, and directions to the lights at the start; absent if no layer
+    follows a light.
+    """
     if not len(model.lit_law):
         return Light.absent()
     scene, bodies = model.scene, model.bodies

@@ -1,4 +1,4 @@
-"""What of the motions that hinges, rails and joints leave free has a spring, damping, friction or limits."""
+"""Motions that hinges, rails and joints leave free and that have a spring, damping, friction or limits."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ class Mechanism:
 
     @property
     def slides(self) -> bool:
-        """Whether it is a way [m] instead of an angle [rad]."""
+        """True if the motion is a way [m] instead of an angle [rad]."""
         return isinstance(self.law, Sliding)
 
     @property
     def is_guide(self) -> bool:
-        """Whether it is the hinge or the rail of a guided body."""
+        """True if it is the hinge or the rail of a guided body."""
         return self.first == WORLD
 
     @property
     def dissipates(self) -> bool:
-        """Whether it has damping or friction."""
+        """True if it has damping or friction."""
         return self.law.damping > 0.0 or self.law.friction > 0.0
 
 

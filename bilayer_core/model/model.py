@@ -247,7 +247,7 @@ class Model(ReadOnlyArrays):
 
     @property
     def has_surface_contact(self) -> bool:
-        """Whether any contact point can meet a surface."""
+        """True if any contact point can meet a surface."""
         return self.scene.contact is not None and bool(self.surfaces.can_collide.any())
 
     @property

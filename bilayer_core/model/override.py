@@ -1,4 +1,4 @@
-"""What is set from outside of a channel or a load, in place of its schedule: a value, at once or by a ramp.
+"""Values set from outside for a channel or a load in place of its schedule, at once or by a ramp.
 
 A row of `State.override` has the value that is reached, and of a ramp from which value, from when and until when [s];
 the last two are 0 for a jump. Where a schedule acts, all are NaN.
@@ -35,18 +35,18 @@ def ramp_to(value: float, start: float, begin: float, over: float) -> Array:
 
 
 def acts(row: Sequence[float]) -> bool:
-    """Whether anything is set."""
+    """Return whether a row sets anything."""
     return not math.isnan(row[VALUE])
 
 
 def spans_of(row: Sequence[float]) -> list[Span]:
-    """What is set, as spans of a schedule: a ramp, if there is one, and the value that it reaches."""
+    """Return an override as spans of a schedule: a ramp, if there is one, and the value that it reaches."""
     value, start, begin, end = row
     reached = Span(math.inf, value)
     return [Span(end, start, begin, (value - start) / (end - begin)), reached] if end > begin else [reached]
 
 
 def value_at(row: Sequence[float], time: float) -> float:
-    """What is set at a time [s]; NaN if nothing is."""
+    """Return the value that is set at a time [s]; NaN if none is."""
     spans = spans_of(row)
     return spans[-1 if time >= row[END] else 0].value(time)

@@ -1,4 +1,4 @@
-"""What will be computed for a scene, and what is skipped, each with its reason."""
+"""Plan of the computation for a scene: what is computed and what is skipped, each with its reason."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def best_dimension(scene: SceneConfig) -> tuple[int, str]:
 
 
 def _choose(key: str, asked, of_scene, allowed: tuple) -> tuple | None:
-    """What the caller or else the scene asks for, and which of them; None if both leave it open."""
+    """Return the choice of the caller, or else of the scene, and which of them made it; None if both leave it open."""
     value, origin = (asked, "asked for") if asked != "auto" else (of_scene, f"set by `solver.{key}`")
     if value == "auto":
         return None

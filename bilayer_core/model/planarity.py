@@ -1,4 +1,4 @@
-"""Whether all that happens in a scene stays in one plane, and if not, what leaves it.
+"""Planarity of a scene: whether everything in it stays in one plane, and if not, what leaves it.
 
 A scene stays in a plane if it is its own mirror image there: its rods lie in the plane with their width across it, what
 acts on them and how they move lies in it, surfaces and free bodies are symmetric about it. Then nothing pushes out of
@@ -87,11 +87,11 @@ class _Survey:
         self._free_surface = any(isinstance(body.motion, Free) and body.surface for body in scene.bodies)
 
     def _height(self, point) -> float:
-        """Of a point over the plane [m]."""
+        """Return the height of a point over the plane [m]."""
         return float(self._normal @ (np.array(point) - self._plane.point))
 
     def _lies_in(self, *vectors) -> bool:
-        """Whether vectors are directions in the plane, or zero."""
+        """Return whether all vectors are directions in the plane, or zero."""
         v = np.array(vectors).reshape(-1, 3)
         return bool(np.all(np.abs(v @ self._normal) <= ROUNDING * np.linalg.norm(v, axis=1)))
 
@@ -100,7 +100,7 @@ class _Survey:
         return bool(np.all(np.abs(heights) <= ROUNDING * self._size))
 
     def _along_normal(self, *vectors) -> bool:
-        """Whether vectors are parallel to the normal, or zero."""
+        """Return whether all vectors are parallel to the normal, or zero."""
         return all(np.linalg.norm(np.cross(v, self._normal)) <= ROUNDING * np.linalg.norm(v) for v in vectors)
 
     def _place(self, body: Body, point) -> Array:
@@ -108,7 +108,7 @@ class _Survey:
         return np.array(body.position) + rotation_matrix(np.array(body.rotation)) @ np.array(point)
 
     def offences(self) -> Iterator[str]:
-        """What leaves the plane, each as a sentence."""
+        """Yield a sentence for each part of the scene that leaves the plane or is not symmetric about it."""
         scene, plane = self._scene, self._plane
         for what in self._vectors():
             yield f"{what} leaves {plane}"
@@ -225,7 +225,9 @@ class _Survey:
         return force[2] * self._normal, moment  # along path × normal, which is ± the plane's
 
     def _carries_points(self, body: Body) -> bool:
-        """Whether forces on its points could turn a free body out of the plane: it, or one whose surface they meet."""
+        """Return whether forces on a body's points could turn a free body out of the plane: it, or one whose surface
+        they meet.
+        """
         return not isinstance(body.motion, Prescribed) and body.motion.turns or self._free_surface
 
     def _points(self, body: Body) -> Array:
@@ -237,14 +239,16 @@ class _Survey:
         return np.array(points).reshape(-1, 5)
 
     def _mirrored(self, points: Array) -> bool:
-        """Whether points are their own mirror image."""
+        """Return whether a set of points is its own mirror image in the plane."""
         image = points.copy()
         image[:, :3] -= 2.0 * np.outer((points[:, :3] - self._plane.point) @ self._normal, self._normal)
         apart = np.abs(points[:, None] - image[None]).max(axis=2, initial=0.0)
         return bool(np.all(apart.min(axis=1, initial=np.inf) <= ROUNDING * self._size)) if len(points) else True
 
     def _fits(self, shape: Shape, position: Array, rotation: Array, free: bool = False) -> bool:
-        """Whether a surface is symmetric about the plane, or runs on along the normal wherever it can be touched."""
+        """Return whether a surface is symmetric about the plane, or runs on along the normal wherever it can be
+        touched.
+        """
         axes = rotation @ shape.rotation
         if shape.kind == "plane":
             return self._lies_in(axes[:, 2])

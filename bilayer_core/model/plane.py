@@ -54,7 +54,7 @@ class Plane(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class InPlane(ReadOnlyArrays):
-    """What the arrays of a model of dimension 2 have in addition.
+    """Additional arrays of a model of dimension 2.
 
     Unknowns in space, of which a step of Newton's method is one vector, keep the order of `Model.layout`; those that
     are solved for are in that of `layout`.

@@ -1,4 +1,4 @@
-"""Whether joints hold what others hold already, and whether they can follow the motions that a scene prescribes.
+"""Redundant joints, which hold what others hold already, and joints that cannot follow the motions a scene prescribes.
 
 A joint allows velocities (V, ω) of its bodies with
 

@@ -1,4 +1,4 @@
-"""What stimuli make of a robot."""
+"""Stress-free strains of a robot, as stimuli set them."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class RodPair:
 
     @property
     def itself(self) -> bool:
-        """Whether it is one rod and itself."""
+        """True if the pair is one rod and itself."""
         return self.first == self.second and not self.copies
 
 
@@ -90,7 +90,7 @@ def passing_warnings(scene: SceneConfig) -> Iterator[Finding]:
 
 
 def _decide(scene: SceneConfig, by_geometry: tuple[bool, str]) -> tuple[bool, bool, str, str]:
-    """Whether geometry lets two rods meet, whether they have contact, and the reasons of either."""
+    """Return whether geometry lets two rods meet, whether they have contact, and the reason for each."""
     possible, geometry = by_geometry
     if scene.contact is None:
         return possible, False, geometry, "no contact settings"
@@ -100,7 +100,7 @@ def _decide(scene: SceneConfig, by_geometry: tuple[bool, str]) -> tuple[bool, bo
 
 
 def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str, float]:
-    """Whether a rod can turn far enough to meet itself, the reason, and how far it can turn [rad]."""
+    """Return whether a rod can turn far enough to meet itself, the reason, and how far it can turn [rad]."""
     length, middles = rod.path.length, np.arange(rod.stations - 1) + 0.5
     figures = edge_figures(scene, rod)
     copy = rod.copies[0].rod  # whose sections are those of all
@@ -129,7 +129,7 @@ Region = tuple[np.ndarray, float]
 def _can_reach(
     scene: SceneConfig, first: list[Region | None], second: list[Region | None], copies: bool = False
 ) -> tuple[bool, str]:
-    """Whether copies of two rods, or several of one, can come together."""
+    """Return whether copies of two rods, or several of one, can come together, and the reason."""
     if None in first or None in second:
         return True, "nothing keeps them apart"
     (center_a, radius_a), (center_b, radius_b) = (

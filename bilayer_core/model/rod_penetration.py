@@ -44,6 +44,6 @@ def refuse_meeting_rods(model: Model) -> None:
 
 
 def _place(model: Model, edge: int, fraction: float) -> str:
-    """What a point of an edge is called in messages."""
+    """Return the name of a point of an edge for messages."""
     strand = next(s for s in model.strands if s.first_edge <= edge < s.first_edge + s.node_count - 1)
     return f"node {edge - strand.first_edge + int(round(fraction))} of {strand.name}"

@@ -97,7 +97,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     meets = can_collide.any(axis=1).tolist()
 
     def kind(strand: StrandArrays) -> tuple[object, ...]:
-        """What strands have alike that are copies of each other; a closed one is by itself."""
+        """Return a key that strands share if they are copies of each other; a closed strand has its own."""
         number, edges = numbers[strand.rod], strand.shown - 1
         radius = float(node_radius[strand.first_node : strand.first_node + strand.node_count].max())
         longest = float(rest_length[strand.first_edge : strand.first_edge + edges].max())
@@ -143,7 +143,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
 
 
 def _too_thin(scene: SceneConfig, strand: StrandArrays, radius: float, total: float) -> SceneError:
-    """What is told of a strand with which rods have too many points."""
+    """Return the error that refuses a strand with which rods have too many points."""
     return SceneError(
         f"{scene.name}: rods.{strand.rod}: must be thicker or shorter for contact between rods: that is computed at "
         f"points {radius:.3g} m apart, half of the thickness of {strand.name}, which makes {total:.3g} points; allowed "
@@ -152,14 +152,14 @@ def _too_thin(scene: SceneConfig, strand: StrandArrays, radius: float, total: fl
 
 
 def _with_copy(own: dict[str, Array], rod: int) -> dict[str, Array]:
-    """What edges of a strand have, with the copy of its first edge, which belongs to a rod of its own."""
+    """Return arrays of a strand's edges with a copy of the first edge at the end, which belongs to a rod of its own."""
     found = {name: np.append(own[name], own[name][:1], axis=0) for name in ("edge_arc", "edge_radius")}
     of_copy = {"edge_rod": rod, "edge_first": False, "edge_before": -1, "edge_after": -1, "points_of_edge": 0}
     return found | {name: np.append(own[name], value) for name, value in of_copy.items()}
 
 
 def _joined(scene: SceneConfig, rods: list[Rod]) -> Array:
-    """Whether one body holds two rods; or both ends, of the same rod; shape (n_rod, n_rod)."""
+    """Return whether one body holds two rods, or both ends of the same rod, shape (n_rod, n_rod)."""
     ends = [(rod.clamp_start, rod.clamp_end) for rod in rods]
     holds = np.array([[body.name in held for body in scene.bodies] for held in ends], dtype=np.float32)
     joined = holds @ holds.T > 0.0

@@ -27,7 +27,7 @@ LAST_STEP = 1e-3
 
 @dataclass
 class State:
-    """What is carried from step to step.
+    """Quantities that are carried from step to step.
 
     `flat` and `set_flat` copy it bit for bit.
 
@@ -175,7 +175,7 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
 
 
 def _settled(model: Model, stimulus: Array) -> Array:
-    """What each law has reached at the start where channels have had their values for long, shape (n_law,)."""
+    """Return the value that each law has at the start if channels have had theirs for long, shape (n_law,)."""
     light, settled = light_of(model), stimulus[model.law_channel]
     if not light.exists:
         return settled

@@ -24,7 +24,7 @@ Span = tuple[int, int, int, int]
 
 @dataclass
 class Collected:
-    """What grows while rods are added one after the other."""
+    """Strands, rods, laws and arrays, which grow while rods are added one after the other."""
 
     strands: list[StrandArrays] = field(default_factory=list)
     rods: list[list[Span]] = field(default_factory=list)
@@ -128,7 +128,7 @@ def stations_of(rod: Rod, layer: Layer | None = None) -> tuple[int, int]:
 
 
 def is_closed(rod: Rod, first: int, last: int) -> bool:
-    """Whether the strand over these stations of a rod has no ends."""
+    """Return whether the strand over these stations of a rod has no ends."""
     return rod.closed and first == 0 and last >= rod.stations - 1
 
 
@@ -363,7 +363,7 @@ def _add_clamps(
 
 
 def halves_to_nodes(of_edges: Array) -> Array:
-    """What edges have, half of it at each of their nodes, shape (..., n_edge + 1)."""
+    """Return the sum at each node of half the values of its edges, shape (..., n_edge + 1)."""
     of_nodes = np.zeros((*of_edges.shape[:-1], of_edges.shape[-1] + 1))
     half = 0.5 * of_edges
     of_nodes[..., :-1] += half

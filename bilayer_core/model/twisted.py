@@ -82,12 +82,12 @@ def _on_twisted_path(rod: Rod) -> bool:
 
 
 def _middles(rod: Rod) -> Array:
-    """Of edges, as lengths along the path [m], shape (n_edge,)."""
+    """Return the middles of edges as lengths along the path [m], shape (n_edge,)."""
     return rod.edge_length * (np.arange(rod.stations - 1) + 0.5)
 
 
 def _twisted_by_bodies(scene: SceneConfig, rod: Rod) -> bool:
-    """Whether two bodies hold it that may turn against each other."""
+    """Return whether the rod is held by two bodies that may turn against each other."""
     held = [body.motion for body in scene.bodies if body.name in (rod.clamp_start, rod.clamp_end)]
     return len(held) == 2 and any(motion.turns for motion in held)
 

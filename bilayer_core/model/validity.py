@@ -51,7 +51,7 @@ class Figure:
 
     @property
     def superlative(self) -> str:
-        """What the figure with the largest severity is among several."""
+        """Phrase that describes this figure when it has the largest severity among several."""
         return "worst" if self.outside else "nearest to the limit"
 
     def line(self, where: str) -> str:
@@ -132,7 +132,7 @@ def _of_section(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
 
 
 def _of_barrier(name: str, thin: float, distance: float) -> Figure:
-    """Of the rod with the least thickness, `thin` [m]."""
+    """Return the figure of the barrier distance; rod `name` has the least thickness, `thin` [m]."""
     return Figure(
         "contact.barrier_distance",
         f"{1e3 * distance:g} mm is",
@@ -149,7 +149,7 @@ def longest_edge(scene: SceneConfig, rod: Rod) -> float:
 
 
 def _of_edges(rod: Rod, longest: float) -> Figure:
-    """Of a rod whose edges should not be longer than that [m]."""
+    """Return the figure of the edge length of a rod, which should be at most `longest` [m]."""
     return Figure(
         f"rods.{rod.name}",
         "edge length",
@@ -224,7 +224,7 @@ class EdgeFigures:
         return np.abs(self._natural) * self._layers
 
     def natural_change(self) -> np.ndarray:
-        """What the layers' natural curvatures add to that of the path [1/m], shape (n_edge,).
+        """Return the curvature that the layers' natural curvatures add to that of the path [1/m], shape (n_edge,).
 
         Σ EI (χ̄ − χ_path)/D, positive towards the normal, with D the bending stiffness of the bonded section.
         """
@@ -236,8 +236,9 @@ class EdgeFigures:
         return (own * (self._natural - self._path)).sum(axis=0) / both
 
     def free_curvature(self) -> np.ndarray:
-        """What eigenstrains add at most to the curvature without loads, by Timoshenko's formula [1/m], shape (n_edge,);
-        0 where there is one layer.
+        """Return the most that eigenstrains add to the curvature without loads [1/m], shape (n_edge,).
+
+        It follows Timoshenko's formula, and is 0 where there is one layer.
         """
         curvature = np.zeros(len(self.width))
         both = (self._layers > 0.0).all(axis=0) & (len(self._layers) == 2)

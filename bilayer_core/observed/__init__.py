@@ -1,1 +1,1 @@
-"""What is seen of a run, and what acts on it from outside: what those exchange who make runs, record and show them."""
+"""Observations of a run and actions on it from outside, shared by the modules that make, record and show runs."""

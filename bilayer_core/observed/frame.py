@@ -1,4 +1,4 @@
-"""What an observer sees: a description of the model that never changes, and one `Frame` per observation."""
+"""Data for observers: a description of the model that never changes, and one `Frame` per observation."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class JointInfo:
 
 @dataclass(frozen=True, repr=False)
 class Description:
-    """What does not change during a run: names, shapes and settings.
+    """Names, shapes and settings, which do not change during a run.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What acts on a run from outside, each with the step from which on it acts: enough to make the same steps again.
+"""Inputs that act on a run from outside, each with the step from which it acts: enough to make the same steps again.
 
 ============ ========================================== ================================================================
 kind         values                                     from
@@ -31,7 +31,7 @@ POSITION, QUATERNION, OVER = slice(0, 3), slice(3, 7), 7
 
 
 class Acted(Protocol):
-    """What inputs act on: a `Simulator`."""
+    """Object that inputs act on: a `Simulator`."""
 
     def set_stimulus(self, channel: str, value: float | None, *, over: float) -> None: ...
 

@@ -1,4 +1,4 @@
-"""Who looks at a run, and what is looked at."""
+"""Observers of a run, and the simulator as they see it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .frame import Description, Frame
 
 
 class Observed(Protocol):
-    """What observers see of a simulator.
+    """Simulator as observers see it.
 
     Attributes
     ----------

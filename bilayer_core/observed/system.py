@@ -1,4 +1,4 @@
-"""What results depend on beside the scene: versions, and the machine."""
+"""Versions and the machine, on which results depend beside the scene."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, str]:
-    """What results depend on to the last bit, beside versions."""
+    """Return the traits of the machine on which results depend to the last bit, beside versions."""
     return {"system": platform.system(), "machine": platform.machine(), "processor": _processor()}
 
 

@@ -1,4 +1,4 @@
-"""What waits for the writer of a log: a bounded queue from the stepping thread to the writer's."""
+"""Bounded queue of items that wait for the writer of a log, from the stepping thread to the writer's."""
 
 from __future__ import annotations
 

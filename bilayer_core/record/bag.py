@@ -58,7 +58,7 @@ class BagRun:
 
     @property
     def address(self) -> str:
-        """What is added to the name of the bag to name the run."""
+        """Suffix that, added to the name of the bag, names the run."""
         return f":{self.node}@{self.number}" if self.of > 1 else f":{self.node}"
 
 
@@ -74,7 +74,7 @@ def split_address(path: str | Path) -> tuple[Path, str, int]:
 
 
 class Bag:
-    """What a bag holds of nodes of this package.
+    """Runs of this package's nodes in a bag.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a bag holds of nodes of this package: whose topics, and runs, which a reset or a new start of the node begins.
+"""Nodes of this package in a bag: their topics, and their runs, which a reset or a new start of the node begins.
 
 A recorder stores when a message came, not its simulated time. That is taken from the stamps of the messages; those
 without one get that of the frame that they were sent with (`record.frame_matching`).
@@ -91,12 +91,12 @@ class Track:
 
 @dataclass
 class NodeTracks:
-    """What a bag holds of one node.
+    """Messages and runs of one node in a bag.
 
     Attributes
     ----------
     node : str
-        Its full name.
+        Full name of the node.
     tracks : dict
         Name of a topic under the node's -> its messages; those of topics without any are left out.
     descriptions : list of (int, bytes)

@@ -120,7 +120,7 @@ def place_of_seal(description: Description) -> int | None:
 
 @dataclass(frozen=True)
 class Wholeness:
-    """What the hash of a log says of its states and inputs.
+    """Verdict of a log's hash on its states and inputs.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What two runs differ by, quantity by quantity; of logs, some megabytes are in memory at once."""
+"""Differences between two runs, quantity by quantity; of logs, some megabytes are in memory at once."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class QuantityDifference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What two runs differ by.
+    """Differences between two runs.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Comparison:
 
     @property
     def equal(self) -> bool:
-        """Whether all are the same, to the last bit that logs keep."""
+        """True if all quantities are the same, to the last bit that logs keep."""
         return not any(self.only) and all(found.largest == 0.0 for found in self.differences)
 
     def __getitem__(self, name: str) -> QuantityDifference:
@@ -178,7 +178,7 @@ class _Largest:
             self.value, self.time = float(apart[row].max()), float(times[row])
 
     def told(self, begin: float, interpolated: bool) -> QuantityDifference:
-        """What came of it."""
+        """Return the largest difference, with its time and its part of the first run's range."""
         extent = max(0.0, self.most - self.least)
         part = self.value / extent if extent else (0.0 if self.value == 0.0 else np.inf)
         time = float(begin) if self.time is None else self.time

@@ -1,4 +1,4 @@
-"""What the description of a run may hold: types, sizes, ranges and names as scenes have them."""
+"""Schema of the description of a run: types, sizes, ranges and names as scenes have them."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ LONGEST_VALUE = 60
 
 
 def _plain(value):
-    """What JSON has no notation for, as lists."""
+    """Return a slice or an array, for which JSON has no notation, as a list."""
     if isinstance(value, slice):
         return [value.start, value.stop]
     return np.asarray(value).tolist()

@@ -1,4 +1,4 @@
-"""What happens in a run, in words: contact made and lost, steps rejected, take-off and landing.
+"""Events of a run in words: contact made and lost, steps rejected, take-off and landing.
 
 Events are found by comparing a frame with the one before, so that a run is the same whether or not anybody looks, and
 costs nothing where nobody does. Their time is that of the frame: contact is made or lost at some time after the frame
@@ -62,7 +62,7 @@ class EventDetector:
         self._told, self._left = (0, 0, 0), 0
 
     def see(self, frame: Frame) -> list[Event]:
-        """What happened since the frame before; at the first one, what touches there."""
+        """Return the events since the frame before; at the first frame, the contacts that it has."""
         pairs = frozenset(frame.contacts)
         if self._pairs is None:
             self._pairs, self._stood = pairs, self._stands(pairs)
@@ -78,11 +78,11 @@ class EventDetector:
         return events + self._rejections(frame)
 
     def end(self, time: float) -> list[Event]:
-        """What is left to be told at the end of a run."""
+        """Return the events that are still to be reported at the end of a run."""
         return self._tell_rejections(time)
 
     def _stands(self, pairs: Iterable[tuple[str, str]]) -> bool:
-        """Whether the robot touches anything else."""
+        """Return whether the robot touches anything else."""
         return any((a in self._robot) != (b in self._robot) for a, b in pairs)
 
     def _rejections(self, frame: Frame) -> list[Event]:

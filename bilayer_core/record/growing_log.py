@@ -26,7 +26,7 @@ Message = tuple[str, int, bytes]
 
 
 class GrowingLog:
-    """What has been added to a log since it was looked at last; only whole chunks are read.
+    """Reader of the messages added to a log since the last look at it; only whole chunks are read.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class GrowingLog:
 
     @property
     def replaced(self) -> bool:
-        """Whether another log has been begun under its name."""
+        """True if another log has been begun under its name."""
         try:
             now = os.stat(self.path)
         except FileNotFoundError:

@@ -25,7 +25,7 @@ MOST_WAITING = 500_000_000
 
 @dataclass(frozen=True)
 class Channel:
-    """What a log holds of one topic.
+    """Topic in a log: its type, encoding, quality of service and number of messages.
 
     Attributes
     ----------

@@ -50,7 +50,7 @@ class LogChannel:
 
 
 class LogFile:
-    """What an MCAP file holds, whole or cut off.
+    """Content of an MCAP file, whole or cut off.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a log of a run holds before its first message: scene, description, versions and settings."""
+"""Content of a run's log before its first message: scene, description, versions and settings."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _OWN = {"description": "state_layout", "versions": DISTRIBUTION}
 
 @dataclass(frozen=True)
 class Head:
-    """What a log holds before its first message."""
+    """Content of a log before its first message."""
 
     description: Description
     versions: dict[str, str]

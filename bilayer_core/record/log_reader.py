@@ -53,7 +53,7 @@ FIRST_DATE = 946_684_800 * NANOSECONDS
 
 @dataclass(frozen=True)
 class LogInfo:
-    """What a log, a bag or another file holds: the content of `bilayer info` (`dataclasses.asdict` gives its JSON).
+    """Contents of a log, a bag or another file: the output of `bilayer info` (`dataclasses.asdict` gives its JSON).
 
     Attributes
     ----------
@@ -105,8 +105,10 @@ class LogInfo:
 
 
 def read_info(path: str | Path) -> LogInfo:
-    """What a log holds, from its index or, when it was cut off, by reading it through; what a bag holds, by reading it
-    through once, and any other MCAP file.
+    """Return the contents of a log, a bag or any other MCAP file.
+
+    Those of a log come from its index or, if it was cut off, from reading it through; a bag and any other file are read
+    through once.
 
     Raises
     ------
@@ -140,7 +142,7 @@ def read_info(path: str | Path) -> LogInfo:
 
 
 def _info_of_bag(bag: Bag, number: int) -> LogInfo:
-    """What a file holds that is no log of ours."""
+    """Return the contents of a file that is not a log of ours."""
     files = bag.files
     spans = files.spans()
     runs = tuple(run for run in bag.runs if number in (0, run.number))
@@ -270,7 +272,7 @@ def _read_metadata(path: Path) -> dict[str, dict[str, str]]:
 
 
 def _lacks(head: Head, file: LogFile, metadata: dict[str, dict[str, str]]) -> tuple[str, ...]:
-    """What older logs, or such as other tools have taken something out of, do not hold."""
+    """Return the parts that a log lacks because it is older or unfinished, or because other tools took them out."""
     lacks = []
     if INPUTS.full_name() not in file.topics:
         lacks.append(f"{INPUTS.full_name()}, what acted on the run: it cannot be replayed")

@@ -179,7 +179,7 @@ def read_chunk(file: BinaryIO, place: Place) -> bytes:
 
 
 def unpacked(data: bytes) -> bytes:
-    """What a chunk holds, from the content of its record, held against its checksum.
+    """Return the unpacked data of a chunk from the content of its record, checked against its checksum.
 
     Raises
     ------
@@ -204,7 +204,7 @@ def unpacked(data: bytes) -> bytes:
 
 
 def _decompressed(packed: memoryview, compression: str, size: int) -> bytes:
-    """What is packed, or as much of it as shows that it has not the declared size: no more is unpacked than that."""
+    """Return the unpacked data; unpack no more of it than shows that it does not have the declared size."""
     if not compression:
         return bytes(packed)
     if compression == "lz4":

@@ -161,7 +161,7 @@ class LogSource:
         return entry.filled(self.times[_group(entry)], values)
 
     def attributes_with(self, name: str) -> dict[str, object]:
-        """That attribute of `RunData`, and all others that come at the same rate."""
+        """Return an attribute of `RunData`, and all others that come at the same rate."""
         if name == EVENTS.name:
             return {name: tuple(self._events())}
         if name in _OF_SHAPES:

@@ -1,4 +1,4 @@
-"""What the end of a finished MCAP file says of it: its types and topics, and where its chunks are."""
+"""Summary at the end of a finished MCAP file: its types and topics, and where its chunks are."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Summary:
 
     @property
     def is_index(self) -> bool:
-        """Whether it tells all that a file holds; other writers may leave parts of it out."""
+        """True if the summary lists all that the file holds; other writers may leave parts of it out."""
         schemas, channels = self.definitions.schemas, self.definitions.channels
         if self.message_count == 0:
             return True

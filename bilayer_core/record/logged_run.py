@@ -38,7 +38,7 @@ class LoggedRun(RunData):
         return self._source.lacks
 
     def entries(self) -> dict[str, Entry]:
-        """What is known of each quantity beside its values, by name."""
+        """Return the entry of each quantity by name: everything that is known of it beside its values."""
         return self._source.entries
 
     def why_not(self, name: str) -> str | None:

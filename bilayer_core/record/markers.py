@@ -232,7 +232,7 @@ class MarkerEncoder:
 
 
 class _Carried:
-    """What has a pose of its own in the frame of a body, or of the world."""
+    """Part with a pose of its own in the frame of a body, or of the world."""
 
     def __init__(self, own: np.ndarray):
         self._own, self._is_away, self._is_turned = own, bool(own[:3].any()), bool(own[6] != 1.0)

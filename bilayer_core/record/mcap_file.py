@@ -28,13 +28,13 @@ _FOOTER_SIZE = 8 + 8 + 4
 
 
 def message_head(channel: int, size: int) -> tuple[bytes, int]:
-    """What stands before `size` bytes of data in a message record, and where in it `time_and_sequence` stands."""
+    """Return the bytes before `size` bytes of data in a message record, and where `time_and_sequence` is in them."""
     head = _MESSAGE.pack(MESSAGE, _MESSAGE_HEAD + size, channel)
     return head + bytes(_MOMENT.size), len(head)
 
 
 def time_and_sequence(time: int, sequence: int) -> bytes:
-    """Of a message record, what says when it is of [ns], and which one it is."""
+    """Return the part of a message record that has its sequence number and its time [ns]."""
     return _MOMENT.pack(sequence, time, time)
 
 
@@ -84,7 +84,7 @@ class McapFile:
 
     @property
     def waiting(self) -> bool:
-        """Whether a message waits for its chunk to be written."""
+        """True if a message waits for its chunk to be written."""
         return any(self._index.values())
 
     def add_attachment(self, name: str, media_type: str, data: bytes) -> None:

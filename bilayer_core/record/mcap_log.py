@@ -227,7 +227,7 @@ class McapRecorder:
             raise failure from (None if failure is self._failure else self._failure)
 
     def _failure_of_run(self) -> Exception | None:
-        """What `close` raises, as things stand."""
+        """Return the exception that `close` raises as things stand; None if it raises none."""
         if not isinstance(self._failure, OSError):
             return self._failure
         reason = f"the log {self.path} could not be written: {self._failure.strerror or self._failure}{self._kept}"

@@ -36,7 +36,7 @@ def open_log(path: Path) -> Iterator[BinaryIO]:
 
 @contextmanager
 def damage_told(path: Path) -> Iterator[None]:
-    """What a reader of MCAP says of a file that is no log, or is damaged, becomes an InputError."""
+    """Turn an MCAP reader's error about a file that is no log, or is damaged, into an InputError."""
     from mcap.exceptions import McapError
     from zstandard import ZstdError
 
@@ -54,9 +54,9 @@ def damage_told(path: Path) -> Iterator[None]:
 
 
 def is_finished(file: BinaryIO) -> bool:
-    """Whether a file ends as it begins, which one that was cut off, or is still written, does not.
+    """Return whether a file ends as it begins; a file that was cut off, or is still being written, does not.
 
-    It is at its begin afterwards.
+    The file is at its beginning afterwards.
     """
     size = file.seek(0, 2)
     file.seek(max(size - len(MAGIC), 0))

@@ -99,5 +99,5 @@ def write_text(path: str | Path, text: str, force: bool) -> None:
 
 
 def _is_special(path: Path) -> bool:
-    """Whether the path is that of a device or a pipe."""
+    """Return whether the path is that of a device or a pipe."""
     return path.exists() and not path.is_file()

@@ -91,7 +91,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Entry:
-    """What a quantity is, and where its values are: in a `RunData`, and in the messages of a log.
+    """Description of a quantity and of where its values are: in a `RunData`, and in the messages of a log.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Entry:
 
     @property
     def of_shape(self) -> bool:
-        """Whether it comes at the rate of markers, for each node of a rod."""
+        """True if the quantity comes at the rate of markers, for each node of a rod."""
         return "node" in self.axes
 
     def of(self, run: Run) -> Quantity:

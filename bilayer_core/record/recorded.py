@@ -1,4 +1,4 @@
-"""What is recorded of a run, by name: from a log, or from memory."""
+"""Recorded quantities of a run, by name: from a log, or from memory."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Recorded(ABC):
 
     @abstractmethod
     def entries(self) -> dict[str, Entry]:
-        """What is known of each quantity beside its values, by name."""
+        """Return the entry of each quantity, by name: all that is known of it besides its values."""
 
     def why_not(self, name: str) -> str | None:
         """Why a quantity that others have is not in this one; None if it is, or if nobody has it."""

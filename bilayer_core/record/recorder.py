@@ -21,7 +21,7 @@ Array = np.ndarray
 
 
 class Attachable(Protocol):
-    """What is recorded: a `Simulator`."""
+    """Object that can be recorded: a `Simulator`."""
 
     @property
     def description(self) -> Description: ...
@@ -124,7 +124,7 @@ class Recorder(Recorded):
 
     @property
     def times(self) -> Array:  # type: ignore[override]  # grows while the simulator runs
-        """Of all quantities [s], shape (frames,)."""
+        """Times of all quantities [s], shape (frames,)."""
         return np.array(self._times)
 
     @property
@@ -134,12 +134,12 @@ class Recorder(Recorded):
 
     @property
     def quantities(self) -> Mapping[str, Quantity]:
-        """What was recorded so far, by name."""
+        """Quantities recorded so far, by name."""
         times = self.times
         return {name: entry.filled(times, np.array(self._values[name])) for name, entry in self._entries.items()}
 
     def entries(self) -> dict[str, Entry]:
-        """What is known of each quantity beside its values, by name."""
+        """Return the entry of each quantity, by name: all that is known of it besides its values."""
         return dict(self._entries)
 
 

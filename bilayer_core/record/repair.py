@@ -68,7 +68,7 @@ _WINDOW = 1 << 20
 
 @dataclass
 class Repaired:
-    """What came of a repair.
+    """Result of a repair.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Repaired:
 
     @property
     def kept(self) -> str:
-        """What was kept, in words."""
+        """Number of messages, chunks, attachments and metadata records that were kept, in words."""
         last = "" if self.last_time is None else f", the last at t = {self.last_time:g} s"
         others = f"{_count(self.attachments, 'attachment')}, {_count(self.metadata, 'metadata record')}"
         return f"{_count(self.messages, 'message')} in {_count(self.chunks, 'chunk')}{last}; {others}"
@@ -196,7 +196,7 @@ class _Repair:
         return found
 
     def _profile_and_library(self) -> tuple[str, str]:
-        """What the header says."""
+        """Return the profile and the library that the header names."""
         from mcap.records import Header
 
         first = next(walk(self._file), None)
@@ -208,7 +208,7 @@ class _Repair:
         return header.profile or "ros2", header.library
 
     def _is_damaged_index(self, place: Place) -> bool:
-        """Whether an index of messages has not the length that its entries have: no checksum protects it."""
+        """Return whether an index of messages differs in length from its entries: no checksum protects it."""
         if place.opcode != MESSAGE_INDEX:
             return False
         self._file.seek(place.offset + 2)
@@ -266,7 +266,7 @@ class _Repair:
             self._found.lost.append(f"the {_TAKEN[place.opcode]} at byte {place.begin}{held}: {error}")
 
     def _held(self, chunk: Place) -> str:
-        """Of when a chunk is, and how many messages the indexes behind it speak of, in words."""
+        """Return the time span of a chunk, and the number of messages in the indexes behind it, in words."""
         self._file.seek(chunk.offset)
         begin, end = struct.unpack("<QQ", self._file.read(16).ljust(16, b"\0"))
         behind = takewhile(lambda place: place.opcode == MESSAGE_INDEX, walk(self._file, chunk.end))
@@ -305,7 +305,7 @@ class _Repair:
 
 
 def _sound(file: BinaryIO, size: int) -> bool:
-    """Whether the index of a finished file is as it was written, by the checksum in its footer."""
+    """Return whether the index of a finished file is as it was written, by the checksum, if any, in its footer."""
     footer = struct.Struct("<QQI")
     file.seek(size - len(MAGIC) - footer.size)
     summary_start, _, checksum = footer.unpack(file.read(footer.size))

@@ -76,7 +76,7 @@ class RunData(Recorded):
         return ()
 
     def entries(self) -> dict[str, Entry]:
-        """What is known of each quantity beside its values, by name."""
+        """Return the entry of each quantity, by name: all that is known of it besides its values."""
         return {entry.name: entry for entry in entries(self.description, self.energy, self.solver)}
 
     def __repr__(self) -> str:

@@ -106,7 +106,7 @@ def _text(array: np.ndarray) -> str:
 
 
 def _difference(saved: dict[str, tuple[int, ...]], description: Description) -> str:
-    """What the state is instead, by the first part that is not the same."""
+    """Say how a saved state differs from that of a run, by the first part that is not the same."""
     for name, shape in description.state_layout:
         if name not in saved:
             return f"without {name!r}, of another version of this program; run its scene again"

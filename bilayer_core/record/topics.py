@@ -160,7 +160,7 @@ def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
 
 
 def input_topics(description: Description) -> tuple[TopicSpec, ...]:
-    """What a log holds beside `output_topics`."""
+    """Return the topics that a log holds beside `output_topics`."""
     return (INPUTS, EVENTS, *stimulus_topics(description))
 
 
@@ -187,7 +187,7 @@ class DisplayGate:
         self._period = -1
 
     def is_due(self, time: float) -> bool:
-        """Whether the frame at `time` [s] carries them; asked once a frame."""
+        """Return whether the frame at `time` [s] carries these topics; call it once a frame."""
         period = math.floor(time * self._rate + self._ROUNDING)
         due = period != self._period
         self._period = period

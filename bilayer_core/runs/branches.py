@@ -24,7 +24,7 @@ MOST = 1000
 
 @dataclass(frozen=True)
 class Varied:
-    """What differs from branch to branch.
+    """Quantity that differs from branch to branch.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class LogSize:
-    """What a log is expected to take.
+    """Expected size of a log.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ def forecast(simulator: Simulator) -> LogSize:
 
 
 def _stays_in_plane(simulator: Simulator, strand: Strand) -> bool:
-    """Whether coordinates of a strand, or their sums or differences, stay exactly zero."""
+    """Return whether coordinates of a strand, or their sums or differences, stay exactly zero."""
     if simulator.plan.dimension == 2:
         return True
     scene, model = simulator.scene, simulator.model

@@ -81,7 +81,7 @@ class Difference:
 
 @dataclass
 class Verification:
-    """What came of making a run again.
+    """Result of making a run again.
 
     Attributes
     ----------
@@ -124,12 +124,12 @@ class Verification:
 
     @property
     def equal(self) -> bool:
-        """Whether everything that was compared came out as it is in the log."""
+        """True if everything that was compared came out as it is in the log."""
         return self.first is None and not self.stopped and not self.first_derived
 
     @property
     def passed(self) -> bool:
-        """Whether the run came out as it is in the log, and the log is whole; of older logs, that is not known."""
+        """True if the run came out as it is in the log, and the log is whole, or too old to tell."""
         return self.equal and (self.wholeness.whole or not self.wholeness.hashed)
 
 
@@ -295,7 +295,7 @@ def _friction_in(overrides: Sequence[str]) -> list[str]:
 
 
 def inputs_after(path: str | Path, state: Array) -> list[Input]:
-    """What acted in a log's run after one of its states, without ends of steps."""
+    """Return the inputs that acted in a log's run after one of its states, without ends of steps."""
     found, passed = [], False
     for event in _events(Path(path)):
         if not isinstance(event, Input):

@@ -46,11 +46,11 @@ class Free(Part):
 
     @property
     def turns(self) -> bool:
-        """Whether it can."""
+        """True if the body can turn."""
         return True
 
     def describe(self) -> str:
-        """What it is, in a few words."""
+        """Describe the body in a few words."""
         return "free body" if self.mass > 0.0 else "junction without mass"
 
     @model_validator(mode="after")
@@ -87,11 +87,11 @@ class Guided(Part):
 
     @property
     def turns(self) -> bool:
-        """Whether it can."""
+        """True if the body can turn."""
         return self.pinned or self.hinge is not None
 
     def describe(self) -> str:
-        """What it is, in a few words."""
+        """Describe the body in a few words."""
         ways = {
             f"on a rail{resistance(self.sliding)}": self.axis is not None,
             f"on a hinge{resistance(self.turning)}": self.hinge is not None,
@@ -124,21 +124,21 @@ class Prescribed(Part):
 
     @property
     def controlled(self) -> bool:
-        """Whether controllers may move or turn it."""
+        """True if controllers may move or turn the body."""
         return self.top_speed is not None or self.top_angular_speed is not None
 
     @property
     def turns(self) -> bool:
-        """Whether it ever does, or may."""
+        """True if the body ever turns, or may turn."""
         return self.top_angular_speed is not None or any(map(any, self.rotations))
 
     def describe(self) -> str:
-        """What it is, in a few words."""
+        """Describe the body in a few words."""
         return "prescribed body, which controllers may move" if self.controlled else "prescribed body"
 
     @property
     def moves(self) -> bool:
-        """Whether it is ever elsewhere than at the start, or may be."""
+        """True if the body ever leaves its pose at the start, or may leave it."""
         return self.controlled or any(any(part) for part in (*self.displacements, *self.rotations))
 
     @model_validator(mode="after")
@@ -187,7 +187,7 @@ class Body(Part):
 
 
 def faults_of_guided(motion: Guided) -> list[Fault]:
-    """Whether it moves, and what of its motion has no meaning."""
+    """Return the faults of a guided motion: no way to move, settings without meaning, impossible inertia."""
     faults: list[Fault] = []
     if motion.axis is None and not motion.turns:
         faults.append((("axis",), None, "must be given, or `hinge`, or `pinned`: else it does not move"))
@@ -209,7 +209,7 @@ def faults_of_guided(motion: Guided) -> list[Fault]:
 
 
 def faults_of_inertia(motion: Free | Guided) -> list[Fault]:
-    """Whether the moments of inertia can be those of a body."""
+    """Return a fault if no body can have the moments of inertia, or if `shell` is given beside them."""
     if motion.inertia is None:
         return []
     if isinstance(motion, Free) and motion.shell:

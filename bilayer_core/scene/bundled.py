@@ -126,6 +126,6 @@ def _of_name(name: str, word: str) -> Path:
 
 
 def is_file_name(given: str | Path) -> bool:
-    """Whether it is meant as a file, not as the name of something bundled."""
+    """Return whether a name is meant as a file, not as something bundled."""
     path = Path(given)
     return isinstance(given, Path) or path.suffix in SUFFIXES or len(path.parts) > 1 or path.is_file()

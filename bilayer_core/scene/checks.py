@@ -71,9 +71,9 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
 
 
 def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:
-    """Whether each layer keeps a rest length |ē|(1 + η) > 0 for all that its channels allow.
+    """Yield a fault for each layer that does not keep a rest length |ē|(1 + η) > 0 for all that its channels allow.
 
-    It is that of a layer by itself. The rest strain of a laminate is a mean of its layers', weighted with their
+    This is that of a layer by itself. The rest strain of a laminate is a mean of its layers', weighted with their
     stiffness, and so above −1 where they are.
     """
     for number, rod in enumerate(scene.rods):

@@ -124,7 +124,7 @@ class Friction(Part):
 
     @property
     def acts(self) -> bool:
-        """Whether there is any friction."""
+        """True if there is any friction."""
         return self.coefficient > 0.0 or max(self.of_rods) > 0.0
 
 

@@ -1,4 +1,4 @@
-"""Whether the path of a rod comes nearer to itself than the rod is thick."""
+"""Faults of paths that come nearer to themselves than their rod is thick."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ with little memory."""
 
 
 def crossings(rod: Rod) -> Iterator[Fault]:
-    """Whether a path comes nearer to itself than the thickness of its rod, but for the two sides of a bend no sharper
-    than half the thickness.
+    """Yield a fault if a path comes nearer to itself than the thickness of its rod, except for the two sides of a bend
+    no sharper than half the thickness.
 
-    One that turns by less than half a turn cannot.
+    A path that turns by less than half a turn cannot.
     """
     if rod.path.turn < math.pi:
         return

@@ -218,7 +218,7 @@ def _keys(annotation: Any) -> list[str]:
 
 
 def _expected(schema: type[BaseModel], location: Location) -> str:
-    """What to write for a missing key."""
+    """Return the text that says what to write for a missing key."""
     annotation = _annotation_at(schema, location)
     for extra in get_args(annotation)[1:] if get_origin(annotation) is Annotated else ():
         describe = getattr(getattr(extra, "func", None), "describe", None)
@@ -244,7 +244,7 @@ def repeated(named: list[tuple[Location, str]], among: str) -> Iterator[Fault]:
 
 
 def faults_of_rounding(rounding: float, largest: float, what: str) -> list[Fault]:
-    """Whether a shape has room for the radius of its edges."""
+    """Return a fault if a shape has no room for the radius of its edges, otherwise an empty list."""
     if rounding <= (1.0 + ROUNDING) * largest:
         return []
     return [(("rounding",), rounding, f"must be at most {what} ({largest:g} m)")]

@@ -1,4 +1,4 @@
-"""What a rod's shape at rest departs from its path by."""
+"""Departures of a rod's shape at rest from its path."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Joint(Part):
 
 
 def faults_of_joint(joint: Joint) -> list[Fault]:
-    """What does not go with its type, and bodies that are one."""
+    """Return the faults of a joint: keys that do not go with its type or each other, and bodies that are one."""
     kind = f"a {joint.type}" + (" joint" if joint.type == "universal" else "")
     faults: list[Fault] = []
     if joint.bodies[0] == joint.bodies[1]:

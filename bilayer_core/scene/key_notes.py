@@ -1,4 +1,4 @@
-"""What the classes of a scene say about their keys: the strings below the fields, read from the source.
+"""Notes of the classes of a scene on their keys: the strings below the fields, read from the source.
 
 They are read when somebody asks for them, not when a scene is loaded.
 """

@@ -32,7 +32,7 @@ HEADER = ("key", "type", "unit", "default", "allowed", "description")
 
 @dataclass(frozen=True)
 class Kind:
-    """What may stand for a key: its type, its unit and its range, as text."""
+    """Values that may stand for a key: their type, unit and range, as text."""
 
     type: str
     unit: str = ""
@@ -156,7 +156,7 @@ def _kind_of_field(field: FieldInfo) -> Kind:
 
 
 def _kind(annotation: Any, metadata: list[Any] | tuple[Any, ...] = ()) -> Kind:
-    """What may stand for an annotation with its metadata."""
+    """Return the kind of values that an annotation with its metadata accepts."""
     if get_origin(annotation) is Annotated:
         annotation, *more = get_args(annotation)
         return _kind(annotation, [*metadata, *more])
@@ -199,7 +199,7 @@ def _count(limits: dict[str, int]) -> str:
 
 
 def _kind_of_bare(annotation: Any) -> Kind:
-    """What may stand for an annotation without metadata."""
+    """Return the kind of values that an annotation without metadata accepts."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return Kind(_link(*models_in(annotation)))
     if isinstance(annotation, TypeVar):

@@ -111,7 +111,7 @@ def _entries(item: Any) -> list[Any]:
 
 
 def faults_of_size(scene: Rods) -> list[Fault]:
-    """Whether a scene has too many rods or nodes to be built, with the memory that they would take."""
+    """Return the faults of a scene with too many rods or nodes to be built, with the memory that they would take."""
     sizes = [(rod.pattern.copies if rod.pattern else 1, rod.stations * len(rod.layers)) for rod in scene.rods]
     copies = sum(copies for copies, _ in sizes)
     if copies > MOST_COPIES:
@@ -132,7 +132,7 @@ def faults_of_size(scene: Rods) -> list[Fault]:
 
 
 def _faults_of_light(scene: Rods, sizes: list[tuple[int, int]], nodes: int) -> list[Fault]:
-    """Whether so many elements of layers follow lights that a look at all of them would take seconds."""
+    """Return a fault if so many elements of layers follow lights that a look at all of them would take seconds."""
     lights = {name for name, channel in scene.stimuli.items() if channel.light is not None}
     lit = [
         copies * rod.stations * sum(law.stimulus in lights for layer in rod.layers for law in layer.eigenstrain)

@@ -56,12 +56,12 @@ class Load(Part):
 
     @property
     def factor(self) -> Spans:
-        """What force and moment are multiplied with."""
+        """Factor of force and moment over time."""
         return ALWAYS if self.schedule is None else self.schedule
 
 
 def faults_of_load(load: Load) -> list[Fault]:
-    """Whether it acts on one thing, at one place, and what acts there."""
+    """Return the faults of a load unless it acts on one thing, at one place, with a force or moment allowed there."""
     if (load.rod is None) == (load.body is None):
         found = None if load.rod is None else f"{load.rod}, beside the body {load.body}"
         return [(("rod",), found, "must be given, or `body` instead of it: a load acts on one of the two")]

@@ -1,4 +1,4 @@
-"""What resists the motions that hinges, rails and joints leave free: springs, damping, friction, limits."""
+"""Resistance to the motions that hinges, rails and joints leave free: springs, damping, friction, limits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PositiveAngularSpeed = Annotated[float, *real("an angular speed", "rad/s", "0.01
 
 
 class Turning(Part):
-    """What resists a turn about an axis. Angles are 0 at the start, and go on over whole turns."""
+    """Resistance to turning about an axis. Angles are 0 at the start, and go on over whole turns."""
 
     spring: NonNegativeTorsion = 0.0
     """Torsional stiffness of a spring about the axis."""
@@ -49,12 +49,12 @@ class Turning(Part):
 
     @property
     def rest(self) -> float:
-        """Of the spring."""
+        """Rest angle of the spring [rad]."""
         return self.rest_angle
 
 
 class Sliding(Part):
-    """What resists sliding along an axis. Displacements are 0 at the start."""
+    """Resistance to sliding along an axis. Displacements are 0 at the start."""
 
     spring: NonNegativeStiffness = 0.0
     """Stiffness of a spring along the axis."""
@@ -78,12 +78,12 @@ class Sliding(Part):
 
     @property
     def rest(self) -> float:
-        """Of the spring."""
+        """Rest position of the spring [m]."""
         return self.rest_position
 
 
 def resistance(*laws: Turning | Sliding | None) -> str:
-    """What laws have, in a few words to go on with; empty if that is nothing."""
+    """Return the kinds of resistance that laws have, in words that continue a phrase; empty if there are none."""
     found = {
         word: None
         for law in laws

@@ -37,7 +37,7 @@ class Override:
 
     @property
     def origin(self) -> str:
-        """What begins a message about it."""
+        """Beginning of a message about the override."""
         return f"override {shortened(self.text)}"
 
     def apply(self, data: dict[str, Any]) -> None:

@@ -1,4 +1,4 @@
-"""What all parts of a scene are made of."""
+"""Base class of all parts of a scene, and types of values that they share."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ Direction = Annotated[tuple[Number, Number, Number], AfterValidator(unit_vector)
 
 
 class _Kept(dict[Any, tuple[tuple, Any]]):
-    """What is derived of a part; all are equal, since parts are that are derived of equal values."""
+    """Objects derived from a part. Any two compare equal, so that parts with equal values are equal."""
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -72,7 +72,7 @@ class Part(BaseModel):
         return _Kept()
 
     def keep(self, what: Hashable, others: tuple, make: Callable[[], Derived]) -> Derived:
-        """What is derived of this part, and of other objects that do not change: made when first asked for.
+        """Return an object derived from this part and others that do not change; `make` makes it when first asked for.
 
         It is no part of what is compared, written or copied.
         """

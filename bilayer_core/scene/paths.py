@@ -27,7 +27,7 @@ Frames = tuple[Array, Array, Array]
 
 
 class Path(Part):
-    """What all paths can tell; `start` and `length` [m] are keys or properties of each."""
+    """Common interface of all paths; `start` and `length` [m] are keys or properties of each."""
 
     @property
     @abstractmethod
@@ -44,7 +44,7 @@ class Path(Part):
 
     @property
     def is_closed(self) -> bool:
-        """Whether it ends where it starts, and a rod on it has no ends."""
+        """True if the path ends where it starts, so that a rod on it has no ends."""
         return bool(vars(self).get("closed", False))  # a field of some paths
 
     @property
@@ -53,7 +53,7 @@ class Path(Part):
         return np.array([0.0, self.length])
 
     def demand_of_normal(self, normal: Array) -> str:
-        """What is wrong with the rod's normal at the start; empty if nothing is."""
+        """Return the fault of the rod's normal at the start, in words; empty if it has none."""
         return _demand_perpendicular(normal, self.direction, "the path")
 
     def key_of_radius(self, arc: float) -> str:
@@ -163,7 +163,7 @@ class ArcPath(Path):
 
 
 def faults_of_arc(path: ArcPath) -> list[Fault]:
-    """Whether a closed one closes."""
+    """Return a fault if the arc is to be closed and its ends do not meet."""
     if not path.closed or abs(path.angle - 2.0 * math.pi) <= ROUNDING:
         return []
     gap = 2.0 * path.radius * abs(math.sin(0.5 * path.angle))
@@ -344,7 +344,7 @@ class HelixPath(Path):
         return np.ones((len(arc), 1)) * rates
 
     def demand_of_normal(self, normal: Array) -> str:
-        """What is wrong with the rod's normal at the start; empty if nothing is."""
+        """Return the fault of the rod's normal at the start, in words; empty if it has none."""
         return _demand_perpendicular(normal, self.axis, "the axis of the helix")
 
     def describe(self) -> str:
@@ -354,7 +354,7 @@ class HelixPath(Path):
 
 
 def faults_of_helix(path: HelixPath) -> list[Fault]:
-    """Whether it runs into its own start."""
+    """Return a fault if the helix runs into its own start."""
     if path.pitch > 0.0 or path.angle < 2.0 * math.pi * (1.0 - ROUNDING):
         return []
     return [(("pitch",), path.pitch, "must be above 0 for a full turn or more: it would close on itself")]

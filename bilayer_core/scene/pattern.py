@@ -81,7 +81,7 @@ Step = Annotated[Point, AfterValidator(_not_zero)]
 
 
 class Pattern(Part):
-    """What copies of a rod may have of their own, one entry for each copy."""
+    """Properties that each copy of a rod may have of its own, one entry for each copy."""
 
     stimuli: dict[Name, list[Name]] = {}
     """By the name of a channel in the rod's eigenstrain laws: the channel that drives each copy instead. What is to
@@ -99,12 +99,12 @@ class Pattern(Part):
         return self.count
 
     def places(self) -> tuple[Placement, ...]:
-        """Of each copy."""
+        """Return the placement of each copy."""
         return self.keep("places", (), lambda: tuple(self._places()))
 
     @abstractmethod
     def _places(self) -> Iterable[Placement]:
-        """The same, made anew."""
+        """Return the placement of each copy, computed anew."""
 
     def per_copy(self) -> Iterator[tuple[Location, list]]:
         """Lists that have an entry for each copy, with their keys."""
@@ -179,7 +179,7 @@ class Grid(Pattern):
         return math.prod(self.counts)
 
     def _places(self) -> list[Placement]:
-        """Of each copy, the first step running fastest."""
+        """Return the placement of each copy, the first step running fastest."""
         steps = np.array(self.steps)
         places = product(*(range(count) for count in reversed(self.counts)))
         return [placed(shift=np.array(place[::-1], float) @ steps) for place in places]
@@ -234,7 +234,7 @@ class Listed(Pattern):
 
     @property
     def copies(self) -> int:
-        """As many as there are places."""
+        """Number of placements: rods in all."""
         return len(self.placements)
 
     def _places(self) -> list[Placement]:

@@ -105,7 +105,7 @@ class PointPath(Path):
         return self.curve.curvatures(normal, arc, over)
 
     def demand_of_normal(self, normal: Array) -> str:
-        """What is wrong with the rod's normal at the start; empty if nothing is."""
+        """Return the demand that the rod's normal at the start does not meet; empty if it meets all."""
         tangent = self.curve.carried(normal, np.zeros(1))[1][0]
         steepness = _angle_between(normal, tangent)
         if min(steepness, math.pi - steepness) < STEEP:
@@ -209,7 +209,7 @@ def _are_one(first: Point, second: Point) -> bool:
 
 
 def _faults_of_gap(path: PointPath) -> list[Fault]:
-    """Whether the last point of a closed path is meant to be the first, but is not quite."""
+    """Return a fault if the last point of a closed path is meant to be the first, but is not quite."""
     own = path.points[: path.own_points]
     gap, others = math.dist(own[-1], own[0]), [math.dist(before, after) for before, after in pairwise(own)]
     if gap >= CLOSED_BY * min(others):
@@ -219,7 +219,7 @@ def _faults_of_gap(path: PointPath) -> list[Fault]:
 
 
 def _faults_of_spacing(path: PointPath) -> list[Fault]:
-    """Whether a point is so near to the one before it that no curve is smooth through all of them."""
+    """Return a fault if a point is so near to the one before it that no curve is smooth through all of them."""
     spaces = [math.dist(before, after) for before, after in pairwise(path.points[: path.own_points])]
     largest, least = max(spaces), min(spaces)
     if least >= ROUNDING * largest:

@@ -54,7 +54,7 @@ class _Varying:
         self._quantity = _quantity(quantity)
 
     def describe(self) -> str:
-        """What is allowed."""
+        """Return a description of the allowed values."""
         return f"{self._quantity.describe()}, or a profile {{at: [...], value: [...]}} along the path"
 
     def __call__(self, value: Any) -> Any:

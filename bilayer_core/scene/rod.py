@@ -111,7 +111,7 @@ class Rod(Part):
 
     @property
     def closed(self) -> bool:
-        """Whether it has no ends."""
+        """True if the rod has no ends."""
         return self.path.is_closed
 
     def on_path(self, stations: np.ndarray) -> np.ndarray:
@@ -264,7 +264,7 @@ LEAST_CLOSED = 5
 
 
 def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
-    """What a rod without ends cannot have."""
+    """Yield the faults of a rod without ends: settings that it cannot have."""
     if rod.stations < LEAST_CLOSED:
         yield ("stations",), rod.stations, f"must be at least {LEAST_CLOSED} on a closed path"
     for end in ("clamp_start", "clamp_end"):
@@ -295,7 +295,7 @@ FARTHEST = 1e9
 
 
 def _far_away(rod: Rod) -> Iterator[Fault]:
-    """Whether the differences of its nodes' coordinates are lost in their rounding."""
+    """Yield a fault if the differences of a rod's node coordinates are lost in their rounding."""
     points = rod.frames_at(np.array([0.0, rod.path.length]))[0]
     farthest = FARTHEST * rod.edge_length
     if np.abs(points).max() > farthest:
@@ -314,7 +314,7 @@ POINTS_COMPARED = 9
 
 
 def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
-    """What a pattern says of laws and clamps that the rod does not have, or has itself, and copies at one place."""
+    """Yield the faults of a pattern: laws that the rod lacks, clamps that it has itself, copies at one place."""
     laws = [law for layer in rod.layers for law in layer.eigenstrain]
     channels = dict.fromkeys(law.stimulus for law in laws)
     for name in rod.pattern.stimuli:
@@ -334,8 +334,8 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
 
 
 def _sharp_bends(rod: Rod) -> Iterator[Fault]:
-    """Whether the face on the inner side of a curved path has a length, and its border likewise: the path's radius
-    exceeds their distance from it.
+    """Yield a fault where the inner face or the inner border of a curved path would have no length: the path's radius
+    must exceed their distance from it.
     """
     arc = rod.path.sharpest
     if rod.path.turn == 0.0 or not len(arc):
@@ -363,7 +363,7 @@ def _sharp_bends(rod: Rod) -> Iterator[Fault]:
 
 
 def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:
-    """Whether profiles along a path of given length [m] stay on it."""
+    """Yield a fault for each place of a profile that lies beyond the end of a path of given length [m]."""
     for key in keys:
         profile = getattr(part, key)
         for index, place in enumerate(profile.at if isinstance(profile, Profile) else ()):

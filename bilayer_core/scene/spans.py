@@ -60,7 +60,7 @@ class Span(NamedTuple):
         return self._replace(begin=self.begin + delay, until=min(self.until + delay, until))
 
     def jump_to(self, following: Span) -> bool:
-        """Whether the value jumps, beyond rounding, where this span ends and another follows."""
+        """Return whether the value jumps, beyond rounding, where this span ends and another follows."""
         before, after = self.value(self.until), following.value(self.until)
         largest = max(abs(self.level), abs(before), abs(self.amplitude), abs(after))
         return abs(after - before) > ROUNDING * largest
@@ -92,7 +92,7 @@ class Spans(BaseModel):
         return span.value(t) if abs(span.until - t) <= SAME * h else self.value(t)
 
     def jumps_at(self, t: float, h: float) -> bool:
-        """Whether the value jumps at time `t` [s], where a step of length `h` [s] ends."""
+        """Return whether the value jumps at time `t` [s], where a step of length `h` [s] ends."""
         span = self.span(t - NEARLY * h)
         return abs(span.until - t) <= SAME * h and span.jump_to(self.span(span.until))
 

@@ -125,7 +125,7 @@ class Quantity:
     at_most: float | None = None
 
     def describe(self) -> str:
-        """What is allowed, with the unit."""
+        """Describe the allowed numbers, with the unit."""
         unit = f" [{self.unit}]" if self.unit not in ("", "1") else ""
         limits = [
             f"{word} {limit:g}"
@@ -174,7 +174,7 @@ class Count:
     at_most: int = LARGEST_COUNT
 
     def describe(self) -> str:
-        """What is allowed."""
+        """Describe the allowed numbers."""
         text = f"a whole number of at least {self.at_least}"
         return text if self.at_most == LARGEST_COUNT else f"{text} and at most {self.at_most}"
 
@@ -187,14 +187,17 @@ class Count:
 
 
 def real(*arguments: Any, **limits: float) -> tuple[Any, ...]:
-    """What makes ``Annotated[float, *real(...)]`` a real number with a unit; the arguments are those of `Quantity`."""
+    """Return the metadata that makes ``Annotated[float, *real(...)]`` a real number with a unit.
+
+    The arguments are those of `Quantity`.
+    """
     quantity = Quantity(*arguments, **limits)
     written = float | str if quantity.unit else float
     return BeforeValidator(quantity, json_schema_input_type=written), Field(description=quantity.describe())
 
 
 def whole(at_least: int, at_most: int = LARGEST_COUNT) -> tuple[Any, ...]:
-    """What makes ``Annotated[int, *whole(...)]`` a whole number from `at_least` to `at_most`."""
+    """Return the metadata that makes ``Annotated[int, *whole(...)]`` a whole number from `at_least` to `at_most`."""
     count = Count(at_least, at_most)
     return BeforeValidator(count, json_schema_input_type=int), Field(description=count.describe())
 

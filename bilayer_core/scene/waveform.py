@@ -77,7 +77,7 @@ class _Pulses(Spans):
         return Span(self.start + (cycle + 1) * self.period if cycle + 1 < last else math.inf, self.low)
 
     def _faults(self, width: float, where: str) -> list[Fault]:
-        """Whether both flanks fit into the period."""
+        """Return a fault unless both flanks fit into the period."""
         shortest = min(width, self.period - width)
         if self.rise_time <= shortest * (1.0 + ROUNDING):
             return []

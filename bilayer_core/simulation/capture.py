@@ -15,7 +15,7 @@ from .stepper import Stepper
 
 
 class Capture:
-    """What attributes of a frame are made of: a copy of the state, and of what was seen of it."""
+    """Source of the attributes of a frame: a copy of the state, and of the observations of it."""
 
     def __init__(self, stepper: Stepper, state: State):
         self.model, self.owners = stepper.model, stepper.contact_owners

@@ -27,7 +27,7 @@ MORE = 100.0
 
 
 def collapsed(model: Model, position: Array) -> str:
-    """What has collapsed, in words; empty if nothing has.
+    """Describe the edge or the joint that has collapsed, in words; empty if none has.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What touches what: which rods, bodies and obstacles are nearer to each other than the barrier distance."""
+"""Pairs in contact: rods, bodies and obstacles that are nearer to each other than the barrier distance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What acts on a simulation from outside: stimuli, loads, friction and poses that a program sets."""
+"""Inputs to a simulation from outside: stimuli, loads, friction and poses that a program sets."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .readings import Readings
 
 
 class Controls(Readings):
-    """What a program sets from outside, and who is told of it."""
+    """Inputs that a program sets from outside, and the listeners that are notified of them."""
 
     _listeners: list[Callable[[Input], None]]
     _until: float  # the last end of steps that listeners were told of [s]

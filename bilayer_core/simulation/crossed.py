@@ -25,7 +25,7 @@ def edge_of_strand(model: Model, edge: int) -> str:
 
 
 def more_stations(model: Model, number: int) -> Remedy:
-    """As many stations as bring nodes so near to each other that small obstacles do not fit between them."""
+    """Return the remedy to use so many stations that small obstacles do not fit between neighbouring nodes."""
     edge, _ = crossed(model, number)
     strand = next(s for s in reversed(model.strands) if s.first_edge <= edge)
     rod = next(rod for rod in model.scene.rods if strand.rod in rod.copy_names)

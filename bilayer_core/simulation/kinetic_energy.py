@@ -11,7 +11,7 @@ _UNIT = np.eye(3)
 
 
 def kinetic_energy(model: Model, state: State) -> float:
-    """Of nodes, of edges about their tangents, and of free bodies [J]."""
+    """Return the kinetic energy of nodes, of edges about their tangents, and of free bodies [J]."""
     kinetic = 0.5 * float(model.node_mass @ np.square(state.velocity).sum(axis=1))
     kinetic += 0.5 * float(model.spin_inertia @ np.square(state.spin))
     for slot, body in enumerate(model.bodies.body_of_free):

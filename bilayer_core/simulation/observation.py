@@ -50,7 +50,7 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
 
 
 def strand(s: StrandArrays) -> Strand:
-    """What is told of a strand."""
+    """Return the description of a strand for observers."""
     return Strand(
         s.name,
         s.rod,

@@ -27,7 +27,7 @@ class Parts:
 
 
 def places_in(state: State) -> Places:
-    """Of the parts of a state in its values."""
+    """Return the places of the parts of a state in its values."""
     ends = np.cumsum([0, *(getattr(state, name).size for name in PARTS)]).tolist()
     shapes = [getattr(state, name).shape for name in PARTS]
     return dict(zip(PARTS, zip(ends[:-1], ends[1:], shapes, strict=True), strict=True))

@@ -82,7 +82,7 @@ class PlaneWatch:
 
     @property
     def started(self) -> bool:
-        """Whether there was a look."""
+        """True if the watch has looked at a state."""
         return self._space is not None
 
     @property
@@ -91,7 +91,7 @@ class PlaneWatch:
         return max(1, self._next - self._since_look)
 
     def is_due(self, steps: int, last: bool = False) -> bool:
-        """Whether to look after so many more steps, of which the `last` of a run was one."""
+        """Count more steps, of which the `last` of a run may be one, and return whether to look now."""
         self._done += steps
         self._since_look += steps
         enough = self._since_look >= (FIRST_LOOK if last else self._next)
@@ -120,7 +120,9 @@ class PlaneWatch:
             self.since = time
 
     def _largest_rate(self, state: State) -> float:
-        """Of modes that leave the plane [1/s], to a factor of two, which it is below; 0 if none is fast enough."""
+        """Return a lower bound, to a factor of two, of the largest rate of modes that leave the plane [1/s]; 0 if none
+        is fast enough.
+        """
         if self._leaving(state, self._slowest) == 0:
             return 0.0
         rate, found = max(self._slowest, CLEAR_OF_TURNING * turning_rate(self._plane, state)), 0.0
@@ -140,7 +142,7 @@ class PlaneWatch:
         return max(unstable, 0)
 
     def warning(self) -> str:
-        """What a user is told."""
+        """Return the warning to the user that the robot would have buckled out of the plane."""
         plane = require_plane(self._plane.model.scene)
         return (
             f"by t = {self.since:.3g} s a disturbance that leaves {plane} would have grown a "

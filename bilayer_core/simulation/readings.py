@@ -1,4 +1,4 @@
-"""What a simulation shows of its present state: time, shape, forces, energies."""
+"""Readings of the present state of a simulation: time, shape, forces, energies."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Array = np.ndarray
 
 
 class Readings(ABC):
-    """What can be read of a simulation, none of which changes it.
+    """Readings of a simulation, none of which changes it.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class Readings(ABC):
         return self._stepper
 
     def _seen(self) -> Parts:
-        """What there is to see of the present state."""
+        """Return all observables of the present state."""
         self.compile()
         return self._stepper.observe(self._state)[0]
 
@@ -161,7 +161,7 @@ class Readings(ABC):
 
     @property
     def energy_account(self) -> Array:
-        """What steps supplied, lost and made of energy; slots in `engine.energy_account`."""
+        """Account of the energy that steps supplied, lost and made; slots in `engine.energy_account`."""
         return self._state.account.copy()
 
     def budget(self) -> dict[str, Any]:
@@ -179,7 +179,7 @@ class Readings(ABC):
 
     @property
     def description(self) -> Description:
-        """What does not change during the run."""
+        """Description of the run: everything that does not change while it lasts."""
         settings = {
             "model": self.plan.model,
             "dimension": str(self.plan.dimension),

@@ -1,4 +1,4 @@
-"""What a user can change where steps cannot go on."""
+"""Remedies where steps cannot go on: changes that a user can make."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def _stiffer(model: Model, speed: float) -> Remedy:
 
 
 def _holds(model: Model, speed: float) -> bool:
-    """Whether the barrier takes up the motion of what is heaviest at a speed [m/s]."""
+    """Return whether the barrier takes up the motion of the heaviest node or free body at a speed [m/s]."""
     distance = model.scene.contact.barrier_distance
     return 0.5 * heaviest(model) * speed**2 <= model.contact_stiffness * barrier(HELD * distance, distance)
 

@@ -1,4 +1,4 @@
-"""What a run returns: why and when it ended."""
+"""Result of a run: why and when it ended."""
 
 from __future__ import annotations
 

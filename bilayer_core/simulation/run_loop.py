@@ -18,7 +18,7 @@ STEPS_AT_ONCE = 64
 
 
 class Advanced(Acted, Protocol):
-    """What the loop advances: a `Simulator`."""
+    """Object that the loop advances: a `Simulator`."""
 
     @property
     def time(self) -> float: ...
@@ -26,7 +26,7 @@ class Advanced(Acted, Protocol):
 
 @dataclass(frozen=True)
 class Callbacks:
-    """Who is called during a run; see `Simulator.run`."""
+    """Functions that are called during a run; see `Simulator.run`."""
 
     stop: Callable[[], bool] | None = None
     interrupted: Callable[[], bool] | None = None

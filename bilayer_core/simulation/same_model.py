@@ -45,7 +45,7 @@ def _differing(one: SceneConfig, other: SceneConfig) -> Iterator[str]:
 
 
 def _of_items(key: str, mine: dict[str, Any], theirs: dict[str, Any]) -> Iterator[str]:
-    """Of parts by name, in order, that have schedules."""
+    """Yield key paths of parts by name that differ in more than their schedules; the order of names counts."""
     if list(mine) != list(theirs):
         yield key
         return
@@ -60,5 +60,5 @@ def _of_parts(key: str, mine: Part, theirs: Part, free: set[str]) -> Iterator[st
 
 
 def _pattern(law: Friction | None) -> Any:
-    """What of a law of friction the forces of a scene and its dimension depend on."""
+    """Return the features of a law of friction on which the forces of a scene and its dimension depend."""
     return None if law is None else (law.axis, law.acts, law.coefficient > 0.0)

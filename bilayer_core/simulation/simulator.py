@@ -428,8 +428,8 @@ class Simulator(Controls):
         self.load_state(self._initial_state().flat())
 
     def same_model(self, scene: SceneConfig) -> bool:
-        """Whether `reset` takes a scene: one that differs at most in texts, duration, output, schedules of stimuli and
-        loads, steps and tolerances, and coefficients of friction that are and stay above 0.
+        """Return whether `reset` takes a scene: one that differs at most in texts, duration, output, schedules of
+        stimuli and loads, steps and tolerances, and coefficients of friction that are and stay above 0.
         """
         return not differing(self.scene, scene)
 

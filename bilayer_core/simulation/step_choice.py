@@ -44,7 +44,7 @@ class Steps:
 
     @property
     def adaptive(self) -> bool:
-        """Whether steps are as long as their error allows."""
+        """True if steps are as long as their error allows."""
         return self.tolerance is not None
 
     def __str__(self) -> str:

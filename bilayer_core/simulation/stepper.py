@@ -67,7 +67,7 @@ class StepReport:
 
     @classmethod
     def of(cls, found: IntegrationReport, time: float, length: float) -> StepReport:
-        """That of a step of a length [s] which ended at a time [s]."""
+        """Return the report of a step of given length [s] that ended at a time [s]."""
         counts = found.done, found.rejected, found.iterations, found.factorisations
         return cls(time, length, *counts, found.largest_residual, found.inaccurate)
 
@@ -161,7 +161,7 @@ class Stepper:
         return Parts(found.values.copy(), places), found.touching[: found.touching_count[0]].copy()
 
     def places_in(self, state: State) -> Places:
-        """Of the parts of a state in its values."""
+        """Return the places of the parts of a state in its values."""
         if state.values.size != self._places[0]:
             self._places = state.values.size, places_in(state)
         return self._places[1]
@@ -237,7 +237,7 @@ class Stepper:
         return found
 
     def _integrate(self, state: State, until: float, due: float, most: int) -> IntegrationReport:
-        """As many steps as succeed, with the capacity and the inputs that they need."""
+        """Make as many steps as succeed, with the capacity and the inputs that they need, and return their report."""
         found: IntegrationReport | None = None
         while True:
             self.surroundings.cover(float(state.time[0]), state.override, state.pose_goal)
@@ -275,7 +275,7 @@ class Stepper:
         return f"{text}: {self.engine.who_blocks(found.pair)}" if found.pair >= 0 else text
 
     def _failure(self, found: IntegrationReport, begin: float, state: State, gap: float) -> SimulationError:
-        """What is told of steps that cannot go on from a state."""
+        """Return the error for steps that cannot go on from a state: the reason, the time and a remedy."""
         why, part = self._why(found, begin), collapsed(self.model, state.position)
         folded = found.status == COLLAPSED or bool(part)
         if found.status != COLLAPSED and part:

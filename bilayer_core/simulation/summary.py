@@ -103,7 +103,7 @@ def summarise(simulator: Any) -> dict:
 
 
 def numerical_energy(simulator: Any) -> tuple[float, float]:
-    """What steps have made or, below zero, lost of energy beyond all forces, and the largest energy of the run [J]."""
+    """Return the energy that steps made (below zero: lost) beyond all forces, and the run's largest energy [J]."""
     account = simulator.energy_account
     return float(account[NUMERICAL]) - simulator.statistics.numerical_before, float(account[LARGEST])
 
@@ -136,7 +136,7 @@ def _of_contact(model: Model, unresolved: int, energy: float) -> Iterator[str]:
 
 
 def _motions(view: JointView | BodyView) -> dict[str, float]:
-    """What has been done about and along an axis, and the most beyond a limit."""
+    """Return the angle about an axis [rad], the way along it [m], and the most that each was beyond a limit."""
     found = {}
     for key, motion in (("turning", view.turning), ("sliding", view.sliding)):
         if motion is not None:

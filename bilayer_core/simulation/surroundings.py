@@ -1,4 +1,4 @@
-"""What acts on a robot from outside: stimuli, what its layers make of them, loads, and bodies on prescribed paths."""
+"""Actions on a robot from outside: stimuli, the response of its layers, loads, and bodies on prescribed paths."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Surroundings:
         return _overridden(scheduled, state.override[len(self._channels) :], time)
 
     def present(self, state: State, index: int) -> float:
-        """What a channel, or a load, by its number after those, is in a state."""
+        """Return the value of a channel or the factor of a load in a state; loads are numbered after channels."""
         return float(np.concatenate([self.stimulus_at(state, float(state.time[0])), self.load_factor(state)])[index])
 
     def cover(self, time: float, override: Array, pose_goal: Array) -> None:
@@ -119,7 +119,7 @@ class Surroundings:
 
 
 def _overridden(scheduled: list[float], override: Array, time: float) -> Array:
-    """What schedules give at a time [s], but what is set from outside where anything is."""
+    """Return the values of schedules at a time [s], or those set from outside where there are any."""
     given = [value_at(row, time) for row in override.tolist()]
     return np.array([value if math.isnan(by) else by for value, by in zip(scheduled, given, strict=True)], dtype=float)
 

@@ -1,4 +1,4 @@
-"""What a stress case is, and what came of it."""
+"""Stress cases and their results."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Decision:
 
     @property
     def holds(self) -> bool:
-        """Whether it lies there; NaN does not."""
+        """True if the figure lies in the interval; False for NaN."""
         return self.low <= self.computed <= self.high
 
     @classmethod
@@ -98,7 +98,7 @@ class StressCase:
     axis: str = ""
 
     def scene(self) -> dict | str:
-        """What `load_scene` takes."""
+        """Return the content or the path of the scene, as `load_scene` takes it."""
         return self.content if isinstance(self.content, str) else self.content()
 
     @property
@@ -109,7 +109,7 @@ class StressCase:
 
 @dataclass
 class Record:
-    """What came of a case: a line of the journal.
+    """Result of a case: a line of the journal.
 
     Attributes
     ----------
@@ -148,7 +148,7 @@ class Record:
     cpu_time: float = 0.0
 
     def line(self) -> str:
-        """As a line of json."""
+        """Return the record as a line of JSON."""
         return json.dumps(asdict(self))
 
     @classmethod

@@ -1,4 +1,4 @@
-"""What a worker does with one case: run it, judge it, compare it with a finer run, try what a refusal names."""
+"""Work of a worker on one case: run it, judge it, compare it with a finer run, try the remedy that a refusal names."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def _error(case: StressCase, trial: Trial) -> tuple[float | None, str]:
 
 
 def _size_of_motion(trial: Trial, frames: Sequence[Frame]) -> float:
-    """What an error is measured by [m]: the longest strip, or the way of what moved farther."""
+    """Return the length that an error is relative to [m]: the longest strip, or the longest motion if that is more."""
     start = trial.start
     return max([trial.length, *(distance_of(start, frame) for frame in frames)])
 

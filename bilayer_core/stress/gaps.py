@@ -89,11 +89,11 @@ class GapCheck:
 
     @property
     def checks_anything(self) -> bool:
-        """Whether the scene has anything that could meet."""
+        """True if the scene has anything that could meet."""
         return bool((self._pairs and self._pairs.count) or self._surfaces)
 
     def moment(self, frame: Frame) -> Moment:
-        """What there is to be looked at in a frame."""
+        """Return the places of nodes, points and surfaces to be looked at in a frame."""
         poses = [
             (position, Rotation.from_quat(quaternion).as_matrix())
             for position, quaternion in zip(frame.body_positions, frame.body_quaternions, strict=True)
@@ -115,7 +115,7 @@ class GapCheck:
         return min(gaps)
 
     def crossed(self, at: Moment) -> str:
-        """What was deep inside something on the straight way from the last look; empty if nothing was."""
+        """Describe a deep overlap on the straight way from the last look to this one; empty if there was none."""
         before, self._before = self._before, at
         if before is None:
             return ""
@@ -136,7 +136,7 @@ class GapCheck:
         return ""
 
     def _deep(self, at: Moment, way: Array, with_rods: bool, with_surfaces: list[bool]) -> str:
-        """What is deep inside something, of nodes that move by `way` from look to look."""
+        """Describe a deep overlap of nodes that move by `way` [m] from look to look; empty if there is none."""
         if with_rods:
             gap, radii = self._rod_gaps(at.nodes)
             deep = np.flatnonzero(gap < -DEEP * radii)

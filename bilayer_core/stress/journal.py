@@ -16,7 +16,7 @@ FILE = "results.jsonl"
 
 
 def head_of(cases: dict[str, StressCase]) -> dict[str, object]:
-    """What results are of: the cases, the machine, the versions, the commit if there is one, the date."""
+    """Return the origin of results: the cases, the machine, the versions, the commit if there is one, the date."""
     return {"cases": digest(cases), "machine": machine.record(), "commit": commit(), **machine.now()}
 
 

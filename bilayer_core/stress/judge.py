@@ -1,4 +1,4 @@
-"""What is asked of every accepted step of every case, and of a run as a whole.
+"""Demands on every accepted step of every case, and on a run as a whole.
 
 ========================= =====================================================================================
 finite                    positions and velocities are numbers
@@ -180,7 +180,7 @@ class _Momentum:
 
 
 def _flies(simulator: Simulator) -> bool:
-    """Whether nothing but gravity acts from outside on the robot."""
+    """Return whether nothing but gravity acts from outside on the robot."""
     scene, model = simulator.scene, simulator.model
     alone = scene.contact is None and scene.fluid is None and not scene.loads and scene.damping.mass == 0.0
     guided = any(isinstance(body.motion, Guided) for body in scene.bodies)

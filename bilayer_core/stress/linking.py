@@ -17,7 +17,7 @@ FLAT = 1e-10
 
 
 def gauss_integral(first: Array, second: Array) -> float:
-    """Of two chains of points, shapes (n, 3) and (m, 3): half the crossings that are seen, averaged over directions."""
+    """Return half the signed crossings seen of two chains, shapes (n, 3) and (m, 3), averaged over directions."""
     a, b = first[:-1, None], first[1:, None]
     c, d = second[None, :-1], second[None, 1:]
     corners = [_unit(np.cross(c - a, d - a)), _unit(np.cross(d - a, d - b))]

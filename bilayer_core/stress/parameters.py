@@ -1,4 +1,4 @@
-"""What the matrix varies: one setting of everything, and the values that each axis goes through."""
+"""Parameters of the stress matrix: one setting of everything, and the values that each axis goes through."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ class Parameters:
     damped: bool = True
 
     def text(self) -> str:
-        """What differs from the defaults, in one line."""
+        """Return the settings that differ from the defaults, in one line."""
         changed = (f for f in fields(self) if getattr(self, f.name) != f.default)
         return ", ".join(f"{f.name} {_short(getattr(self, f.name))}" for f in changed) or "all as by default"
 

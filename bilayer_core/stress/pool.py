@@ -76,7 +76,7 @@ def _lost(case: StressCase, why: str) -> Record:
 
 
 def _begin() -> None:
-    """What each worker does first: numpy and scipy are loaded, and then its address space is limited."""
+    """Prepare a worker: load numpy and scipy, and then limit its address space."""
     from . import execute  # noqa: F401 (loads all that cases need)
 
     try:

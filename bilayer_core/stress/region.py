@@ -75,7 +75,7 @@ def free_bend(p: Parameters) -> float:
 
 
 def impact_speed(p: Parameters) -> float:
-    """Of what meets a surface or a strip [m/s]."""
+    """Return the speed of the part that hits a surface or a strip [m/s]."""
     if p.robot in ("drop", "pile"):
         return math.sqrt(2.0 * robots.gravity(p) * (robots.height(p) + robots.barrier(p)))
     return robots.speed(p)
@@ -118,7 +118,7 @@ def _of_time(p: Parameters) -> Iterator[str]:
 
 
 def shortest_time(p: Parameters) -> float:
-    """Of the motion [s]: of the second bending vibration, of what a stimulus does, and of an impact."""
+    """Return the shortest time of the motion [s]: of the second bending vibration, a noisy stimulus and an impact."""
     found = [robots.period(p) / 6.27]
     if p.stimulus == "noise":
         found.append(robots.duration(p) / robots.NOISE_STEPS)

@@ -80,7 +80,7 @@ def shortfalls(records: Sequence[Record]) -> list[str]:
 
 
 def summary_lines(records: Sequence[Record]) -> Iterator[str]:
-    """What a terminal shows at the end."""
+    """Yield the lines that a terminal shows at the end."""
     for where, outcomes in counts(records).items():
         total = sum(outcomes.values())
         parts = ", ".join(f"{outcomes[outcome]} {outcome}" for outcome in Outcome)
@@ -194,7 +194,7 @@ def _torture_cases(records: Sequence[Record]) -> Iterator[str]:
 
 
 def _notes() -> Iterator[str]:
-    """What came of what is tried in a checkout alone, as it was noted there."""
+    """Yield the results of tests that run only in a checkout, as they were noted there."""
     for title, file, command in NOTES:
         path = DATA / file
         yield f"## {title}"

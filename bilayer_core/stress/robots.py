@@ -45,7 +45,7 @@ WALLS = (
 
 
 def thickness(p: Parameters) -> float:
-    """Of the whole section where both layers are [m]."""
+    """Return the thickness of the whole section where both layers are [m]."""
     return p.length / p.slenderness
 
 
@@ -73,7 +73,7 @@ def bending_stiffness(p: Parameters) -> float:
 
 
 def period(p: Parameters) -> float:
-    """Of the first bending vibration of a strip held at one end, in its fluid [s]."""
+    """Return the period of the first bending vibration of a strip held at one end, in its fluid [s]."""
     mass = DENSITY * thickness(p)
     if p.added_mass and p.fluid_ratio > 0.0:
         mass += math.pi / 4.0 * p.fluid_ratio * DENSITY * width(p)
@@ -81,7 +81,7 @@ def period(p: Parameters) -> float:
 
 
 def duration(p: Parameters) -> float:
-    """Of the run [s]."""
+    """Return the duration of the run [s]."""
     fastest = max(speed(p), math.sqrt(0.2 * p.length * gravity(p)) if p.robot == "ball" else 0.0)
     flight = {"ball": 1.2, "bat": 1.2, "box": 12.0}.get(p.robot, 0.0) * p.length / fastest
     if p.robot in ("drop", "pile") and p.gravity > 0.0:

@@ -19,7 +19,7 @@ ROUNDS = 2
 
 
 def is_shrinkable(case: StressCase) -> bool:
-    """Whether it is a case of the matrix, whose settings can be taken back."""
+    """Return whether a case is one of the matrix, whose settings can be taken back."""
     return isinstance(case.content, functools.partial)
 
 
@@ -44,7 +44,7 @@ def shrink(case: StressCase, record: Record, directory: Path, workers: int) -> P
 
 
 def _kind(record: Record) -> str:
-    """What kind of failure it is: its first words."""
+    """Return the kind of a failure: the first words of its reason."""
     return " ".join(record.reason.split()[:3])
 
 

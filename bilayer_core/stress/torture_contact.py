@@ -24,7 +24,9 @@ def met(trial: Trial) -> Decision:
 
 
 def stays_apart(trial: Trial) -> Decision:
-    """That nothing passes through anything: the judge looks at every step; what met must have come near."""
+    """Run a trial and check that nothing passed through anything: the judge looks at every step, and the smallest gap
+    must be below the barrier distance, so that parts have met.
+    """
     trial.run()
     return met(trial)
 

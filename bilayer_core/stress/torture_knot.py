@@ -26,7 +26,7 @@ THICKER = 2.5
 
 
 def loop_radius(points: Array) -> float:
-    """Of the circle that the middle two radians of the loop follow [m]."""
+    """Return the radius of the circle that the middle two radians of the loop follow [m]."""
     edges = np.diff(points, axis=0)
     length = np.linalg.norm(edges, axis=1).mean()
     cosine = (

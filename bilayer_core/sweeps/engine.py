@@ -230,7 +230,7 @@ class Engine:
         return rows
 
     def _of_dead(self, job: Job, points: list[Point]) -> list[Row]:
-        """What is to be done with the runs of a process that died: each once more by itself, then it is its fault."""
+        """Try each run of a process that died once more by itself; return the row of one that is at fault."""
         if len(points) > 1:
             self._again.extend((job, point) for point in points)
             return []

@@ -1,4 +1,4 @@
-"""What a process does with the runs that it gets: load, build or reset, run, measure."""
+"""Execution of the runs that a process gets: load, build or reset, run, measure."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _warmed = False
 
 
 def present_versions() -> dict[str, str]:
-    """What results depend on to the last digit, but for the machine: versions, and the sources of kernels."""
+    """Return versions and kernel sources (hashed), which with the machine fix results to the last digit."""
     return versions() | {"sources": fingerprint()}
 
 
@@ -149,13 +149,13 @@ def simulator_of(scene: SceneConfig) -> Simulator:
 
 
 def recording_of(job: Job, simulator: Simulator) -> Recorder | None:
-    """What records the quantities of a run that are looked at; None if none are."""
+    """Return a recorder of the quantities that a job and its metrics look at in a run; None if there are none."""
     names = list(dict.fromkeys((*job.quantities, *_names(job, simulator))))
     return Recorder(simulator, names, job.rate) if names else None
 
 
 def _names(job: Job, simulator: Simulator) -> list[str]:
-    """Of quantities that metrics look at."""
+    """Return the names of the quantities that metrics look at."""
     return [name_and_component(quantity, ())[0] for quantity in quantities_of(job.metrics)]
 
 
@@ -179,7 +179,7 @@ def _keep_or_drop(job: Job, path: Path, row: Row) -> None:
 
 
 def prepare(job: Job, token: str) -> dict[str, Any]:
-    """What a process says before its first run: its versions, and whether it sees the directory of logs.
+    """Return the report of a process before its first run: its versions, and whether it sees the directory of logs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What travels to the processes that run, and what comes back."""
+"""Data that travel to the processes that run, and rows that come back."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class Code:
 
 @dataclass(frozen=True)
 class Job:
-    """What all runs of a sweep have in common.
+    """Data that all runs of a sweep have in common.
 
     Attributes
     ----------
@@ -96,12 +96,12 @@ class Job:
 
     @cached_property
     def scene_hash(self) -> str:
-        """Of the scene without what is varied."""
+        """Hash of the scene as it is before parameters are varied."""
         return digest(self.scene)
 
     @cached_property
     def _common(self) -> str:
-        """Of all that keys depend on beside parameters."""
+        """Hash of everything that keys depend on besides parameters."""
         change = repr(self.codes.get(self.change)) if self.change else ""
         return digest(json.dumps([self.scene, self.paths, self.units, change, self.expected], sort_keys=True))
 
@@ -121,7 +121,7 @@ class Point:
 
 @dataclass
 class Row:
-    """What came of a run.
+    """Result of a run.
 
     Attributes
     ----------

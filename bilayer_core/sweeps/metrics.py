@@ -26,7 +26,7 @@ class MetricError(Exception):
 
 @dataclass(frozen=True)
 class FinishedRun:
-    """What functions of a sweep look at.
+    """Finished run, as functions of a sweep see it.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ def _value(name: str, metric: Metric, job: Job, run: FinishedRun) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """What a column takes."""
+    """Return a value in a type that a column takes; raise TypeError if it has none."""
     if value is None or isinstance(value, bool | str):
         return value
     if isinstance(value, np.bool_):
@@ -177,7 +177,7 @@ def series(metric: OfQuantity, recording: Recorded) -> np.ndarray:
 
 
 def check_metrics(job: Job, run: FinishedRun) -> None:
-    """Whether runs have all that metrics ask for; functions are not called.
+    """Check that a run has everything that the metrics ask for, without calling functions.
 
     Raises
     ------

@@ -41,7 +41,7 @@ BEST = "best.yaml"
 
 @dataclass(frozen=True)
 class Optimum:
-    """What a search found.
+    """Result of a search.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Optimum:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether that is small enough."""
+        """True if the relative difference of the run with finer steps is known and small enough."""
         return self.difference is not None and abs(self.difference) <= CONFIRMED
 
 
@@ -139,7 +139,7 @@ class Search:
         return self.sweep.point(self.asked - 1, values)
 
     def tell(self, number: int, row: Row) -> None:
-        """What came of it."""
+        """Give the study the outcome of a run: its metric, or that it failed."""
         optuna = _optuna()
         value = row.metrics.get(self.metric)
         if row.outcome is Outcome.DONE and _is_value(value):

@@ -81,7 +81,7 @@ def _few_lines(result: SweepResult, varied: list[str], numeric: list[str]) -> bo
 
 
 def _other(varied: list[str], numeric: list[str]) -> str:
-    """Of two parameters the one that is not along the axis."""
+    """Return the one of two parameters that is not along the axis."""
     return next(name for name in varied if name != numeric[0])
 
 

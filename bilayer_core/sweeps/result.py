@@ -28,7 +28,7 @@ ABOUT = b"bilayer_sweep"
 
 @dataclass(frozen=True)
 class Columns:
-    """What columns of results are.
+    """Parameters and metrics in the columns of results, with their units and objectives.
 
     Attributes
     ----------
@@ -52,14 +52,14 @@ class Columns:
 
     @classmethod
     def from_text(cls, text: str | bytes) -> Columns:
-        """As JSON has them."""
+        """Return the columns that a JSON text describes."""
         content = json.loads(text)
         names = {key: tuple(content[key]) for key in ("parameters", "metrics", "logarithmic")}
         return cls(**content | names)
 
 
 class SweepResult:
-    """What came of a sweep.
+    """Result of a sweep.
 
     Parameters
     ----------

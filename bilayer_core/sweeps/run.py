@@ -54,12 +54,12 @@ class Sweep:
             yield self.point(number, values)
 
     def keys(self) -> set[str]:
-        """Of all its runs."""
+        """Return the keys of all runs."""
         return {point.key for point in self.points()}
 
     @property
     def about(self) -> Columns:
-        """What the columns of its results are."""
+        """Description of the columns of the sweep's results."""
         job, spec = self.job, self.spec
         logarithmic = tuple(name for name, parameter in spec.parameters.items() if parameter.spacing == "log")
         return Columns(tuple(job.paths), tuple(job.metrics), job.units, dict(spec.objectives), logarithmic, spec.title)

@@ -57,7 +57,7 @@ MemorySize = Annotated[float, *real("a memory size", "byte", "2 GB", above=0.0)]
 
 
 class Parameter(Part):
-    """What is varied: by `values`, or over a range."""
+    """Quantity that a sweep varies: by `values`, or over a range."""
 
     path: str | list[str] | None = None
     """Key path of the scene, or several that take the same value; none for what `change` alone looks at."""
@@ -91,7 +91,7 @@ class Parameter(Part):
 
     @cached_property
     def ends(self) -> tuple[float, float]:
-        """Of its range, in its unit."""
+        """Ends of its range, in its unit."""
         return self.from_.value, self.in_unit(self.to)
 
     @cached_property
@@ -169,7 +169,7 @@ class OfQuantity(Part):
 
 
 class OfFunction(Part):
-    """What a Python function says of the run, which it gets as a `FinishedRun`."""
+    """Metric that a Python function computes of a run, which it gets as a `FinishedRun`."""
 
     function: Function
 
@@ -193,14 +193,14 @@ Metric = Annotated[OfSummary | OfQuantity | OfFunction, BeforeValidator(_kind_of
 
 
 class Condition(Part):
-    """What a column of a row has to be."""
+    """Condition that a column of a row has to meet."""
 
     above: PlainNumber | None = None
     below: PlainNumber | None = None
     equals: str | float | bool | None = None
 
     def holds(self, value: Any) -> bool:
-        """Whether it is that; what is missing is not."""
+        """Return whether a value meets the condition; a missing value does not."""
         if self.equals is not None and value != self.equals:
             return False
         if self.above is None and self.below is None:
@@ -211,7 +211,7 @@ class Condition(Part):
 
 
 class Recording(Part):
-    """What of each run is kept while it lasts, for metrics that are functions."""
+    """Quantities of each run to keep while it lasts, for metrics that are functions."""
 
     quantities: list[str] = []
     """Names or patterns, such as ``body/*/position``."""
@@ -220,7 +220,7 @@ class Recording(Part):
 
 
 class RunLimits(Part):
-    """What one run may take."""
+    """Limits of one run: wall time and memory."""
 
     wall_time: PositiveTime | None = None
     """Then it is stopped between two steps, and is a row with that outcome; one that hangs is killed."""

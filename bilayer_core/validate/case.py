@@ -1,4 +1,4 @@
-"""What a validation case is, and what comes of it."""
+"""Validation cases and their results."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a case.
+    """Result of a case.
 
     Attributes
     ----------
@@ -84,11 +84,11 @@ class Result:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is within the limit."""
+        """True if the error is within the limit."""
         return self.error <= self.case.limit
 
     def record(self) -> dict[str, object]:
-        """As a line of the table in json and csv; what is not a number is None."""
+        """Return the result as a line of the table in json and csv, with None for a number that is not finite."""
         numbers = {"computed": self.computed, "reference": self.reference, "error": self.error}
         return {
             "case": self.case.name,

@@ -160,7 +160,7 @@ def _rolling(kind: str) -> tuple[float, float, float]:
 
 
 def rolling_acceleration(kind: str) -> tuple[float, float]:
-    """Of a ball down a slope of 0.3 rad [m/s²]."""
+    """Return the acceleration of a ball down a slope of 0.3 rad, simulated and exact [m/s²]."""
     return _rolling(kind)[0], BALLS[kind][1] * GRAVITY * math.sin(0.3)
 
 

@@ -35,7 +35,7 @@ def strip(layers: list[dict], **more) -> dict:
 
 
 def acceleration(direction: str, layers: list[dict]) -> tuple[float, float]:
-    """Of a strip that a force per own mass of 1 m/s² drives [m/s²]."""
+    """Return the acceleration [m/s²], measured and expected, of a strip driven by a force per own mass of 1 m/s²."""
     axis = AXES[direction]
     simulator = Simulator(load_scene(strip(layers, gravity=[float(k == axis) for k in range(3)])))
     simulator.run(0.1)

@@ -177,10 +177,10 @@ def pulled_over_grain(
 
 
 def acceleration_on_grain(off: float) -> np.ndarray:
-    """Of a block from rest, along the grain and across it [m/s²], shape (2,).
+    """Return the acceleration of a block from rest, along the grain and across it [m/s²], shape (2,).
 
-    It goes straight on, along a unit vector d at which pull and friction M² d/|M d| leave nothing across d; M has the
-    coefficients along and across the grain.
+    The block goes straight on, along a unit vector d at which pull and friction M² d/|M d| leave nothing across d; M
+    has the coefficients along and across the grain.
     """
     pull = PULL * np.array([math.cos(off), math.sin(off)])
 

@@ -56,7 +56,7 @@ SPAN, RISE = 2.0 * LENGTH, 1.2 * THICKNESS
 
 
 def _arch_stands(model: str, dimension: int, load: float) -> bool:
-    """Whether a shallow arch between two hinges, of the shape of half a sine, bears a load [N/m] of the same shape."""
+    """Return whether a shallow arch between two hinges, half a sine in shape, bears a load [N/m] of the same shape."""
     wave = math.pi / SPAN
     points = [[x, 0.0, RISE * math.sin(wave * x)] for x in np.linspace(0.0, SPAN, 201).tolist()]
     arch = rod(layers_of(model), SPAN, EDGES + 1, width=WIDTH, name="arch", clamp_start="left", clamp_end="right")
@@ -106,7 +106,7 @@ def swinging(model: str, dimension: int, **steps) -> Simulator:
 
 
 def period(model: str, dimension: int) -> tuple[float, float]:
-    """Of a strip that swings on a hinge [ms]."""
+    """Return the period of a strip that swings on a hinge [ms], measured and expected."""
     simulator, angle = swinging(model, dimension, integrator="sdirk2", dt=5e-4), math.radians(2.0)
     times, last = [], simulator.positions[-1, 0]
     while len(times) < 3:
@@ -202,7 +202,7 @@ def four_bar(model: str, dimension: int) -> tuple[float, float]:
 
 @cache
 def _sinking(model: str, dimension: int, joined_by: str = "") -> float:
-    """Of the tip of a heavy strip [mm]; joined in its middle it is two."""
+    """Return how far the tip of a heavy strip sinks [mm]; if joined in its middle, the strip is two."""
     half, soft = 0.5 * LENGTH, {"gel": GEL | {"youngs_modulus": 1e7}}
     if joined_by:
         second = "junction" if joined_by == "junction" else "other"

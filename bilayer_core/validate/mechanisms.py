@@ -22,7 +22,7 @@ STEPS = {"integrator": "tr_bdf2", "dt": 5e-4}
 
 
 def spring_period(model: str, dimension: int) -> tuple[float, float]:
-    """Of a stiff strip on a hinge with a spring [ms], 2π √(I/k)."""
+    """Return the period of a stiff strip on a hinge with a spring [ms], simulated and as 2π √(I/k)."""
     mass = GEL["density"] * LENGTH * WIDTH * THICKNESS
     inertia = mass * (LENGTH**2 / 3.0 + THICKNESS**2 / 12.0)
     spring = inertia * 400.0
@@ -83,7 +83,7 @@ def _extremes(simulator: Simulator, value, count: int) -> list[float]:
 
 
 def friction_of_a_swing(dimension: int) -> tuple[float, float]:
-    """What a pendulum loses of its amplitude in a cycle by the friction of its hinge [mrad], 4 M/(m g l)."""
+    """Return the amplitude that hinge friction takes from a pendulum per cycle [mrad], simulated and as 4 M/(m g l)."""
     start, lost = math.radians(3.0), 4e-3
     moment = 0.25 * lost * MASS * GRAVITY * ARM
     content = pendulum(start, friction=moment, friction_speed=1e-3)

@@ -109,7 +109,7 @@ SINKING = {
 
 
 def terminal_velocity(direction: str) -> tuple[float, float]:
-    """Of a strip that sinks in a flowing fluid [m/s]; that of its slowest node."""
+    """Return the terminal velocity of a sinking strip in a flowing fluid [m/s]: of its slowest node, and expected."""
     axis, layers, area, coefficient = SINKING[direction]
     gravity = [DRIVE * (k == axis) for k in range(3)]
     fluid = {"density": 800.0, "drag_along": 0.4, "drag_across": 1.2, "velocity": FLOW}

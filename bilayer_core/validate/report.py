@@ -39,7 +39,10 @@ def write_page(results: Sequence[Result], path: Path) -> None:
 
 
 def page(results: Sequence[Result]) -> str:
-    """What `write_page` writes. Errors are rounded up to one digit, so that the page says the same on every machine."""
+    """Return the text that `write_page` writes.
+
+    Errors are rounded up to one digit, so that the page says the same on every machine.
+    """
     lines = []
     for family, members in groupby(results, lambda result: result.case.family):
         lines += [

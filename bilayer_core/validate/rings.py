@@ -68,7 +68,7 @@ def _circle(simulator: Simulator) -> tuple[Array, Array, Array]:
 
 @cache
 def frequency(kind: str, waves: int, edges: int = EDGES, steps: int = 400) -> tuple[float, float]:
-    """Of a mode of n waves [Hz], by the end of a first period in so many steps, and Hoppe's."""
+    """Return the frequency of a mode of n waves [Hz], by the end of a first period of `steps` steps, and Hoppe's."""
     layers, model, dimension = KINDS[kind]
     line = GEL["density"] * WIDTH * THICKNESS
     rate = math.sqrt(BENDING / line) / RADIUS**2 * waves * (waves**2 - 1) / math.sqrt(waves**2 + 1)
@@ -175,7 +175,7 @@ def strained(model: str, dimension: int) -> tuple[float, float, float]:
 
 
 def _energy_of_pair(model: str) -> float:
-    """That of a ring whose inner layer has an eigenstrain [J]."""
+    """Return the energy of a ring whose inner layer has an eigenstrain [J]."""
     modulus, half, length = GEL["youngs_modulus"], THICKNESS / 2, 2.0 * math.pi * RADIUS
     reduced = modulus * WIDTH * half / 3.0
     if model == "two_rod":

@@ -26,7 +26,8 @@ def gel(time: float, youngs_modulus: float = 1e6) -> dict:
 def damping_ratio(
     model: str, dimension: int, integrator: str, times: tuple[float, float] = (0.02, 0.02)
 ) -> tuple[float, float]:
-    """Of the first bending mode of a cantilever of two equal layers, ζ, from a fit to its tip, and ω τ/2.
+    """Return the damping ratio ζ of the first bending mode of a cantilever of two equal layers, from a fit to its tip,
+    and ω τ/2 for comparison.
 
     EI (w″″ + τ ẇ″″) + ρA ẅ = 0 has for each mode q̈ + τ ω² q̇ + ω² q = 0; either layer has half
     of the stiffness, so that τ is the mean of theirs.

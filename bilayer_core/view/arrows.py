@@ -42,12 +42,12 @@ class Arrows:
 
 
 def contact_arrows(run: RunData, scales: Scales) -> Arrows:
-    """Of contact forces on nodes and contact points."""
+    """Return the arrows of contact forces on nodes and contact points."""
     return Arrows(run.shape_times, run.positions, run.contact_forces, scales.metres_per_newton, scales.shown_force)
 
 
 def reaction_arrows(run: RunData, scales: Scales) -> dict[str, Arrows]:
-    """Of what rods exert on each body that holds some, by `REACTIONS`; those alone that ever act."""
+    """Return arrows of the reactions of rods on bodies that hold them, by `REACTIONS`; only of those that ever act."""
     return scaled_reactions(run, scales, reaction_references(run, scales.size))
 
 

@@ -159,7 +159,7 @@ def shots(
 
 
 def is_worth_following(far: float, near: float) -> bool:
-    """Whether a camera that stands still is so much farther away than one that follows the robot."""
+    """Return whether a still camera is more than `WORTH_FOLLOWING` times as far away as one that follows the robot."""
     return far > WORTH_FOLLOWING * near
 
 
@@ -195,7 +195,7 @@ def _along(camera: Camera, way: np.ndarray, groups: list[np.ndarray], aspect: fl
 def _perspective(
     camera: Camera, points: np.ndarray, wide: float, low: float, high: float, extent: float
 ) -> tuple[np.ndarray, float]:
-    """What the eye looks at, in the axes of the picture, and from how far [m].
+    """Return the point that the eye looks at, in the axes of the picture, and its distance from the eye [m].
 
     A point (x, y, z) is seen at slopes (x − e_x)/(e_z − z) and (y − e_y)/(e_z − z) from an eye e. That the upper one is
     at most h asks for e_y + h e_z ≥ max(y + h z), and so on: the least e_z and the middle of what it leaves for e_x and

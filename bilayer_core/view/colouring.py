@@ -1,4 +1,4 @@
-"""What the colours of rods say: axial strain, curvature, or the pressure of contact."""
+"""Colours of rods by axial strain, curvature, or the pressure of contact."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Colouring:
         return (0.0, f"-{self.shown_limit}"), (0.5, "0"), (1.0, f"+{self.shown_limit}")
 
     def values(self, run: RunData, layer: Strand) -> np.ndarray:
-        """Of one of the description's `layers`, in SI units, shape (shapes, its nodes)."""
+        """Return the values of one of the description's `layers`, in SI units, shape (shapes, its nodes)."""
         return _values(run, layer, self.quantity)
 
     def colours(self, values: np.ndarray) -> np.ndarray:
@@ -70,7 +70,7 @@ class Colouring:
         return map_colours(values, -self.limit if self.diverging else 0.0, self.limit, self.colour_map)
 
     def sentence(self) -> str:
-        """What colours say, in words."""
+        """Return the meaning of the colours, in words."""
         if self.diverging:
             low, high = self.ticks[0][1], self.ticks[-1][1]
             return f"{self.title}: {low} (blue) over 0 (grey) to {high} (red)"

@@ -1,4 +1,4 @@
-"""What must be there for a run to be drawn."""
+"""Requirements that a run must meet to be drawn."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def ribbon_faces(nodes: int) -> np.ndarray:
 
 
 def two_triangles(corners: np.ndarray) -> np.ndarray:
-    """Of each of some quadrilaterals, shape (quadrilaterals, 4): shape (triangles, 3)."""
+    """Return the two triangles of each of some quadrilaterals, shape (quadrilaterals, 4): shape (triangles, 3)."""
     return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]).astype(np.uint32)
 
 

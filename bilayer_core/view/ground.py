@@ -50,7 +50,7 @@ class Ground:
     cell: float
 
     def corners(self, plane: ShapeInfo) -> np.ndarray:
-        """Of a square that holds what is seen of a plane [m], shape (4, 3)."""
+        """Return the corners of a square that holds the visible part of a plane [m], shape (4, 3)."""
         axes, point = plane_axes(plane), np.array(plane.position)
         middle = (self.middle - point) @ axes[:2].T
         return point + (middle + self.radius * np.array(_SIGNS)) @ axes[:2]

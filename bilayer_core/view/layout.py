@@ -71,7 +71,7 @@ def energy_groups(run: RunData, known: Collection[str] = ()) -> dict[str, dict[s
 
 
 def entity_name(name: str) -> str:
-    """Of a curve in the recording."""
+    """Return the entity name of a curve in the recording."""
     return name.split(" [")[0].replace(" ", "_").replace(",", "")
 
 

@@ -25,7 +25,7 @@ FRAMES = 5000
 
 
 class LiveScales:
-    """What quantities look like from the present time on.
+    """Scales and colours of quantities from the present time on.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class LiveScales:
         return before != (self.scales, self.colouring, self.reactions, self.contact)
 
     def _update_contact(self, forces: np.ndarray) -> None:
-        """As for a whole run: a few frames of impact would make all other arrows invisible."""
+        """Scale contact arrows as for a whole run, so that a few frames of impact do not make all others invisible."""
         largest = np.linalg.norm(forces, axis=2).max(axis=1, initial=0.0)
         self._largest.extend(largest[largest > 0.0].tolist())
         if not self._largest:
@@ -99,7 +99,7 @@ def _scene_of(description: Description) -> SceneConfig | None:
 
 
 def _largest_eigenstrain(scene: SceneConfig | None) -> float:
-    """Of any layer, at the ends of its channels' ranges."""
+    """Return the largest eigenstrain of any layer at the ends of its channels' ranges."""
     found = [0.0]
     for rod in scene.rods if scene else ():
         for layer in rod.layers:
@@ -110,7 +110,7 @@ def _largest_eigenstrain(scene: SceneConfig | None) -> float:
 
 
 def _moves(scene: SceneConfig | None, description: Description) -> bool:
-    """Whether the rods are held by nothing that stays where it is."""
+    """Return whether the rods are held by nothing that stays where it is."""
     holding = [body.name for body in description.bodies if body.holds_rods and body.prescribed]
     if scene is None:
         return not holding

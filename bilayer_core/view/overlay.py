@@ -1,4 +1,4 @@
-"""What is written on pictures: the time, the colour bar with its unit, a scale bar, what arrows and squares mean."""
+"""Annotations of pictures: the time, the colour bar with its unit, a scale bar, the meaning of arrows and squares."""
 
 from __future__ import annotations
 

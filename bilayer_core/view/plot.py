@@ -215,7 +215,7 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
 
 @dataclass(frozen=True)
 class _Legend:
-    """What the curves of a panel are called, above its axes: there it covers none."""
+    """Legend of the curves of a panel, above its axes: there it covers none."""
 
     labels: tuple[str, ...]
     columns: int
@@ -261,7 +261,7 @@ def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
 
 
 def _label(own: list[str], unit: str) -> str:
-    """What the quantities of a panel are, in one or two words."""
+    """Return a label for the quantities of a panel, in one or two words."""
     if len(own) == 1:
         head, comma, node = own[0].partition(", ")
         parts = head.split("/")

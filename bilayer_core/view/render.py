@@ -106,7 +106,7 @@ class Studio:
 
     @property
     def warning(self) -> str | None:
-        """That shapes end long before the run, where they were logged too seldom."""
+        """Warning that shapes end long before the run, where they were logged too seldom; None if they do not."""
         end = float(self._run.times[-1])
         if end - self.last <= MISSED * (end - float(self._run.times[0])):
             return None
@@ -184,7 +184,7 @@ class Studio:
         size: tuple[int, int] | None = None,
         longest: int | None = None,
     ) -> _Setting:
-        """What is seen at `times`, from where, and how large."""
+        """Return the moments at `times` [s], the view of each, the size of pictures and how many metres a pixel is."""
         for time in times:
             if not self.first <= time <= self.last:
                 raise InputError(f"{self._path}: holds {self.first:g} s to {self.last:g} s, and not {time:g} s")
@@ -229,7 +229,7 @@ class Studio:
         return Overlay(size, self._look.theme, self._colouring, metres_per_pixel, self._notes(), text_size)
 
     def _notes(self) -> list[str]:
-        """What arrows and squares mean."""
+        """Return notes that explain the arrows and squares."""
         run, notes = self._run, []
         if run.contact_forces.any():
             notes.append(f"green: contact force, {10 / self._scales.metres_per_newton:.3g} mN for 10 mm")

@@ -226,7 +226,7 @@ class RunSender:
         return {name: size for name, size in sizes.items() if name in known or size.any()}
 
     def _send_events(self, run: RunData) -> None:
-        """What happened, as text."""
+        """Send the events of a run as text."""
         if not run.events:
             return
         colours = [EVENT_COLOURS.get(event.name, PLAIN_COLOUR) for event in run.events]

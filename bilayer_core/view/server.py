@@ -151,7 +151,7 @@ def open_window(server: ViewServer) -> subprocess.Popen:
 
 
 def _bracketed(host: str) -> str:
-    """As addresses want it."""
+    """Return a host as a URL needs it: an IPv6 address in brackets."""
     return f"[{host}]" if ":" in host else host
 
 

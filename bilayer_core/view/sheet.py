@@ -41,7 +41,7 @@ def layout_of(count: int, width: int, height: int) -> tuple[int, float]:
 
 
 def width_of(columns: int, scale: float, size: tuple[int, int]) -> int:
-    """Of a whole sheet [pixels]."""
+    """Return the width of a whole sheet [pixels]."""
     return columns * (int(scale * size[0]) + GAP) - GAP
 
 

@@ -285,7 +285,7 @@ class Stage:
 
 
 def _hides(plane: ShapeInfo, shot: Shot, points: np.ndarray) -> bool:
-    """Whether a plane is between the eye and one of the points, or may be: no eye is on a side without a direction."""
+    """Return whether a plane is between the eye and one of the points, or may be because the eye is on neither side."""
     normal = geometry.plane_axes(plane)[2]
     heights = (points - np.array(plane.position)) @ normal
     back = shot.eye - shot.target if shot.half_height is not None else shot.eye - np.array(plane.position)
@@ -294,7 +294,7 @@ def _hides(plane: ShapeInfo, shot: Shot, points: np.ndarray) -> bool:
 
 
 def _equal(first: Shot, second: Shot) -> bool:
-    """Whether two shots show the same."""
+    """Return whether two shots show the same."""
     return first.half_height == second.half_height and all(
         np.array_equal(getattr(first, name), getattr(second, name)) for name in ("eye", "target", "up")
     )

@@ -150,7 +150,7 @@ class HeadlessViewer:
             self._check(deadline, "finish the picture", period)
 
     def complaints(self) -> list[str]:
-        """What the viewer could not show, and the errors in its log."""
+        """Return the viewer's reports of parts that it could not show, and the errors in its log."""
         reports = [
             f"{view.name}: {report.severity}: {report.summary}: {report.details}"
             for view in self.client.get_state().views

@@ -1,1 +1,1 @@
-"""What controllers ask for, and when it acts."""
+"""Commands of controllers, and the time when they act."""

@@ -39,7 +39,7 @@ class _Sent:
 
 @dataclass
 class _Heard:
-    """What sources said of a channel, the last one last."""
+    """Last messages of the sources of a channel, the latest one last."""
 
     sources: dict[Source, _Sent] = field(default_factory=dict)
     told: bool = False

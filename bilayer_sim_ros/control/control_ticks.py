@@ -1,4 +1,4 @@
-"""What controllers ask for, as what acts: at ticks, the multiples of the control period.
+"""Commands of controllers, applied to the simulator at ticks, the multiples of the control period.
 
 Whoever advances time, freely, step by step while paused or in lockstep, comes by here at each step: at the first that
 begins at a tick or after it, what has come since the tick before is set on the simulator, the last message of each
@@ -59,7 +59,7 @@ class Control:
 
     @property
     def waiting(self) -> bool:
-        """Whether simulated time must not go on."""
+        """True if simulated time must not go on."""
         return self._open and self._lockstep is not None and self._lockstep.waiting
 
     @property

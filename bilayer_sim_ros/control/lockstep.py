@@ -42,7 +42,7 @@ class Lockstep:
 
     @property
     def waiting(self) -> bool:
-        """Whether the tick lacks an answer for which there is still time; asked for the first time, that begins."""
+        """True if the tick lacks an answer for which there is still time; the first query starts that time."""
         if self._inputs.answered:
             return False
         if self._timeout and math.isinf(self.wait_ends_at):

@@ -51,7 +51,7 @@ class Pacer:
 
 
 def cause_of_delay(spent: dict[str, float], real: float) -> str:
-    """What most of some real time [s] went to, in words, with what the rest went to."""
+    """Describe in words the cause that took most of some real time [s], with the shares of the others."""
     shares = sorted(((seconds / real, cause) for cause, seconds in spent.items()), reverse=True)
     if not shares:
         return "not known"

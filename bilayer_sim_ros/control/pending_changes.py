@@ -46,7 +46,7 @@ class Commands:
         self.forgotten()
 
     def pose(self, body: str, message: PoseStamped) -> Callable[[], None]:
-        """What asks for a body to go to a pose; InputError if its frame is not that of the world."""
+        """Return a function that asks for a body to go to a pose; raise InputError if its frame is not the world's."""
         if message.header.frame_id not in FRAMES:
             frame = shortened(message.header.frame_id)
             raise InputError(f"pose of body {body!r}: frame {frame!r} is not allowed; it must be 'world'")

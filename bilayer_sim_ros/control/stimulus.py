@@ -107,7 +107,7 @@ class StimulusInputs:
 
     @property
     def answered(self) -> bool:
-        """Whether the open tick is complete."""
+        """True if the open tick is complete."""
         return self._answers is None or self._answers.complete
 
     @property
@@ -196,8 +196,8 @@ class StimulusInputs:
         return fault
 
     def changes(self, time: float) -> dict[str, float | None]:
-        """What to set for the step that begins at `time` [s], a tick: channels that a message or the fallback changes,
-        in the scene's order, whichever message came first.
+        """Return the values to set for the step that begins at `time` [s], a tick: those of channels that a message or
+        the fallback changes, in the scene's order, whichever message came first.
 
         None gives a channel back to the scene's schedule.
         """
@@ -229,7 +229,7 @@ class StimulusInputs:
         return changes
 
     def _is_silent(self, name: str, time: float) -> bool:
-        """Whether the fallback acts: before the first message, and after the timeout."""
+        """Return whether the fallback acts on a channel: before the first message, and after the timeout."""
         if name not in self._heard:
             return True
         return self._timeout > 0.0 and time - self._heard[name] >= self._timeout - TIME_ROUNDING

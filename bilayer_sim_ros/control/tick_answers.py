@@ -9,7 +9,7 @@ LATE, DUPLICATE, FOREIGN = "late", "duplicate", "foreign"
 
 
 def mount(body: str) -> str:
-    """What the pose of a body is called among the answers to a tick: its topic."""
+    """Return the name of a body's pose among the answers to a tick: its topic."""
     return f"mount_pose/{body}"
 
 
@@ -50,13 +50,13 @@ class Answers:
 
     @property
     def complete(self) -> bool:
-        """Whether nothing more is waited for; so it is where there is no channel."""
+        """True if no further answer is awaited, as always where there is no channel."""
         if not self._open or not (self._channels or self._needed):
             return True
         return self._needed <= self._given if self._needed else bool(self._given)
 
     def waits_for(self, name: str) -> bool:
-        """Whether no tick is complete without an answer of that name."""
+        """Return whether every tick needs an answer of that name to be complete."""
         return name in self._needed
 
     def take(self, channels: Collection[str], stamp: int | None) -> str:

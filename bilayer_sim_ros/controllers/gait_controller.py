@@ -90,7 +90,7 @@ class GaitController(Node):
                 raise ValueError(f"parameter '{name}' cannot be {value!r}")
 
     def values(self, now: float) -> list[float]:
-        """Of all channels at a simulated time [s]."""
+        """Return the values of all channels at a simulated time [s]."""
         rests = self.periods and now >= self.periods * self.period
         parts = [0.0 if rests else wave(self.shape, now / self.period - phase, self.duty) for phase in self.phases]
         return [self.low + (self.high - self.low) * part for part in parts]

@@ -97,7 +97,7 @@ class RampController(Node):
 
     @property
     def connected(self) -> bool:
-        """Whether the channel is there, and answers will be heard."""
+        """True if the channel is there, and answers will be heard."""
         return self.count_subscribers(self.topic) > 0 and self.publisher.get_subscription_count() > 0
 
     def look(self) -> None:

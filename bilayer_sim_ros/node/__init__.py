@@ -1,1 +1,1 @@
-"""What every node of this package is made of: parameters, arguments, signals, and the life of a run beside it."""
+"""Common parts of the nodes of this package: parameters, arguments, signals, and the life of a run beside a node."""

@@ -1,4 +1,4 @@
-"""What is published when ROS has been shut down under a running simulation: nothing, and that is no error.
+"""Publishing after ROS has been shut down under a running simulation: it does nothing, and that is no error.
 
 `rclpy.shutdown`, or the signal handlers of rclpy, may do so at any moment, and what runs in other threads learns it
 from the failure of a publisher alone. The simulation goes on until it is stopped, and finishes its files.
@@ -18,7 +18,7 @@ Arguments = ParamSpec("Arguments")
 
 
 def is_valid(node: Node) -> bool:
-    """Whether a node's context is; without waiting for its lock, which is held while nodes are ended."""
+    """Return whether a node's context is valid, without waiting for its lock, which is held while nodes are ended."""
     handle = node.context.handle
     if handle is None:
         return False
@@ -57,11 +57,11 @@ class WhileValid:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody subscribes to anything."""
+        """True if anybody subscribes to anything."""
         return self._if_valid(lambda: self._publisher.wanted)
 
     def is_shown(self) -> bool:
-        """Whether anybody shows the run while it goes on."""
+        """Return whether anybody shows the run while it goes on."""
         return self._if_valid(self._publisher.is_shown)
 
     def publish(self, frame: Frame, everything: bool = False) -> None:

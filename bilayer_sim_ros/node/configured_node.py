@@ -136,7 +136,7 @@ def declare(
 
 
 def descriptor_of(parameter: NodeParameter) -> ParameterDescriptor:
-    """What tools show of a parameter, and what the node refuses by itself.
+    """Return the description of a parameter for tools, with the limits that the node enforces by itself.
 
     A live number is typed dynamically: its first value says that it is a number, and an integer will do later too.
     """

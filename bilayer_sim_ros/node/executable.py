@@ -1,4 +1,4 @@
-"""What all executables of the package share: command line, signals, exit codes."""
+"""Common parts of all executables of the package: command line, signals, exit codes."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def _run_node(
 
 
 def _not_understood(error: RuntimeError) -> InputError:
-    """What rclpy says of its arguments, without the places in its sources."""
+    """Return an error with rclpy's complaint about its arguments, without the places in its sources."""
     reason = str(error).partition(", at ")[0].removeprefix("Failed to parse ROS arguments: ")
     return InputError(f"ROS arguments are not understood: {reason}")
 

@@ -74,7 +74,7 @@ class GraphWatch:
             self._node.get_logger().warning(f"{MOST_WARNINGS} warnings about topics were given; no more follow")
 
     def _unheard(self, topic: str, sent: str) -> str:
-        """What is to be said of those who listen to a topic, on which `sent` is sent, and can hear nothing."""
+        """Return a warning of a subscriber that cannot receive a topic, sent as type `sent`; empty without one."""
         others = self._node.get_subscriptions_info_by_topic(topic)
         offered = [of.qos_profile for of in self._node.get_publishers_info_by_topic(topic)] if others else []
         for other in others:

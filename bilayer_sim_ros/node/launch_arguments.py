@@ -27,7 +27,7 @@ def argument_name(parameter: NodeParameter) -> str:
 
 
 def describe(parameter: NodeParameter) -> str:
-    """What `ros2 launch --show-args` says of the argument for a parameter."""
+    """Return the text that `ros2 launch --show-args` shows for the argument of a parameter."""
     default = parameter.default
     shown = ", ".join(default) if isinstance(default, list) else str(default)
     shown = shown.lower() if isinstance(default, bool) else shown or "none"
@@ -80,6 +80,9 @@ def value_of(parameter: NodeParameter, text: str) -> Value:
 
 
 def near_misses(declared: Collection[str], given: Iterable[str]) -> list[str]:
-    """What is to be said of arguments that nobody has declared, but almost. Other files of a launch have theirs."""
+    """Return a warning for each argument that is not declared but nearly named like one that is.
+
+    Other files of a launch have arguments of their own.
+    """
     meant = {name: nearest(name, declared) for name in given if name not in declared}
     return [f"launch argument '{name}' is not read: did you mean '{close}'?" for name, close in meant.items() if close]

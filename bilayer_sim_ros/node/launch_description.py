@@ -1,4 +1,4 @@
-"""What the launch files of this package describe: one node, with an argument for each of its parameters."""
+"""Contents of this package's launch files: one node, with an argument for each of its parameters."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ KEYS = dict(zip(FRICTION, COEFFICIENTS, strict=True))
 
 
 def friction_overrides(scene: SceneConfig, parameters: Mapping[str, Value]) -> list[str]:
-    """What the parameters change of a scene before it is run; InputError if it has no friction to change."""
+    """Return the overrides of a scene by parameters before it is run; InputError if it has no friction to change."""
     given = {name: parameters[name] for name in KEYS if parameters[name] != FRICTION_OF_SCENE}
     if given and (scene.contact is None or scene.contact.friction is None):
         name, value = next(iter(given.items()))

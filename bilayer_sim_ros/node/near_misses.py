@@ -23,7 +23,7 @@ def of_topics(
     published: Mapping[str, Collection[str]],
     subscribed: Collection[str],
 ) -> dict[str, str]:
-    """What is to be said of topics on which a node and others miss each other.
+    """Describe the topics on which a node and others miss each other.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class NodeParameter:
 
     @property
     def allowed(self) -> str:
-        """What may be given, in words."""
+        """Values that may be given, in words."""
         if isinstance(self.default, bool):
             return "true or false"
         if isinstance(self.default, list):

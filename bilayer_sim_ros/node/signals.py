@@ -49,7 +49,7 @@ class Stop:
         self._wake()
 
     def is_set(self) -> bool:
-        """Whether the node is to end."""
+        """Return whether the node is to end."""
         return self._asked
 
     def wait(self) -> None:

@@ -67,17 +67,17 @@ class SimulationRun:
 
     @property
     def compiling(self) -> bool:
-        """Whether kernels are being compiled; a compiler cannot be ended in the middle of a piece of the engine."""
+        """True while kernels are being compiled; a compiler cannot be ended in the middle of a piece of the engine."""
         return self._compilation.is_alive()
 
     @property
     def started(self) -> bool:
-        """Whether it was started."""
+        """True if the run was started."""
         return self._thread.ident is not None
 
     @property
     def over(self) -> bool:
-        """Whether it has ended, and its files are finished."""
+        """True if the run has ended, and its files are finished."""
         return self._over.is_set()
 
     def start(self) -> None:

@@ -1,4 +1,4 @@
-"""What to say where ROS 2 is not installed."""
+"""Message that is shown where ROS 2 is not installed."""
 
 from __future__ import annotations
 

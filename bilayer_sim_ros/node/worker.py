@@ -36,7 +36,7 @@ class Publisher(Protocol):
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody listens."""
+        """True if anybody listens."""
 
     def publish(self, frame: Frame, everything: bool = False) -> None:
         """Send what somebody listens to: what is due, or everything."""
@@ -122,7 +122,7 @@ class SimulationWorker:
 
     @property
     def begun(self) -> bool:
-        """Whether it was started."""
+        """True if the thread was started."""
         return self._thread.ident is not None
 
     def start(self) -> None:

@@ -1,1 +1,1 @@
-"""What a run says on topics, in files and to viewers."""
+"""Output of a run on topics, in files and to viewers."""

@@ -40,7 +40,7 @@ def to_seconds(stamp: Time) -> float:
 
 
 def status_without_run(message: str, name: str) -> DiagnosticArray:
-    """What the node of that full name does before there is a run."""
+    """Return diagnostics of the node's activity before there is a run; `name` is the node's full name."""
     return DiagnosticArray(status=[_report(DiagnosticStatus.OK, message, name, {})])
 
 

@@ -1,4 +1,4 @@
-"""What happens in a run, as the topic ``~/events``."""
+"""Events of a run, as the topic ``~/events``."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class EventPublisher:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody subscribes."""
+        """True if anybody subscribes."""
         return self._publisher.get_subscription_count() > 0
 
     def publish(self, frame: Frame) -> None:

@@ -159,7 +159,7 @@ class Listener:
 
     @property
     def connected(self) -> bool:
-        """Whether frames of the node would come, and what they are of is known."""
+        """True if the node publishes frames and the description of its run is known."""
         return self._description is not None and self._frames.get_publisher_count() > 0
 
     def _take_description(self, message) -> None:
@@ -185,7 +185,7 @@ class Listener:
 
 
 def _time_of(parts: dict[str, bytes]) -> int:
-    """Of a frame [ns], from the /clock among its messages."""
+    """Return the time of a frame [ns], from the /clock among its messages."""
     from rclpy.serialization import deserialize_message
     from rosgraph_msgs.msg import Clock
 

@@ -72,7 +72,7 @@ class LivePublisher:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody subscribes."""
+        """True if anybody subscribes."""
         return self._publisher.get_subscription_count() > 0
 
     def set_rates(self, rate: float, marker_rate: float) -> None:

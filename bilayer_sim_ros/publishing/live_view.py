@@ -30,7 +30,7 @@ _LOOK = 0.05
 
 
 class Viewers(Protocol):
-    """Who looks at the run while it goes on."""
+    """Viewers of the run while it goes on."""
 
     def wait(self, stop: threading.Event, seen: Callable[[], bool]) -> None:
         """Return once the first frame would be `seen`, or the node is to end."""

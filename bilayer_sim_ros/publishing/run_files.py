@@ -104,7 +104,7 @@ class Recording:
 
     @property
     def wanted(self) -> bool:
-        """Whether any file is written."""
+        """True if any file is written."""
         return bool(self._recorders)
 
     @property

@@ -14,7 +14,7 @@ PACKAGE = "tf2_msgs"
 
 
 def tf_prefix(node: Node, parameters: Mapping[str, Value]) -> str:
-    """What the names of frames begin with, the node's own full name; empty if /tf is not asked for.
+    """Return the prefix of the names of frames, the node's own full name; empty if /tf is not asked for.
 
     Raises
     ------

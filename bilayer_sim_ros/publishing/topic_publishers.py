@@ -62,7 +62,7 @@ class FramePublisher:
 
     @property
     def wanted(self) -> bool:
-        """Whether anybody subscribes to anything."""
+        """True if anybody subscribes to anything."""
         if self._events.wanted or self._live.wanted:
             return True
         return any(of.get_subscription_count() > 0 for _, of in self._topics)
@@ -92,7 +92,7 @@ class FramePublisher:
         self._live.tell(event)
 
     def is_shown(self) -> bool:
-        """Whether anybody shows the run while it goes on."""
+        """Return whether anybody shows the run while it goes on."""
         return self._live.wanted
 
     def finish(self) -> None:

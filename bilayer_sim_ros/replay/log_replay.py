@@ -83,7 +83,7 @@ def _play(node: Node, log: IndexedLog, parameters: Mapping[str, Value], stop: th
 
 
 def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
-    """What parameters ask for of a log, or InputError."""
+    """Return the playback of a log that parameters ask for, or raise InputError."""
     offset, duration, until, position = (
         parameters[f"play.{name}"]
         for name in ("start_offset", "playback_duration", "playback_until_timestamp", "position")

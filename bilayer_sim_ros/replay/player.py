@@ -60,7 +60,7 @@ class Outlet(Protocol):
 
 @dataclass(frozen=True)
 class Playback:
-    """What is to be played, and how.
+    """Part of a log to play, and how to play it.
 
     Attributes
     ----------
@@ -162,7 +162,7 @@ class Player:
 
     @property
     def paused(self) -> bool:
-        """Whether time stands still."""
+        """True if time stands still."""
         return not self._clock.running
 
     @property
@@ -231,7 +231,7 @@ class Player:
             self._finished()
 
     def _time_to_wait(self) -> float:
-        """Until something is to be done without being asked [s]."""
+        """Return the time until something has to be done without a request [s]."""
         now = time.monotonic()
         wait = self._shown_at + SHOWING_PERIOD - now
         if self._playback.clock_rate > 0.0:
@@ -326,7 +326,7 @@ class Player:
         self._moved(self.position)
 
     def _answering(self, action: Callable[[], object]) -> Callable[[Future], None]:
-        """What does something, tells where playing is, and then answers with what was returned."""
+        """Return a function that runs `action`, reports where playing is, and then answers with the action's result."""
 
         def do(answer: Future) -> None:
             result = action()

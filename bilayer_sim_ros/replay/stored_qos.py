@@ -18,7 +18,9 @@ LARGEST_DEPTH = 1000
 
 
 def offered_profile(text: str) -> QoSProfile:
-    """What to offer a topic with: reliable, volatile, the last ten messages, where the log says nothing else.
+    """Return the quality of service to offer a topic with.
+
+    It is reliable, volatile, with the last ten messages, where the log says nothing else.
 
     Of several publishers in the log, the strongest offers count, so that who could listen to any of them can listen;
     each of them kept its own last messages, so that the depths add up. Names stay those of ROS topics: without its

@@ -22,7 +22,7 @@ UNKNOWN = (math.nan,) * 3
 
 @dataclass(frozen=True)
 class EntityState:
-    """Of an entity at a time [s], in the world's frame.
+    """State of an entity at a time [s], in the world's frame.
 
     Attributes
     ----------
@@ -78,7 +78,7 @@ class Entities:
 
     @staticmethod
     def to_message(state: EntityState) -> Any:
-        """As `simulation_interfaces/msg/EntityState`."""
+        """Return a state as a `simulation_interfaces/msg/EntityState`."""
         from simulation_interfaces.msg import EntityState as Message
 
         message = Message()

@@ -1,4 +1,4 @@
-"""What other threads ask of the one that simulates, or plays."""
+"""Requests of other threads to the one that simulates, or plays."""
 
 from __future__ import annotations
 

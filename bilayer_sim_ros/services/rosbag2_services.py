@@ -43,7 +43,7 @@ def rosbag2_services(node: Node, player: Player) -> list[Service]:
         return player.seek(time.sec * NANOSECONDS + time.nanosec)
 
     def answer(write: Callable[[Any, Any], None], refused: Any = None) -> Callable[[Any, Future], None]:
-        """What writes a result into a response, or `refused`, with the reason in a warning."""
+        """Return a function that writes a result into a response, or `refused`, with the reason in a warning."""
 
         def fill(response: Any, future: Future) -> None:
             try:

@@ -42,7 +42,7 @@ QUIT = "ended by SetSimulationState"
 
 
 class Worker(Protocol):
-    """What is asked of the thread that simulates; see `SimulationWorker`."""
+    """Interface that services need of the thread that simulates; see `SimulationWorker`."""
 
     begun: bool
 
@@ -55,7 +55,7 @@ class Worker(Protocol):
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a request: a code, and an explanation unless it is `OK`."""
+    """Outcome of a request: a code, and an explanation unless it is `OK`."""
 
     code: int = OK
     text: str = ""

@@ -64,7 +64,7 @@ class StepsGoal:
         self._action, self._step, self._services = action, step, services
 
     async def execute(self, goal: Any) -> Any:
-        """Until all steps are done, the first is refused, or the goal is cancelled; the result."""
+        """Make steps until all are done, one is refused, or the goal is cancelled, and return the result."""
         count = goal.request.steps
         with self._services.answering():
             for done in range(count):

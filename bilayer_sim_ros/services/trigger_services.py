@@ -97,7 +97,7 @@ class Services:
                 self._all_answered.notify_all()
 
     def in_executor(self, future: Future) -> AwaitedFuture:
-        """What a coroutine of the node's executor awaits until `future` is done."""
+        """Return a future that a coroutine of the node's executor awaits until `future` is done."""
         executor = self._node.executor
         awaited = AwaitedFuture(executor=executor)
 

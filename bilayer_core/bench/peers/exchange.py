@@ -27,7 +27,7 @@ class Cantilever:
 
     @property
     def area(self) -> float:
-        """Of the section [m²]."""
+        """Area of the section [m²]."""
         return self.width * self.thickness
 
     @property

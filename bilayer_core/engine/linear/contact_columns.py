@@ -101,7 +101,7 @@ def _add_own_edges(columns, node_row, band):
 
 @kernel
 def _choose_nodes(columns, strands):
-    """Of each two strands in contact (or halves of one) the nodes that are fewer have contact columns."""
+    """Give contact columns to the smaller set of nodes of each two strands in contact (or halves of one)."""
     count, dimension, row = columns.counts[CONTACTS], strands.dimension, strands.row
     node, strand, attached, mark, met = columns.node, columns.strand, columns.attached, columns.mark, columns.met
     joined = columns.joined

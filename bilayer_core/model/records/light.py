@@ -1,4 +1,4 @@
-"""What light falls on, and what hides it."""
+"""Elements on which light falls, and the edges and surfaces that hide it."""
 
 from __future__ import annotations
 

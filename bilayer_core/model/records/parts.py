@@ -1,4 +1,4 @@
-"""What the engine takes of a model: its arrays, in groups.
+"""Arrays that the engine takes from a model, in groups.
 
 What a scene does not need is there with arrays of length zero, and says that it does not exist (`jit.record`): one
 program serves all scenes of a dimension.
@@ -44,7 +44,7 @@ class Viscosity:
 
 @record
 class Drives:
-    """What stimuli change: rest strains of edges and joints."""
+    """Rest strains of edges and joints, which stimuli change."""
 
     rest_strain: Vector
     driven_edge: Indices
@@ -64,7 +64,7 @@ class Drives:
 
 @record
 class Space:
-    """What dimension 3 has: second derivatives of bonds. Absent in a plane."""
+    """Arrays of dimension 3 only: second derivatives of bonds. Absent in a plane."""
 
     first_hessian: Stack = ("pair", 3, 4)  # of p and the first edge of its joint
     second_hessian: Stack = ("pair", 3, 4)
@@ -72,7 +72,7 @@ class Space:
 
 @record
 class Plane:
-    """What dimension 2 has instead of frames and twist; see `forces.planar`."""
+    """Arrays of dimension 2, instead of frames and twist; see `forces.planar`."""
 
     normal: Vector
     side: Vector
@@ -139,7 +139,7 @@ class Constrained:
 
 @record
 class Attachments:
-    """What free bodies among them hold: how it enters the border."""
+    """Nodes, directions and clamp edges that free bodies hold: their entries in the border of the matrix."""
 
     holding: int  # how many nodes
     unknown: Indices  # rows of the matrix

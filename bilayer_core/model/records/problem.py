@@ -120,7 +120,7 @@ class ForceTable:
 
 @record
 class Outcome:
-    """What a piece found beside the number that it returns; slots in `model.records.outcome`."""
+    """Results of a piece beside the number that it returns; slots in `model.records.outcome`."""
 
     counts: Indices
     figures: Vector

@@ -1,4 +1,4 @@
-"""What a step needs: configurations, a stage, points, what acts from outside, extremes of the run."""
+"""Records of a step: configurations, a stage, points, inputs from outside, extremes of the run."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Configuration:
 
 @record
 class Stage:
-    """What is frozen over a stage of a step: it reads as an implicit Euler step from an origin (`integrators.method`).
+    """Frozen data of a stage of a step, which reads as an implicit Euler step from an origin (`integrators.method`).
 
     The velocity of whatever is at q is (q − origin)/(γ h).
     """
@@ -120,7 +120,7 @@ class Method:
 
 @record
 class StageInputs:
-    """What acts from outside during a step, at each of its points: the ends of stages, and of the step."""
+    """Inputs from outside during a step, at each of its points: the ends of stages, and of the step."""
 
     applied: Vector = ("channel",)  # stimuli at the end of the last step
     elapsed: Vector = ("stage end",)  # from the start of the step to each point [s]
@@ -173,7 +173,7 @@ class Work:
 
 @record
 class StateArrays:
-    """What of a `model.state.State` a step changes."""
+    """Arrays of a `model.state.State` that a step changes."""
 
     values: Vector  # all parts, these and others, in one piece
     position: Matrix

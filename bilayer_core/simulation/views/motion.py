@@ -1,4 +1,4 @@
-"""What hinges, rails and joints have done along or about their axis."""
+"""Motions of hinges, rails and joints along or about their axis."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .present import Present
 
 @dataclass(frozen=True)
 class Motion:
-    """What a hinge, a rail or a joint has done along or about its axis, where something resists that.
+    """Motion of a hinge, a rail or a joint along or about its axis, where something resists it.
 
     Attributes
     ----------

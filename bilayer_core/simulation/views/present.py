@@ -1,4 +1,4 @@
-"""What views look at, and how they are found by name."""
+"""Objects that views look at, and a mapping that finds views by name."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_TOLD = 12
 
 @dataclass(frozen=True)
 class Present:
-    """What views look at: a model, its state, what evaluates the forces there, and what there is to see."""
+    """Objects that views look at: a model, its state, the evaluator of the forces there, and the observables."""
 
     model: Model
     state: State
