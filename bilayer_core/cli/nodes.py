@@ -12,7 +12,7 @@ from bilayer_core.errors import InputError
 
 REPLAY_NODE = "bilayer_sim_ros.replay_node"
 """Module that is run; the core does not import it. It says itself where ROS 2 is missing."""
-FOLLOWER = "bilayer_sim_ros.publishing.follower"
+FOLLOWER = "bilayer_sim_ros.follower"
 """Likewise."""
 
 

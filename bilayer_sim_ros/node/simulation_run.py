@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -189,6 +190,9 @@ class SimulationRun:
     def _end_with_program(self) -> None:
         self.stop(AT_EXIT)
         self.wait()
+        # Python clears modules from the last to the first, and rclpy's global executor needs `weakref` to end, which
+        # rclpy imports: with rclpy last, a program that does not shut it down ends without a traceback.
+        sys.modules["rclpy"] = sys.modules.pop("rclpy")
 
 
 class _NotNeededError(Exception):

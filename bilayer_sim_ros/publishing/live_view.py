@@ -18,7 +18,7 @@ from bilayer_sim_ros.node.parameters import Value
 
 SERVE = "serve"
 """Value of the parameter ``rerun``."""
-FOLLOWER = "bilayer_sim_ros.publishing.follower"
+FOLLOWER = "bilayer_sim_ros.follower"
 READY = "following"
 """How the line begins that the follower prints once frames reach it."""
 START_LIMIT = 30.0

@@ -28,7 +28,7 @@ def followers(node):
     (follower,) = (
         of
         for of in psutil.process_iter(["cmdline", "ppid"])
-        if of.info["ppid"] == node.pid and "bilayer_sim_ros.publishing.follower" in (of.info["cmdline"] or ())
+        if of.info["ppid"] == node.pid and "bilayer_sim_ros.follower" in (of.info["cmdline"] or ())
     )
     return [follower, *follower.children(recursive=True)]
 

@@ -22,7 +22,7 @@ def case_of(most_steps=2000, outside=(), decide=None, compared=True, **changes):
 
 
 def test_an_easy_case_is_accurate_and_its_figures_are_told():
-    record = execute(case_of(robot="drop", stations=11))
+    record = execute(case_of(robot="drop", stations=11, tolerance=1e-5))
     assert record.outcome is Outcome.ACCURATE
     assert 0.0 < record.error < 0.01
     figures = record.figures
