@@ -72,7 +72,7 @@ def test_the_notice_has_the_licences_of_what_compiled_kernels_contain(root):
     assert "LLVM (Apache-2.0 WITH LLVM-exception)" in notice and "embedded into an Object form" in notice
 
 
-def test_the_installation_the_citation_and_the_release_notes_name_the_version_of_package_xml(root, version):
+def test_every_file_that_names_the_version_names_that_of_package_xml(root, version):
     citation = yaml.safe_load((root / "CITATION.cff").read_text(encoding="utf-8"))
     released = re.search(r"^## (\S+)$", (root / "CHANGELOG.md").read_text(encoding="utf-8"), re.M)[1]
     assert citation["version"] == released == bilayer_core.__version__ == version
