@@ -100,7 +100,7 @@ setup(
     package_data={
         "bilayer_core": ["py.typed"],
         "bilayer_sim_ros": ["py.typed"],
-        "bilayer_core.bench": ["references.json"],
+        "bilayer_core.verification.bench": ["references.json"],
     },
     data_files=data_files,
     zip_safe=False,

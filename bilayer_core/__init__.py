@@ -10,31 +10,31 @@ from importlib import import_module
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # what checkers of types take for true, without an import of milliseconds
-    from bilayer_core.converge.study import estimate_error
-    from bilayer_core.fitting.fit import fit
-    from bilayer_core.record.compare import compare
-    from bilayer_core.record.log_reader import read_log
-    from bilayer_core.record.recorder import Recorder
+    from bilayer_core.log.run.compare import compare
+    from bilayer_core.log.run.log_reader import read_log
+    from bilayer_core.log.run.recorder import Recorder
     from bilayer_core.scene.loader import load_scene
     from bilayer_core.simulation.simulator import Simulator
-    from bilayer_core.sweeps.optimise import optimise
-    from bilayer_core.sweeps.result import read_results
-    from bilayer_core.sweeps.run import sweep
+    from bilayer_core.studies.converge.study import estimate_error
+    from bilayer_core.studies.fitting.fit import fit
+    from bilayer_core.studies.sweeps.optimise import optimise
+    from bilayer_core.studies.sweeps.run_sweep import sweep
+    from bilayer_core.studies.sweeps.sweep_result import read_results
 
     __version__: str
 
 DISTRIBUTION = "bilayer_sim_ros"
 _HOME = {
-    "Recorder": "bilayer_core.record.recorder",
+    "Recorder": "bilayer_core.log.run.recorder",
     "Simulator": "bilayer_core.simulation.simulator",
-    "compare": "bilayer_core.record.compare",
-    "estimate_error": "bilayer_core.converge.study",
-    "fit": "bilayer_core.fitting.fit",
+    "compare": "bilayer_core.log.run.compare",
+    "estimate_error": "bilayer_core.studies.converge.study",
+    "fit": "bilayer_core.studies.fitting.fit",
     "load_scene": "bilayer_core.scene.loader",
-    "optimise": "bilayer_core.sweeps.optimise",
-    "read_log": "bilayer_core.record.log_reader",
-    "read_results": "bilayer_core.sweeps.result",
-    "sweep": "bilayer_core.sweeps.run",
+    "optimise": "bilayer_core.studies.sweeps.optimise",
+    "read_log": "bilayer_core.log.run.log_reader",
+    "read_results": "bilayer_core.studies.sweeps.sweep_result",
+    "sweep": "bilayer_core.studies.sweeps.run_sweep",
 }
 
 __all__ = [

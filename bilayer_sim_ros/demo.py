@@ -21,8 +21,8 @@ from rosgraph_msgs.msg import Clock
 
 from bilayer_core import load_scene
 from bilayer_core.errors import BilayerError, SimulationError
-from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.run_data import RunData
+from bilayer_core.log.run.log_reader import read_log
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.view.rerun_view import convert_log, screenshot
 from bilayer_sim_ros.publishing.conversions import to_seconds
 

@@ -142,7 +142,7 @@ class Listener:
         from rclpy.qos import QoSProfile, ReliabilityPolicy
         from std_msgs.msg import String, UInt8MultiArray
 
-        from bilayer_core.record.topics import DESCRIPTION, LIVE
+        from bilayer_core.log.messages.topics import DESCRIPTION, LIVE
         from bilayer_sim_ros.publishing.live_topic import KEPT
 
         name = name if name.startswith("/") else f"/{name}"
@@ -163,13 +163,13 @@ class Listener:
         return self._description is not None and self._frames.get_publisher_count() > 0
 
     def _take_description(self, message) -> None:
-        from bilayer_core.record.description_text import from_json
+        from bilayer_core.log.messages.description_text import from_json
 
         description = from_json(message.data)
         self._description, self._begun = description, False
 
     def _take_frame(self, message) -> None:
-        from bilayer_core.record.packing import unpack
+        from bilayer_core.log.messages.packing import unpack
 
         if self._description is None:
             return  # it is on its way

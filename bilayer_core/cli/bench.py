@@ -34,31 +34,31 @@ def bench(
     Writes DIR/bench.json, and tables (csv, Markdown) and plots (png) beside it. CPU times are those of one thread,
     without compilation; other work on the machine disturbs them, so its load is recorded.
     """
-    from bilayer_core.bench import run
-    from bilayer_core.bench.results import Results
     from bilayer_core.extras import require
+    from bilayer_core.verification.bench import run_benchmark
+    from bilayer_core.verification.bench.results import Results
 
-    chosen = run.chosen_names(only, quick)
+    chosen = run_benchmark.chosen_names(only, quick)
     if listing:
         _list(chosen)
         return
     if references:
-        _make_references(run.chosen_problems(chosen))
+        _make_references(run_benchmark.chosen_problems(chosen))
         return
     require("bench", "matplotlib")
     directory = output_directory(out)
     results = Results(directory, quick, resume, force)
-    with count_bar(run.count(chosen, quick), quiet) as show:
-        skipped = run.measure(chosen, results, quick, show)
+    with count_bar(run_benchmark.count(chosen, quick), quiet) as show:
+        skipped = run_benchmark.measure(chosen, results, quick, show)
     for line in skipped:
         click.echo(line)
-    for path in run.write(results, directory):
+    for path in run_benchmark.write(results, directory):
         click.echo(f"wrote {path}")
     _conclude(results.content)
 
 
 def _list(chosen: list[str]) -> None:
-    from bilayer_core.bench.problems import PROBLEMS
+    from bilayer_core.verification.bench.problems import PROBLEMS
 
     titles = {problem.name: problem.title for problem in PROBLEMS} | {
         "peers": "The cantilever by programs that install from PyPI",
@@ -70,15 +70,15 @@ def _list(chosen: list[str]) -> None:
 
 
 def _make_references(problems: list) -> None:
-    from bilayer_core.bench import references
-    from bilayer_core.bench.configurations import shapes
+    from bilayer_core.verification.bench import converged_answers
+    from bilayer_core.verification.bench.configurations import shapes
 
     for problem in problems:
         for model in dict.fromkeys(model for model, _ in shapes(problem.config())):
-            entry = references.make(problem, model, lambda text: click.echo(f"  {text}", err=True))
+            entry = converged_answers.make(problem, model, lambda text: click.echo(f"  {text}", err=True))
             checks = ", ".join(f"{name} {difference:.1e} away" for name, difference in entry["checks"].items())
             click.echo(f"{problem.name}, {model}: order {entry['order']}, error bar {entry['bar']:.1e}; {checks}")
-    click.echo(f"wrote {references.FILE}")
+    click.echo(f"wrote {converged_answers.FILE}")
 
 
 def _conclude(content: dict) -> None:

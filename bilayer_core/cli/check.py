@@ -38,11 +38,11 @@ def check(scene: str, overrides: tuple[str, ...], as_json: bool) -> None:
 
 def _report(simulator) -> dict[str, Any]:
     """Return a description of the planned computation, as the content of ``check --json``."""
+    from bilayer_core.log.messages.topics import Rate, output_topics
     from bilayer_core.model.findings import told
     from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
     from bilayer_core.model.validity import validity_figures
-    from bilayer_core.record.topics import Rate, output_topics
     from bilayer_core.runs.forecast import forecast
 
     scene, plan, model = simulator.scene, simulator.plan, simulator.model

@@ -13,7 +13,7 @@ from bilayer_core.cli.options import Verb, say_renamed
 from bilayer_core.cli.terminal import say
 
 if TYPE_CHECKING:
-    from bilayer_core.record.compare import Comparison
+    from bilayer_core.log.run.compare import Comparison
 
 WIDTHS = (44, 18, 14)
 """Of the table's columns but the last."""
@@ -45,7 +45,7 @@ def compare(first: str, second: str, json_file: str | None, everything: bool) ->
 
     Logs with other times are compared over the time that both have, the second one interpolated.
     """
-    from bilayer_core.record.compare import compare, rows
+    from bilayer_core.log.run.compare import compare, rows
 
     with json_to(json_file) as write_json:
         found = compare(first, second)

@@ -31,9 +31,9 @@ def converge(
     quiet: bool,
 ) -> None:
     """Run SCENE at twice and half its time step, with half and twice its edges: observed orders and error bars."""
-    from bilayer_core.converge import study
     from bilayer_core.processes import usable_cores
     from bilayer_core.scene.loader import load_scene
+    from bilayer_core.studies.converge import study
 
     config = load_scene(scene, overrides)
     runs = len(study.planned_runs(config))
@@ -59,8 +59,8 @@ def _print_table(rows: list) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from bilayer_core.converge.quantities import unit_of
-    from bilayer_core.converge.study import BASE
+    from bilayer_core.studies.converge.quantities import unit_of
+    from bilayer_core.studies.converge.study import BASE
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     for title in ("figure", "value", "error bar", "half the step", "order", "twice the edges", "order"):

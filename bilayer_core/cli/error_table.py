@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from bilayer_core.cli.terminal import say
-from bilayer_core.converge.order import ROUNDING
-from bilayer_core.converge.quantities import unit_of
-from bilayer_core.converge.study import BASE, FINER_STEP, Row, Study
+from bilayer_core.studies.converge.order import ROUNDING
+from bilayer_core.studies.converge.quantities import unit_of
+from bilayer_core.studies.converge.study import BASE, FINER_STEP, Row, Study
 
 NO_ORDER = "none seen"
 

@@ -26,7 +26,7 @@ def export(
     What is of the nodes of a rod has a row for each node at each time.
     """
     from bilayer_core.errors import InputError
-    from bilayer_core.record.export import CSV, NPZ, PARQUET, export
+    from bilayer_core.log.run.export import CSV, NPZ, PARQUET, export
 
     wanted = {CSV: csv, PARQUET: parquet, NPZ: npz}
     if not any(wanted.values()):

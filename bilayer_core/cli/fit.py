@@ -13,7 +13,7 @@ from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import compile_kernels
 
 if TYPE_CHECKING:
-    from bilayer_core.fitting.result import FitResult
+    from bilayer_core.studies.fitting.fit_result import FitResult
 
 NOT_CONVERGED = 1
 """Exit code of a fit that ended before it had converged."""
@@ -49,8 +49,8 @@ def fit(
     Least squares; 95 % intervals and correlations. Parameters that the data cannot tell apart are named instead, with
     exit code 1.
     """
-    from bilayer_core.fitting import outputs
-    from bilayer_core.fitting.fit import fit as fit_scene
+    from bilayer_core.studies.fitting import outputs
+    from bilayer_core.studies.fitting.fit import fit as fit_scene
 
     directory = None if out is None else output_directory(out)
     if directory is not None:
@@ -66,7 +66,7 @@ def fit(
         report = json.dumps(outputs.report_of(found), indent=2, allow_nan=False)
         _print(found)
         if directory is not None:
-            from bilayer_core.fitting.picture import write_picture
+            from bilayer_core.studies.fitting.picture import write_picture
 
             written = outputs.write_files(found, directory, report, force)
             write_picture(found, directory / outputs.PICTURE, force)

@@ -13,7 +13,7 @@ from bilayer_core.cli.options import Verb
 from bilayer_core.cli.terminal import say
 
 if TYPE_CHECKING:
-    from bilayer_core.record.log_reader import LogInfo
+    from bilayer_core.log.run.log_reader import LogInfo
 
 
 @click.command(cls=Verb)
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @click.option("--quantities", is_flag=True, help="List the quantities that export, plot and read_log know, with units.")
 def info(file: str, as_json: bool, quantities: bool) -> None:
     """Say what a log, a bag of `ros2 bag record` or another MCAP file holds."""
-    from bilayer_core.record.log_reader import read_info
+    from bilayer_core.log.run.log_reader import read_info
 
     if quantities:
         _list_quantities(file, as_json)
@@ -65,7 +65,7 @@ def _rows_of_bag(found: LogInfo) -> Iterator[tuple[str, str]]:
 
 
 def _list_quantities(file: str, as_json: bool) -> None:
-    from bilayer_core.record.log_source import LogSource
+    from bilayer_core.log.run.log_source import LogSource
 
     entries = LogSource(file).entries.values()
     if as_json:

@@ -26,7 +26,7 @@ def json_to(path: str | None, force: bool = True) -> Iterator[Callable[[str], No
     InputError
         At once, if the file cannot be written, or is there and `force` is not given.
     """
-    from bilayer_core.record.paths import check_output_path, write_text
+    from bilayer_core.log.file.output_paths import check_output_path, write_text
 
     if path == STANDARD_OUTPUT:
         kept: list[str] = []

@@ -29,7 +29,7 @@ class NewVerb(Verb):
 def new(file: str, template: str | None, origin: str | None, force: bool) -> None:
     """Write a scene to start from: complete, with comments, ready to run."""
     from bilayer_core.errors import InputError
-    from bilayer_core.record.paths import check_output_path, write_text
+    from bilayer_core.log.file.output_paths import check_output_path, write_text
     from bilayer_core.scene.new import DEFAULT_TEMPLATE, new_scene
 
     if template is not None and origin is not None:

@@ -51,9 +51,9 @@ def optimise(
     from pathlib import Path
 
     from bilayer_core.extras import require
-    from bilayer_core.sweeps import optimise as search
-    from bilayer_core.sweeps.plots import draw
-    from bilayer_core.sweeps.result import read_results
+    from bilayer_core.studies.sweeps import optimise as search
+    from bilayer_core.studies.sweeps.plots import draw
+    from bilayer_core.studies.sweeps.sweep_result import read_results
 
     if (maximise is None) == (minimise is None):
         raise click.UsageError("give --maximise METRIC or --minimise METRIC")

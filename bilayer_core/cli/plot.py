@@ -52,7 +52,7 @@ def plot(
 
 def _is_log(word: str) -> bool:
     """Return whether a word names a log or a bag, and not a quantity."""
-    from bilayer_core.record.bag import split_address
+    from bilayer_core.log.run.bag import split_address
 
     path, _, _ = split_address(word)
     return path.suffix.lower() == SUFFIX or (path.is_dir() and any(path.glob(f"*{SUFFIX}")))

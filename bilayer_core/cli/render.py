@@ -92,7 +92,7 @@ def render(
 ) -> None:
     """Draw a run without a screen: the robot alone, with a colour bar and a scale bar."""
     from bilayer_core.errors import InputError
-    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.log.file.output_paths import check_output_path
 
     wanted = {"--png": png, "--sheet": sheet, "--gif": gif, "--mp4": mp4}
     outputs = [path for path in wanted.values() if path]

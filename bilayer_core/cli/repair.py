@@ -17,7 +17,7 @@ def repair(log: str, new: str, force: bool) -> None:
 
     All that is whole is kept; says what was kept and what was lost. A whole log is copied as it is.
     """
-    from bilayer_core.record.repair import repair
+    from bilayer_core.log.file.repair import repair
 
     say(repair(log, new, force))
     say(f"log  {new}")

@@ -71,7 +71,7 @@ def replay(
 
     Exit code 1 if --verify finds a difference, or that states or inputs are missing.
     """
-    from bilayer_core.record.log_head import read_head
+    from bilayer_core.log.file.log_head import read_head
 
     if verifies + (moment is not None) + publishes != 1:
         raise InputError(
@@ -177,7 +177,7 @@ def _tell(found: Verification) -> None:
 
 def _short(topics: tuple[str, ...]) -> list[str]:
     """Return topics as a run names them, those of all bodies or channels as one."""
-    from bilayer_core.record.topics import LOG_NAMESPACE
+    from bilayer_core.log.messages.topics import LOG_NAMESPACE
 
     return list(dict.fromkeys(topic.removeprefix(f"{LOG_NAMESPACE}/").split("/")[0] or topic for topic in topics))
 
@@ -209,7 +209,7 @@ def _go_on(
     quiet: bool,
 ) -> None:
     from bilayer_core.cli.report import summary_lines
-    from bilayer_core.record.mcap_log import McapRecorder
+    from bilayer_core.log.file.mcap_log import McapRecorder
     from bilayer_core.runs.replay import branch
 
     interrupt, observers = Interrupt(), []
@@ -238,7 +238,7 @@ def _go_on(
 
 def _time_left(log: str, time: float) -> float:
     """Simulated time from an instant to the end of a log's run [s]."""
-    from bilayer_core.record.log_reader import read_info
+    from bilayer_core.log.run.log_reader import read_info
 
     left = read_info(log).last_time - time
     if left <= 0.0:
@@ -258,8 +258,8 @@ def _branch_out(
     force: bool,
     quiet: bool,
 ) -> None:
-    from bilayer_core.record.log_reader import read_state
-    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.log.file.output_paths import check_output_path
+    from bilayer_core.log.run.log_reader import read_state
     from bilayer_core.runs.branches import Varied, run_branches
     from bilayer_core.view.rerun_view import require_rerun, write_branches
 

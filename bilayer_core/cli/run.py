@@ -19,9 +19,9 @@ from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
 from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError, naming
 
 if TYPE_CHECKING:
-    from bilayer_core.converge.study import Study
     from bilayer_core.scene.config import SceneConfig
     from bilayer_core.simulation.simulator import Simulator
+    from bilayer_core.studies.converge.study import Study
 
 SOLVER_OPTIONS = ("dt", "model", "dimension", "integrator", "tolerance")
 TOLERANCE_HELP = (
@@ -115,7 +115,7 @@ class _Judge:
     """The runs at twice and half the step, beside the one that was asked for, and what comes of them."""
 
     def __init__(self, simulator: Simulator, duration: float, quiet: bool):
-        from bilayer_core.converge.quantities import Watch
+        from bilayer_core.studies.converge.quantities import Watch
 
         self._scene, self._duration, self._quiet = simulator.scene, duration, quiet
         self._start, self._watch = simulator.save_state(), Watch(simulator)
@@ -126,8 +126,8 @@ class _Judge:
 
     def estimate(self) -> None:
         """Make the runs. One that stops is this command's failure, and so is Ctrl-C, once the outputs are written."""
-        from bilayer_core.converge.study import estimate_error
         from bilayer_core.processes import usable_cores
+        from bilayer_core.studies.converge.study import estimate_error
 
         def tell(name: str) -> None:
             if not self._quiet:
@@ -151,7 +151,7 @@ class _Judge:
 
 def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
     """The recorders; whatever cannot be written is refused here, before anything is computed."""
-    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.log.file.output_paths import check_output_path
 
     force, output = options["force"], config.output
     paths = {key: options[key] for key in OUTPUT_SUFFIXES if options[key] and not _is_stdout(key, options)}
@@ -161,8 +161,8 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
             raise InputError(f"{path}: is named for two outputs; give each a file of its own")
     observers, rate = [], options["log_rate"] or output.rate
     if options["log"]:
-        from bilayer_core.record.mcap_log import McapRecorder
-        from bilayer_core.record.topics import LOG_NAMESPACE
+        from bilayer_core.log.file.mcap_log import McapRecorder
+        from bilayer_core.log.messages.topics import LOG_NAMESPACE
 
         tf = LOG_NAMESPACE.strip("/") if options["tf"] else ""
         observers.append(McapRecorder(options["log"], rate, output.marker_rate, force, tf=tf))
@@ -185,7 +185,7 @@ def _make_simulator(
         raise InputError("--at: is a time of the log of --from-state; give that too")
     simulator = Simulator(config, budget=budget)
     if from_state is not None:
-        from bilayer_core.record.state_file import read_saved_state
+        from bilayer_core.log.run.state_file import read_saved_state
 
         state = read_saved_state(from_state, simulator.description, at)
         with naming(from_state):
@@ -231,7 +231,7 @@ def _summary(
     simulator: Simulator, duration: float, failure: BilayerError | None, judge: _Judge | None
 ) -> dict[str, Any]:
     """All figures of the run."""
-    from bilayer_core.simulation.result import Termination
+    from bilayer_core.simulation.run_result import Termination
 
     summary = {**simulator.summary(), "duration": duration}
     if isinstance(failure, SimulationError):
@@ -256,8 +256,8 @@ def _write_outputs(
     BilayerError or None
         The first failure, which `failure` is if there was one; later ones are notes to it.
     """
-    from bilayer_core.record.paths import write_text
-    from bilayer_core.record.state_file import write_state
+    from bilayer_core.log.file.output_paths import write_text
+    from bilayer_core.log.run.state_file import write_state
 
     def state(path: str) -> None:
         write_state(path, simulator.save_state(), simulator.description, options["force"])

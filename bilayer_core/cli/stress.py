@@ -46,9 +46,9 @@ def stress(
     """
     from bilayer_core.extras import require
     from bilayer_core.processes import usable_cores
-    from bilayer_core.stress import report
-    from bilayer_core.stress.journal import Journal, head_of
-    from bilayer_core.stress.run import chosen_cases, measure, write
+    from bilayer_core.verification.stress import stability_page
+    from bilayer_core.verification.stress.journal import Journal, head_of
+    from bilayer_core.verification.stress.stress_test import chosen_cases, measure, write
 
     workers = workers or usable_cores()
     cases = chosen_cases(only, quick, scenes)
@@ -66,9 +66,9 @@ def stress(
             say(f"wrote {path}")
         records = list(journal.records.values())
         write_json(_as_json(journal))
-        for line in report.summary_lines(records):
+        for line in stability_page.summary_lines(records):
             say(line)
-        for line in report.shortfalls(records):
+        for line in stability_page.shortfalls(records):
             say(line)
     return FAILED if any(record.outcome == "FAILED" for record in records) else 0
 

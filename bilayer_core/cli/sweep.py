@@ -69,7 +69,7 @@ def _refuse_contradictions(
 
 
 def _security_of(*certificates: str | None) -> Any:
-    from bilayer_core.sweeps.certificates import security_of
+    from bilayer_core.studies.sweeps.certificates import security_of
 
     return security_of(*certificates)
 
@@ -119,11 +119,11 @@ def sweep(
     not go on, with its reason. Killed at any moment, --resume makes what is missing.
     """
     from bilayer_core.extras import require
-    from bilayer_core.sweeps.design import count_of
-    from bilayer_core.sweeps.journal import Journal
-    from bilayer_core.sweeps.opening import Processes
-    from bilayer_core.sweeps.result import write_table
-    from bilayer_core.sweeps.run import read_sweep, run_missing
+    from bilayer_core.studies.sweeps.design import count_of
+    from bilayer_core.studies.sweeps.journal import Journal
+    from bilayer_core.studies.sweeps.open_processes import Processes
+    from bilayer_core.studies.sweeps.run_sweep import read_sweep, run_missing
+    from bilayer_core.studies.sweeps.sweep_result import write_table
 
     directory = Path(out)
     read = read_sweep(file, directory, run_code=not listed)
@@ -150,7 +150,7 @@ def sweep(
             say(f"  {line}")
         say(f"wrote {table}")
         if plotted:
-            from bilayer_core.sweeps.plots import draw
+            from bilayer_core.studies.sweeps.plots import draw
 
             for path in draw(result, directory):
                 say(f"wrote {path}")

@@ -12,7 +12,7 @@ from bilayer_core.cli.options import Verb, output_directory
 from bilayer_core.cli.watch import compile_kernels
 
 if TYPE_CHECKING:
-    from bilayer_core.validate.case import Result
+    from bilayer_core.verification.validate.validation_case import Result
 
 FAILED = 1
 """Exit code if a case fails."""
@@ -29,9 +29,9 @@ WIDTHS = (52, 13, 13, 9, 7, 6)
 def validate(out: str | None, json_file: str | None, only: str | None, quick: bool, listing: bool) -> int:
     """Compute the paper's validations and every other case with a known answer; exit code 1 if one fails."""
     from bilayer_core.extras import require
-    from bilayer_core.validate import figures, register, report
+    from bilayer_core.verification.validate import case_register, case_report, paper_figures
 
-    cases = register.select(only, quick)
+    cases = case_register.select(only, quick)
     if listing:
         for case in cases:
             click.echo(f"{case.name:{WIDTHS[0]}}  {case.against}")
@@ -42,13 +42,13 @@ def validate(out: str | None, json_file: str | None, only: str | None, quick: bo
     with json_to(json_file) as write_json:
         compile_kernels(quiet=False)
         _print_line(("case", "computed", "reference", "error", "limit", ""), "bold")
-        results = register.run(cases, _print_result)
-        write_json(report.as_json(results))
+        results = case_register.run(cases, _print_result)
+        write_json(case_report.as_json(results))
         if directory is not None:
-            report.write_json(results, directory / "validation.json")
-            report.write_csv(results, directory / "validation.csv")
-            report.write_page(results, directory / "validation.md")
-            for path in figures.draw(cases, directory):
+            case_report.write_json(results, directory / "validation.json")
+            case_report.write_csv(results, directory / "validation.csv")
+            case_report.write_page(results, directory / "validation.md")
+            for path in paper_figures.draw(cases, directory):
                 click.echo(f"wrote {path}")
         failed = sum(not result.passed for result in results)
         cpu_time = sum(result.cpu_time for result in results)

@@ -48,7 +48,7 @@ def view(
 ) -> None:
     """Show a run in rerun; with --follow one that goes on."""
     from bilayer_core.errors import InputError
-    from bilayer_core.record.paths import check_output_path
+    from bilayer_core.log.file.output_paths import check_output_path
     from bilayer_core.view.colouring import STRAIN
 
     if moment is not None and picture is None:

@@ -17,9 +17,9 @@ import math
 
 import numpy as np
 
-from ..jit import kernel, piece, record
-from ..jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Vector
-from .segment import square_distance
+from bilayer_core.contact.segment import square_distance
+from bilayer_core.jit import kernel, piece, record
+from bilayer_core.jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Vector
 
 
 @record

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
-from ..kinematics.copying import copy
-from .shapes import shape_distance
+from bilayer_core.contact.shapes import shape_distance
+from bilayer_core.jit import kernel
+from bilayer_core.kinematics.copying import copy
 
 CUTS = 60
 """Intervals that are looked at in one edge; each is a part of the one before."""

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from ..jit import kernel
+from bilayer_core.jit import kernel
 
 
 @kernel

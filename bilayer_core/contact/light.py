@@ -26,10 +26,10 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
-from ..kinematics.frames import edge_geometry
-from ..kinematics.vector import cross, dot, row
-from .shapes import PLANE, shape_distance
+from bilayer_core.contact.shapes import PLANE, shape_distance
+from bilayer_core.jit import kernel
+from bilayer_core.kinematics.frames import edge_geometry
+from bilayer_core.kinematics.vector import cross, dot, row
 
 GRAZING = 1e-9
 """Cosine between a ray and the normal of an edge below which it passes along it."""

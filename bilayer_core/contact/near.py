@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
-from .shapes import PLANE, shape_distance
+from bilayer_core.contact.shapes import PLANE, shape_distance
+from bilayer_core.jit import kernel
 
 
 @kernel

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
-from .rod_list import FIRST, PATH
-from .segment import SLACK
-from .step_bound import KEPT_FRACTION
+from bilayer_core.contact.rod_list import FIRST, PATH
+from bilayer_core.contact.segment import SLACK
+from bilayer_core.contact.step_bound import KEPT_FRACTION
+from bilayer_core.jit import kernel
 
 TOUCH = 0.05  # of the gap: nearer to the distance to keep than this, the search ends
 MAX_PARTS = 1000

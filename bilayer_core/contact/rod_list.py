@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from bilayer_core.jit import kernel
 
 MARGIN = 0.3
 """Of a list, in units of the barrier distance and the thickest layer together."""

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from bilayer_core.jit import kernel
 
 PLANE, SPHERE, BOX, CYLINDER = 0, 1, 2, 3
 

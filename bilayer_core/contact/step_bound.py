@@ -26,11 +26,11 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
-from ..jit.stack import stack_vector
-from ..kinematics.vector import row
-from .near import gap_normal
-from .shapes import SPHERE
+from bilayer_core.contact.near import gap_normal
+from bilayer_core.contact.shapes import SPHERE
+from bilayer_core.jit import kernel
+from bilayer_core.jit.stack import stack_vector
+from bilayer_core.kinematics.vector import row
 
 KEPT_FRACTION = 0.1  # of each gap
 CLOSE_ENOUGH = 1e-6  # of a gap: how near to the kept gap the search ends

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..jit.record import Indices, Matrix, Stack, Vector, record
-from ..jit.stack import stack_vector
-from ..kinematics.rotating import rotate_by, spin_of
-from ..model.records.status import READY
-from ..model.records.step import StageInputs
-from ..scene.spans import ROUNDING, Span
-from .laws import value_of_span
+from bilayer_core.engine.laws import value_of_span
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.record import Indices, Matrix, Stack, Vector, record
+from bilayer_core.jit.stack import stack_vector
+from bilayer_core.kinematics.rotating import rotate_by, spin_of
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import StageInputs
+from bilayer_core.scene.spans import ROUNDING, Span
 
 
 @record

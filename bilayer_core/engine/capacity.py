@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..errors import BilayerError, Remedy
-from ..model.model import Model
-from ..model.rod_surfaces import MOST_PAIRS
+from bilayer_core.errors import BilayerError, Remedy
+from bilayer_core.model.model import Model
+from bilayer_core.model.rod_surfaces import MOST_PAIRS
 
 FIRST_POINTS = 10_000
 """Points of rods at most for which there is capacity at first: of a long thin rod, which has millions, few touch."""

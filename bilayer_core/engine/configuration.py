@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from ..forces.rod_arms import place_rod_points
-from ..jit import kernel, piece
-from ..kinematics.copying import copy, copy_matrix, copy_row
-from ..kinematics.frames import edge_geometry, planar_frames, transport_directors
-from ..kinematics.rotating import compose_quaternion, rotate_by, rotated_by, rotation_vector_between
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage, StateArrays
+from bilayer_core.forces.rod_arms import place_rod_points
+from bilayer_core.jit import kernel, piece
+from bilayer_core.kinematics.copying import copy, copy_matrix, copy_row
+from bilayer_core.kinematics.frames import edge_geometry, planar_frames, transport_directors
+from bilayer_core.kinematics.rotating import compose_quaternion, rotate_by, rotated_by, rotation_vector_between
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage, StateArrays
 
 
 @kernel

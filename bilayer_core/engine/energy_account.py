@@ -38,21 +38,9 @@ The account is part of the state, so that a run that is continued makes the same
 
 from __future__ import annotations
 
-from ..forces.added_mass import fluid_momentum
-from ..forces.inertia import second_moment_beyond
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix
-from ..kinematics.copying import copy
-from ..kinematics.vector import row
-from ..model.force_list import Kind, kinds
-from ..model.force_slots import NAMES, slot_of
-from ..model.records.outcome import CONTACT_ERROR, FRACTION, GAINED
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
-from .kinetic import kinetic_energy
-from .laws import eigenstrain_of
-from .powers import (
+from bilayer_core.engine.kinetic import kinetic_energy
+from bilayer_core.engine.laws import eigenstrain_of
+from bilayer_core.engine.powers import (
     BY_FLOW,
     DRIVEN,
     LOSING,
@@ -65,6 +53,18 @@ from .powers import (
     in_barriers,
     write_forces_of_laws,
 )
+from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.forces.inertia import second_moment_beyond
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.kinematics.vector import row
+from bilayer_core.model.force_list import Kind, kinds
+from bilayer_core.model.force_slots import NAMES, slot_of
+from bilayer_core.model.records.outcome import CONTACT_ERROR, FRACTION, GAINED
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 
 ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
 FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN, MADE, UNSURE = range(6, 14)

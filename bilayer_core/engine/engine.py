@@ -6,30 +6,39 @@ import math
 
 import numpy as np
 
-from ..errors import SimulationError
-from ..forces.joints import Joints
-from ..integrators.method import Method
-from ..integrators.sdirk2 import METHOD as SELF_STARTING
-from ..model.contact_points import contact_point_names
-from ..model.model import Model
-from ..model.records.contacts import RodContact, Surfaces
-from ..model.records.outcome import CONFIGURATION, FACTORISATIONS, GAP, ITERATIONS, PAIR, RESIDUAL, SETTLINGS, STATUS
-from ..model.records.parts import Mechanisms
-from ..model.records.problem import Sums
-from ..model.records.step import RunExtrema, StageInputs, StateArrays
-from ..model.rest_strains import RestStrains
-from ..model.state import State
-from .actuation import Actuation
-from .capacity import CapacityError
-from .energy_account import open_account
-from .error_norm import ErrorNorm
-from .integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
-from .observables import Observables, observe
-from .potential import add_forces, expand_to_unknowns
-from .report import FAILURES, IntegrationReport
-from .run_extrema import count_shape
-from .step import treat_state
-from .storage import Storage, new_configuration, new_work
+from bilayer_core.engine.actuation import Actuation
+from bilayer_core.engine.capacity import CapacityError
+from bilayer_core.engine.energy_account import open_account
+from bilayer_core.engine.error_norm import ErrorNorm
+from bilayer_core.engine.integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
+from bilayer_core.engine.observables import Observables, observe
+from bilayer_core.engine.potential import add_forces, expand_to_unknowns
+from bilayer_core.engine.run_extrema import count_shape
+from bilayer_core.engine.step import treat_state
+from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
+from bilayer_core.engine.storage import Storage, new_configuration, new_work
+from bilayer_core.errors import SimulationError
+from bilayer_core.forces.joints import Joints
+from bilayer_core.integrators.method import Method
+from bilayer_core.integrators.sdirk2 import METHOD as SELF_STARTING
+from bilayer_core.model.contact_points import contact_point_names
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.contacts import RodContact, Surfaces
+from bilayer_core.model.records.outcome import (
+    CONFIGURATION,
+    FACTORISATIONS,
+    GAP,
+    ITERATIONS,
+    PAIR,
+    RESIDUAL,
+    SETTLINGS,
+    STATUS,
+)
+from bilayer_core.model.records.parts import Mechanisms
+from bilayer_core.model.records.problem import Sums
+from bilayer_core.model.records.step import RunExtrema, StageInputs, StateArrays
+from bilayer_core.model.state import State
+from bilayer_core.model.stimulated_strains import RestStrains
 
 Array = np.ndarray
 
@@ -127,7 +136,7 @@ class Engine:
         )
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
-        """Carry out a request (`engine.modes`) on a state at rest, with the drive set before, and return its report."""
+        """Carry out a request (`engine.request_modes`) on a state at rest, with the drive set before; return a report."""
         self._storage.set_friction(state.friction)
         while True:
             run = self._parts_for(state)

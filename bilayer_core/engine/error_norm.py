@@ -26,11 +26,11 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..jit.record import Indices, Vector, record
-from ..jit.stack import stack_vector
-from ..kinematics.rotating import rotation_vector_between
-from ..model.records.step import StateArrays
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.record import Indices, Vector, record
+from bilayer_core.jit.stack import stack_vector
+from bilayer_core.kinematics.rotating import rotation_vector_between
+from bilayer_core.model.records.step import StateArrays
 
 
 @record

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 
-from ..forces.friction_limit import limit_by_friction
-from ..forces.rod_contact import find_rod_contacts
-from ..forces.surface_pairs import list_surface_pairs
-from ..jit import piece
-from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, STATUS
-from ..model.records.problem import Problem
-from ..model.records.status import READY, ROD_CAPACITY_EXCEEDED
-from ..model.records.step import Configuration, Stage
-from .configuration import measure_departure
-from .newton import bound, correction_speed, predicted_decrease
-from .potential import add_forces, expand_to_unknowns
+from bilayer_core.engine.configuration import measure_departure
+from bilayer_core.engine.newton import bound, correction_speed, predicted_decrease
+from bilayer_core.engine.potential import add_forces, expand_to_unknowns
+from bilayer_core.forces.friction_limit import limit_by_friction
+from bilayer_core.forces.rod_contact import find_rod_contacts
+from bilayer_core.forces.surface_pairs import list_surface_pairs
+from bilayer_core.jit import piece
+from bilayer_core.model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, STATUS
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY, ROD_CAPACITY_EXCEEDED
+from bilayer_core.model.records.step import Configuration, Stage
 
 
 @piece(int, Problem, Configuration, Stage, bool, bool)

@@ -8,22 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..forces.elements import start_elements
-from ..forces.register import memory_size
-from ..model.force_slots import NAMES
-from ..model.model import Model
-from ..model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, PAIR, SHIFT, SIMPLIFIED
-from ..model.records.problem import Problem, Sums
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Point, Stage, StateArrays
-from ..model.state import State, initial_state
-from .configuration import move, take_state, transport_frames
-from .engine import new_inputs
-from .evaluate import bound_step, evaluate_at, speed_of_step
-from .linear.newton_matrix import EXACT, assemble, factorise, solve
-from .potential import start_stage, update_lagged
-from .stages import predict_stage, stand_still_stage, start_step_point
-from .storage import Storage, new_configuration, new_work
+from bilayer_core.engine.configuration import move, take_state, transport_frames
+from bilayer_core.engine.engine import new_inputs
+from bilayer_core.engine.evaluate import bound_step, evaluate_at, speed_of_step
+from bilayer_core.engine.linear.newton_matrix import EXACT, assemble, factorise, solve
+from bilayer_core.engine.potential import start_stage, update_lagged
+from bilayer_core.engine.stages import predict_stage, stand_still_stage, start_step_point
+from bilayer_core.engine.storage import Storage, new_configuration, new_work
+from bilayer_core.forces.elements import start_elements
+from bilayer_core.forces.force_register import memory_size
+from bilayer_core.model.force_slots import NAMES
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, PAIR, SHIFT, SIMPLIFIED
+from bilayer_core.model.records.problem import Problem, Sums
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Point, Stage, StateArrays
+from bilayer_core.model.state import State, initial_state
 
 Array = np.ndarray
 

@@ -12,10 +12,31 @@ import math
 
 import numpy as np
 
-from ..jit import kernel, piece, record_at
-from ..jit.record import Indices, Vector, record
-from ..kinematics.copying import copy
-from ..model.records.outcome import (
+from bilayer_core.engine.actuation import (
+    Actuation,
+    corner_after,
+    drive_step,
+    jumps_at,
+    stimulus_has_jumped,
+    take_first_stimuli,
+)
+from bilayer_core.engine.energy_account import LARGEST, NONE, SOME
+from bilayer_core.engine.error_norm import ErrorNorm, fastest, step_defect
+from bilayer_core.engine.run_extrema import count_end
+from bilayer_core.engine.step import make_step
+from bilayer_core.engine.step_size import (
+    FAILURE_FACTOR,
+    GROWTH_LIMIT,
+    NUMBER_ROUNDING,
+    after_rejection,
+    after_success,
+    fit,
+    next_end,
+)
+from bilayer_core.jit import kernel, piece, record_at
+from bilayer_core.jit.record import Indices, Vector, record
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.model.records.outcome import (
     CONFIGURATION,
     CONTACT_ERROR,
     FACTORISATIONS,
@@ -30,15 +51,9 @@ from ..model.records.outcome import (
     SETTLINGS,
     STATUS,
 )
-from ..model.records.problem import Problem
-from ..model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
-from ..model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
-from .actuation import Actuation, corner_after, drive_step, jumps_at, stimulus_has_jumped, take_first_stimuli
-from .energy_account import LARGEST, NONE, SOME
-from .error_norm import ErrorNorm, fastest, step_defect
-from .run_extrema import count_end
-from .step import make_step
-from .step_size import FAILURE_FACTOR, GROWTH_LIMIT, NUMBER_ROUNDING, after_rejection, after_success, fit, next_end
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
+from bilayer_core.model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
 
 configuration_at = record_at(Configuration)
 TIME_ROUNDING = 1e-9

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ..jit import kernel
-from ..jit.stack import stack_matrix
-from ..kinematics.rotating import inertia_tensor
-from ..kinematics.vector import row
+from bilayer_core.jit import kernel
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.kinematics.rotating import inertia_tensor
+from bilayer_core.kinematics.vector import row
 
 
 @kernel

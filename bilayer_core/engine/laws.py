@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..jit import kernel
-from ..scene import spans, transduction
+from bilayer_core.jit import kernel
+from bilayer_core.scene import spans, transduction
 
 value_of_span = kernel(spans.value_of_span)
 lagged = kernel(transduction.lagged)

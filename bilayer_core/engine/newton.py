@@ -11,14 +11,24 @@ from __future__ import annotations
 
 import math
 
-from ..forces.friction_limit import limit_by_friction
-from ..forces.rod_contact import bound_between_rods, find_rod_contacts
-from ..forces.surface_pairs import bound_at_surfaces
-from ..jit import kernel, piece
-from ..jit.record import Matrix, Stack
-from ..kinematics.copying import copy
-from ..kinematics.rotating import compose_quaternion, rotate_by, rotation_vector_between
-from ..model.records.outcome import (
+from bilayer_core.engine.configuration import (
+    copy_prescribed,
+    departure_of_constrained,
+    move,
+    transport_frames,
+    update_attached,
+)
+from bilayer_core.engine.linear.newton_matrix import factorise, solve
+from bilayer_core.engine.potential import evaluate, settle_forces, update_lagged
+from bilayer_core.engine.request_modes import NEGATIVE, VALUE
+from bilayer_core.forces.friction_limit import limit_by_friction
+from bilayer_core.forces.rod_contact import bound_between_rods, find_rod_contacts
+from bilayer_core.forces.surface_pairs import bound_at_surfaces
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.record import Matrix, Stack
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.kinematics.rotating import compose_quaternion, rotate_by, rotation_vector_between
+from bilayer_core.model.records.outcome import (
     FACTORISATIONS,
     FRACTION,
     GAP,
@@ -29,8 +39,8 @@ from ..model.records.outcome import (
     STATUS,
     SWAPPED,
 )
-from ..model.records.problem import Problem
-from ..model.records.status import (
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import (
     BLOCKED,
     CONVERGED,
     LINE_SEARCH,
@@ -40,11 +50,7 @@ from ..model.records.status import (
     ROD_CAPACITY_EXCEEDED,
     UNSETTLED,
 )
-from ..model.records.step import Configuration, Stage
-from .configuration import copy_prescribed, departure_of_constrained, move, transport_frames, update_attached
-from .linear.newton_matrix import factorise, solve
-from .modes import NEGATIVE, VALUE
-from .potential import evaluate, settle_forces, update_lagged
+from bilayer_core.model.records.step import Configuration, Stage
 
 ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 2006, ch. 3)
 KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections

@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..forces.added_mass import fluid_momentum
-from ..forces.bend_twist import bending_strain
-from ..forces.joints import Joints
-from ..jit import kernel, piece, record, shapes_of, zeros_in_one
-from ..jit.record import Flags, IndexTable, Indices, Matrix, Vector
-from ..kinematics.copying import copy
-from ..kinematics.rotating import quaternion_of
-from ..kinematics.vector import combine3, cross, row, scaled
-from ..model.model import Model
-from ..model.records.parts import Fluid
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, StateArrays
-from ..model.sizes import sizes_of
-from .build import fluid_of
-from .kinetic import kinetic_energy
+from bilayer_core.engine.build_problem import fluid_of
+from bilayer_core.engine.kinetic import kinetic_energy
+from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.forces.bend_twist import bending_strain
+from bilayer_core.forces.joints import Joints
+from bilayer_core.jit import kernel, piece, record, shapes_of, zeros_in_one
+from bilayer_core.jit.record import Flags, IndexTable, Indices, Matrix, Vector
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.kinematics.rotating import quaternion_of
+from bilayer_core.kinematics.vector import combine3, cross, row, scaled
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.parts import Fluid
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, StateArrays
+from bilayer_core.model.sizes import sizes_of
 
 Array = np.ndarray
 

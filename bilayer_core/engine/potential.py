@@ -6,14 +6,14 @@ import math
 
 from numba import types
 
-from ..forces.contact_on_bodies import condense_contact
-from ..jit import caller, kernel, piece
-from ..kinematics.copying import copy
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage
-from .linear.assembly import expand_gradient
-from .linear.attachments import condense_gradient
+from bilayer_core.engine.linear.assembly import expand_gradient
+from bilayer_core.engine.linear.attachments import condense_gradient
+from bilayer_core.forces.contact_on_bodies import condense_contact
+from bilayer_core.jit import caller, kernel, piece
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage
 
 
 def _signature(result, *more):

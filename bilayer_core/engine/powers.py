@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from ..contact.barrier import barrier_gradient
-from ..contact.near import gap_normal
-from ..forces.bend_twist import bend_by_strains
-from ..forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix, stack_vector
-from ..kinematics.rotating import inertia_tensor, solve_three
-from ..kinematics.vector import cross, dot, row
-from ..model.force_slots import slot_of
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, StageInputs, Work
+from bilayer_core.contact.barrier import barrier_gradient
+from bilayer_core.contact.near import gap_normal
+from bilayer_core.forces.bend_twist import bend_by_strains
+from bilayer_core.forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.kinematics.rotating import inertia_tensor, solve_three
+from bilayer_core.kinematics.vector import cross, dot, row
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, StageInputs, Work
 
 SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, STRAINED = range(8)
 """Slots of `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage

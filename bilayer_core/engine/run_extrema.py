@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from ..forces.bend_twist import bending_strain
-from ..forces.rod_arms import node_of
-from ..jit import kernel, piece
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, RunExtrema, Stage, StateArrays
+from bilayer_core.forces.bend_twist import bending_strain
+from bilayer_core.forces.rod_arms import node_of
+from bilayer_core.jit import kernel, piece
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, RunExtrema, Stage, StateArrays
 
 
 @piece(int, Problem, StateArrays, Configuration, Stage, RunExtrema)

@@ -15,19 +15,19 @@ Positions and momenta advance as `integrators.method` says. What is no vector ne
 
 from __future__ import annotations
 
-from ..forces.added_mass import momentum_at
-from ..forces.elements import measure_strains
-from ..forces.mechanisms import measure_mechanisms
-from ..forces.restitution import measure_gaps
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix
-from ..kinematics.copying import add_scaled, copy, copy_matrix, copy_row
-from ..kinematics.rotating import inertia_tensor, rotate_by, rotation_vector_between, solve_three
-from ..kinematics.vector import row
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Method, Point, Stage, StageInputs, StateArrays, Work
-from .configuration import clear_departure
+from bilayer_core.engine.configuration import clear_departure
+from bilayer_core.forces.added_mass import momentum_at
+from bilayer_core.forces.elements import measure_strains
+from bilayer_core.forces.mechanisms import measure_mechanisms
+from bilayer_core.forces.restitution import measure_gaps
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.kinematics.copying import add_scaled, copy, copy_matrix, copy_row
+from bilayer_core.kinematics.rotating import inertia_tensor, rotate_by, rotation_vector_between, solve_three
+from bilayer_core.kinematics.vector import row
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Method, Point, Stage, StageInputs, StateArrays, Work
 
 SPIN_ITERATIONS = 50
 SPIN_CHANGE = 1e-15

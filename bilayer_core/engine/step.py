@@ -4,10 +4,43 @@ from __future__ import annotations
 
 import math
 
-from ..contact.crossing import crossing, note_start
-from ..jit import kernel, piece, record_at
-from ..kinematics.copying import copy
-from ..model.records.outcome import (
+from bilayer_core.contact.crossing import crossing, note_start
+from bilayer_core.engine.configuration import take_state
+from bilayer_core.engine.energy_account import begin_step_account, close_step_account
+from bilayer_core.engine.laws import eigenstrain_of, lagged
+from bilayer_core.engine.light_over_step import begin_light, end_light, see_light
+from bilayer_core.engine.newton import first_guess_of, minimise_potential
+from bilayer_core.engine.potential import end_forces, start_stage
+from bilayer_core.engine.powers import add_powers
+from bilayer_core.engine.request_modes import (
+    COUNT,
+    EVALUATE_STATE,
+    EVALUATION_TIME,
+    MINIMUM,
+    NEGATIVE,
+    SETTLE,
+    VALUE,
+    WITHOUT_INERTIA,
+)
+from bilayer_core.engine.stages import (
+    add_history_to_origin,
+    predict_end,
+    predict_stage,
+    set_origin,
+    stand_still_stage,
+    start_step_point,
+)
+from bilayer_core.engine.step_ends import (
+    distance,
+    end_stage,
+    keep_stage_derivatives,
+    write_end,
+    write_shape,
+    write_twist,
+)
+from bilayer_core.jit import kernel, piece, record_at
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.model.records.outcome import (
     CONFIGURATION,
     FACTORISATIONS,
     GAINS,
@@ -20,19 +53,9 @@ from ..model.records.outcome import (
     SETTLINGS,
     SWAPPED,
 )
-from ..model.records.problem import Problem
-from ..model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, CROSSED, MAX_ITERATIONS, READY
-from ..model.records.step import Configuration, Method, StageInputs, StateArrays, Work
-from .configuration import take_state
-from .ends import distance, end_stage, keep_stage_derivatives, write_end, write_shape, write_twist
-from .energy_account import begin_step_account, close_step_account
-from .laws import eigenstrain_of, lagged
-from .light import begin_light, end_light, see_light
-from .modes import COUNT, EVALUATE_STATE, EVALUATION_TIME, MINIMUM, NEGATIVE, SETTLE, VALUE, WITHOUT_INERTIA
-from .newton import first_guess_of, minimise_potential
-from .potential import end_forces, start_stage
-from .powers import add_powers
-from .stages import add_history_to_origin, predict_end, predict_stage, set_origin, stand_still_stage, start_step_point
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, CROSSED, MAX_ITERATIONS, READY
+from bilayer_core.model.records.step import Configuration, Method, StageInputs, StateArrays, Work
 
 configuration_at = record_at(Configuration)
 LEAST_LENGTH = 0.01

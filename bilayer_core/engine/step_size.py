@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 import sys
 
-from ..jit.kernel import exact_kernel, kernel
+from bilayer_core.jit.kernel import exact_kernel, kernel
 
 SAFETY = 0.9
 PROPORTIONAL, INTEGRAL = 0.6, 0.2

@@ -4,21 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..forces.friction_limit import PATH_SIZE
-from ..forces.mechanisms import mechanisms_record
-from ..forces.register import force_table, memory_size, require_computed
-from ..jit import shapes_of, zeros_in_one
-from ..model.friction import friction_law, none_given
-from ..model.model import Model
-from ..model.records.contacts import ContactColumns, RodContact, RodContactList, Sliding, Slips, Surfaces
-from ..model.records.outcome import COUNTS, FIGURES
-from ..model.records.parts import Plane, Space
-from ..model.records.problem import BorderedSystem, Outcome, Problem, Sums
-from ..model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEEDED, ROD_CAPACITY_EXCEEDED
-from ..model.records.step import Configuration, Point, Stage, Work
-from ..model.rod_surfaces import NearPairs
-from ..model.sizes import sizes_of
-from .build import (
+from bilayer_core.engine.build_problem import (
     contact_columns_of,
     lasting_groups,
     plane_of,
@@ -28,7 +14,7 @@ from .build import (
     slips_of,
     surfaces_of,
 )
-from .capacity import (
+from bilayer_core.engine.capacity import (
     FIRST_POINTS,
     PAIRS_PER_POINT,
     Capacity,
@@ -37,6 +23,20 @@ from .capacity import (
     rod_pairs_for,
     surface_pairs_for,
 )
+from bilayer_core.forces.force_register import force_table, memory_size, require_computed
+from bilayer_core.forces.friction_limit import PATH_SIZE
+from bilayer_core.forces.mechanisms import mechanisms_record
+from bilayer_core.jit import shapes_of, zeros_in_one
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.contacts import ContactColumns, RodContact, RodContactList, Sliding, Slips, Surfaces
+from bilayer_core.model.records.outcome import COUNTS, FIGURES
+from bilayer_core.model.records.parts import Plane, Space
+from bilayer_core.model.records.problem import BorderedSystem, Outcome, Problem, Sums
+from bilayer_core.model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEEDED, ROD_CAPACITY_EXCEEDED
+from bilayer_core.model.records.step import Configuration, Point, Stage, Work
+from bilayer_core.model.rod_surfaces import NearPairs
+from bilayer_core.model.set_friction import friction_law, none_given
+from bilayer_core.model.sizes import sizes_of
 
 Array = np.ndarray
 FIRST = ("node", "edge", "pair", "body", "contact_point", "contact")

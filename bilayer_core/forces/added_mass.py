@@ -48,12 +48,12 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..kinematics.copying import copy
-from ..model.force_slots import slot_of
-from ..model.records.parts import Fluid
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
+from bilayer_core.jit import kernel, piece
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Fluid
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 ADDED_MASS = slot_of("added mass")
 

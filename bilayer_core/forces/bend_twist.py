@@ -66,8 +66,9 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..kinematics.vector import (
+from bilayer_core.forces.elements import acts_viscously
+from bilayer_core.jit import kernel, piece
+from bilayer_core.kinematics.vector import (
     add_column,
     add_outer,
     add_outer_sum,
@@ -83,11 +84,10 @@ from ..kinematics.vector import (
     row,
     scaled,
 )
-from ..model.force_slots import slot_of
-from ..model.records.parts import Space
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from .elements import acts_viscously
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Space
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 BENDING, TWISTING, BOND = map(slot_of, ("bending", "twisting", "bond"))
 TWO_PI = 2.0 * math.pi

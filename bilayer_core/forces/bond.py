@@ -54,8 +54,9 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..kinematics.vector import (
+from bilayer_core.forces.elements import acts_viscously
+from bilayer_core.jit import kernel, piece
+from bilayer_core.kinematics.vector import (
     add_column,
     add_identity,
     add_outer,
@@ -69,11 +70,10 @@ from ..kinematics.vector import (
     row,
     scaled,
 )
-from ..model.force_slots import slot_of
-from ..model.records.parts import Space
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from .elements import acts_viscously
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Space
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 BENDING, TWISTING, BOND = map(slot_of, ("bending", "twisting", "bond"))
 

@@ -20,12 +20,12 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..kinematics.vector import add_row, add_upper_outer_sum, combine, combine3, cross, dot, row, scaled
-from ..model.force_slots import slot_of
-from ..model.records.parts import Flow
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
+from bilayer_core.jit import kernel, piece
+from bilayer_core.kinematics.vector import add_row, add_upper_outer_sum, combine, combine3, cross, dot, row, scaled
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Flow
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 DRAG = slot_of("drag")
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..kinematics.vector import angle, combine, dot, row
-from ..model.force_slots import slot_of
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage
+from bilayer_core.jit import kernel, piece
+from bilayer_core.kinematics.vector import angle, combine, dot, row
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage
 
 STRETCHING, BENDING, TWISTING, BOND, VISCOSITY = map(
     slot_of, ("stretching", "bending", "twisting", "bond", "viscosity")

@@ -19,12 +19,12 @@ from __future__ import annotations
 
 import math
 
-from ..contact.friction_law import friction_over_speed, friction_slope
-from ..jit import kernel, piece
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from .rod_contact import rod_slip_along
-from .surface_friction import slip_paths
+from bilayer_core.contact.friction_law import friction_over_speed, friction_slope
+from bilayer_core.forces.rod_contact import rod_slip_along
+from bilayer_core.forces.surface_friction import slip_paths
+from bilayer_core.jit import kernel, piece
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 PATH_SIZE = 9
 """Numbers of a contact's slip path."""

@@ -29,12 +29,12 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix
-from ..kinematics.rotating import real_part
-from ..model.force_slots import slot_of
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.kinematics.rotating import real_part
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 INERTIA, DAMPING, GRAVITY = map(slot_of, ("inertia", "damping", "gravity"))
 

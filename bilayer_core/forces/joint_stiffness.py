@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..jit import kernel
-from ..model.model import Model
+from bilayer_core.jit import kernel
+from bilayer_core.model.model import Model
 
 STIFFER = 100.0
 """Than the stiffest edge and the stiffest bend of a rod."""

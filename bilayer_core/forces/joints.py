@@ -30,18 +30,18 @@ import math
 
 import numpy as np
 
-from ..jit import kernel, piece, record
-from ..jit.record import Flags, Indices, Matrix, Stack, Vector
-from ..jit.stack import stack_matrix, stack_vector
-from ..kinematics.vector import cross, dot
-from ..model.force_slots import slot_of
-from ..model.model import Model
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from ..scene.joint import SLIDES, Joint
-from .contact_on_bodies import add_force
-from .joint_stiffness import across, scatter_pair, stiffness_of_joints
-from .mechanisms import add_product, add_way
+from bilayer_core.forces.contact_on_bodies import add_force
+from bilayer_core.forces.joint_stiffness import across, scatter_pair, stiffness_of_joints
+from bilayer_core.forces.mechanisms import add_product, add_way
+from bilayer_core.jit import kernel, piece, record
+from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector
+from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.kinematics.vector import cross, dot
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
+from bilayer_core.scene.joint import SLIDES, Joint
 
 JOINTS = slot_of("joints")
 ALIGNED = {"pin": 0, "universal": 0, "hinge": 1, "cylinder": 1, "slide": 3, "weld": 3}

@@ -22,15 +22,15 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix
-from ..kinematics.vector import combine3
-from ..model.force_slots import slot_of
-from ..model.records.parts import Moments, PointForces
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage
-from .drag import node_directions
+from bilayer_core.forces.drag import node_directions
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.kinematics.vector import combine3
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Moments, PointForces
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage
 
 MOMENTS = slot_of("moments")
 

@@ -36,18 +36,18 @@ import math
 
 import numpy as np
 
-from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix, stack_vector
-from ..kinematics.vector import cross, dot
-from ..model.force_slots import slot_of
-from ..model.mechanisms import WORLD
-from ..model.model import Model
-from ..model.records.parts import Mechanisms
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage
-from .joint_stiffness import across, scatter_pair, stiffness_of_joints
+from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from bilayer_core.forces.joint_stiffness import across, scatter_pair, stiffness_of_joints
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.kinematics.vector import cross, dot
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.free_motions import WORLD
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.parts import Mechanisms
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage
 
 JOINTS, FRICTION = map(slot_of, ("joints", "joint friction"))
 TWO_PI = 2.0 * math.pi

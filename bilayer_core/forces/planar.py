@@ -27,13 +27,13 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..model.force_slots import slot_of
-from ..model.records.parts import Plane
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from .bend_twist import bend_by_strains
-from .elements import acts_viscously
+from bilayer_core.forces.bend_twist import bend_by_strains
+from bilayer_core.forces.elements import acts_viscously
+from bilayer_core.jit import kernel, piece
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Plane
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 STRETCHING, BENDING, BOND = map(slot_of, ("stretching", "bending", "bond"))
 

@@ -26,14 +26,14 @@ import math
 
 from scipy.optimize import brentq
 
-from ..contact.barrier import barrier
-from ..contact.near import gap_normal
-from ..jit import kernel, piece
-from ..model.force_slots import slot_of
-from ..model.records.contacts import Restitution
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage
+from bilayer_core.contact.barrier import barrier
+from bilayer_core.contact.near import gap_normal
+from bilayer_core.jit import kernel, piece
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.contacts import Restitution
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage
 
 RESTITUTION = slot_of("restitution")
 MOST = 0.999

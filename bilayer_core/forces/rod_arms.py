@@ -21,8 +21,8 @@ Second derivatives are listed: `engine.linear.arms` hands them to the unknowns.
 
 from __future__ import annotations
 
-from ..jit import kernel
-from ..kinematics.vector import combine, cross, dot, row
+from bilayer_core.jit import kernel
+from bilayer_core.kinematics.vector import combine, cross, dot, row
 
 
 @kernel

@@ -38,21 +38,21 @@ from __future__ import annotations
 
 import math
 
-from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
-from ..contact.broad_phase import near_pairs
-from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from ..contact.rod_bound import rod_step_bound
-from ..contact.rod_list import FIRST, PATH, begin_list, end_list, list_serves, reachable
-from ..contact.segment import facing_contacts
-from ..jit import kernel, piece
-from ..jit.record import Matrix
-from ..jit.stack import stack_vector
-from ..model.force_slots import slot_of
-from ..model.records.contacts import RodContact
-from ..model.records.outcome import STATUS
-from ..model.records.problem import Problem
-from ..model.records.status import READY, ROD_CAPACITY_EXCEEDED
-from ..model.records.step import Configuration, Stage
+from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
+from bilayer_core.contact.broad_phase import near_pairs
+from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from bilayer_core.contact.rod_bound import rod_step_bound
+from bilayer_core.contact.rod_list import FIRST, PATH, begin_list, end_list, list_serves, reachable
+from bilayer_core.contact.segment import facing_contacts
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.record import Matrix
+from bilayer_core.jit.stack import stack_vector
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.contacts import RodContact
+from bilayer_core.model.records.outcome import STATUS
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY, ROD_CAPACITY_EXCEEDED
+from bilayer_core.model.records.step import Configuration, Stage
 
 ROD_BARRIER, ROD_FRICTION = map(slot_of, ("rod barrier", "rod friction"))
 

@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import math
 
-from ..jit import piece
-from ..kinematics.vector import add_row, add_upper_outer, add_upper_projector, row
-from ..model.force_slots import slot_of
-from ..model.records.parts import Space
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from .elements import acts_viscously
+from bilayer_core.forces.elements import acts_viscously
+from bilayer_core.jit import piece
+from bilayer_core.kinematics.vector import add_row, add_upper_outer, add_upper_projector, row
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Space
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 STRETCHING = slot_of("stretching")
 

@@ -22,19 +22,19 @@ from __future__ import annotations
 
 import math
 
-from ..contact.barrier import barrier, barrier_gradient, barrier_hessian
-from ..contact.near import gap_normal
-from ..contact.shapes import shape_curvature
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix, stack_vector
-from ..model.force_slots import slot_of
-from ..model.records.contacts import Surfaces
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from .contact_on_bodies import add_force, add_second_derivative
-from .restitution import RESTITUTION, damping_at
-from .rod_arms import add_to_edges, has_arm, new_arm, node_of, write_curvature, write_material_rate
-from .surface_pairs import list_surface_pairs
+from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
+from bilayer_core.contact.near import gap_normal
+from bilayer_core.contact.shapes import shape_curvature
+from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
+from bilayer_core.forces.restitution import RESTITUTION, damping_at
+from bilayer_core.forces.rod_arms import add_to_edges, has_arm, new_arm, node_of, write_curvature, write_material_rate
+from bilayer_core.forces.surface_pairs import list_surface_pairs
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.contacts import Surfaces
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 BARRIER = slot_of("barrier")
 

@@ -38,22 +38,30 @@ from __future__ import annotations
 
 import math
 
-from ..contact.barrier import barrier_gradient
-from ..contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from ..contact.near import gap_normal
-from ..jit import kernel, piece
-from ..jit.stack import stack_matrix, stack_vector
-from ..kinematics.copying import copy_matrix
-from ..kinematics.rotating import product_transposed
-from ..kinematics.vector import row
-from ..model.force_slots import slot_of
-from ..model.records.contacts import Sliding
-from ..model.records.problem import Problem
-from ..model.records.status import READY
-from ..model.records.step import Configuration, Stage
-from .contact_on_bodies import add_force, add_second_derivative
-from .restitution import damping_at
-from .rod_arms import add_motion_of_arm, add_step_of_arm, add_to_edges, copy_rate, new_arm, node_of, write_rate
+from bilayer_core.contact.barrier import barrier_gradient
+from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from bilayer_core.contact.near import gap_normal
+from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
+from bilayer_core.forces.restitution import damping_at
+from bilayer_core.forces.rod_arms import (
+    add_motion_of_arm,
+    add_step_of_arm,
+    add_to_edges,
+    copy_rate,
+    new_arm,
+    node_of,
+    write_rate,
+)
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.kinematics.copying import copy_matrix
+from bilayer_core.kinematics.rotating import product_transposed
+from bilayer_core.kinematics.vector import row
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.contacts import Sliding
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Stage
 
 FRICTION = slot_of("friction")
 NO_DIRECTION = 1e-6

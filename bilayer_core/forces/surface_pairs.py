@@ -5,14 +5,14 @@ Whoever needs the list asks for it at a configuration: it is made anew only if s
 
 from __future__ import annotations
 
-from ..contact.near import list_near, moved_since
-from ..contact.step_bound import motion_of_points, motion_of_surfaces, step_bound
-from ..jit import piece
-from ..model.records.contacts import Surfaces
-from ..model.records.outcome import PAIR, STATUS
-from ..model.records.problem import Problem
-from ..model.records.status import PAIR_CAPACITY_EXCEEDED, READY
-from ..model.records.step import Configuration
+from bilayer_core.contact.near import list_near, moved_since
+from bilayer_core.contact.step_bound import motion_of_points, motion_of_surfaces, step_bound
+from bilayer_core.jit import piece
+from bilayer_core.model.records.contacts import Surfaces
+from bilayer_core.model.records.outcome import PAIR, STATUS
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import PAIR_CAPACITY_EXCEEDED, READY
+from bilayer_core.model.records.step import Configuration
 
 MOTION_MARGIN = 4.0
 """Margin of a list, in units of the motion that demands it."""

@@ -26,10 +26,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel, piece
-from ..model.records.problem import Problem
-from ..model.records.step import Configuration, Stage
-from .elements import (
+from bilayer_core.forces.elements import (
     BENDING,
     BOND,
     STRETCHING,
@@ -40,6 +37,9 @@ from .elements import (
     slot_of_pair,
     strains_of_pair,
 )
+from bilayer_core.jit import kernel, piece
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
 
 
 @kernel

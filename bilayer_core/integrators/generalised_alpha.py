@@ -15,7 +15,7 @@ whose start a load or an eigenstrain jumps, is made with SDIRK2.
 
 from __future__ import annotations
 
-from .method import History, Method, estimate_of
+from bilayer_core.integrators.method import History, Method, estimate_of
 
 RHO = 0.5
 """Of the fastest vibrations, what a step leaves."""

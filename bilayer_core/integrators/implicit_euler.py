@@ -6,7 +6,7 @@ local error of positions: ½ h² q̈
 
 from __future__ import annotations
 
-from .method import Method
+from bilayer_core.integrators.method import Method
 
 METHOD = Method(
     name="implicit_euler",

@@ -10,7 +10,7 @@ without contact, and for holding other methods against.
 
 from __future__ import annotations
 
-from .method import Method
+from bilayer_core.integrators.method import Method
 
 METHOD = Method(
     name="implicit_midpoint",

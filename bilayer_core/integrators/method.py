@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.records.step import Method as MethodArrays
+from bilayer_core.model.records.step import Method as MethodArrays
 
 
 @dataclass(frozen=True)

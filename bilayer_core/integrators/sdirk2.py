@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from .method import Method, estimate_of
+from bilayer_core.integrators.method import Method, estimate_of
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 

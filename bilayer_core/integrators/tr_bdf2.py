@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from .method import History, Method, estimate_of
+from bilayer_core.integrators.method import History, Method, estimate_of
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 W = math.sqrt(2.0) / 4.0

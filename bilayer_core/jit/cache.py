@@ -29,8 +29,8 @@ import numba
 import numpy as np
 from platformdirs import user_cache_path
 
-from ..errors import OutputError
-from .private_folder import exposure, make_private
+from bilayer_core.errors import OutputError
+from bilayer_core.jit.private_folder import exposure, make_private
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("jit", "kinematics", "contact", "scene", "model", "forces", "engine")

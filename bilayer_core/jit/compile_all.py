@@ -16,9 +16,9 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from ..errors import OutputError
-from .cache import cache_folder
-from .piece import PIECES
+from bilayer_core.errors import OutputError
+from bilayer_core.jit.cache import cache_folder
+from bilayer_core.jit.piece import PIECES
 
 COMPLETE = "complete"
 """Name of an empty file in the folder in which all pieces are."""
@@ -78,7 +78,7 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     RuntimeError
         If one cannot be compiled; the message has what the process printed.
     """
-    from ..processes import usable_cores  # its imports are for who compiles
+    from bilayer_core.processes import usable_cores
 
     folder = cache_folder()
     if folder is None:

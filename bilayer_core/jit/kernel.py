@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numba
 
-from . import unofficial
-from .cache import cache_folder, cached
+from bilayer_core.jit import undocumented
+from bilayer_core.jit.cache import cache_folder, cached
 
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 EXACT = {"contract", "nsz"}
 """For sums whose rounding errors are kept: their terms must not be reordered."""
-OPTIONS = dict(nogil=True, error_model="numpy", **unofficial.OPTIONS)
+OPTIONS = dict(nogil=True, error_model="numpy", **undocumented.OPTIONS)
 
 
 def kernel(function):

@@ -34,9 +34,9 @@ from numba.extending import intrinsic, lower_builtin, type_callable
 from numba.types import Any as AnyType
 from numba.types import VarArg
 
-from .cache import cache_folder, cached
-from .kernel import FASTMATH, OPTIONS
-from .record import NUMBERS, Record, type_in_kernels
+from bilayer_core.jit.cache import cache_folder, cached
+from bilayer_core.jit.kernel import FASTMATH, OPTIONS
+from bilayer_core.jit.record import NUMBERS, Record, type_in_kernels
 
 IN_C = {int: ctypes.c_int64, float: ctypes.c_double, bool: ctypes.c_bool}
 FIND = "bilayer_find_piece"

@@ -34,7 +34,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, models, register_model
 
-from .unofficial import add_attributes, add_field
+from bilayer_core.jit.undocumented import add_attributes, add_field
 
 WORD = 8
 CACHE_LINE = 64

@@ -11,9 +11,9 @@ import sys
 import threading
 from importlib import import_module
 
-from ..errors import OutputError
-from .compile_all import ENGINE
-from .piece import PIECES
+from bilayer_core.errors import OutputError
+from bilayer_core.jit.compile_all import ENGINE
+from bilayer_core.jit.piece import PIECES
 
 
 def main() -> None:

@@ -6,7 +6,7 @@ an unevaluated sum x + r, with r at most half the last digit of x, to which disp
 
 from __future__ import annotations
 
-from ..jit.kernel import exact_kernel
+from bilayer_core.jit.kernel import exact_kernel
 
 
 @exact_kernel

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..jit import kernel
-from ..jit.flat import flat
+from bilayer_core.jit import kernel
+from bilayer_core.jit.flat import flat
 
 
 @kernel

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..jit import entry, kernel
-from .vector import combine, dot, row, scaled
+from bilayer_core.jit import entry, kernel
+from bilayer_core.kinematics.vector import combine, dot, row, scaled
 
 
 @entry

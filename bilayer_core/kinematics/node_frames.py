@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..jit import entry, kernel
-from .rotating import quaternion_of
-from .vector import combine, cross, dot, row, scaled
+from bilayer_core.jit import entry, kernel
+from bilayer_core.kinematics.rotating import quaternion_of
+from bilayer_core.kinematics.vector import combine, cross, dot, row, scaled
 
 
 @entry

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
-from . import rotation
+from bilayer_core.jit import kernel
+from bilayer_core.kinematics import rotation
 
 quaternion_of = kernel(rotation.quaternion_of)
 

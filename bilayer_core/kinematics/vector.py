@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..jit import kernel
+from bilayer_core.jit import kernel
 
 SMALL_ANGLE = 0.05
 """Tangent up to which six terms of the series of the inverse tangent are exact to rounding."""

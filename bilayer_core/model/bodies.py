@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kinematics.rotation import rotation_matrix
-from ..scene.body import Body, Free, Guided, Prescribed
-from ..scene.config import SceneConfig
-from .model import Bodies
-from .plane import Plane
-from .shapes import Shape, shape_of
-from .strands import Collected
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.model import Bodies
+from bilayer_core.model.plane import Plane
+from bilayer_core.model.shape_numbers import Shape, shape_of
+from bilayer_core.model.strands import Collected
+from bilayer_core.scene.body import Body, Free, Guided, Prescribed
+from bilayer_core.scene.config import SceneConfig
 
 
 def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = None) -> Bodies:

@@ -7,11 +7,11 @@ from enum import IntEnum
 
 import numpy as np
 
-from ..scene.body import Body, Prescribed
-from ..scene.config import SceneConfig
-from ..scene.profile import values_at
-from ..scene.rod import Rod
-from .section import outline
+from bilayer_core.model.section import outline
+from bilayer_core.scene.body import Body, Prescribed
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.rod import Rod
 
 
 class Mobility(IntEnum):

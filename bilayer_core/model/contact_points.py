@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import PenetrationError
-from ..scene.config import SceneConfig
-from ..scene.shape import Obstacle, Surface
-from .colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
-from .model import Bodies, ContactPoints, Model, Surfaces
-from .rod_points import RodPoints, rod_points
-from .shapes import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
-from .strand_arrays import StrandArrays
-from .strands import Collected
+from bilayer_core.errors import PenetrationError
+from bilayer_core.model.colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
+from bilayer_core.model.model import Bodies, ContactPoints, Model, Surfaces
+from bilayer_core.model.rod_points import RodPoints, rod_points
+from bilayer_core.model.shape_numbers import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.model.strands import Collected
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.shape import Obstacle, Surface
 
 
 @dataclass(frozen=True)

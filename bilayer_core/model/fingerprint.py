@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..scene.config import SceneConfig
+from bilayer_core.scene.config import SceneConfig
 
 Array = np.ndarray
 _encode = json.JSONEncoder(sort_keys=True, ensure_ascii=False).encode

@@ -2,7 +2,7 @@
 
 A force has its line here and its formula in `forces/`; the part of the engine that computes it asks for its slot by
 name (`model.force_slots.slot_of`). An engine refuses to be built for a scene that needs a force that no term of
-`forces.register` computes.
+`forces.force_register` computes.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 
-from ..scene.body import Prescribed
-from ..scene.config import SceneConfig
-from ..scene.load import Load
-from .colliders import ContactPair, contact_pairs
-from .findings import few
-from .mechanisms import mechanisms_of
-from .rod_pairs import RodPair, rod_pairs
+from bilayer_core.model.colliders import ContactPair, contact_pairs
+from bilayer_core.model.findings import few
+from bilayer_core.model.free_motions import mechanisms_of
+from bilayer_core.model.rod_pairs import RodPair, rod_pairs
+from bilayer_core.scene.body import Prescribed
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.load import Load
 
 
 class Kind(Enum):

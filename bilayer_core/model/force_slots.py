@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .force_list import kinds
+from bilayer_core.model.force_list import kinds
 
 NAMES = tuple(kinds())
 """Of forces, in the order of the sum."""

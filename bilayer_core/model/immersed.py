@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..scene.config import Fluid
-from ..scene.rod import Rod
-from .section import outline
-from .strands import Collected, Span, stations_of
+from bilayer_core.model.section import outline
+from bilayer_core.model.strands import Collected, Span, stations_of
+from bilayer_core.scene.config import Fluid
+from bilayer_core.scene.rod import Rod
 
 Array = np.ndarray
 

@@ -13,10 +13,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..contact.barrier import barrier
-from ..contact.shapes import PLANE
-from .findings import Finding
-from .model import Model
+from bilayer_core.contact.barrier import barrier
+from bilayer_core.contact.shapes import PLANE
+from bilayer_core.model.findings import Finding
+from bilayer_core.model.model import Model
 
 Array = np.ndarray
 HELD = 0.1

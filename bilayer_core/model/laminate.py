@@ -8,16 +8,12 @@ from itertools import groupby
 
 import numpy as np
 
-from ..scene.config import SceneConfig
-from ..scene.pattern import stacked
-from ..scene.profile import values_at
-from ..scene.rod import Rod, RodCopy
-from .immersed import add_fluid
-from .laminate_section import LayerHalves, WholeSection, layer_halves, side
-from .lit import add_lit_elements, is_light
-from .section import Section, outline, sections
-from .strand_arrays import StrandArrays
-from .strands import (
+from bilayer_core.model.immersed import add_fluid
+from bilayer_core.model.laminate_section import LayerHalves, WholeSection, layer_halves, side
+from bilayer_core.model.lit_elements import add_lit_elements, is_light
+from bilayer_core.model.section import Section, outline, sections
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.model.strands import (
     Collected,
     StrandElements,
     StrandShape,
@@ -28,7 +24,11 @@ from .strands import (
     strand_shape,
     with_copies,
 )
-from .validity import Figure
+from bilayer_core.model.validity import Figure
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.pattern import stacked
+from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.rod import Rod, RodCopy
 
 Array = np.ndarray
 NAME = "laminate"

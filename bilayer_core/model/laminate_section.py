@@ -37,11 +37,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.config import SceneConfig
-from ..scene.profile import values_at
-from ..scene.rod import Rod
-from .section import bond, sections
-from .strands import StrandShape
+from bilayer_core.model.section import bond, sections
+from bilayer_core.model.strands import StrandShape
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.rod import Rod
 
 Array = np.ndarray
 ON_AXIS = 1e-12

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.config import SceneConfig
-from .layout import Layout, ReadOnlyArrays
-from .mechanisms import Mechanism, mechanisms_of
-from .plane import InPlane
-from .rod_surfaces import RodSurfaces
-from .shapes import Shape
-from .strand_arrays import StrandArrays
+from bilayer_core.model.free_motions import Mechanism, mechanisms_of
+from bilayer_core.model.plane import InPlane
+from bilayer_core.model.rod_surfaces import RodSurfaces
+from bilayer_core.model.shape_numbers import Shape
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.model.unknown_order import Layout, ReadOnlyArrays
+from bilayer_core.scene.config import SceneConfig
 
 Array = np.ndarray
 AXES = np.eye(3)

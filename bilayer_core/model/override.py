@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..scene.spans import Span
+from bilayer_core.scene.spans import Span
 
 Array = np.ndarray
 VALUE, START, BEGIN, END = range(4)

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from ..errors import SceneError
-from ..scene.config import Coupling, SceneConfig
-from ..scene.rod import Rod
-from .colliders import ContactPair, contact_pairs, is_ribbon
-from .findings import few, told
-from .force_list import planned
-from .imperfection import advice
-from .laminate import uneven_faces
-from .mechanisms import mechanisms_of
-from .planarity import find_plane, require_plane
-from .redundancy import redundant_joints, require_possible_motion
-from .rod_pairs import RodPair, passing_warnings, rod_pairs
-from .twisted import HELIX, helix_error, twist_figures
-from .validity import Figure, validity_warnings
+from bilayer_core.errors import SceneError
+from bilayer_core.model.colliders import ContactPair, contact_pairs, is_ribbon
+from bilayer_core.model.findings import few, told
+from bilayer_core.model.force_list import planned
+from bilayer_core.model.free_motions import mechanisms_of
+from bilayer_core.model.imperfect_shapes import advice
+from bilayer_core.model.laminate import uneven_faces
+from bilayer_core.model.planarity import find_plane, require_plane
+from bilayer_core.model.redundancy import redundant_joints, require_possible_motion
+from bilayer_core.model.rod_pairs import RodPair, passing_warnings, rod_pairs
+from bilayer_core.model.twisted import HELIX, helix_error, twist_figures
+from bilayer_core.model.validity import Figure, validity_warnings
+from bilayer_core.scene.config import Coupling, SceneConfig
+from bilayer_core.scene.rod import Rod
 
 MODELS = ("two_rod", "laminate")
 DIMENSIONS = (3, 2)

@@ -12,16 +12,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import SceneError
-from ..kinematics.rest_strains import cross
-from ..kinematics.rotation import rotation_matrix
-from ..scene.body import Body, Free, Guided, Prescribed
-from ..scene.config import SceneConfig
-from ..scene.joint import TURNS
-from ..scene.profile import extremes
-from ..scene.rod import RodCopy
-from .plane import Plane
-from .shapes import Shape, obstacle_pose, shape_of
+from bilayer_core.errors import SceneError
+from bilayer_core.kinematics.frame_strains import cross
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.plane import Plane
+from bilayer_core.model.shape_numbers import Shape, obstacle_pose, shape_of
+from bilayer_core.scene.body import Body, Free, Guided, Prescribed
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.joint import TURNS
+from bilayer_core.scene.profile import extremes
+from bilayer_core.scene.rod import RodCopy
 
 Array = np.ndarray
 ROUNDING = 1e-9

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..kinematics.rest_strains import cross
-from .layout import Layout, ReadOnlyArrays
+from bilayer_core.kinematics.frame_strains import cross
+from bilayer_core.model.unknown_order import Layout, ReadOnlyArrays
 
 Array = np.ndarray
 COORDINATES = "xyz"

@@ -20,13 +20,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import SceneError
-from ..scene.body import Body, Guided, Prescribed
-from ..scene.config import SceneConfig
-from ..scene.joint import SLIDES, TURNS, Joint
-from .bodies import guided_motions
-from .findings import Finding, few
-from .plane import Plane
+from bilayer_core.errors import SceneError
+from bilayer_core.model.bodies import guided_motions
+from bilayer_core.model.findings import Finding, few
+from bilayer_core.model.plane import Plane
+from bilayer_core.scene.body import Body, Guided, Prescribed
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.joint import SLIDES, TURNS, Joint
 
 Array = np.ndarray
 DEPENDENT = 1e-7

@@ -22,13 +22,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.body import Prescribed
-from ..scene.config import SceneConfig
-from ..scene.profile import values_at
-from ..scene.rod import Rod
-from .findings import Finding
-from .section import sections
-from .validity import edge_figures
+from bilayer_core.model.findings import Finding
+from bilayer_core.model.section import sections
+from bilayer_core.model.validity import edge_figures
+from bilayer_core.scene.body import Prescribed
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.rod import Rod
 
 HALF_TURN = math.pi
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import PenetrationError
-from .model import Model
-from .rod_surfaces import NearPairs
+from bilayer_core.errors import PenetrationError
+from bilayer_core.model.model import Model
+from bilayer_core.model.rod_surfaces import NearPairs
 
 MOST_SHOWN = 1_000_000
 """Of places that overlap: among how many the deepest is looked for."""

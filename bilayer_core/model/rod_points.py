@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rest_strains import cross
-from .strands import Collected
+from bilayer_core.kinematics.frame_strains import cross
+from bilayer_core.model.strands import Collected
 
 Array = np.ndarray
 OF_BORDER = 0.25

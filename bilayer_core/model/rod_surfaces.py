@@ -8,15 +8,15 @@ from itertools import groupby
 
 import numpy as np
 
-from ..contact.broad_phase import RodSearch, near_pairs, scratch
-from ..errors import SceneError
-from ..scene.config import SceneConfig
-from ..scene.rod import Rod
-from .layout import ReadOnlyArrays
-from .rod_pairs import rod_pairs
-from .strand_arrays import StrandArrays
-from .strands import Collected
-from .validity import edge_figures
+from bilayer_core.contact.broad_phase import RodSearch, near_pairs, scratch
+from bilayer_core.errors import SceneError
+from bilayer_core.model.rod_pairs import rod_pairs
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.model.strands import Collected
+from bilayer_core.model.unknown_order import ReadOnlyArrays
+from bilayer_core.model.validity import edge_figures
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.rod import Rod
 
 Array = np.ndarray
 WITHIN = 1.0 - 1e-9

@@ -6,15 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.rest_strains import rest_strains
-from ..scene.config import SceneConfig
-from ..scene.profile import values_at
-from ..scene.rod import Layer, Rod, RodCopy
-from .immersed import add_fluid
-from .lit import add_lit_elements, is_light
-from .section import Section, bond, outline, sections
-from .strand_arrays import StrandArrays
-from .strands import (
+from bilayer_core.kinematics.frame_strains import rest_strains
+from bilayer_core.model.immersed import add_fluid
+from bilayer_core.model.lit_elements import add_lit_elements, is_light
+from bilayer_core.model.section import Section, bond, outline, sections
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.model.strands import (
     Collected,
     Span,
     StrandElements,
@@ -24,6 +21,9 @@ from .strands import (
     strand_shape,
     with_copies,
 )
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.rod import Layer, Rod, RodCopy
 
 Array = np.ndarray
 _OUTWARD = (-1.0, 1.0)

@@ -11,11 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..scene.config import Coupling, Material
-from ..scene.profile import values_at
-from ..scene.rod import Layer, Rod
-from .layout import ReadOnlyArrays
-from .torsion_section import bond_torsion, rectangle_torsion
+from bilayer_core.model.torsion_section import bond_torsion, rectangle_torsion
+from bilayer_core.model.unknown_order import ReadOnlyArrays
+from bilayer_core.scene.config import Coupling, Material
+from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.rod import Layer, Rod
 
 Array = np.ndarray
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .force_list import on_nodes
-from .force_slots import NAMES
-from .model import Model
+from bilayer_core.model.force_list import on_nodes
+from bilayer_core.model.force_slots import NAMES
+from bilayer_core.model.model import Model
 
 
 def sizes_of(model: Model) -> dict[str, int]:

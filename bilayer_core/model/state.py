@@ -7,14 +7,14 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ..errors import InputError
-from .fingerprint import FREE, difference
-from .friction import none_given
-from .lit import light_of, part_seen
-from .mechanisms import start_rates
-from .model import Model
-from .override import no_overrides
-from .sizes import sizes_of
+from bilayer_core.errors import InputError
+from bilayer_core.model.fingerprint import FREE, difference
+from bilayer_core.model.free_motions import start_rates
+from bilayer_core.model.lit_elements import light_of, part_seen
+from bilayer_core.model.model import Model
+from bilayer_core.model.override import no_overrides
+from bilayer_core.model.set_friction import none_given
+from bilayer_core.model.sizes import sizes_of
 
 Array = np.ndarray
 POSE_GOAL = 26
@@ -53,7 +53,7 @@ class State:
     body_rotation: Array  # shape (n_body, 3, 3)
     body_velocity: Array  # [m/s], shape (n_body, 3)
     body_angular_velocity: Array  # [rad/s], shape (n_body, 3)
-    memory: Array  # what forces carry from step to step (`forces.register`), shape (n_memory,)
+    memory: Array  # what forces carry from step to step (`forces.force_register`), shape (n_memory,)
     has_history: (
         Array  # 1 if the accelerations and forces below are those of the last step, shape (1,), or (0,) without a use
     )
@@ -72,7 +72,7 @@ class State:
     conditions: Array  # number of all that a state may be taken into another scene for, shape (1,)
     seal: Array  # checksum of a flat state, 0 before it is one, shape (1,)
     override: Array  # what is set from outside of channels, then of loads (`model.override`), shape (n, 4)
-    friction: Array  # what is set from outside of its coefficients (`model.friction`), shape (4,)
+    friction: Array  # what is set from outside of its coefficients (`model.set_friction`), shape (4,)
     pose_goal: Array  # of controlled bodies; see `simulation.poses`, shape (n_controlled, 26), zeros where none acts
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
 

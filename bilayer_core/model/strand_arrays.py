@@ -4,7 +4,8 @@ A strand without ends, of a closed rod of N edges, is one with ends in memory: a
 of the first two, N and N + 1, and after its edges a copy of the first, N. So every joint, at the nodes 1 … N, lies
 between two edges that follow each other, and no force needs to know that the strand is closed. Of what is there twice
 only one has mass, stiffness and contact: nodes 1 … N and edges 0 … N − 1. That copies move as what they are copies of
-is left to the Newton matrix (`engine.linear.joins`); they begin alike, take the same steps and stay so bit for bit.
+is left to the Newton matrix (`engine.linear.closed_rods`); they begin alike, take the same steps and stay so bit for
+bit.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .layout import ReadOnlyArrays
+from bilayer_core.model.unknown_order import ReadOnlyArrays
 
 Array = np.ndarray
 

@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
-from ..kinematics.rest_strains import cross, rest_strains
-from ..kinematics.rotation import rotation_matrix
-from ..scene.config import SceneConfig
-from ..scene.eigenstrain import Eigenstrain
-from ..scene.pattern import Placement
-from ..scene.rod import Layer, Rod
-from .imperfection import departure
-from .strand_arrays import StrandArrays
+from bilayer_core.kinematics.frame_strains import cross, rest_strains
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.imperfect_shapes import departure
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.pattern import Placement
+from bilayer_core.scene.rod import Layer, Rod
 
 Array = np.ndarray
 Span = tuple[int, int, int, int]

@@ -11,7 +11,7 @@ where r₀, ψ₀ and, unless a layer has natural ones, χ̄_l, τ̄_l are those
 across the width is not looked at). On the neutral axis the linear part of E has the stiffnesses A, D and GJ
 alone; from its minimum x₀ = (ε, χ, τ) one step x₁ = x₀ − (∂E/∂x)/(A, D, GJ) leads to that of E but for terms of second
 order. Radius |χ|/(χ² + τ²) and pitch 2π |τ|/(χ² + τ²) at x₀ and x₁ give the error: 11.1 % of the radius for natural
-(15, 150) 1/m on a straight layer, 1 + 1 mm, 10 mm wide, where least energy has 11.05 % (`validate.helix`).
+(15, 150) 1/m on a straight layer, 1 + 1 mm, 10 mm wide, where least energy has 11.05 % (`verification.validate.helix`).
 
 Clamped ends. The model lets a section warp everywhere. At a clamp it cannot; the twist grows from zero over a length
 (Wagner 1929, Vlasov 1940; GJ τ − EC_w τ″ = torque)
@@ -35,11 +35,11 @@ from itertools import product
 
 import numpy as np
 
-from ..scene.config import SceneConfig
-from ..scene.profile import extremes, values_at
-from ..scene.rod import Rod
-from .section import bond, outline, sections
-from .validity import Figure, edge_figures
+from bilayer_core.model.section import bond, outline, sections
+from bilayer_core.model.validity import Figure, edge_figures
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.profile import extremes, values_at
+from bilayer_core.scene.rod import Rod
 
 Array = np.ndarray
 HELIX = 0.01

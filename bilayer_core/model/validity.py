@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..scene.config import SceneConfig
-from ..scene.eigenstrain import Eigenstrain
-from ..scene.profile import values_at
-from ..scene.rod import Layer, Rod
-from .section import outline
+from bilayer_core.model.section import outline
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.rod import Layer, Rod
 
 LARGE_STRAIN = 0.1  # linear elasticity and the rectangular section lose meaning
 SLENDER = 5.0  # least length over width

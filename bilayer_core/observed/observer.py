@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from .frame import Description, Frame
+from bilayer_core.observed.frame import Description, Frame
 
 
 class Observed(Protocol):

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.log.run.log_reader import read_state
+from bilayer_core.log.run.memory import MemoryRecorder
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.inputs import Input
-from bilayer_core.record.log_reader import read_state
-from bilayer_core.record.memory import MemoryRecorder
-from bilayer_core.record.run_data import RunData
 from bilayer_core.runs.replay import branch, set_from_outside
 from bilayer_core.simulation.simulator import Simulator
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 
+from bilayer_core.log.file.log_chunks import LogFile
+from bilayer_core.log.messages.cdr import nanoseconds, seconds_text
+from bilayer_core.log.messages.clouds import CloudEncoder
+from bilayer_core.log.messages.encoders import FrameEncoder, decode_input, encode_float64
+from bilayer_core.log.messages.markers import deleting_all_first
+from bilayer_core.log.messages.tf_frames import read_prefix
+from bilayer_core.log.messages.topics import INPUTS, LOG_NAMESPACE, MARKERS, TF, Rate, stimulus_topics
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import STIMULUS
-from bilayer_core.record.cdr import nanoseconds, seconds_text
-from bilayer_core.record.clouds import CloudEncoder
-from bilayer_core.record.encoders import FrameEncoder, decode_input, encode_float64
-from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.markers import deleting_all_first
-from bilayer_core.record.tf_frames import read_prefix
-from bilayer_core.record.topics import INPUTS, LOG_NAMESPACE, MARKERS, TF, Rate, stimulus_topics
 
 Message = tuple[str, int, bytes]
 """Topic, log time [ns] and bytes."""

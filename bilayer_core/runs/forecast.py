@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.log.messages.encoders import FrameEncoder
+from bilayer_core.log.messages.topics import Rate
 from bilayer_core.observed.frame import Strand
-from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.topics import Rate
 from bilayer_core.scene.profile import extremes
 from bilayer_core.simulation.simulator import Simulator
 

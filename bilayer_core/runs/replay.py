@@ -15,18 +15,18 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError, SimulationError, naming
-from bilayer_core.model.friction import COEFFICIENTS
+from bilayer_core.log.file.chain import STATE, Wholeness, check_chain
+from bilayer_core.log.file.log_chunks import LogFile
+from bilayer_core.log.file.log_head import Head
+from bilayer_core.log.messages.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
+from bilayer_core.log.messages.encoders import decode_input
+from bilayer_core.log.messages.topics import INPUTS
+from bilayer_core.log.run.log_reader import read_head, read_messages, read_state
+from bilayer_core.model.set_friction import COEFFICIENTS
 from bilayer_core.observed.frame import Description
 from bilayer_core.observed.inputs import FRICTION, LOAD, RESET, STIMULUS, UNTIL, Input
 from bilayer_core.observed.system import machine, versions
 from bilayer_core.printable import shortened
-from bilayer_core.record.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
-from bilayer_core.record.chain import STATE, Wholeness, check_chain
-from bilayer_core.record.encoders import decode_input
-from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.log_head import Head
-from bilayer_core.record.log_reader import read_head, read_messages, read_state
-from bilayer_core.record.topics import INPUTS
 from bilayer_core.runs.derived import DerivedComparison
 from bilayer_core.scene.loader import parse_scene
 from bilayer_core.simulation.simulator import Simulator

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, field_serializer, model_validator
 
-from bilayer_core.scene.crossings import crossings
+from bilayer_core.scene.close_paths import crossings
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, refuse_all, repeated
 from bilayer_core.scene.imperfection import Imperfection

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
-from ..model.state import State, sealed
-from ..observed.frame import Frame
-from .observation import energies, positions_with_points, velocities_with_points
-from .parts import Parts
-from .statistics import RunStatistics, center_of_mass
-from .stepper import Stepper
+from bilayer_core.model.state import State, sealed
+from bilayer_core.observed.frame import Frame
+from bilayer_core.simulation.observation import energies, positions_with_points, velocities_with_points
+from bilayer_core.simulation.parts import Parts
+from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
+from bilayer_core.simulation.stepper import Stepper
 
 
 class Capture:

@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 
-from ..engine.step import LEAST_LENGTH
-from ..errors import Remedy
-from ..model.model import Model
-from .crossed import edge_of_strand
+from bilayer_core.engine.step import LEAST_LENGTH
+from bilayer_core.errors import Remedy
+from bilayer_core.model.model import Model
+from bilayer_core.simulation.crossing_remedy import edge_of_strand
 
 Array = np.ndarray
 SHARPEST = math.radians(175.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.model import Model
+from bilayer_core.model.model import Model
 
 Array = np.ndarray
 Pairs = tuple[tuple[str, str], ...]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from ..errors import InputError
-from ..model.override import acts, jump_to, ramp_to
-from ..observed.inputs import FRICTION, LOAD, POSE, STIMULUS, Input, values_of_pose
-from ..scene.channel_range import value_in_range
-from .friction import change_friction
-from .poses import LEAST_TIME, new_goal
-from .readings import Readings
+from bilayer_core.errors import InputError
+from bilayer_core.model.override import acts, jump_to, ramp_to
+from bilayer_core.observed.inputs import FRICTION, LOAD, POSE, STIMULUS, Input, values_of_pose
+from bilayer_core.scene.channel_range import value_in_range
+from bilayer_core.simulation.friction_changes import change_friction
+from bilayer_core.simulation.poses import LEAST_TIME, new_goal
+from bilayer_core.simulation.readings import Readings
 
 
 class Controls(Readings):

@@ -37,18 +37,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..engine.evaluator import Evaluator
-from ..engine.modes import EVALUATION_TIME
-from ..kinematics.rotation import rotation_matrix
-from ..model.force_list import Kind, kinds
-from ..model.model import Model
-from ..model.records.step import Configuration
-from ..model.rest_strains import RestStrains
-from ..model.state import State
-from .fluid_energy import survey_fluid
-from .kinetic_energy import kinetic_energy
-from .motion import Gradient, Motion, displacement, of_prescribed, velocity
-from .quadrature import simpson
+from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.engine.request_modes import EVALUATION_TIME
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.model.force_list import Kind, kinds
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.step import Configuration
+from bilayer_core.model.state import State
+from bilayer_core.model.stimulated_strains import RestStrains
+from bilayer_core.simulation.edge_space import Gradient, Motion, displacement, of_prescribed, velocity
+from bilayer_core.simulation.fluid_energy import survey_fluid
+from bilayer_core.simulation.kinetic_energy import kinetic_energy
+from bilayer_core.simulation.quadrature import simpson
 
 Array = np.ndarray
 BARRIERS = ("barrier", "rod barrier")

@@ -17,14 +17,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..engine.modes import COUNT, SETTLE
-from ..engine.report import FAILURES, IntegrationReport
-from ..errors import InputError, SimulationError
-from ..model.lit import light_of, part_seen
-from ..model.records.status import CROSSED, MAX_ITERATIONS
-from ..model.state import NOT_KNOWN, State
-from .crossed import crossed, edge_of_strand
-from .stepper import Stepper
+from bilayer_core.engine.request_modes import COUNT, SETTLE
+from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.model.lit_elements import light_of, part_seen
+from bilayer_core.model.records.status import CROSSED, MAX_ITERATIONS
+from bilayer_core.model.state import NOT_KNOWN, State
+from bilayer_core.simulation.crossing_remedy import crossed, edge_of_strand
+from bilayer_core.simulation.stepper import Stepper
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
 """Length h of the first round [s], its factors after success and failure, and the length at which to give up [s]."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..engine.build import fluid_of
-from ..forces.added_mass import fluid_momentum
-from ..model.model import Model
-from ..model.records.parts import Fluid
-from ..model.records.step import Configuration
-from ..model.sizes import sizes_of
+from bilayer_core.engine.build_problem import fluid_of
+from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.parts import Fluid
+from bilayer_core.model.records.step import Configuration
+from bilayer_core.model.sizes import sizes_of
 
 Array = np.ndarray
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..kinematics.rotation import quaternion_from_matrix
-from ..model.model import Model
-from ..observed.frame import JointInfo, ShapeInfo
-from ..scene.body import Guided
-from ..scene.joint import Joint
+from bilayer_core.kinematics.rotation import quaternion_from_matrix
+from bilayer_core.model.model import Model
+from bilayer_core.observed.frame import JointInfo, ShapeInfo
+from bilayer_core.scene.body import Guided
+from bilayer_core.scene.joint import Joint
 
 RADIUS = 0.2
 """Of pins and axes, over the largest width of a rod."""

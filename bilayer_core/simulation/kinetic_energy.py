@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.model import Model
-from ..model.state import State
+from bilayer_core.model.model import Model
+from bilayer_core.model.state import State
 
 _UNIT = np.eye(3)
 

@@ -6,16 +6,16 @@ from functools import cache
 
 import numpy as np
 
-from ..kinematics.rotation import quaternion_from_matrix
-from ..model.force_list import Kind, kinds
-from ..model.force_slots import slot_of
-from ..model.model import Model
-from ..model.shapes import Shape, obstacle_pose, shape_of
-from ..model.state import State
-from ..model.strand_arrays import StrandArrays
-from ..observed.frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
-from .joint_shapes import joint_shapes
-from .parts import Parts
+from bilayer_core.kinematics.rotation import quaternion_from_matrix
+from bilayer_core.model.force_list import Kind, kinds
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.model import Model
+from bilayer_core.model.shape_numbers import Shape, obstacle_pose, shape_of
+from bilayer_core.model.state import State
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.observed.frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
+from bilayer_core.simulation.joint_shapes import joint_shapes
+from bilayer_core.simulation.parts import Parts
 
 Array = np.ndarray
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
-from ..engine import step_size
-from ..observed.observer import Observed, Observer
+from bilayer_core.engine import step_size
+from bilayer_core.observed.observer import Observed, Observer
 
 TIME_ROUNDING = step_size.PERIOD_ROUNDING
 completed = step_size.completed.py_func

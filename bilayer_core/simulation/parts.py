@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model.state import PARTS, State
+from bilayer_core.model.state import PARTS, State
 
 Array = np.ndarray
 Places = dict[str, tuple[int, int, tuple[int, ...]]]

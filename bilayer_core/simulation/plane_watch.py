@@ -22,13 +22,13 @@ from collections.abc import Callable
 import numpy as np
 from scipy.linalg import eigh
 
-from ..engine.modes import COUNT, EVALUATE_STATE
-from ..forces.mechanisms import REMEMBERED
-from ..forces.register import memory_size
-from ..model.planarity import require_plane
-from ..model.rest_strains import RestStrains
-from ..model.state import PARTS, State, initial_state
-from .stepper import Stepper
+from bilayer_core.engine.request_modes import COUNT, EVALUATE_STATE
+from bilayer_core.forces.force_register import memory_size
+from bilayer_core.forces.mechanisms import REMEMBERED
+from bilayer_core.model.planarity import require_plane
+from bilayer_core.model.state import PARTS, State, initial_state
+from bilayer_core.model.stimulated_strains import RestStrains
+from bilayer_core.simulation.stepper import Stepper
 
 Array = np.ndarray
 GROWTH = math.log(100.0)

@@ -17,12 +17,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import InputError
-from ..kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
-from ..model.model import Model
-from ..model.state import OUT_OF_PLANE, POSE_GOAL, State
-from ..scene.body import Prescribed
-from ..scene.spans import ROUNDING
+from bilayer_core.errors import InputError
+from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
+from bilayer_core.model.model import Model
+from bilayer_core.model.state import OUT_OF_PLANE, POSE_GOAL, State
+from bilayer_core.scene.body import Prescribed
+from bilayer_core.scene.spans import ROUNDING
 
 Array = np.ndarray
 BEGIN, DURATION = 0, 1

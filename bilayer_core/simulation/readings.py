@@ -7,28 +7,28 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..model.impacts import reason_of_stiffness
-from ..model.model import Model
-from ..model.plan import Plan
-from ..model.state import State
-from ..observed.frame import Description, Frame
-from ..observed.system import versions
-from ..scene.config import SceneConfig
-from ..scene.loader import scene_text
-from . import observation as observe
-from .capture import make_frame
-from .energy_budget import EnergyLedger
-from .friction import coefficients
-from .parts import Parts
-from .statistics import RunStatistics, center_of_mass
-from .step_choice import Steps
-from .stepper import Stepper
-from .views.body import BodyView, body_views
-from .views.clamp import ClampView, clamp_views
-from .views.joint import JointView, joint_views
-from .views.present import ByName, Present
-from .views.rod import RodView, rod_views
+from bilayer_core.errors import InputError
+from bilayer_core.model.impacts import reason_of_stiffness
+from bilayer_core.model.model import Model
+from bilayer_core.model.plan import Plan
+from bilayer_core.model.state import State
+from bilayer_core.observed.frame import Description, Frame
+from bilayer_core.observed.system import versions
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.loader import scene_text
+from bilayer_core.simulation import observation as observe
+from bilayer_core.simulation.capture import make_frame
+from bilayer_core.simulation.energy_budget import EnergyLedger
+from bilayer_core.simulation.friction_changes import coefficients
+from bilayer_core.simulation.parts import Parts
+from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
+from bilayer_core.simulation.step_choice import Steps
+from bilayer_core.simulation.stepper import Stepper
+from bilayer_core.simulation.views.body import BodyView, body_views
+from bilayer_core.simulation.views.clamp import ClampView, clamp_views
+from bilayer_core.simulation.views.joint import JointView, joint_views
+from bilayer_core.simulation.views.present import ByName, Present
+from bilayer_core.simulation.views.rod import RodView, rod_views
 
 Array = np.ndarray
 

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from ..contact.barrier import barrier
-from ..engine.newton import LAST_DIGITS
-from ..engine.report import IntegrationReport
-from ..errors import Remedy
-from ..integrators.method import Method
-from ..model.impacts import HELD, heaviest, stiffness_that_holds
-from ..model.model import Model
-from ..model.records.status import (
+from bilayer_core.contact.barrier import barrier
+from bilayer_core.engine.newton import LAST_DIGITS
+from bilayer_core.engine.step_outcome import IntegrationReport
+from bilayer_core.errors import Remedy
+from bilayer_core.integrators.method import Method
+from bilayer_core.model.impacts import HELD, heaviest, stiffness_that_holds
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.status import (
     BEYOND,
     BLOCKED,
     CROSSED,
@@ -23,10 +23,10 @@ from ..model.records.status import (
     TOO_INACCURATE,
     UNSETTLED,
 )
-from ..scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
-from .collapse import damp_materials
-from .crossed import more_stations
-from .step_choice import Steps
+from bilayer_core.scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
+from bilayer_core.simulation.collapse import damp_materials
+from bilayer_core.simulation.crossing_remedy import more_stations
+from bilayer_core.simulation.step_choice import Steps
 
 NEARLY = 1e3
 """Times Newton's tolerance: a last correction that is no larger may well be good enough."""

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..errors import InputError
-from ..observed.inputs import Acted, Input
-from .observers import Schedule
-from .result import Termination
+from bilayer_core.errors import InputError
+from bilayer_core.observed.inputs import Acted, Input
+from bilayer_core.simulation.observers import Schedule
+from bilayer_core.simulation.run_result import Termination
 
 STEPS_AT_ONCE = 64
 """That the engine makes before anyone is asked whether to go on."""

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from ..scene.config import Friction, SceneConfig
-from ..scene.part import Part
+from bilayer_core.scene.config import Friction, SceneConfig
+from bilayer_core.scene.part import Part
 
 FREE = {"name", "title", "description", "duration", "output"}
 """Keys of a scene that may differ."""

@@ -11,34 +11,34 @@ from typing import Any
 
 import numpy as np
 
-from ..engine.energy_account import OPEN, QUESTIONED
-from ..engine.report import IntegrationReport
-from ..errors import InputError, SimulationError
-from ..forces.register import memory_size
-from ..integrators.register import INTEGRATORS
-from ..jit.compile_all import ensure_compiled
-from ..jit.piece import loading
-from ..model.build import build_model
-from ..model.fingerprint import conditions_of, fingerprint_of
-from ..model.model import Model
-from ..model.plan import make_plan
-from ..model.state import State, initial_state, refuse_out_of_plane
-from ..observed.inputs import RESET, UNTIL, Input
-from ..observed.observer import Observer
-from ..scene.config import SceneConfig
-from ..scene.loader import load_scene
-from .controls import Controls
-from .energy_budget import EnergyLedger
-from .equilibrium import StaticReport, solve_static
-from .observers import Schedule, first_failure
-from .plane_watch import PlaneWatch
-from .result import RunResult, Termination
-from .run_loop import Callbacks, advance_to, time_left
-from .same_model import differing
-from .statistics import RunStatistics
-from .step_choice import choose_steps
-from .stepper import Stepper, StepReport
-from .summary import summarise
+from bilayer_core.engine.energy_account import OPEN, QUESTIONED
+from bilayer_core.engine.step_outcome import IntegrationReport
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.forces.force_register import memory_size
+from bilayer_core.integrators.integrator_register import INTEGRATORS
+from bilayer_core.jit.compile_all import ensure_compiled
+from bilayer_core.jit.piece import loading
+from bilayer_core.model.build_model import build_model
+from bilayer_core.model.fingerprint import conditions_of, fingerprint_of
+from bilayer_core.model.model import Model
+from bilayer_core.model.plan import make_plan
+from bilayer_core.model.state import State, initial_state, refuse_out_of_plane
+from bilayer_core.observed.inputs import RESET, UNTIL, Input
+from bilayer_core.observed.observer import Observer
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.controls import Controls
+from bilayer_core.simulation.energy_budget import EnergyLedger
+from bilayer_core.simulation.equilibrium import StaticReport, solve_static
+from bilayer_core.simulation.observers import Schedule, first_failure
+from bilayer_core.simulation.plane_watch import PlaneWatch
+from bilayer_core.simulation.run_loop import Callbacks, advance_to, time_left
+from bilayer_core.simulation.run_result import RunResult, Termination
+from bilayer_core.simulation.same_model import differing
+from bilayer_core.simulation.statistics import RunStatistics
+from bilayer_core.simulation.step_choice import choose_steps
+from bilayer_core.simulation.stepper import Stepper, StepReport
+from bilayer_core.simulation.summary import summarise
 
 Array = np.ndarray
 
@@ -263,7 +263,7 @@ class Simulator(Controls):
             little longer and changes none.
         log : str or Path, optional
             MCAP file to write, at the rates of the scene's `output`; for others, or to replace a file, put a
-            `bilayer_core.record.mcap_log.McapRecorder` among the observers.
+            `bilayer_core.log.file.mcap_log.McapRecorder` among the observers.
         observers : sequence of Observer
             Each sees the first frame, the last, and at its rate between that of the first step which ends at or after
             each due time; all are closed whatever happens. For those that look at more than one run see `attach`.
@@ -297,7 +297,7 @@ class Simulator(Controls):
         if fixed and left > 0.0 and steps == 0:
             raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
         if log is not None:
-            from ..record.mcap_log import McapRecorder
+            from bilayer_core.log.file.mcap_log import McapRecorder
 
             output = self.scene.output
             observers = [McapRecorder(log, output.rate, output.marker_rate), *observers]

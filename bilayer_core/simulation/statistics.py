@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..engine.energy_account import NUMERICAL
-from ..engine.report import IntegrationReport
-from ..model.model import Model
-from ..model.state import State
-from .stepper import Stepper
+from bilayer_core.engine.energy_account import NUMERICAL
+from bilayer_core.engine.step_outcome import IntegrationReport
+from bilayer_core.model.model import Model
+from bilayer_core.model.state import State
+from bilayer_core.simulation.stepper import Stepper
 
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:

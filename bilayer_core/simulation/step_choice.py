@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..errors import InputError
-from ..integrators.method import Method
-from ..scene.config import DEFAULT_DT, DEFAULT_TOLERANCE, LARGEST_TOLERANCE, SceneConfig
+from bilayer_core.errors import InputError
+from bilayer_core.integrators.method import Method
+from bilayer_core.scene.config import DEFAULT_DT, DEFAULT_TOLERANCE, LARGEST_TOLERANCE, SceneConfig
 
 WORTH_OF_DEFAULT = "this one keeps the bundled robots' figures within 1 %, the jump's within 4 %"
 

@@ -8,29 +8,29 @@ from functools import cached_property
 
 import numpy as np
 
-from ..engine.energy_account import LARGEST
-from ..engine.engine import Engine
-from ..engine.integrate import TIME_ROUNDING, StepControl
-from ..engine.modes import EVALUATE_STATE
-from ..engine.newton import LAST_DIGITS
-from ..engine.observables import Observables, observables_of
-from ..engine.report import FAILURES, IntegrationReport
-from ..engine.step import LEAST_LENGTH
-from ..errors import InputError, SimulationError
-from ..integrators.method import Method
-from ..model.model import Model
-from ..model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
-from ..model.records.step import Configuration
-from ..model.state import NOT_KNOWN, State
-from ..scene.config import SceneConfig
-from .collapse import collapsed
-from .contact_pairs import ContactOwners
-from .crossed import crossed, edge_of_strand
-from .energy_budget import EnergyLedger
-from .parts import Parts, Places, places_in
-from .remedies import remedy
-from .step_choice import Steps
-from .surroundings import Surroundings
+from bilayer_core.engine.energy_account import LARGEST
+from bilayer_core.engine.engine import Engine
+from bilayer_core.engine.integrate import TIME_ROUNDING, StepControl
+from bilayer_core.engine.newton import LAST_DIGITS
+from bilayer_core.engine.observables import Observables, observables_of
+from bilayer_core.engine.request_modes import EVALUATE_STATE
+from bilayer_core.engine.step import LEAST_LENGTH
+from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.integrators.method import Method
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
+from bilayer_core.model.records.step import Configuration
+from bilayer_core.model.state import NOT_KNOWN, State
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.simulation.collapse import collapsed
+from bilayer_core.simulation.contact_pairs import ContactOwners
+from bilayer_core.simulation.crossing_remedy import crossed, edge_of_strand
+from bilayer_core.simulation.energy_budget import EnergyLedger
+from bilayer_core.simulation.parts import Parts, Places, places_in
+from bilayer_core.simulation.remedies import remedy
+from bilayer_core.simulation.step_choice import Steps
+from bilayer_core.simulation.surroundings import Surroundings
 
 FIXED_ROUNDING = 1e-6
 """Part of a fixed step by which two times are the same."""

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ..engine.energy_account import LARGEST, NUMERICAL
-from ..model.impacts import heaviest, stiffness_that_holds
-from ..model.model import Model
-from ..model.validity import LARGE_STRAIN
-from ..observed.system import versions
-from .plane_watch import PlaneWatch
-from .result import Termination
-from .views.body import BodyView
-from .views.joint import JointView
+from bilayer_core.engine.energy_account import LARGEST, NUMERICAL
+from bilayer_core.model.impacts import heaviest, stiffness_that_holds
+from bilayer_core.model.model import Model
+from bilayer_core.model.validity import LARGE_STRAIN
+from bilayer_core.observed.system import versions
+from bilayer_core.simulation.plane_watch import PlaneWatch
+from bilayer_core.simulation.run_result import Termination
+from bilayer_core.simulation.views.body import BodyView
+from bilayer_core.simulation.views.joint import JointView
 
 LARGE_NUMERICAL = 0.1
 """Part of the largest energy of a run that its steps may make or lose without a warning."""

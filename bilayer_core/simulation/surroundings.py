@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
-from ..engine.actuation import Actuation, Paths
-from ..model.model import Model
-from ..model.override import acts, no_overrides, spans_of, value_at
-from ..model.rest_strains import RestStrains
-from ..model.state import POSE_GOAL, State
-from ..scene.body import Prescribed
-from ..scene.spans import Span, Spans
-from ..scene.transduction import free_strain
-from .poses import BEGIN, DURATION, MOVE, POSITION, ROTATION, ROTATION_VECTOR, SPIN, VELOCITY
+from bilayer_core.engine.actuation import Actuation, Paths
+from bilayer_core.model.model import Model
+from bilayer_core.model.override import acts, no_overrides, spans_of, value_at
+from bilayer_core.model.state import POSE_GOAL, State
+from bilayer_core.model.stimulated_strains import RestStrains
+from bilayer_core.scene.body import Prescribed
+from bilayer_core.scene.spans import Span, Spans
+from bilayer_core.scene.transduction import free_strain
+from bilayer_core.simulation.poses import BEGIN, DURATION, MOVE, POSITION, ROTATION, ROTATION_VECTOR, SPIN, VELOCITY
 
 Array = np.ndarray
 SPANS_AT_ONCE = 8

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.memory import MemoryRecorder
-from bilayer_core.record.quantities import Quantity
-from bilayer_core.record.run_data import RunData
+from bilayer_core.log.run.memory import MemoryRecorder
+from bilayer_core.log.run.quantities import Quantity
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.scene.overrides import Overrides
-from bilayer_core.simulation.result import RunResult
+from bilayer_core.simulation.run_result import RunResult
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.stress.judge import MOST_MADE, Judge, Verdict
+from bilayer_core.testing.judge import MOST_MADE, Judge, Verdict
 
 Scene = str | Path | Mapping[str, Any] | SceneConfig
 Drive = Callable[[Simulator], object]
@@ -91,7 +91,7 @@ class RobotRun:
 
     def assert_sound(self) -> None:
         """Fail unless each step was right: finite, nothing through anything, no energy from nothing, momentum kept, and
-        the effort bounded; see `bilayer_core.stress.judge` for the limits.
+        the effort bounded; see `bilayer_core.testing.judge` for the limits.
         """
         if self.verdict is not None:
             raise AssertionError(f"{self.simulator.scene.name}: {self.verdict}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bilayer_core.record.run_data import RunData
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.view.scales import ARROW_SHARE, SHOWN_SHARE, Scales, reference_of, rounded_up
 
 REACTIONS = {"clamp_forces": slice(0, 3), "clamp_moments": slice(3, 6)}

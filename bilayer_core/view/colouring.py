@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.log.messages.colours import PRESSURE_MAP, STRAIN_MAP, map_colours
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.frame import Strand
-from bilayer_core.record.colours import PRESSURE_MAP, STRAIN_MAP, map_colours
-from bilayer_core.record.run_data import RunData
 from bilayer_core.view.scales import rounded_up
 
 STRAIN, CURVATURE, CONTACT = "strain", "curvature", "contact"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bilayer_core.errors import InputError
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.frame import Strand
-from bilayer_core.record.run_data import RunData
 
 DRAWN = ("body_pose", "nodes", "points")
 """Topics without which there is nothing to draw."""

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from bilayer_core.record.paths import draft_of
+from bilayer_core.log.file.output_paths import draft_of
 
 if TYPE_CHECKING:
     from PIL import Image

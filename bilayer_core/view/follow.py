@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from bilayer_core.record.growing_log import GrowingLog
+from bilayer_core.log.file.growing_log import GrowingLog
 from bilayer_core.view.colouring import STRAIN
 from bilayer_core.view.rerun_view import require_rerun
 

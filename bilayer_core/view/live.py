@@ -8,13 +8,13 @@ from pathlib import Path
 import rerun as rr
 import rerun.blueprint as rrb
 
+from bilayer_core.log.run.run_data import RunData
+from bilayer_core.log.run.unfinished_run import ArrivingRun
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.arriving import ArrivingRun
-from bilayer_core.record.run_data import RunData
 from bilayer_core.view.arrows import metres_per, scaled_reactions
 from bilayer_core.view.colouring import STRAIN
-from bilayer_core.view.layout import GRAVITY, Curves, Plot, arranged, entity_name, explanation, robot_view
 from bilayer_core.view.live_scales import LiveScales
+from bilayer_core.view.recording_layout import GRAVITY, Curves, Plot, arranged, entity_name, explanation, robot_view
 from bilayer_core.view.rrd_writer import RunSender
 from bilayer_core.view.scales import place_moving_eye
 from bilayer_core.view.server import ViewServer, suffixed

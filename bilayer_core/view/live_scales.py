@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from bilayer_core.errors import SceneError
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.run_data import RunData
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import parse_scene
 from bilayer_core.view.arrows import reaction_references

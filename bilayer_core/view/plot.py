@@ -16,10 +16,10 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.extras import require
-from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.paths import check_output_path, draft_of
-from bilayer_core.record.run_data import RunData
-from bilayer_core.record.tables import chosen_names, component_unit
+from bilayer_core.log.file.output_paths import check_output_path, draft_of
+from bilayer_core.log.run.log_reader import read_log
+from bilayer_core.log.run.run_data import RunData
+from bilayer_core.log.run.tables import chosen_names, component_unit
 
 SUFFIXES = (".pdf", ".png", ".svg")
 MILLIMETRE = 1.0 / 25.4

@@ -11,13 +11,13 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.extras import require
-from bilayer_core.record.log_reader import read_log
+from bilayer_core.log.run.log_reader import read_log
 from bilayer_core.view.arrows import contact_arrows, reaction_arrows
 from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
 from bilayer_core.view.colouring import STRAIN, choose_colouring
 from bilayer_core.view.drawable import has_sections, refuse_undrawable
 from bilayer_core.view.ground import Ground
-from bilayer_core.view.moments import Moment, Moments
+from bilayer_core.view.run_at_times import Moment, Moments
 from bilayer_core.view.scales import choose_scales
 from bilayer_core.view.stage import Stage
 from bilayer_core.view.theme import Theme, theme_of

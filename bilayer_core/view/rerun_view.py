@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 from bilayer_core.errors import InputError, naming
 from bilayer_core.extras import require
-from bilayer_core.record.memory import MemoryRecorder
-from bilayer_core.record.paths import check_output_path, draft_of
-from bilayer_core.record.private_directory import private_directory
-from bilayer_core.record.run_data import RunData
+from bilayer_core.log.file.output_paths import check_output_path, draft_of
+from bilayer_core.log.file.private_directory import private_directory
+from bilayer_core.log.run.memory import MemoryRecorder
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.view.colouring import STRAIN
 
 if TYPE_CHECKING:
-    from bilayer_core.view.branches import Branch
+    from bilayer_core.view.branch_recording import Branch
 
 RRD_SUFFIX = ".rrd"
 
@@ -32,16 +32,16 @@ def write_rrd(run: RunData, rrd_path: str | Path, force: bool = True, colour: st
 
 def convert_log(mcap_path: str | Path, rrd_path: str | Path, colour: str = STRAIN) -> None:
     """Convert an MCAP log, whole or cut off, to a rerun recording. An existing recording is replaced."""
-    from bilayer_core.record.log_reader import read_log
+    from bilayer_core.log.run.log_reader import read_log
 
     with naming(mcap_path):
         write_rrd(read_log(mcap_path), rrd_path, colour=colour)
 
 
 def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path, force: bool) -> None:
-    """Write runs that differ by what has a name as one recording; see `view.branches`."""
+    """Write runs that differ by what has a name as one recording; see `view.branch_recording`."""
     require_rerun()
-    from bilayer_core.view.branches import write_branches as write
+    from bilayer_core.view.branch_recording import write_branches as write
 
     with draft_of(check_output_path(rrd_path, force, RRD_SUFFIX), force) as draft:
         write(branches, name, draft)

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 
+from bilayer_core.log.messages.events import LEVEL_NAMES
+from bilayer_core.log.messages.node_frames import layer_rows
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.frame import Description, ShapeInfo, Strand
-from bilayer_core.record.events import LEVEL_NAMES
-from bilayer_core.record.node_frames import layer_rows
-from bilayer_core.record.run_data import RunData
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import Arrows, contact_arrows, reaction_arrows
 from bilayer_core.view.colouring import STRAIN, Colouring, choose_colouring
 from bilayer_core.view.drawable import has_sections, refuse_undrawable
-from bilayer_core.view.layout import (
+from bilayer_core.view.recording_layout import (
     CHANNEL_COLOURS,
     EVENTS,
     GRAVITY,

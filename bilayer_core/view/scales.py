@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bilayer_core.record.run_data import RunData
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.view.geometry import rotated, shape_extent
 
 _STEPS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 10.0])

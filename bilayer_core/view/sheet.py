@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from PIL import Image, ImageDraw
 
-from bilayer_core.record.paths import draft_of
+from bilayer_core.log.file.output_paths import draft_of
 from bilayer_core.view.theme import Theme
 
 if TYPE_CHECKING:

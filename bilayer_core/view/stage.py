@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.frame import ShapeInfo, Strand
-from bilayer_core.record.run_data import RunData
 from bilayer_core.view import geometry
 from bilayer_core.view.arrows import REACTIONS, Arrows
 from bilayer_core.view.camera import Shot
 from bilayer_core.view.colouring import Colouring
 from bilayer_core.view.ground import Ground, add_plane
-from bilayer_core.view.moments import Moment, Moments
+from bilayer_core.view.run_at_times import Moment, Moments
 from bilayer_core.view.theme import (
     ARROW_COLOUR,
     BALL_COLOURS,

@@ -18,7 +18,7 @@ from typing import TypeVar
 from bilayer_core.errors import InputError
 from bilayer_core.extras import missing_library
 from bilayer_core.view.bound_process import BoundProcess
-from bilayer_core.view.layout import TIMELINE
+from bilayer_core.view.recording_layout import TIMELINE
 
 WINDOW_SIZE = "1920x1080"
 START_LIMIT = 60.0  # longest wait for the viewer to answer [s]; a software driver on a busy machine is slow

@@ -11,8 +11,8 @@ from typing import Any, ParamSpec
 
 from rclpy.node import Node
 
+from bilayer_core.log.messages.events import Event
 from bilayer_core.observed.frame import Frame
-from bilayer_core.record.events import Event
 
 Arguments = ParamSpec("Arguments")
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 
 from bilayer_core.errors import InputError
-from bilayer_core.model.friction import COEFFICIENTS
-from bilayer_core.record.events import Event, changed_setting
+from bilayer_core.log.messages.events import Event, changed_setting
+from bilayer_core.model.set_friction import COEFFICIENTS
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.simulation.friction import refuse_friction
+from bilayer_core.simulation.friction_changes import refuse_friction
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.control.pending_changes import Commands
 from bilayer_sim_ros.node.parameters import FRICTION, FRICTION_OF_SCENE, Value

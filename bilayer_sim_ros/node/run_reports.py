@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
+from bilayer_core.log.messages.events import Event, late_stimulus
 from bilayer_core.printable import shortened
-from bilayer_core.record.events import Event, late_stimulus
 from bilayer_sim_ros.control.pacing import cause_of_delay
 from bilayer_sim_ros.control.stimulus import StimulusInputs
 from bilayer_sim_ros.node.parameters import Value

@@ -12,10 +12,10 @@ from functools import partial
 from typing import Any, Protocol
 
 from bilayer_core.errors import InputError, OutputError
+from bilayer_core.log.messages.events import Event, changed_setting, ended_run
 from bilayer_core.observed.frame import Frame
-from bilayer_core.record.events import Event, changed_setting, ended_run
 from bilayer_core.simulation.observers import TIME_ROUNDING
-from bilayer_core.simulation.result import Termination
+from bilayer_core.simulation.run_result import Termination
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.control.control_ticks import Control
 from bilayer_sim_ros.control.pacing import CONTROLLERS, LOG, OTHERS, PHYSICS, SUBSCRIBERS, Pacer

@@ -6,10 +6,10 @@ from rcl_interfaces.msg import Log
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
+from bilayer_core.log.messages.event_messages import encode_event
+from bilayer_core.log.messages.events import Event, EventDetector
+from bilayer_core.log.messages.topics import EVENTS
 from bilayer_core.observed.frame import Description, Frame
-from bilayer_core.record.event_messages import encode_event
-from bilayer_core.record.events import Event, EventDetector
-from bilayer_core.record.topics import EVENTS
 from bilayer_sim_ros.publishing.cheap_publishers import create_output
 
 DEPTH = 100

@@ -12,13 +12,13 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import MultiArrayDimension, MultiArrayLayout, String, UInt8MultiArray
 
+from bilayer_core.log.messages.description_text import to_json
+from bilayer_core.log.messages.encoders import FrameEncoder
+from bilayer_core.log.messages.event_messages import encode_event
+from bilayer_core.log.messages.events import Event, EventDetector
+from bilayer_core.log.messages.packing import pack
+from bilayer_core.log.messages.topics import DESCRIPTION, EVENTS, LIVE, DisplayGate, Rate
 from bilayer_core.observed.frame import Description, Frame
-from bilayer_core.record.description_text import to_json
-from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.event_messages import encode_event
-from bilayer_core.record.events import Event, EventDetector
-from bilayer_core.record.packing import pack
-from bilayer_core.record.topics import DESCRIPTION, EVENTS, LIVE, DisplayGate, Rate
 from bilayer_sim_ros.publishing.cheap_publishers import create_output
 
 PERIOD = 0.01

@@ -7,10 +7,10 @@ from functools import partial
 from pathlib import Path
 
 from bilayer_core.errors import InputError, OutputError
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.events import Event
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import Input
-from bilayer_core.record.events import Event
-from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.simulation.observers import first_failure
 
 RRD_ENDING = ".rrd"

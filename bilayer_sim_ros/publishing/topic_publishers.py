@@ -9,11 +9,11 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
+from bilayer_core.log.messages.encoders import FrameEncoder
+from bilayer_core.log.messages.events import Event
+from bilayer_core.log.messages.markers import deleting_all_first
+from bilayer_core.log.messages.topics import MARKERS, DisplayGate, Rate, TopicSpec, output_topics
 from bilayer_core.observed.frame import Description, Frame
-from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.events import Event
-from bilayer_core.record.markers import deleting_all_first
-from bilayer_core.record.topics import MARKERS, DisplayGate, Rate, TopicSpec, output_topics
 from bilayer_sim_ros.node.message_types import CLOCK_TOPIC, message_class
 from bilayer_sim_ros.publishing.cheap_publishers import create_output
 from bilayer_sim_ros.publishing.conversions import to_time

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from bilayer_core.record.cdr import NANOSECONDS
+from bilayer_core.log.messages.cdr import NANOSECONDS
 
 LONGEST = 2**62
 """More than any log takes, at any rate [ns]."""

@@ -10,8 +10,8 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from bilayer_core.errors import BilayerError, InputError
-from bilayer_core.record.cdr import NANOSECONDS, nanoseconds, seconds_text
-from bilayer_core.record.indexed_log import IndexedLog
+from bilayer_core.log.file.indexed_log import IndexedLog
+from bilayer_core.log.messages.cdr import NANOSECONDS, nanoseconds, seconds_text
 from bilayer_sim_ros.node.live_parameters import LiveParameters
 from bilayer_sim_ros.node.parameters import REPLAY_NODE, Value
 from bilayer_sim_ros.replay.player import Playback, Player

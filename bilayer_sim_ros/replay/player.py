@@ -12,8 +12,8 @@ from functools import partial
 from typing import Protocol
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.cdr import nanoseconds, seconds_text
-from bilayer_core.record.indexed_log import IndexedLog, Message
+from bilayer_core.log.file.indexed_log import IndexedLog, Message
+from bilayer_core.log.messages.cdr import nanoseconds, seconds_text
 from bilayer_sim_ros.replay.log_clock import LogClock
 from bilayer_sim_ros.services.requests import Requests
 

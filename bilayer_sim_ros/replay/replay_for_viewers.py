@@ -10,12 +10,12 @@ from rclpy.node import Node
 from std_msgs.msg import String, UInt8MultiArray
 
 from bilayer_core.errors import InputError
+from bilayer_core.log.file.log_head import read_head
+from bilayer_core.log.messages.cdr import NANOSECONDS
+from bilayer_core.log.messages.description_text import to_json
+from bilayer_core.log.messages.encoders import clock_template
+from bilayer_core.log.messages.topics import DESCRIPTION, EVENTS, LIVE, Rate, output_topics
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.cdr import NANOSECONDS
-from bilayer_core.record.description_text import to_json
-from bilayer_core.record.encoders import clock_template
-from bilayer_core.record.log_head import read_head
-from bilayer_core.record.topics import DESCRIPTION, EVENTS, LIVE, Rate, output_topics
 from bilayer_sim_ros.node.message_types import CLOCK_TOPIC
 from bilayer_sim_ros.publishing.cheap_publishers import create_output
 from bilayer_sim_ros.publishing.live_topic import KEPT, LARGE_PERIOD, LOSSY, PERIOD, UNSHOWN, live_message

@@ -15,11 +15,11 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
 from bilayer_core.errors import InputError
+from bilayer_core.log.file.indexed_log import Channel, IndexedLog, Message
+from bilayer_core.log.messages.cdr import HEADER, NANOSECONDS
+from bilayer_core.log.messages.markers import delete_all, deleting_all_first
+from bilayer_core.log.messages.topics import LOG_NAMESPACE
 from bilayer_core.printable import printable, shortened
-from bilayer_core.record.cdr import HEADER, NANOSECONDS
-from bilayer_core.record.indexed_log import Channel, IndexedLog, Message
-from bilayer_core.record.markers import delete_all, deleting_all_first
-from bilayer_core.record.topics import LOG_NAMESPACE
 from bilayer_sim_ros.node.message_types import CLOCK_TOPIC, installed_message_class
 from bilayer_sim_ros.replay.player import Playback
 from bilayer_sim_ros.replay.replay_for_viewers import replayed_run

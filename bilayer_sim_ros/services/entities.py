@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point, Quaternion, Vector3
 
+from bilayer_core.log.messages.node_frames import NodeFrames
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.node_frames import NodeFrames
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.publishing.conversions import to_time
 

@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.type_support import check_is_valid_srv_type
 
 from bilayer_core.errors import BilayerError, InputError
-from bilayer_core.record.cdr import NANOSECONDS
+from bilayer_core.log.messages.cdr import NANOSECONDS
 from bilayer_sim_ros.replay.player import Player
 from bilayer_sim_ros.services.trigger_services import Service
 

@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.beam2d.beam import PlanarBeam
-from bilayer_core.beam2d.energy import BeamEnergy, Section
-from bilayer_core.beam2d.scene import beam_of, set_stimuli
 from bilayer_core.errors import InputError, SceneError, SimulationError
-from bilayer_core.validate import beams
-from bilayer_core.validate.bending import strip
+from bilayer_core.verification.beam2d.beam import PlanarBeam
+from bilayer_core.verification.beam2d.energy import BeamEnergy, Section
+from bilayer_core.verification.beam2d.scene import beam_of, set_stimuli
+from bilayer_core.verification.validate import beams
+from bilayer_core.verification.validate.bending import strip
 
 NODES, EDGE = 7, 0.3
 SECTION = Section(axial=3.0, coupling=0.7, bending=0.5, mass=1.0)

@@ -7,10 +7,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bilayer_core.bench import cantilever, machine, measuring, plots, problems, references, run, tables
-from bilayer_core.bench.configurations import Configuration, Family, families
 from bilayer_core.cli import main
 from bilayer_core.model.plan import MODELS
+from bilayer_core.verification.bench import (
+    cantilever,
+    converged_answers,
+    machine,
+    measuring,
+    plots,
+    problems,
+    run_benchmark,
+    tables,
+)
+from bilayer_core.verification.bench.configurations import Configuration, Family, families
 
 FAMILY = Family("two_rod", 3, "sdirk2")
 
@@ -37,16 +46,16 @@ def small(monkeypatch):
     )
     times = np.linspace(0.0, 0.02, 11)
     way = np.column_stack([times, 0.1 + 0 * times, 0 * times, -0.5 * 9.81 * times**2])
-    made = references.Reference(way, 1e-4, "free fall", 1e-3)
-    for module in (problems, run):
+    made = converged_answers.Reference(way, 1e-4, "free fall", 1e-3)
+    for module in (problems, run_benchmark):
         monkeypatch.setattr(module, "PROBLEMS", chosen)
     entry = {"bar": 1e-4, "checks": {"free fall": 1e-3}, "values": way.tolist()}
     entries = {problem.name: {model: entry for model in MODELS} for problem in chosen}
     for module in (plots, tables):
         monkeypatch.setattr(module, "PROBLEMS", chosen)
         monkeypatch.setattr(module, "read_file", lambda: entries)
-    monkeypatch.setattr(references, "read_file", lambda: entries)
-    monkeypatch.setattr(references, "stored", lambda problem, model: made)
+    monkeypatch.setattr(converged_answers, "read_file", lambda: entries)
+    monkeypatch.setattr(converged_answers, "stored", lambda problem, model: made)
     monkeypatch.setattr(measuring, "REPEATS", 1)
     monkeypatch.setattr(cantilever, "find_spec", lambda name: None)
 
@@ -101,20 +110,20 @@ def test_what_is_not_there_to_be_measured_is_refused(capsys, tmp_path):
 def test_the_list_says_what_there_is(capsys):
     assert main(["bench", "--list"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == run.names()
+    assert [line.split()[0] for line in lines] == run_benchmark.names()
     assert len(problems.PROBLEMS) >= 7
 
 
 @pytest.mark.parametrize("problem", problems.PROBLEMS, ids=lambda problem: problem.name)
 def test_every_problem_has_a_reference_that_fits_it(problem):
-    models = references.read_file()[problem.name]
-    assert references.JUDGE in models
+    models = converged_answers.read_file()[problem.name]
+    assert converged_answers.JUDGE in models
     for model in models:
-        reference = references.stored(problem, model)
+        reference = converged_answers.stored(problem, model)
         assert reference.values.shape[1] in (1, 4) and np.isfinite(reference.values).all()
         # two methods that have neither mesh nor step, or not the integrator, in common
         assert reference.difference <= reference.bar + 1e-3
-        assert reference.bar <= references.BLURRED
+        assert reference.bar <= converged_answers.BLURRED
 
 
 @pytest.mark.parametrize("problem", problems.PROBLEMS, ids=lambda problem: problem.name)
@@ -127,9 +136,9 @@ def test_levels_are_meshes_and_steps_that_end_with_the_run(problem):
 
 def test_a_problem_that_changed_asks_for_a_new_reference(monkeypatch):
     problem = problems.problem("cantilever")
-    monkeypatch.setattr(references, "fingerprint", lambda problem: "another")
+    monkeypatch.setattr(converged_answers, "fingerprint", lambda problem: "another")
     with pytest.raises(Exception, match="bilayer bench --references --only cantilever"):
-        references.stored(problem, "two_rod")
+        converged_answers.stored(problem, "two_rod")
 
 
 def test_a_way_has_a_point_for_every_step():

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.bench import pareto, scaling, start
-from bilayer_core.bench.configurations import Family
-from bilayer_core.bench.independent import SplineRod
-from bilayer_core.bench.track import Track, Trajectory, rms_distance
-from bilayer_core.validate.references import FIRST_MODE, heavy_cantilever
+from bilayer_core.verification.bench import pareto, scaling, start
+from bilayer_core.verification.bench.configurations import Family
+from bilayer_core.verification.bench.independent import SplineRod
+from bilayer_core.verification.bench.track import Track, Trajectory, rms_distance
+from bilayer_core.verification.validate.closed_forms import FIRST_MODE, heavy_cantilever
 
 LEAN, RICH = Family("lean", 3, "sdirk2"), Family("rich", 3, "sdirk2")
 

@@ -171,7 +171,7 @@ def measure(name: str, mode: str, seed: int, log: Path, options: argparse.Namesp
 def error_of(log: Path, part: float) -> tuple[float, float]:
     """Largest, and last, distance of a node from the run at a part of the tolerance, over the longest rod."""
     from bilayer_core import read_log
-    from bilayer_core.record.log_reader import read_info
+    from bilayer_core.log.run.log_reader import read_info
     from bilayer_core.runs.replay import branch, simulator_of
 
     finer, inputs = branch(log, 0.0, [f"solver.tolerance={part * simulator_of(log).tolerance}"])

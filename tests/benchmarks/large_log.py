@@ -33,9 +33,9 @@ MAIN = "from bilayer_core.cli import main\ncode = main({arguments})\nassert code
 
 def write_log(path: Path, megabytes: float, rate: float = 50.0, every: int = 1) -> None:
     """A log of the synthetic run, with noise in all numbers, so that it is as large as one of a robot that moves."""
-    import synthetic_run
+    from support import synthetic_run
 
-    from bilayer_core.record.mcap_log import McapRecorder
+    from bilayer_core.log.file.mcap_log import McapRecorder
 
     generator = np.random.default_rng(1)
     recorder = McapRecorder(path, rate=rate, marker_rate=rate, force=True)

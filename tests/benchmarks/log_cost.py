@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 
 ROBOTS = ("gripping", "crawling_inchworm", "crawling_dual_leg", "jumping", "swimming")
 LONGEST = 6.0

@@ -11,11 +11,11 @@ import sys
 from pathlib import Path
 
 from bilayer_core.errors import SimulationError
-from bilayer_core.stress.case import Outcome, Record
-from bilayer_core.stress.cases import all_cases
-from bilayer_core.stress.execute import ACCURATE
-from bilayer_core.stress.robots import LOOKS
-from bilayer_core.stress.trial import Trial, distance_of
+from bilayer_core.testing.trial import Trial, distance_of
+from bilayer_core.verification.stress.all_cases import all_cases
+from bilayer_core.verification.stress.execute_case import ACCURATE
+from bilayer_core.verification.stress.robots import LOOKS
+from bilayer_core.verification.stress.stress_case import Outcome, Record
 
 SHIFT = 1e-6
 """Of the longest rod."""

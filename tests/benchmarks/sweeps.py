@@ -16,10 +16,10 @@ from itertools import islice
 
 import psutil
 
-from bilayer_core.bench.machine import record
-from bilayer_core.sweeps.execute import execute
-from bilayer_core.sweeps.opening import Processes, open_engine
-from bilayer_core.sweeps.run import read_sweep, sweep
+from bilayer_core.studies.sweeps.execute_runs import execute
+from bilayer_core.studies.sweeps.open_processes import Processes, open_engine
+from bilayer_core.studies.sweeps.run_sweep import read_sweep, sweep
+from bilayer_core.verification.bench.machine import record
 
 GAIN = {
     "bending": "rods.strip.layers.active.eigenstrain.gain",

@@ -7,11 +7,11 @@ import sys
 
 import numpy as np
 import pytest
-import synthetic_run
-from processes import TESTS, TIMEOUT, environment
+from support import synthetic_run
+from support.processes import TESTS, TIMEOUT, environment
 
 from bilayer_core.cli.program import program
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 
 SWEEP = """
 schema: 1
@@ -60,7 +60,7 @@ if __name__ == "__main__":
     print("ENDED", json.dumps(ended))
 """
 LOOK = """
-from bilayer_core.record import lock
+from bilayer_core.log.file import lock
 from bilayer_core.cli import signals
 print(lock.fcntl, hasattr(signals.signal, "SIGALRM"), hasattr(signals.os, "fork"))
 """

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import synthetic_run
-from processes import TIMEOUT, environment
+from support import synthetic_run
+from support.processes import TIMEOUT, environment
 
 from bilayer_core import DISTRIBUTION
 from bilayer_core.cli.program import program
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 
 NAME = re.compile(r"[\w.-]+")
 SWEEP = "schema: 1\nscene: cantilever\nparameters:\n  gravity: {path: gravity.2, values: [-1, -2]}\n"

@@ -9,11 +9,11 @@ import time
 
 import numpy as np
 import pytest
-import synthetic_run
-from processes import TIMEOUT, bilayer, command, environment
+from support import synthetic_run
+from support.processes import TIMEOUT, bilayer, command, environment
 
-from bilayer_core.record.log_reader import read_info, read_log
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.log_reader import read_info, read_log
 
 FULL = "File too large"
 """What the system says where a file would be longer than the limit of its process: to the program, a full disk."""
@@ -184,8 +184,8 @@ def test_a_run_whose_reader_is_gone_tells_its_failure_all_the_same(here):
 
 WRITER = """
 import sys, time
-import synthetic_run
-from bilayer_core.record.mcap_log import McapRecorder
+from support import synthetic_run
+from bilayer_core.log.file.mcap_log import McapRecorder
 
 recorder = McapRecorder(sys.argv[1])
 recorder.start(synthetic_run.description())

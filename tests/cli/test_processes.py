@@ -6,7 +6,7 @@ import time
 from multiprocessing import active_children
 
 import pytest
-from processes import python
+from support.processes import python
 
 from bilayer_core.processes import side_by_side, usable_cores
 

@@ -6,8 +6,8 @@ import subprocess
 
 import pytest
 import yaml
-from processes import bilayer, command, environment, python
-from sample_scenes import everything
+from support.processes import bilayer, command, environment, python
+from support.sample_scenes import everything
 
 import bilayer_core.cli.program
 from bilayer_core.cli import main

@@ -9,12 +9,12 @@ import time
 
 import numpy as np
 import pytest
-from processes import TIMEOUT, command, environment
+from support.processes import TIMEOUT, command, environment
 
 from bilayer_core import load_scene
 from bilayer_core.cli import main, watch
 from bilayer_core.jit import compile_all
-from bilayer_core.record.log_reader import read_info, read_log, read_state, scene_from_log
+from bilayer_core.log.run.log_reader import read_info, read_log, read_state, scene_from_log
 from bilayer_core.scene.loader import parse_scene
 
 SUMMARY_KEYS = """

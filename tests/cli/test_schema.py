@@ -6,7 +6,7 @@ import json
 import pytest
 import yaml
 from jsonschema import Draft202012Validator
-from processes import bilayer
+from support.processes import bilayer
 
 from bilayer_core.scene.bundled import bundled_scenes
 

@@ -8,11 +8,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from processes import TIMEOUT, bilayer, command, environment
+from support.processes import TIMEOUT, bilayer, command, environment
 
 from bilayer_core.cli import main, program
 from bilayer_core.cli.signals import Interruption, Signals, interruption_behind
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.log.run.log_reader import read_info
 
 LINES = {signal.SIGINT: "bilayer: interrupted\n", signal.SIGTERM: "bilayer: ended by SIGTERM\n"}
 LONG_RUN = ("run", "cantilever", "--dt", "0.1 ms", "--duration", "1000", "--quiet")

@@ -4,12 +4,12 @@ import json
 
 import click
 import pytest
-import synthetic_run
 import yaml
+from support import synthetic_run
 
 from bilayer_core.cli import main
 from bilayer_core.cli.program import program
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.scene.bundled import bundled_scenes
 
 TO_STANDARD_OUTPUT = {"check", "info"}

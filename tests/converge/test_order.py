@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from bilayer_core.converge.order import SAFETY_WITH_ORDER, SAFETY_WITHOUT, estimate, observed_order
+from bilayer_core.studies.converge.order import SAFETY_WITH_ORDER, SAFETY_WITHOUT, estimate, observed_order
 
 
 @pytest.mark.parametrize("order", [1.0, 1.7, 2.0, 4.0])

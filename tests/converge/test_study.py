@@ -11,11 +11,11 @@ from bilayer_core import Simulator, estimate_error, load_scene
 from bilayer_core.cli import main
 from bilayer_core.cli.error_table import print_errors
 from bilayer_core.cli.signals import Interruption
-from bilayer_core.converge import study
-from bilayer_core.converge.order import estimate
-from bilayer_core.converge.quantities import measure
-from bilayer_core.converge.study import BASE, COARSER_MESH, COARSER_STEP, FINER_STEP, planned_runs
 from bilayer_core.errors import SimulationError
+from bilayer_core.studies.converge import study
+from bilayer_core.studies.converge.order import estimate
+from bilayer_core.studies.converge.quantities import measure
+from bilayer_core.studies.converge.study import BASE, COARSER_MESH, COARSER_STEP, FINER_STEP, planned_runs
 
 SMALL = ["--set", "rods.strip.stations=11", "--set", "solver.dt=4 ms", "--set", "solver.integrator=implicit_euler"]
 

@@ -16,7 +16,7 @@ PROGRAM = """
 import json
 
 import numpy as np
-from sample_scenes import layer, rod, scene
+from support.sample_scenes import layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator

@@ -4,8 +4,8 @@ import subprocess
 import sys
 
 import pytest
-from documents import blocks, is_told
-from processes import TIMEOUT, environment
+from support.documents import blocks, is_told
+from support.processes import TIMEOUT, environment
 
 PAGE = "docs/fitting.md"
 

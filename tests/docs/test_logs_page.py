@@ -6,11 +6,11 @@ import subprocess
 import sys
 
 import pytest
-from documents import blocks, is_told
-from processes import TIMEOUT, environment
+from support.documents import blocks, is_told
+from support.processes import TIMEOUT, environment
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 
 MCAP_INCLUDE = os.environ.get("MCAP_INCLUDE", "")
 """The folder `cpp/mcap/include` of a checkout of MCAP."""

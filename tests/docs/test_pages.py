@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 import pytest
-from documents import FENCE, blocks
-from processes import TIMEOUT, environment
+from support.documents import FENCE, blocks
+from support.processes import TIMEOUT, environment
 
 from bilayer_core.cli.options import Settings
 from bilayer_core.cli.program import program

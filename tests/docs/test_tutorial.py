@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from documents import Block, blocks, is_told
-from processes import TIMEOUT, claimed_domain, environment
+from support.documents import Block, blocks, is_told
+from support.processes import TIMEOUT, claimed_domain, environment
 
 MODULES = {
     "bilayer": "bilayer_core",

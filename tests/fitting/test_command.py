@@ -12,7 +12,7 @@ import pytest
 import yaml
 from benchmarks.fit_coverage import SCENE, TIMES, TIP, TRUTH, exact_data
 from PIL import Image
-from processes import TIMEOUT, command, environment
+from support.processes import TIMEOUT, command, environment
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
@@ -144,7 +144,7 @@ def test_what_cannot_be_told_apart_ends_with_1_and_writes_nothing(here, capsys):
 
 
 def test_a_fit_that_has_not_converged_ends_with_1_and_writes_what_it_has(here, capsys, monkeypatch):
-    monkeypatch.setattr("bilayer_core.fitting.fit.MOST_EVALUATIONS", 1)
+    monkeypatch.setattr("bilayer_core.studies.fitting.fit.MOST_EVALUATIONS", 1)
     assert fitted(*ASKED, "--json", "early.json", "--quiet") == 1
     assert "not converged after as many evaluations as a fit may make" in capsys.readouterr().out
     assert json.loads((here / "early.json").read_text())["converged"] is False

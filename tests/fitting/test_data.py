@@ -6,8 +6,8 @@ import pytest
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.fitting.data import read_data, with_sigma
-from bilayer_core.fitting.runs import Runs, check_times, known_quantities
+from bilayer_core.studies.fitting.data import read_data, with_sigma
+from bilayer_core.studies.fitting.runs import Runs, check_times, known_quantities
 
 GOOD = "time,com.z\n0.1,1\n0.2,2\n"
 

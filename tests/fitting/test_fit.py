@@ -7,9 +7,9 @@ from benchmarks.fit_coverage import PARAMETERS, SCENE, TIP, TRUTH, exact_data
 import bilayer_core
 from bilayer_core import Simulator, fit, load_scene
 from bilayer_core.errors import InputError, SceneError, SimulationError, UnknownName
-from bilayer_core.fitting import fit as whole
-from bilayer_core.fitting.identify import NotIdentifiable
-from bilayer_core.fitting.runs import Runs, known_quantities
+from bilayer_core.studies.fitting import fit as whole
+from bilayer_core.studies.fitting.identify import NotIdentifiable
+from bilayer_core.studies.fitting.runs import Runs, known_quantities
 
 MODULUS, GAIN = TRUTH
 NOISE = 0.5e-3
@@ -124,7 +124,9 @@ def test_curvature_and_forces_are_data_too():
 
 def test_schedules_are_fitted_by_resetting_one_simulator(exact, monkeypatch):
     built = []
-    monkeypatch.setattr("bilayer_core.fitting.runs.Simulator", lambda scene: built.append(1) or Simulator(scene))
+    monkeypatch.setattr(
+        "bilayer_core.studies.fitting.runs.Simulator", lambda scene: built.append(1) or Simulator(scene)
+    )
     path = "stimuli.swelling.schedule.end"
     found = fit(SCENE, exact, {path: ("0.2 s", "0.32 s", "0.25 s")})
     assert found.values == {path: pytest.approx(0.3, rel=1e-6)}

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from bilayer_core.errors import InputError
-from bilayer_core.fitting.identify import (
+from bilayer_core.studies.fitting.identify import (
     NotIdentifiable,
     refuse_undetermined,
     refuse_unseen,
     refuse_without_influence,
 )
-from bilayer_core.fitting.intervals import spread_of
-from bilayer_core.fitting.parameters import Parameter
+from bilayer_core.studies.fitting.intervals import spread_of
+from bilayer_core.studies.fitting.parameters import Parameter
 
 RANDOM = np.random.default_rng(3)
 COLUMNS = RANDOM.normal(size=(30, 4))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bilayer_core.fitting.intervals import spread_of
+from bilayer_core.studies.fitting.intervals import spread_of
 
 RANDOM = np.random.default_rng(11)
 MATRIX = np.stack([np.ones(8), np.linspace(0.0, 1.0, 8)], axis=1)

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from rough_runs import FormulaRuns, deterministic_noise
+from support.rough_runs import FormulaRuns, deterministic_noise
 
 from bilayer_core import Simulator, fit, load_scene
-from bilayer_core.fitting import fit as whole
-from bilayer_core.fitting.data import read_data
-from bilayer_core.fitting.differences import jacobian
-from bilayer_core.fitting.noise import LARGEST_STEP, Step, choose_steps, shares
-from bilayer_core.fitting.parameters import read_parameters
-from bilayer_core.fitting.runs import Runs, known_quantities
+from bilayer_core.studies.fitting import fit as whole
+from bilayer_core.studies.fitting.data import read_data
+from bilayer_core.studies.fitting.differences import jacobian
+from bilayer_core.studies.fitting.noise import LARGEST_STEP, Step, choose_steps, shares
+from bilayer_core.studies.fitting.parameters import read_parameters
+from bilayer_core.studies.fitting.runs import Runs, known_quantities
 
 TIMES = np.linspace(0.1, 1.0, 40)
 NAIVE = 1.5e-8

@@ -4,7 +4,7 @@ import pytest
 
 from bilayer_core import load_scene
 from bilayer_core.errors import InputError, SceneError
-from bilayer_core.fitting.parameters import read_parameters
+from bilayer_core.studies.fitting.parameters import read_parameters
 
 MODULUS = "materials.gel.youngs_modulus"
 

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import sample_scenes as samples
 import yaml
 from hypothesis import strategies as st
+from support import sample_scenes as samples
 
 from bilayer_core.scene.bundled import bundled_scenes
 from bilayer_core.scene.text import read_yaml

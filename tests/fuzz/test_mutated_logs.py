@@ -23,8 +23,8 @@ import pytest
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.state_file import write_state
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.state_file import write_state
 from fuzz.log_mutations import write_mutated_log, write_mutated_state
 
 LOGS = int(os.environ.get("FUZZ_LOGS", "100"))

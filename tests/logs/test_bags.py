@@ -4,18 +4,18 @@ import shutil
 
 import numpy as np
 import pytest
-import synthetic_run
-from bags import EPOCH, live_messages, text_message, write_bag, write_mcap
 from mcap.writer import CompressionType, IndexType
 from rosbags.rosbag2 import StoragePlugin
+from support import synthetic_run
+from support.bags import EPOCH, live_messages, text_message, write_bag, write_mcap
 
 from bilayer_core import compare, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.cdr import HEADER
-from bilayer_core.record.encoders import multi_array_template
-from bilayer_core.record.log_reader import read_info
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.cdr import HEADER
+from bilayer_core.log.messages.encoders import multi_array_template
+from bilayer_core.log.run.log_reader import read_info
 
 ROBOT = "/lab/robot1"
 DOUBLE = "std_msgs/msg/Float64"

@@ -1,19 +1,19 @@
 """What `replay --verify` says of logs that are not whole, or whose messages are no longer those that were written."""
 
 import pytest
-from acted_scenes import pushed
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
+from support.acted_scenes import pushed
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
-from bilayer_core.record.chain import CHAIN, END, check_chain
-from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.log_reader import read_description, read_info
-from bilayer_core.record.log_records import CHUNK, walk
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.repair import repair
+from bilayer_core.log.file.chain import CHAIN, END, check_chain
+from bilayer_core.log.file.log_chunks import LogFile
+from bilayer_core.log.file.log_records import CHUNK, walk
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.file.repair import repair
+from bilayer_core.log.run.log_reader import read_description, read_info
 from bilayer_core.runs.replay import verify
 
 STATE, INPUTS = "/bilayer_sim/state", "/bilayer_sim/inputs"
@@ -150,7 +150,7 @@ def test_states_and_inputs_that_are_missing_changed_added_or_moved_are_noticed(l
 
 
 def test_the_last_time_up_to_which_all_is_as_written_is_told(log, tmp_path, monkeypatch):
-    monkeypatch.setattr("bilayer_core.record.mcap_log.CHUNK_SIZE", 4000)
+    monkeypatch.setattr("bilayer_core.log.file.mcap_log.CHUNK_SIZE", 4000)
     long = tmp_path / "long.mcap"
     Simulator(load_scene(pushed())).run(0.2, observers=[McapRecorder(long, rate=100.0)])
     changed_at = LogFile(long).times(STATE)[6] / 1e9
@@ -199,7 +199,7 @@ def test_a_log_that_was_cut_off_is_compared_as_far_as_it_goes_and_said_to_have_n
 
 
 def test_a_repaired_log_without_a_chunk_in_the_middle_says_so(tmp_path, monkeypatch):
-    monkeypatch.setattr("bilayer_core.record.mcap_log.CHUNK_SIZE", 4000)
+    monkeypatch.setattr("bilayer_core.log.file.mcap_log.CHUNK_SIZE", 4000)
     log, damaged, new = (tmp_path / name for name in ("run.mcap", "damaged.mcap", "new.mcap"))
     Simulator(load_scene(pushed())).run(0.1, observers=[McapRecorder(log, rate=100.0)])
     places, data = chunks(log), bytearray(log.read_bytes())

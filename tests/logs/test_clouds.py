@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-import synthetic_run
 from rosbags.typesys import Stores, get_typestore
+from support import synthetic_run
 
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.clouds import CloudEncoder, surface_points
+from bilayer_core.log.run.log_reader import read_messages
 from bilayer_core.observed.frame import ShapeInfo
-from bilayer_core.record.clouds import CloudEncoder, surface_points
-from bilayer_core.record.log_reader import read_messages
-from bilayer_core.record.mcap_log import McapRecorder
 
 TURNED = (0.0, np.sin(0.3), 0.0, np.cos(0.3))
 CLOUDS = {"obstacle_points", "body_points", "contact_force_points"}

@@ -2,14 +2,13 @@
 
 import json
 
-import hostile_logs
 import pytest
-import synthetic_run
+from support import hostile_logs, synthetic_run
 
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_head import read_head
+from bilayer_core.log.file.log_head import read_head
 
 DESCRIPTION = synthetic_run.description()
 ESCAPE = "\x1b]0;owned\x07"

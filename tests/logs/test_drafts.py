@@ -7,15 +7,15 @@ import subprocess
 import sys
 
 import pytest
-from processes import TIMEOUT, environment
+from support.processes import TIMEOUT, environment
 
-from bilayer_core.record import private_directory as module
-from bilayer_core.record.paths import draft_of, write_text
-from bilayer_core.record.private_directory import LOCK, OLD, PREFIX, private_directory
+from bilayer_core.log.file import private_directory as module
+from bilayer_core.log.file.output_paths import draft_of, write_text
+from bilayer_core.log.file.private_directory import LOCK, OLD, PREFIX, private_directory
 
 HOLDER = """
 import signal, sys, time
-from bilayer_core.record.paths import draft_of
+from bilayer_core.log.file.output_paths import draft_of
 signal.signal(signal.SIGINT, signal.default_int_handler)  # which who runs in the background does not have
 with draft_of(sys.argv[1], force=False) as draft:
     draft.write_text("half")

@@ -6,15 +6,15 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-import synthetic_run
 from rclpy.serialization import deserialize_message
 from rosbags.typesys import Stores, get_typestore
+from support import synthetic_run
 from visualization_msgs.msg import Marker
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.cdr import nanoseconds, read_float64_multi_array
-from bilayer_core.record.encoders import FrameEncoder, encode_float64, multi_array_template
-from bilayer_core.record.markers import (
+from bilayer_core.log.messages.cdr import nanoseconds, read_float64_multi_array
+from bilayer_core.log.messages.encoders import FrameEncoder, encode_float64, multi_array_template
+from bilayer_core.log.messages.markers import (
     ADD,
     ARROW_DECADE,
     ARROW_FORCE,
@@ -25,8 +25,8 @@ from bilayer_core.record.markers import (
     delete_all,
     deleting_all_first,
 )
-from bilayer_core.record.schemas import schema_text
-from bilayer_core.record.topics import MULTI_ARRAY, TF, DisplayGate, Rate, output_topics, stimulus_topics
+from bilayer_core.log.messages.schemas import schema_text
+from bilayer_core.log.messages.topics import MULTI_ARRAY, TF, DisplayGate, Rate, output_topics, stimulus_topics
 
 DESCRIPTION = synthetic_run.description()
 TOPICS = {spec.name: spec for spec in output_topics(DESCRIPTION, tf=True)}

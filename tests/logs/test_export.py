@@ -6,13 +6,13 @@ import json
 import numpy as np
 import pandas
 import pytest
-import synthetic_run
+from support import synthetic_run
 
 from bilayer_core import read_log
 from bilayer_core.cli import main
-from bilayer_core.record import export as module
-from bilayer_core.record.export import CSV, NPZ, PARQUET, export
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run import export as module
+from bilayer_core.log.run.export import CSV, NPZ, PARQUET, export
 
 TIMES = np.arange(0, 26) * 0.02
 ROD = "rod/arm_1/active"

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import synthetic_run
 from hypothesis import given
 from hypothesis import strategies as st
+from support import synthetic_run
 
 from bilayer_core.cli import main
 from bilayer_core.errors import OutputError
-from bilayer_core.record import export as module
-from bilayer_core.record.csv_cells import text_cell
-from bilayer_core.record.export import CSV, NPZ, PARQUET, export
-from bilayer_core.record.file_names import file_names
-from bilayer_core.record.log_source import LogSource
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.file_names import file_names
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run import export as module
+from bilayer_core.log.run.csv_cells import text_cell
+from bilayer_core.log.run.export import CSV, NPZ, PARQUET, export
+from bilayer_core.log.run.log_source import LogSource
 
 HOSTILE = (
     "../results",

@@ -6,7 +6,7 @@ import pytest
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.runs.forecast import forecast
 
 MOST_OFF = 0.2

@@ -7,9 +7,9 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.cdr import read_float64_multi_array
-from bilayer_core.record.log_reader import read_messages
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.cdr import read_float64_multi_array
+from bilayer_core.log.run.log_reader import read_messages
 
 LIVE = {"/diagnostics"}
 """Topics of the node alone."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bilayer_core.record.frame_matching import match_frames
+from bilayer_core.log.file.frame_matching import match_frames
 
 PERIOD = 20_000_000
 """Of frames [ns]."""

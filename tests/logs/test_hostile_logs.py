@@ -5,14 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
-import hostile_logs
 import pytest
-import synthetic_run
+from support import hostile_logs, synthetic_run
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.state_file import write_state
 from bilayer_core.observed.frame import Description
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.state_file import write_state
 
 MORE_OF_INFO = 300e6
 """Peak memory of ``bilayer info`` above that for a log of no frame [bytes]."""

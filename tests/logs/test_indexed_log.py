@@ -1,9 +1,9 @@
 import pytest
 from mcap.writer import CompressionType, Writer
-from written_logs import WITHOUT_INDEX, damage, number, value_of, write_log
+from support.written_logs import WITHOUT_INDEX, damage, number, value_of, write_log
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.indexed_log import IndexedLog
+from bilayer_core.log.file.indexed_log import IndexedLog
 
 
 def counted(topic="/a", count=100, period=0.1):

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import matrix_from_quaternion
-from bilayer_core.record.description_text import from_text, to_text
-from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.markers import (
+from bilayer_core.log.messages.description_text import from_text, to_text
+from bilayer_core.log.messages.encoders import FrameEncoder
+from bilayer_core.log.messages.markers import (
     ARROW_DECADE,
     ARROW_FORCE,
     ARROW_MOMENT,
@@ -19,7 +19,7 @@ from bilayer_core.record.markers import (
     SPHERE,
     force_arrows,
 )
-from bilayer_core.record.topics import output_topics
+from bilayer_core.log.messages.topics import output_topics
 
 
 def block(name, position, **motion):

@@ -6,8 +6,8 @@ KILLS=200 KILLS_SEED=7 pytest -m "" -s tests/logs/test_kills.py
 import os
 
 import pytest
-from kills import kills
-from processes import claimed_domain
+from support.kills import kills
+from support.processes import claimed_domain
 
 KILLS = int(os.environ.get("KILLS", "10"))
 SEED = int(os.environ.get("KILLS_SEED", "1"))

@@ -4,18 +4,18 @@ import tracemalloc
 
 import numpy as np
 import pytest
-import synthetic_run
 from benchmarks.large_log import write_log
+from support import synthetic_run
 
 from bilayer_core import compare, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record import log_records
-from bilayer_core.record.bag import Bag
-from bilayer_core.record.log_chunks import LogFile
-from bilayer_core.record.log_reader import read_info, read_state
-from bilayer_core.record.log_source import LogSource
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file import log_records
+from bilayer_core.log.file.log_chunks import LogFile
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.bag import Bag
+from bilayer_core.log.run.log_reader import read_info, read_state
+from bilayer_core.log.run.log_source import LogSource
 
 LARGE = 60.0
 """Of the log [MB]."""

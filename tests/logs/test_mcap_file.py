@@ -4,12 +4,12 @@ import io
 
 import numpy as np
 import pytest
-import synthetic_run
 from mcap.writer import CompressionType, Writer
+from support import synthetic_run
 
-from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.frame_block import FrameBlock
-from bilayer_core.record.mcap_file import McapFile, message_head, time_and_sequence
+from bilayer_core.log.file.frame_block import FrameBlock
+from bilayer_core.log.file.mcap_file import McapFile, message_head, time_and_sequence
+from bilayer_core.log.messages.encoders import FrameEncoder
 
 TOPICS = ("/a", "/b", "/never", "/d")
 

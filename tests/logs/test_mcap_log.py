@@ -6,22 +6,22 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-import synthetic_run
 import yaml
-from kills import kill
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
-from slow_disks import Full
+from support import synthetic_run
+from support.kills import kill
+from support.slow_disks import Full
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, OutputError, SimulationError
-from bilayer_core.record import mcap_log
-from bilayer_core.record.description_text import to_text
-from bilayer_core.record.log_reader import read_description, read_info, read_log, read_state, scene_from_log
-from bilayer_core.record.markers import DELETE_ALL
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.log.file import mcap_log
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.description_text import to_text
+from bilayer_core.log.messages.markers import DELETE_ALL
+from bilayer_core.log.run.log_reader import read_description, read_info, read_log, read_state, scene_from_log
+from bilayer_core.log.run.memory import MemoryRecorder
 
 TIMES = np.arange(0, 51) * 0.02
 
@@ -164,8 +164,8 @@ def test_an_interrupted_run_is_not_complete(tmp_path):
 
 RECORDING = """
 import time
-import synthetic_run
-from bilayer_core.record.mcap_log import McapRecorder
+from support import synthetic_run
+from bilayer_core.log.file.mcap_log import McapRecorder
 
 recorder = McapRecorder({log!r})
 recorder.start(synthetic_run.description())

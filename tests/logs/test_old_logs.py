@@ -4,18 +4,18 @@ import math
 
 import numpy as np
 import pytest
-import synthetic_run
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
+from support import synthetic_run
 
 from bilayer_core import Simulator, compare, load_scene, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.cdr import Template, read_float64_multi_array
-from bilayer_core.record.chain import CHAIN, Link
-from bilayer_core.record.log_reader import read_info, read_state
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.topics import MULTI_ARRAY
+from bilayer_core.log.file.chain import CHAIN, Link
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.cdr import Template, read_float64_multi_array
+from bilayer_core.log.messages.topics import MULTI_ARRAY
+from bilayer_core.log.run.log_reader import read_info, read_state
 from bilayer_core.runs.replay import verify
 
 NO_LINK = Link(0, 0, "")

@@ -5,15 +5,15 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-import synthetic_run
+from support import synthetic_run
 
 import bilayer_core
 from bilayer_core import Simulator, compare, load_scene, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.forces.register import TERMS
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.run_data import RunData
+from bilayer_core.forces.force_register import TERMS
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.run_data import RunData
 
 TIMES = np.arange(0, 26) * 0.02
 

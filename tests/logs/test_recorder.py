@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from sample_scenes import everything
+from support.sample_scenes import everything
 
 from bilayer_core import Recorder, Simulator, compare, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.memory import MemoryRecorder
 
 
 @pytest.fixture

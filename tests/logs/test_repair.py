@@ -4,18 +4,18 @@ import io
 
 import numpy as np
 import pytest
-import synthetic_run
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
+from support import synthetic_run
 
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_reader import read_info, read_messages
-from bilayer_core.record.log_records import CHANNEL, CHUNK, SCHEMA, walk
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.repair import repair
+from bilayer_core.log.file.log_records import CHANNEL, CHUNK, SCHEMA, walk
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.file.repair import repair
+from bilayer_core.log.run.log_reader import read_info, read_messages
 
 TIMES = np.arange(0, 76) * 0.02
 

@@ -5,16 +5,16 @@ import math
 
 import numpy as np
 import pytest
-from acted_scenes import pushed
-from sample_scenes import everything
+from support.acted_scenes import pushed
+from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
+from bilayer_core.log.file import mcap_log
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.log_reader import read_info, read_log, read_state
 from bilayer_core.observed.inputs import LOAD, POSE, STIMULUS, UNTIL, Input
-from bilayer_core.record import mcap_log
-from bilayer_core.record.log_reader import read_info, read_log, read_state
-from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.runs import replay
 from bilayer_core.runs.replay import branch, inputs_after, verify
 from bilayer_core.scene.bundled import bundled_scenes
@@ -172,7 +172,7 @@ def test_a_log_of_before_says_what_it_lacks(tmp_path, monkeypatch):
 
 
 def mcap_log_stimuli(description):
-    from bilayer_core.record.topics import EVENTS, stimulus_topics
+    from bilayer_core.log.messages.topics import EVENTS, stimulus_topics
 
     return (EVENTS, *stimulus_topics(description))
 

@@ -5,16 +5,16 @@ import time
 
 import numpy as np
 import pytest
-import synthetic_run
-from slow_disks import Full, Valve
+from support import synthetic_run
+from support.slow_disks import Full, Valve
 
 from bilayer_core.errors import OutputError
+from bilayer_core.log.file import mcap_log
+from bilayer_core.log.file.mcap_log import QUEUE_LENGTH, McapRecorder
+from bilayer_core.log.messages.encoders import decode_input
+from bilayer_core.log.messages.topics import INPUTS
+from bilayer_core.log.run.log_reader import read_info, read_log, read_messages
 from bilayer_core.observed.inputs import STIMULUS, Input
-from bilayer_core.record import mcap_log
-from bilayer_core.record.encoders import decode_input
-from bilayer_core.record.log_reader import read_info, read_log, read_messages
-from bilayer_core.record.mcap_log import QUEUE_LENGTH, McapRecorder
-from bilayer_core.record.topics import INPUTS
 
 FRAMES = 300
 PERIOD = 0.02

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-import synthetic_run
 from rosbags.typesys import Stores, get_typestore
-from sample_scenes import everything
+from support import synthetic_run
+from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
-from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.log_reader import read_info, read_log, read_messages
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.topics import TF
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.encoders import FrameEncoder
+from bilayer_core.log.messages.topics import TF
+from bilayer_core.log.run.log_reader import read_info, read_log, read_messages
 
 TYPESTORE = get_typestore(Stores.ROS2_KILTED)
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from moving_scenes import ADAPTIVE, EXACT, PROBLEMS, cantilever, driven, falling, part, simulate, with_parts
-from sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
+from support.moving_scenes import ADAPTIVE, EXACT, PROBLEMS, cantilever, driven, falling, part, simulate, with_parts
+from support.sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.engine import error_norm_of
 from bilayer_core.engine.error_norm import step_defect
-from bilayer_core.engine.report import IntegrationReport
+from bilayer_core.engine.step_outcome import IntegrationReport
 from bilayer_core.engine.step_size import LARGEST_GROWTH, after_rejection, after_success, fit
 from bilayer_core.errors import InputError, SceneError, SimulationError
-from bilayer_core.integrators.register import INTEGRATORS
+from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.model.records.status import BEYOND, BLOCKED, MAX_ITERATIONS, TOO_INACCURATE, UNSETTLED
 from bilayer_core.model.records.step import StateArrays
 from bilayer_core.simulation.remedies import remedy

@@ -1,16 +1,16 @@
-"""Inertia of the fluid: derivatives, what it must conserve, and vibrations; more answers are in `validate.fluid`."""
+"""Inertia of the fluid: derivatives, conservation, and vibrations; more are in `verification.validate.fluid`."""
 
 import math
 
 import numpy as np
 import pytest
-from evaluations import end_of_step, left_of_step, undriven
-from sample_scenes import fixed, layer, rod, scene
+from support.evaluations import end_of_step, left_of_step, undriven
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.section import rectangle
 from bilayer_core.model.state import initial_state
 from bilayer_core.simulation.fluid_energy import energy_of_fluid, momentum_of_fluid, survey_fluid

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sample_scenes import contact, everything, fixed, layer, rod, scene
+from support.sample_scenes import contact, everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 
 CHANGES = {
     "modulus": {"materials.gel.youngs_modulus": 1.1e6},

@@ -4,15 +4,15 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine import capacity, storage
 from bilayer_core.errors import PenetrationError, SceneError, SimulationError
 from bilayer_core.model import rod_penetration, rod_surfaces
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.records.status import PAIR_CAPACITY_EXCEEDED
-from bilayer_core.stress.cases import all_cases
+from bilayer_core.verification.stress.all_cases import all_cases
 
 
 def falling(thickness=1e-3, gap=2.5e-3, **more):

@@ -1,7 +1,7 @@
 """What `auto` chooses for model, dimension, integrator and steps, and what a scene or a caller asks for instead."""
 
 import pytest
-from sample_scenes import layer, rod, scene
+from support.sample_scenes import layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 

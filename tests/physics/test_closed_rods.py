@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from evaluations import Problem, dense
-from sample_scenes import ball, contact, layer, rod, scene
+from support.evaluations import Problem, dense
+from support.sample_scenes import ball, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.log.messages.description_text import from_text, to_text
+from bilayer_core.log.messages.node_frames import NodeFrames
 from bilayer_core.model.laminate import NAME
-from bilayer_core.record.description_text import from_text, to_text
-from bilayer_core.record.node_frames import NodeFrames
 
 RADIUS, EDGES = 0.03, 40
 LENGTH = 2.0 * np.pi * RADIUS

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from records_by_hand import record_of
-from sample_scenes import HALF_SIZES, ball, contact, fixed, layer, rod, scene
+from support.records_by_hand import record_of
+from support.sample_scenes import HALF_SIZES, ball, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.contact.crossing import crossing
@@ -15,7 +15,7 @@ from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.records.contacts import Surfaces
 from bilayer_core.model.records.parts import Strands
 from bilayer_core.model.records.step import Configuration
-from bilayer_core.model.shapes import NUMBER, Shape, signed_distance
+from bilayer_core.model.shape_numbers import NUMBER, Shape, signed_distance
 
 surfaces_at, strands_at, configuration_at = record_at(Surfaces), record_at(Strands), record_at(Configuration)
 RADIUS = 0.02

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evaluations import Problem, check
-from sample_scenes import ball, contact, everything, layer, rod, scene
-from slips import dissipation
+from support.evaluations import Problem, check
+from support.sample_scenes import ball, contact, everything, layer, rod, scene
+from support.slips import dissipation
 
 from bilayer_core.model.force_list import FORCES
 

@@ -1,10 +1,10 @@
-"""An impact, and a layer that lags; motions with a known answer are in `bilayer_core.validate`."""
+"""An impact, and a layer that lags; motions with a known answer are in `bilayer_core.verification.validate`."""
 
 import math
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, layer, rod, scene
+from support.sample_scenes import GROUND, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 

@@ -4,16 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evaluations import Problem, at_rest, check
-from planar_scenes import AHEAD, HUBS, everything_in_plane
-from sample_scenes import everything, fixed, layer, rod, scene
+from support.evaluations import Problem, at_rest, check
+from support.planar_scenes import AHEAD, HUBS, everything_in_plane
+from support.sample_scenes import everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.model.build import build_model
-from bilayer_core.validate.bending import THICKNESS, strip
-from bilayer_core.validate.ends import PAIRS, beam, patched
-from bilayer_core.validate.profiles import linear
-from bilayer_core.validate.references import timoshenko
+from bilayer_core.model.build_model import build_model
+from bilayer_core.verification.validate.bending import THICKNESS, strip
+from bilayer_core.verification.validate.closed_forms import timoshenko
+from bilayer_core.verification.validate.ends import PAIRS, beam, patched
+from bilayer_core.verification.validate.profiles import linear
 
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1}}}
 GROWTH = {"stimulus": "heat", "gain": 0.01}

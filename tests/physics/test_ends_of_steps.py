@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from moving_scenes import ADAPTIVE, cantilever, driven, falling, part, simulate
 from oracles.prescribed_motion import scheduled_motion
-from sample_scenes import contact, everything
+from support.moving_scenes import ADAPTIVE, cantilever, driven, falling, part, simulate
+from support.sample_scenes import contact, everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.integrators.register import INTEGRATORS
-from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.integrators.integrator_register import INTEGRATORS
+from bilayer_core.log.run.memory import MemoryRecorder
 
 # where steps end
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from budgets import driven
-from sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, scene
+from support.budgets import driven
+from support.sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.energy_account import (
@@ -17,10 +17,10 @@ from bilayer_core.engine.energy_account import (
     NUMERICAL,
 )
 from bilayer_core.errors import SimulationError
-from bilayer_core.stress.parameters import Parameters
-from bilayer_core.stress.robots import scene_of
-from bilayer_core.validate.impacts import thrown
-from bilayer_core.validate.motion import let_go
+from bilayer_core.verification.stress.parameters import Parameters
+from bilayer_core.verification.stress.robots import scene_of
+from bilayer_core.verification.validate.impacts import thrown
+from bilayer_core.verification.validate.motion import let_go
 
 METHODS = ["implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint"]
 

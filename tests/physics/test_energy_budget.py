@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from budgets import EXACT, SOFT, clamped, driven, moving, run, throw
-from sample_scenes import fixed, layer, rod, scene
+from support.budgets import EXACT, SOFT, clamped, driven, moving, run, throw
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError
-from bilayer_core.integrators.register import INTEGRATORS
+from bilayer_core.integrators.integrator_register import INTEGRATORS
 
 # what the integrator loses
 

@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 import pytest
-from sample_scenes import everything
+from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError

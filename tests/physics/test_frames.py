@@ -7,8 +7,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from acted_scenes import pushed
-from sample_scenes import everything
+from support.acted_scenes import pushed
+from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.observed.frame import Frame

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.validate.friction import FAR, GRAVITY, MASS, SECOND_ORDER, SIZE, at_rest, block
+from bilayer_core.verification.validate.friction import FAR, GRAVITY, MASS, SECOND_ORDER, SIZE, at_rest, block
 
 PERIOD, COEFFICIENT, SPEED = 0.1, 0.3, 5.0
 

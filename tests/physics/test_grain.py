@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from evaluations import Problem, check
-from sample_scenes import GROUND, contact, everything, fixed, layer, rod, scene
+from support.evaluations import Problem, check
+from support.sample_scenes import GROUND, contact, everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.validate.friction import (
+from bilayer_core.verification.validate.friction import (
     FAR,
     GRAIN,
     GRAVITY,

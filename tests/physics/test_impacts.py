@@ -4,13 +4,13 @@ import re
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.findings import told
 from bilayer_core.model.impacts import impact_warnings
-from bilayer_core.validate.impacts import SPEED, rebound, thrown
+from bilayer_core.verification.validate.impacts import SPEED, rebound, thrown
 
 METHODS = ["implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha"]
 

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
-from bilayer_core.model.imperfection import departure
+from bilayer_core.model.imperfect_shapes import departure
 from bilayer_core.model.plan import MODELS
 from bilayer_core.scene.bundled import bundled_scenes
-from bilayer_core.validate.beams import imperfect_column
-from bilayer_core.validate.plane import blade
+from bilayer_core.verification.validate.beams import imperfect_column
+from bilayer_core.verification.validate.plane import blade
 
 SIZE = 1e-4
 PATHS = {

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from moving_scenes import EXACT, PROBLEMS, SOFT, cantilever, driven, part, spinner, with_parts
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from support.moving_scenes import EXACT, PROBLEMS, SOFT, cantilever, driven, part, spinner, with_parts
+from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.integrators.method import Method
-from bilayer_core.integrators.register import INTEGRATORS
 
 HISTORY = [name for name, method in INTEGRATORS.items() if method.history is not None]
 SECOND_ORDER = [name for name, method in INTEGRATORS.items() if method.order == 2]

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from evaluations import at_rest
-from sample_scenes import ball, contact, layer, rod, scene
+from support.evaluations import at_rest
+from support.sample_scenes import ball, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.section import bond, rectangle
 
 ELASTIC = ("stretching", "bending", "twisting", "bond")

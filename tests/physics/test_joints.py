@@ -5,13 +5,13 @@ import re
 import numpy as np
 import pytest
 import yaml
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
 from bilayer_core.errors import SceneError
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.validate.joints import layers_of, swinging
+from bilayer_core.verification.validate.joints import layers_of, swinging
 
 MODELS, GRAVITY = ["laminate", "two_rod"], [0, 0, -9.81]
 STEPS = {"integrator": "sdirk2", "dt": 5e-4}

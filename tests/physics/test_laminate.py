@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-from evaluations import dense
-from sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, scene
+from support.evaluations import dense
+from support.sample_scenes import GEL, GROUND, contact, everything, fixed, layer, rod, scene
 
 import bilayer_core.model.laminate as laminate
 from bilayer_core import Simulator, load_scene
-from bilayer_core.beam2d.scene import beam_of, set_stimuli
 from bilayer_core.engine.evaluator import Evaluator
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.contact_points import start_contact_points
 from bilayer_core.model.plan import make_plan, simplest_model
 from bilayer_core.simulation.surroundings import Surroundings
-from bilayer_core.validate.bending import PAIRS, THICKNESS, strip
-from bilayer_core.validate.references import timoshenko
+from bilayer_core.verification.beam2d.scene import beam_of, set_stimuli
+from bilayer_core.verification.validate.bending import PAIRS, THICKNESS, strip
+from bilayer_core.verification.validate.closed_forms import timoshenko
 
 ELASTIC = ("stretching", "bending", "twisting")
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1}}}

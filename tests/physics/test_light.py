@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from sample_scenes import layer, rod, scene
+from support.sample_scenes import layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.model.build import build_model
-from bilayer_core.model.lit import light_of, part_seen
-from bilayer_core.model.shapes import obstacle_pose, shape_of, signed_distance
-from bilayer_core.validate.light import CURVATURE, GAIN, LENGTH, SMALL, lit_strip
+from bilayer_core.model.build_model import build_model
+from bilayer_core.model.lit_elements import light_of, part_seen
+from bilayer_core.model.shape_numbers import obstacle_pose, shape_of, signed_distance
+from bilayer_core.verification.validate.light import CURVATURE, GAIN, LENGTH, SMALL, lit_strip
 
 
 def seen_at_start(content, model="laminate"):

@@ -4,16 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from crowded_scenes import crowded_simulator
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from support.crowded_scenes import crowded_simulator
+from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.model.friction import OF_SCENE
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.model.set_friction import OF_SCENE
 from bilayer_core.observed.inputs import FRICTION, Input
-from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.runs.replay import branch, verify
-from bilayer_core.validate.friction import FAR, GRAVITY, MASS, SIZE, at_rest, block
+from bilayer_core.verification.validate.friction import FAR, GRAVITY, MASS, SIZE, at_rest, block
 
 SLOPE = 0.3  # tan α
 ALPHA = math.atan(SLOPE)

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError

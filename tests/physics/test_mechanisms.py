@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from evaluations import Problem, check
-from sample_scenes import fixed, layer, rod, scene
+from support.evaluations import Problem, check
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.forces.mechanisms import limit_energy
-from bilayer_core.validate.mechanisms import ARM, GRAVITY, MASS, pendulum, rigid
+from bilayer_core.verification.validate.mechanisms import ARM, GRAVITY, MASS, pendulum, rigid
 
 AXES = {"axis": [0.6, 0.0, 0.8], "second_axis": [0.0, 1.0, 0.0]}
 KEYS = {

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from meeting_rods import CASES, D_HAT, Rods, folded_rod, model_of
-from sample_scenes import layer, rod
+from support.meeting_rods import CASES, D_HAT, Rods, folded_rod, model_of
+from support.sample_scenes import layer, rod
 
 from bilayer_core.contact.rod_bound import FAR
 from bilayer_core.contact.step_bound import KEPT_FRACTION

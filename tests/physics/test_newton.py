@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.engine.modes import SETTLE
+from bilayer_core.engine.request_modes import SETTLE
 from bilayer_core.model.records.status import CONVERGED, MAX_ITERATIONS
 
 INERTIA_OVER = 0.01

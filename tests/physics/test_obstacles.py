@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
+from support.sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SimulationError

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from evaluations import undriven
 from oracles import discrete_rod
-from sample_scenes import layer, rod, scene
+from support.evaluations import undriven
+from support.sample_scenes import layer, rod, scene
 
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
@@ -15,7 +15,7 @@ from bilayer_core.engine.linear.band import backward_band, eliminate_band, facto
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 from bilayer_core.kinematics.vector import angle
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.state import initial_state
 from bilayer_core.scene.loader import load_scene
 

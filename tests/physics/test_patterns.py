@@ -4,10 +4,10 @@ import copy
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.log.run.memory import MemoryRecorder
 from bilayer_core.view.geometry import ribbon_vertices
 
 BOTH = [("laminate", 2), ("laminate", 3), ("two_rod", 2), ("two_rod", 3)]

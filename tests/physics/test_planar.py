@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from planar_scenes import AHEAD, everything_in_plane, mechanism, snap
-from sample_scenes import PAPER, fixed, layer, rod, scene
+from support.planar_scenes import AHEAD, everything_in_plane, mechanism, snap
+from support.sample_scenes import PAPER, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.integrators.register import INTEGRATORS
+from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.model.plan import MODELS
 
 SAME = 1e-8

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from evaluations import HESSIAN_LIMIT, Problem, check
-from planar_scenes import AHEAD, HUBS, everything_in_plane, touching_rods
+from support.evaluations import HESSIAN_LIMIT, Problem, check
+from support.planar_scenes import AHEAD, HUBS, everything_in_plane, touching_rods
 
 from bilayer_core.model.force_list import FORCES
 from bilayer_core.model.plan import MODELS

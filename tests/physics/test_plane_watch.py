@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from planar_scenes import snap
-from sample_scenes import GROUND, contact, layer, rod, scene
+from support.planar_scenes import snap
+from support.sample_scenes import GROUND, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.model.plan import MODELS
 from bilayer_core.simulation.plane_watch import FIRST_LOOK, MOST_STEPS, turning_rate
-from bilayer_core.validate.plane import blade
+from bilayer_core.verification.validate.plane import blade
 
 STIFF = contact(1e-4, 0.3) | {"stiffness": 1e8}
 """Else the ends of what jumps come down faster than the barrier can hold."""

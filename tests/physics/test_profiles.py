@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from sample_scenes import GEL, fixed, layer, rod, scene
 from scipy.integrate import quad
+from support.sample_scenes import GEL, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.validity import validity_warnings
-from bilayer_core.validate.profiles import LENGTH, between, linear
+from bilayer_core.verification.validate.profiles import LENGTH, between, linear
 
 
 def test_a_bilayer_of_varying_thickness_starts_without_stress_and_stays():

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from sample_scenes import everything
+from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.runs.replay import verify
 
 CORNERS = (0.0, 0.04, 0.1, 0.16, 0.2)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from sample_scenes import everything, layer, rod, scene
+from support.sample_scenes import everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.validate.reactions import cantilever, load_of_nodes
+from bilayer_core.verification.validate.reactions import cantilever, load_of_nodes
 
 MODELS = ["laminate", "two_rod"]
 

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError

@@ -8,14 +8,14 @@ import sys
 
 import numpy as np
 import pytest
-from crowded_scenes import COMBINATIONS, DT, DURATION, OUTPUT_RATE, crowded, crowded_simulator
-from moving_scenes import driven, part
-from processes import TIMEOUT, environment
-from repeats import assert_goes_on, differences, figures, follow
+from support.crowded_scenes import COMBINATIONS, DT, DURATION, OUTPUT_RATE, crowded, crowded_simulator
+from support.moving_scenes import driven, part
+from support.processes import TIMEOUT, environment
+from support.repeats import assert_goes_on, differences, figures, follow
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.energy_account import ENERGY, LOWEST, OPEN
-from bilayer_core.record.state_file import read_saved_state, write_state
+from bilayer_core.log.run.state_file import read_saved_state, write_state
 from bilayer_core.scene.bundled import bundled_scenes
 
 QUICK = COMBINATIONS[::7]
@@ -131,7 +131,7 @@ def test_a_state_file_holds_the_bits_of_a_state(tmp_path):
 PROGRAM = """
 import hashlib, json, sys
 import numpy as np
-from crowded_scenes import COMBINATIONS, DT, crowded_simulator
+from support.crowded_scenes import COMBINATIONS, DT, crowded_simulator
 from bilayer_core import Simulator, load_scene
 from bilayer_core.scene.bundled import bundled_scenes
 

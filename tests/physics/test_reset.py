@@ -4,8 +4,8 @@ import copy
 
 import numpy as np
 import pytest
-from repeats import differences, figures
-from sample_scenes import everything
+from support.repeats import differences, figures
+from support.sample_scenes import everything
 
 from bilayer_core import Recorder, Simulator, load_scene
 from bilayer_core.errors import InputError

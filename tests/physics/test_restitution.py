@@ -4,16 +4,16 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
+from support.sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.contact.barrier import barrier
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.errors import SceneError
 from bilayer_core.forces.restitution import damping_of, integral_of_barrier
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.state import initial_state
-from bilayer_core.validate.impacts import rebound, thrown
+from bilayer_core.verification.validate.impacts import rebound, thrown
 
 
 def speed_after(content, seconds, **steps):

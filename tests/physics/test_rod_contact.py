@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from evaluations import Problem
-from meeting_rods import CASES, D_HAT, Rods, model_of, parallel_rods
-from sample_scenes import contact, layer, rod, scene
-from slips import dissipation
+from support.evaluations import Problem
+from support.meeting_rods import CASES, D_HAT, Rods, model_of, parallel_rods
+from support.sample_scenes import contact, layer, rod, scene
+from support.slips import dissipation
 
 from bilayer_core.kinematics.rotation import rotation_matrix
 

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from sample_scenes import everything
+from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene, read_log
 from bilayer_core.errors import InputError
 from bilayer_core.runs.replay import verify
-from bilayer_core.simulation.result import Termination
+from bilayer_core.simulation.run_result import Termination
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from sample_scenes import HALF_SIZES
+from support.sample_scenes import HALF_SIZES
 
 from bilayer_core.contact.shapes import shape_curvature, shape_distance
-from bilayer_core.model.shapes import NUMBER, Shape, axis_frame, signed_distance
+from bilayer_core.model.shape_numbers import NUMBER, Shape, axis_frame, signed_distance
 
 
 def surface_cloud(kind, rng, count=200_000):

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 import yaml
-from sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
+from support.sample_scenes import GROUND, PAPER, contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.newton import SETTLED_WITHIN
 from bilayer_core.errors import InputError, PenetrationError, SceneError, SimulationError
-from bilayer_core.simulation.result import Termination
+from bilayer_core.simulation.run_result import Termination
 
 
 class Recorder:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from slips import dissipation
+from support.slips import dissipation
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.forces.friction_limit import PASSED, PATH_SIZE, friction_limit

@@ -1,10 +1,10 @@
-"""Equilibria found without marching in time; those with a known answer are in `bilayer_core.validate`."""
+"""Equilibria found without marching in time; those with a known answer are in `bilayer_core.verification.validate`."""
 
 import math
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, PAPER, contact, fixed, layer, rod, scene
+from support.sample_scenes import GROUND, PAPER, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError

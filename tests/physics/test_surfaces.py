@@ -2,21 +2,21 @@
 
 import numpy as np
 import pytest
-from evaluations import at_rest
-from records_by_hand import record_of
-from sample_scenes import HALF_SIZES, contact, layer, rod, scene
+from support.evaluations import at_rest
+from support.records_by_hand import record_of
+from support.sample_scenes import HALF_SIZES, contact, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.contact.near import gap_normal, list_near
 from bilayer_core.contact.step_bound import KEPT_FRACTION, motion_of_points, step_bound
 from bilayer_core.jit import kernel, record_at
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.records.contacts import RodPoints, Surfaces
 from bilayer_core.model.records.parts import Bodies, Strands
 from bilayer_core.model.records.problem import System
 from bilayer_core.model.records.step import Configuration
-from bilayer_core.model.shapes import NUMBER
+from bilayer_core.model.shape_numbers import NUMBER
 from bilayer_core.model.state import initial_state
 
 surfaces_at, strands_at, bodies_at = record_at(Surfaces), record_at(Strands), record_at(Bodies)

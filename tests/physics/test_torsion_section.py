@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from oracles.strip_elasticity import section_torsion
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.model.torsion_section import bond_torsion, rectangle_torsion

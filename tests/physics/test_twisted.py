@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from oracles.strip_elasticity import clamped_twist
-from sample_scenes import GEL, fixed, layer, rod, scene
+from support.sample_scenes import GEL, fixed, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.model.plan import make_plan
 from bilayer_core.model.twisted import HELIX, TwistedRod, helix_error
-from bilayer_core.validate.references import bonded_helix, strip_torsion
+from bilayer_core.verification.validate.closed_forms import bonded_helix, strip_torsion
 
 CRANK = {"name": "crank", "position": [0.1, 0, 0], "motion": {"type": "prescribed"}}
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sample_scenes import everything
+from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, UnknownName

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from sample_scenes import GEL, everything, fixed, layer, rod, scene
+from support.sample_scenes import GEL, everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.model.plan import make_plan
-from bilayer_core.validate.motion import let_go
-from bilayer_core.validate.viscosity import gel
+from bilayer_core.verification.validate.motion import let_go
+from bilayer_core.verification.validate.viscosity import gel
 
 MODELS = [("laminate", 2), ("laminate", 3), ("two_rod", 2), ("two_rod", 3)]
 METHODS = ["implicit_euler", "sdirk2", "tr_bdf2", "generalised_alpha"]

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from sample_scenes import GROUND, ball, contact, layer, rod, scene
+from support.sample_scenes import GROUND, ball, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.validate.contacts import upright
+from bilayer_core.verification.validate.contacts import upright
 
 
 def test_a_strip_falls_beyond_the_slope_on_which_its_border_holds_it():

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from budgets import EXACT, clamped, driven, extrapolated, moving, run
-from sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
+from support.budgets import EXACT, clamped, driven, extrapolated, moving, run
+from support.sample_scenes import GROUND, ball, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.simulation.edge_space import PARTS
 from bilayer_core.simulation.energy_budget import BARRIERS
-from bilayer_core.simulation.motion import PARTS
 
 
 def bouncing():

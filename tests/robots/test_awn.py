@@ -6,7 +6,7 @@ import pytest
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, rotation_vector
 from bilayer_core.model.twisted import helix_error
-from bilayer_core.validate.helix import screw
+from bilayer_core.verification.validate.helix import screw
 
 
 def turns_of_the_seed(simulator):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from paper import TWO_RODS
-from strides import DAMPED, strides
+from support.paper import TWO_RODS
+from support.strides import DAMPED, strides
 
 from bilayer_core import Simulator, load_scene
 

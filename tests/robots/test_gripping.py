@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from paper import TWO_RODS
+from support.paper import TWO_RODS
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.memory import MemoryRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.memory import MemoryRecorder
 
 pytestmark = pytest.mark.slow
 

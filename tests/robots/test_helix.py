@@ -3,8 +3,8 @@
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.validate.helix import screw
-from bilayer_core.validate.references import bonded_helix
+from bilayer_core.verification.validate.closed_forms import bonded_helix
+from bilayer_core.verification.validate.helix import screw
 
 
 @pytest.mark.slow

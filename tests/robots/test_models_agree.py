@@ -1,8 +1,8 @@
 """The paper's robots as laminates do what they do as pairs of bonded rods."""
 
 import pytest
-from paper import PAPERS, TWO_RODS
-from strides import strides
+from support.paper import PAPERS, TWO_RODS
+from support.strides import strides
 
 from bilayer_core import Simulator, load_scene
 

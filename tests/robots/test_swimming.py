@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from paper import TWO_RODS
+from support.paper import TWO_RODS
 
 from bilayer_core import Simulator, load_scene
 

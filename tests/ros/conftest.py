@@ -8,11 +8,11 @@ import time
 
 import pytest
 import rclpy
-from processes import claimed_domain
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
+from support.processes import claimed_domain
 
 NODE = "/bilayer_sim"
 # Longest wait for anything that needs discovery or a first compilation [s].

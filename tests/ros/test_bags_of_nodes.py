@@ -5,12 +5,12 @@ import time
 
 import numpy as np
 import pytest
-from bags import write_bag
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from support.bags import write_bag
 
 from bilayer_core import read_log
 from bilayer_core.cli import main
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.log.run.log_reader import read_info
 from bilayer_sim_ros.node.message_types import message_class
 
 PARAMETERS = {"scene": "bending", "start_paused": True, "rate": 50.0}

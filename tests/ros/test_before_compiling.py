@@ -12,7 +12,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_core.log.run.log_reader import read_info, read_log
 from bilayer_sim_ros.node import simulation_run
 from bilayer_sim_ros.simulation_node import SimulationNode
 

@@ -5,11 +5,11 @@ import random
 
 import numpy as np
 import pytest
-from acted_scenes import pushed
+from support.acted_scenes import pushed
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.observed.inputs import STIMULUS
-from bilayer_core.record.mcap_log import McapRecorder
 from bilayer_core.runs.replay import verify
 from bilayer_sim_ros.control.control_ticks import Control
 from bilayer_sim_ros.control.pending_changes import Commands

@@ -7,10 +7,10 @@ import subprocess
 import sys
 
 import pytest
-from logged_commands import stimuli_taken
 from rosgraph_msgs.msg import Clock
+from support.logged_commands import stimuli_taken
 
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.log.run.log_reader import read_info
 from bilayer_sim_ros.publishing.conversions import to_seconds
 
 PERIOD = 0.02

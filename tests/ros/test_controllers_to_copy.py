@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import yaml
 from geometry_msgs.msg import PointStamped
-from logged_commands import stimuli_taken
 from std_msgs.msg import Float64MultiArray
+from support.logged_commands import stimuli_taken
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.topics import output_topics
+from bilayer_core.log.messages.topics import output_topics
+from bilayer_core.log.run.log_reader import read_log
 from bilayer_sim_ros.controllers.gait_controller import wave
 
 CONTROLLERS = ("ramp_controller", "gait_controller", "goal_controller")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_core.log.run.log_reader import read_info, read_log
 from bilayer_sim_ros.demo import BALL, CHANNEL, RAMP_DURATION, SCENE
 
 ROUNDING = 1e-7

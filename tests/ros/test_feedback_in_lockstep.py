@@ -9,13 +9,13 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from acted_scenes import TWO_CHANNELS
-from logged_commands import stimuli_taken
 from rosgraph_msgs.msg import Clock
+from support.acted_scenes import TWO_CHANNELS
+from support.logged_commands import stimuli_taken
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.log_reader import read_messages
-from bilayer_core.record.topics import INPUTS
+from bilayer_core.log.messages.topics import INPUTS
+from bilayer_core.log.run.log_reader import read_messages
 from bilayer_sim_ros.control.control_ticks import Control
 from bilayer_sim_ros.control.pacing import Pacer
 from bilayer_sim_ros.control.pending_changes import Commands

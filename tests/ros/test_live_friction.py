@@ -10,11 +10,11 @@ from rclpy.parameter import Parameter
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_core.log.run.log_reader import read_info, read_log
 from bilayer_core.runs.replay import verify
 from bilayer_core.scene.loader import scene_text
-from bilayer_core.validate.friction import FAR, GRAVITY, SIZE, at_rest, block
-from bilayer_core.validate.parts import GROUND, contact, fixed, layer, rod, scene
+from bilayer_core.verification.validate.friction import FAR, GRAVITY, SIZE, at_rest, block
+from bilayer_core.verification.validate.parts import GROUND, contact, fixed, layer, rod, scene
 from bilayer_sim_ros.control.pending_changes import Commands
 from bilayer_sim_ros.node.live_friction import LiveFriction, friction_overrides
 from bilayer_sim_ros.node.parameters import FRICTION, FRICTION_OF_SCENE

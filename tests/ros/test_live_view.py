@@ -6,14 +6,14 @@ import time
 
 import psutil
 import pytest
-import recordings
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PointStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
+from support import recordings
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.description_text import from_json
+from bilayer_core.log.messages.description_text import from_json
 from bilayer_sim_ros.publishing.conversions import to_seconds
 
 SERVED = {"scene": "bending", "rerun": "serve"}

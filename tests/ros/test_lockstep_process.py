@@ -8,15 +8,15 @@ import time
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from logged_commands import stimuli_taken
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
+from support.logged_commands import stimuli_taken
 
 from bilayer_core.jit.compile_all import compile_all, is_complete
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.log.run.log_reader import read_info
 from bilayer_sim_ros.publishing.conversions import to_seconds
 
 CHANNEL = "/bilayer_sim/stimulus/swelling"

@@ -10,10 +10,10 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.log.messages.encoders import decode_input
+from bilayer_core.log.messages.topics import INPUTS
+from bilayer_core.log.run.log_reader import read_log, read_messages
 from bilayer_core.observed.inputs import POSE
-from bilayer_core.record.encoders import decode_input
-from bilayer_core.record.log_reader import read_log, read_messages
-from bilayer_core.record.topics import INPUTS
 from bilayer_core.runs.replay import verify
 from bilayer_sim_ros.publishing.conversions import to_seconds
 

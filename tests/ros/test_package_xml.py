@@ -47,7 +47,7 @@ def imported(folder):
 
 def test_the_ros_packages_that_are_imported_are_those_of_package_xml(root, declared, requirements):
     of_python = {"yaml" if name == "pyyaml" else name for name in requirements}
-    topics = (root / "bilayer_core" / "record" / "topics.py").read_text()
+    topics = (root / "bilayer_core" / "log" / "messages" / "topics.py").read_text()
     published = set(re.findall(r"(\w+)/msg/\w", topics))  # these are imported by name
     needed = (imported(root / "bilayer_sim_ros") | published) - of_python - OPTIONAL
     named = {name for name in declared["depend"] | declared["exec_depend"] if not name.startswith("python3-")}

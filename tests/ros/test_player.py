@@ -6,10 +6,10 @@ import tracemalloc
 from contextlib import suppress
 
 import pytest
-from written_logs import LATCHED, damage, number, value_of, write_log
+from support.written_logs import LATCHED, damage, number, value_of, write_log
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.indexed_log import IndexedLog
+from bilayer_core.log.file.indexed_log import IndexedLog
 from bilayer_sim_ros.replay.player import Playback, Player
 
 FAST = 1e6

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
-from bilayer_core.record.log_reader import read_log
+from bilayer_core.log.run.log_reader import read_log
 from bilayer_sim_ros.controllers.ramp_controller import FINAL_MESSAGES, RampController, ramp
 
 DURATION = 1.0

@@ -4,19 +4,18 @@ import signal
 
 import numpy as np
 import pytest
-import recordings
-import synthetic_run
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
+from support import recordings, synthetic_run
+from support.written_logs import number, write_log
 from visualization_msgs.msg import Marker, MarkerArray
-from written_logs import number, write_log
 
-from bilayer_core.record.description_text import from_json
-from bilayer_core.record.log_reader import read_description
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.description_text import from_json
+from bilayer_core.log.run.log_reader import read_description
 
 NODE = "/bilayer_replay"
 EPOCH = 1_764_000_000.0

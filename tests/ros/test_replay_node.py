@@ -10,19 +10,19 @@ from functools import partial
 
 import numpy as np
 import pytest
-import synthetic_run
-from processes import bilayer, command, environment
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
-from written_logs import LATCHED, number, value_of, write_log
+from support import synthetic_run
+from support.processes import bilayer, command, environment
+from support.written_logs import LATCHED, number, value_of, write_log
 
-from bilayer_core.record.indexed_log import IndexedLog
-from bilayer_core.record.log_reader import read_messages
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.indexed_log import IndexedLog
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.log_reader import read_messages
 from bilayer_sim_ros.node.parameters import REPLAY_NODE
 from bilayer_sim_ros.replay.log_replay import playback_of
 

@@ -6,16 +6,16 @@ import time
 
 import pytest
 import yaml
-from acted_scenes import pushed
 from geometry_msgs.msg import PoseStamped
-from processes import bilayer
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
+from support.acted_scenes import pushed
+from support.processes import bilayer
 
+from bilayer_core.log.messages.encoders import decode_input
+from bilayer_core.log.messages.topics import INPUTS
+from bilayer_core.log.run.log_reader import read_messages
 from bilayer_core.observed.inputs import LOAD, POSE, RESET, STIMULUS, UNTIL
-from bilayer_core.record.encoders import decode_input
-from bilayer_core.record.log_reader import read_messages
-from bilayer_core.record.topics import INPUTS
 
 NAMESPACE = "/bilayer_sim"
 

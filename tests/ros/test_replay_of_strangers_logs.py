@@ -3,7 +3,7 @@
 import pytest
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Float64
-from written_logs import number, value_of, write_log
+from support.written_logs import number, value_of, write_log
 
 from bilayer_core.errors import InputError
 from bilayer_sim_ros.node.message_types import installed_message_class

@@ -5,7 +5,7 @@ import re
 import subprocess
 import sys
 
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.log.run.log_reader import read_info
 
 
 def test_the_program_of_the_page_composes_two_simulations_that_end_well(root, domain, tmp_path):

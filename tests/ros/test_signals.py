@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.log_reader import read_info
+from bilayer_core.log.run.log_reader import read_info
 
 LIMIT = 120.0
 HEAD = """
@@ -51,7 +51,7 @@ def send():  # to the thread that calls this, not to the one that handles signal
         signal.pthread_kill(threading.get_ident(), number)
 """
 WHILE_CLOSING = """
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 close = McapRecorder.close
 def close_slowly(self, *arguments):
     send(5)

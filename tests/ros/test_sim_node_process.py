@@ -10,7 +10,7 @@ from mcap_ros2.decoder import DecoderFactory
 from rosgraph_msgs.msg import Clock
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.log_reader import read_info, read_log, read_state
+from bilayer_core.log.run.log_reader import read_info, read_log, read_state
 from bilayer_core.runs.replay import verify
 
 FAST = {"scene": "bending", "real_time_factor": 0}

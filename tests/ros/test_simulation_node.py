@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import BilayerError, InputError, SimulationError
-from bilayer_core.record.log_reader import read_info, read_state
+from bilayer_core.log.run.log_reader import read_info, read_state
 from bilayer_sim_ros.simulation_node import SimulationNode
 
 LIMIT = 60.0

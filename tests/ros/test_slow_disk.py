@@ -6,19 +6,19 @@ import threading
 import time
 
 import pytest
-from acted_scenes import pushed
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from slow_disks import Full, Valve
 from std_msgs.msg import Float64
+from support.acted_scenes import pushed
+from support.slow_disks import Full, Valve
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import OutputError
+from bilayer_core.log.file import mcap_log
+from bilayer_core.log.file.mcap_log import QUEUE_LENGTH
+from bilayer_core.log.messages.encoders import decode_input
+from bilayer_core.log.messages.topics import INPUTS
+from bilayer_core.log.run.log_reader import read_info, read_log, read_messages
 from bilayer_core.observed.inputs import STIMULUS
-from bilayer_core.record import mcap_log
-from bilayer_core.record.encoders import decode_input
-from bilayer_core.record.log_reader import read_info, read_log, read_messages
-from bilayer_core.record.mcap_log import QUEUE_LENGTH
-from bilayer_core.record.topics import INPUTS
 from bilayer_core.runs.replay import verify
 from bilayer_core.scene.schedule import Hold
 from bilayer_sim_ros.control.control_ticks import Control

@@ -13,12 +13,12 @@ import time
 import numpy as np
 import psutil
 import pytest
-import soak_clients
 import yaml
-from acted_scenes import pushed
-from processes import environment
+from support import soak_clients
+from support.acted_scenes import pushed
+from support.processes import environment
 
-from bilayer_core.record.log_reader import read_info, read_log
+from bilayer_core.log.run.log_reader import read_info, read_log
 
 SECONDS = float(os.environ.get("SOAK_SECONDS", "12"))
 SAMPLE_PERIOD = 0.25

@@ -2,13 +2,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-import synthetic_run
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from support import synthetic_run
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.indexed_log import IndexedLog
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.indexed_log import IndexedLog
+from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_sim_ros.replay.stored_qos import LARGEST_DEPTH, offered_profile
 
 INFINITE = "{sec: 9223372036, nsec: 854775807}"

@@ -5,10 +5,10 @@ import sys
 from types import ModuleType, SimpleNamespace
 
 import pytest
-import synthetic_run
+from support import synthetic_run
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.encoders import FrameEncoder
+from bilayer_core.log.messages.encoders import FrameEncoder
 from bilayer_sim_ros.publishing.tf_topic import tf_prefix
 from bilayer_sim_ros.publishing.topic_publishers import FramePublisher
 

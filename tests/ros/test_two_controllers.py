@@ -10,9 +10,7 @@ from contextlib import contextmanager, suppress
 
 import pytest
 import rclpy
-from acted_scenes import TWO_CHANNELS
 from mcap.reader import make_reader
-from processes import bilayer
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
@@ -20,6 +18,8 @@ from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
+from support.acted_scenes import TWO_CHANNELS
+from support.processes import bilayer
 
 from bilayer_sim_ros.publishing.conversions import to_seconds
 

@@ -1,12 +1,12 @@
 """Faults of bodies and of what can be touched are refused with their key path and what is allowed."""
 
 import pytest
-from faulty_scenes import changed, faults_of
-from sample_scenes import ball, everything, fixed, layer, rod, scene
+from support.faulty_scenes import changed, faults_of
+from support.sample_scenes import ball, everything, fixed, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.errors import PenetrationError
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 
 BOX = {"shape": "box", "size": [0.01, 0.02, 0.03]}
 

@@ -2,8 +2,8 @@
 
 import pytest
 import yaml
-from faulty_scenes import DELETE, changed, faults_of
-from sample_scenes import everything, layer, rod, scene
+from support.faulty_scenes import DELETE, changed, faults_of
+from support.sample_scenes import everything, layer, rod, scene
 
 from bilayer_core import load_scene
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from sample_scenes import layer, rod, scene
+from support.sample_scenes import layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.validity import validity_warnings
 from bilayer_core.scene.eigenstrain import LAWS
 from bilayer_core.scene.loader import parse_scene, scene_text

@@ -17,7 +17,7 @@ from bilayer_core.errors import SceneError
 from bilayer_core.scene.faults import MOST_FAULTS
 from bilayer_core.scene.limits import DEEPEST, LARGEST_FILE, MOST_COPIES, MOST_NODES, MOST_VALUES
 from bilayer_core.scene.text import read_yaml
-from bilayer_core.validate.parts import layer, rod, scene
+from bilayer_core.verification.validate.parts import layer, rod, scene
 
 BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
     f"{name}: &{name} [{', '.join(['*' + last] * 9)}]\n" for last, name in zip("abcdefghi", "bcdefghij", strict=True)
@@ -225,7 +225,7 @@ def test_as_many_nodes_as_are_allowed_are_built_in_time_and_memory():
     code = (
         "import resource, sys\n"
         "from bilayer_core import Simulator, load_scene\n"
-        "from bilayer_core.validate.parts import layer, rod, scene\n"
+        "from bilayer_core.verification.validate.parts import layer, rod, scene\n"
         "strip = rod([layer('a'), layer('b')], length=1e4, stations=100_000)\n"
         "Simulator(load_scene(scene([strip])), model='two_rod')\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"

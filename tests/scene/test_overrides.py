@@ -1,5 +1,5 @@
 import pytest
-from sample_scenes import everything
+from support.sample_scenes import everything
 
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 import yaml
-from documents import blocks
-from sample_scenes import fixed, layer, rod, scene
+from support.documents import blocks
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sample_scenes import contact, fixed, layer, rod, scene
+from support.sample_scenes import contact, fixed, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.cli import main

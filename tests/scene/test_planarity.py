@@ -1,8 +1,8 @@
 """Which scenes stay in a plane, and what is said of those that do not."""
 
 import pytest
-from planar_scenes import FREE
-from sample_scenes import contact, layer, rod, scene
+from support.planar_scenes import FREE
+from support.sample_scenes import contact, layer, rod, scene
 
 from bilayer_core.errors import SceneError
 from bilayer_core.model.plan import best_dimension, make_plan

@@ -3,7 +3,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sample_scenes import everything, layer, rod, scene
+from support.sample_scenes import everything, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError

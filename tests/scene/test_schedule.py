@@ -1,7 +1,7 @@
 import pytest
 import yaml
 from pydantic import TypeAdapter
-from sample_scenes import everything
+from support.sample_scenes import everything
 
 from bilayer_core import load_scene
 from bilayer_core.errors import SceneError

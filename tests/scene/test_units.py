@@ -2,8 +2,8 @@ from typing import Annotated
 
 import numpy as np
 import pytest
-from processes import python
 from pydantic import TypeAdapter, ValidationError
+from support.processes import python
 
 from bilayer_core.scene import units
 from bilayer_core.scene.units import parse_quantity

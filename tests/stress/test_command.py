@@ -10,13 +10,13 @@ import pytest
 
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.stress import pool
-from bilayer_core.stress.case import Outcome, Record, StressCase
-from bilayer_core.stress.journal import Journal
-from bilayer_core.stress.parameters import Parameters
-from bilayer_core.stress.pool import run_cases
-from bilayer_core.stress.robots import scene_of
-from bilayer_core.stress.shrink import shrink
+from bilayer_core.verification.stress import pool
+from bilayer_core.verification.stress.journal import Journal
+from bilayer_core.verification.stress.parameters import Parameters
+from bilayer_core.verification.stress.pool import run_cases
+from bilayer_core.verification.stress.robots import scene_of
+from bilayer_core.verification.stress.shrink import shrink
+from bilayer_core.verification.stress.stress_case import Outcome, Record, StressCase
 
 ONE = "restitution/0.5/ball/laminate"
 
@@ -87,7 +87,7 @@ def dies(trial):
 
 
 def fine(trial):
-    from bilayer_core.stress.case import Decision
+    from bilayer_core.verification.stress.stress_case import Decision
 
     return Decision("nothing", 1.0, 0.0, 2.0)
 
@@ -119,7 +119,7 @@ def test_a_failure_is_made_smaller_and_runs_again(tmp_path):
 
 
 def is_stiff(limit, trial):
-    from bilayer_core.stress.case import Decision
+    from bilayer_core.verification.stress.stress_case import Decision
 
     stiffness = trial.simulator.scene.materials["lower"].youngs_modulus
     return Decision("stiff: too much", stiffness, 0.0, limit)

@@ -7,13 +7,13 @@ import pytest
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.stress import judge as judging
-from bilayer_core.stress.case import Decision, Outcome, Record, StressCase
-from bilayer_core.stress.execute import execute
-from bilayer_core.stress.judge import Judge, Verdict
-from bilayer_core.stress.parameters import Parameters
-from bilayer_core.stress.robots import scene_of
-from bilayer_core.validate.parts import layer, rod, scene
+from bilayer_core.testing import judge as judging
+from bilayer_core.testing.judge import Judge, Verdict
+from bilayer_core.verification.stress.execute_case import execute
+from bilayer_core.verification.stress.parameters import Parameters
+from bilayer_core.verification.stress.robots import scene_of
+from bilayer_core.verification.stress.stress_case import Decision, Outcome, Record, StressCase
+from bilayer_core.verification.validate.parts import layer, rod, scene
 
 
 def case_of(most_steps=2000, outside=(), decide=None, compared=True, **changes):

@@ -8,9 +8,9 @@ import pytest
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.stress.gaps import GapCheck, PairsOfEdges, from_segment
-from bilayer_core.stress.matrix import matrix
-from bilayer_core.stress.robots import scene_of
+from bilayer_core.testing.gaps import GapCheck, PairsOfEdges, from_segment
+from bilayer_core.verification.stress.matrix import matrix
+from bilayer_core.verification.stress.robots import scene_of
 
 
 def simulator_of(name):

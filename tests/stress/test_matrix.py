@@ -6,11 +6,11 @@ import pickle
 import pytest
 
 from bilayer_core.scene.loader import load_scene
-from bilayer_core.stress.cases import QUICK, all_cases, quick_names
-from bilayer_core.stress.matrix import SEED, matrix
-from bilayer_core.stress.parameters import CHOICES, RANGES, ROBOTS, Parameters
-from bilayer_core.stress.region import outside
-from bilayer_core.stress.robots import scene_of
+from bilayer_core.verification.stress.all_cases import QUICK, all_cases, quick_names
+from bilayer_core.verification.stress.matrix import SEED, matrix
+from bilayer_core.verification.stress.parameters import CHOICES, RANGES, ROBOTS, Parameters
+from bilayer_core.verification.stress.region import outside
+from bilayer_core.verification.stress.robots import scene_of
 
 DECIDED = "77873c1528cca557"
 """Of names and reasons. Whoever changes the region or the sample to have better results changes this line."""

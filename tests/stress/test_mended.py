@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from bilayer_core.stress.case import Outcome
-from bilayer_core.stress.cases import all_cases
-from bilayer_core.stress.execute import execute
+from bilayer_core.verification.stress.all_cases import all_cases
+from bilayer_core.verification.stress.execute_case import execute
+from bilayer_core.verification.stress.stress_case import Outcome
 
 MENDED = {
     "all/0010": "a step of a strip that a moving body meets made more energy than the run had",

@@ -11,14 +11,14 @@ from scipy.spatial.transform import Rotation
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.scene.bundled import bundled_scenes
-from bilayer_core.stress.case import Outcome, StressCase
-from bilayer_core.stress.execute import execute
-from bilayer_core.stress.kirchhoff import cantilever, loaded_tip
-from bilayer_core.stress.ladder import content_of, torture_scenes
-from bilayer_core.stress.linking import gauss_integral, longer, twist
-from bilayer_core.stress.torture import NOT_EXPRESSIBLE, TORTURES, torture_cases
-from bilayer_core.stress.torture_twist import critical_torque, ply
-from bilayer_core.validate.references import end_loaded_cantilever
+from bilayer_core.verification.stress.execute_case import execute
+from bilayer_core.verification.stress.kirchhoff import cantilever, loaded_tip
+from bilayer_core.verification.stress.ladder import content_of, torture_scenes
+from bilayer_core.verification.stress.linking import gauss_integral, longer, twist
+from bilayer_core.verification.stress.stress_case import Outcome, StressCase
+from bilayer_core.verification.stress.torture import NOT_EXPRESSIBLE, TORTURES, torture_cases
+from bilayer_core.verification.stress.torture_twist import critical_torque, ply
+from bilayer_core.verification.validate.closed_forms import end_loaded_cantilever
 
 X = np.array([1.0, 0.0, 0.0])
 SLOW = {7, 8, 16, 17, 18, 21, 22}

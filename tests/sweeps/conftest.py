@@ -3,7 +3,7 @@
 import copy
 
 import pytest
-from sweep_programs import STRIP, address_in, dask, end, start_scheduler
+from support.sweep_programs import STRIP, address_in, dask, end, start_scheduler
 
 
 @pytest.fixture

@@ -9,13 +9,13 @@ import pytest
 from bilayer_core import Recorder, Simulator, load_scene
 from bilayer_core.scene.bundled import bundled_sweeps
 from bilayer_core.scene.loader import load_content, scene_content
-from bilayer_core.sweeps.code import load
-from bilayer_core.sweeps.execute import execute, scene_of
-from bilayer_core.sweeps.job import Outcome, Point
-from bilayer_core.sweeps.metrics import FinishedRun
-from bilayer_core.sweeps.optimise import CONFIRMED, finer_job, start_of
-from bilayer_core.sweeps.run import read_sweep
-from bilayer_core.validate.references import timoshenko
+from bilayer_core.studies.sweeps.execute_runs import execute, scene_of
+from bilayer_core.studies.sweeps.job import Outcome, Point
+from bilayer_core.studies.sweeps.metrics import FinishedRun
+from bilayer_core.studies.sweeps.optimise import CONFIRMED, finer_job, start_of
+from bilayer_core.studies.sweeps.run_sweep import read_sweep
+from bilayer_core.studies.sweeps.sweep_functions import load
+from bilayer_core.verification.validate.closed_forms import timoshenko
 
 ROUNDING = 1e-5
 """To which the walker's scene file gives lengths [m] and directions."""

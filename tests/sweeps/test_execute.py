@@ -5,9 +5,9 @@ import json
 import pytest
 
 from bilayer_core import Simulator, load_scene, read_log
-from bilayer_core.sweeps.execute import execute, simulator_of
-from bilayer_core.sweeps.job import Outcome, Row
-from bilayer_core.sweeps.run import read_sweep
+from bilayer_core.studies.sweeps.execute_runs import execute, simulator_of
+from bilayer_core.studies.sweeps.job import Outcome, Row
+from bilayer_core.studies.sweeps.run_sweep import read_sweep
 
 GAIN = "rods.strip.layers.active.eigenstrain.gain"
 

@@ -1,10 +1,10 @@
 """Workers of a cluster that come during a sweep."""
 
 import pytest
-from sweep_programs import address_in, dask, end, start_scheduler
+from support.sweep_programs import address_in, dask, end, start_scheduler
 
 from bilayer_core.errors import InputError
-from bilayer_core.sweeps.run import sweep
+from bilayer_core.studies.sweeps.run_sweep import sweep
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ class Enough(Exception):
 
 @pytest.mark.slow
 def test_a_worker_that_comes_later_takes_runs(strip, small, monkeypatch):
-    monkeypatch.setattr("bilayer_core.sweeps.engine.COUNT_TIME", 0.5)
+    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.COUNT_TIME", 0.5)
     address, start = small
     took = set()
     from distributed import Client
@@ -54,7 +54,7 @@ def test_a_worker_that_comes_later_takes_runs(strip, small, monkeypatch):
 
 @pytest.mark.slow
 def test_a_worker_with_another_version_that_comes_later_ends_the_sweep_by_name(strip, small, monkeypatch):
-    monkeypatch.setattr("bilayer_core.sweeps.engine.COUNT_TIME", 0.5)
+    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.COUNT_TIME", 0.5)
     address, start = small
 
     def look(row):

@@ -7,8 +7,8 @@ import sys
 import pytest
 
 from bilayer_core.errors import InputError, OutputError
-from bilayer_core.sweeps.job import Outcome, Row
-from bilayer_core.sweeps.journal import FILE, SCHEMA, Journal
+from bilayer_core.studies.sweeps.job import Outcome, Row
+from bilayer_core.studies.sweeps.journal import FILE, SCHEMA, Journal
 
 CONTENT = {"scene": "bending", "parameters": {"gain": {"values": [1, 2]}}, "design": "grid"}
 
@@ -83,8 +83,8 @@ def test_a_damaged_journal_is_named(tmp_path, content):
 def test_rows_of_before_survive_a_program_that_is_killed(tmp_path):
     program = (
         "import os, signal, sys; from pathlib import Path\n"
-        "from bilayer_core.sweeps.journal import Journal\n"
-        "from bilayer_core.sweeps.job import Row\n"
+        "from bilayer_core.studies.sweeps.journal import Journal\n"
+        "from bilayer_core.studies.sweeps.job import Row\n"
         f"journal = Journal(Path(sys.argv[1]), {CONTENT!r})\n"
         "for k in range(100):\n"
         "    journal.add([Row(k, f'key{k}', {}, '', '')])\n"

@@ -2,14 +2,14 @@
 
 import pytest
 import yaml
-from sweep_programs import STRIP
+from support.sweep_programs import STRIP
 
 from bilayer_core import load_scene, optimise
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.sweeps.journal import Journal
-from bilayer_core.sweeps.optimise import Search, finer_job
-from bilayer_core.sweeps.run import read_sweep
+from bilayer_core.studies.sweeps.journal import Journal
+from bilayer_core.studies.sweeps.optimise import Search, finer_job
+from bilayer_core.studies.sweeps.run_sweep import read_sweep
 
 RANGES = {
     "gain": {"path": "rods.strip.layers.active.eigenstrain.gain", "from": "0.5 %", "to": "2 %", "start": "1 %"},
@@ -26,7 +26,7 @@ def ranges():
 
 def search_in_process(content, metric, trials, functions=None):
     """A search without processes, as `optimise` makes it with one worker."""
-    from bilayer_core.sweeps.execute import execute
+    from bilayer_core.studies.sweeps.execute_runs import execute
 
     read = read_sweep(content, functions=functions)
     search, rows = Search(read, metric, True, 3), []

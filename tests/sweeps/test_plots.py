@@ -5,10 +5,10 @@ import pytest
 
 from bilayer_core import read_results
 from bilayer_core.errors import InputError
-from bilayer_core.sweeps.job import Outcome, Row
-from bilayer_core.sweeps.journal import Journal
-from bilayer_core.sweeps.plots import cell_borders, draw, front
-from bilayer_core.sweeps.result import Columns, SweepResult, write_table
+from bilayer_core.studies.sweeps.job import Outcome, Row
+from bilayer_core.studies.sweeps.journal import Journal
+from bilayer_core.studies.sweeps.plots import cell_borders, draw, front
+from bilayer_core.studies.sweeps.sweep_result import Columns, SweepResult, write_table
 
 
 def result(points, about, metric=lambda **of: sum(of.values())):

@@ -3,9 +3,9 @@
 import pytest
 
 from bilayer_core.errors import InputError
-from bilayer_core.sweeps.design import runs_of
-from bilayer_core.sweeps.run import read_sweep
-from bilayer_core.sweeps.spec import read_spec
+from bilayer_core.studies.sweeps.design import runs_of
+from bilayer_core.studies.sweeps.run_sweep import read_sweep
+from bilayer_core.studies.sweeps.spec import read_spec
 
 
 def changed(content, path, value):

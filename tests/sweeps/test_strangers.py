@@ -9,11 +9,11 @@ import sys
 import psutil
 import pytest
 import yaml
-from sweep_programs import STRIP, address_in, dask, end, start_scheduler
+from support.sweep_programs import STRIP, address_in, dask, end, start_scheduler
 
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.sweeps.run import read_sweep, sweep
+from bilayer_core.studies.sweeps.run_sweep import read_sweep, sweep
 
 WORKERS = 2
 STRANGER = """

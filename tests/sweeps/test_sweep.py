@@ -11,14 +11,14 @@ import time
 
 import pytest
 import yaml
-from processes import TIMEOUT, environment
-from sweep_programs import address_in, await_workers, dask, end, start_scheduler, wait_until
+from support.processes import TIMEOUT, environment
+from support.sweep_programs import address_in, await_workers, dask, end, start_scheduler, wait_until
 
 from bilayer_core import read_results
 from bilayer_core.errors import EngineError, InputError
-from bilayer_core.sweeps.job import Outcome
-from bilayer_core.sweeps.opening import Processes, open_engine
-from bilayer_core.sweeps.run import read_sweep, sweep
+from bilayer_core.studies.sweeps.job import Outcome
+from bilayer_core.studies.sweeps.open_processes import Processes, open_engine
+from bilayer_core.studies.sweeps.run_sweep import read_sweep, sweep
 
 COMMAND = [sys.executable, "-m", "bilayer_core"]
 
@@ -39,7 +39,7 @@ def results(found):
 
 @pytest.fixture(scope="session")
 def strip_rows(cluster):
-    from sweep_programs import STRIP
+    from support.sweep_programs import STRIP
 
     return results(sweep(STRIP, scheduler=cluster))
 
@@ -117,7 +117,7 @@ def hang(run):
     ids=["memory", "time"],
 )
 def test_a_run_over_its_limits_is_killed_alone_and_is_a_row(strip, monkeypatch, function, limits, told):
-    monkeypatch.setattr("bilayer_core.sweeps.engine.KILL_EXTRA", 1.0)
+    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.KILL_EXTRA", 1.0)
     found = sweep(strip | {"limits": limits}, workers=2, functions={"there": function})
     lost = [row for row in found.rows if row.outcome is not Outcome.DONE]
     assert [(row.outcome, row.parameters) for row in lost] == [(Outcome.KILLED, {"gain": 1.0, "length": 80.0})]
@@ -143,7 +143,7 @@ def test_of_pieces_given_ahead_nothing_is_lost_with_the_process_they_wait_for(st
 
 
 TWICE = """
-from sweep_programs import STRIP
+from support.sweep_programs import STRIP
 from bilayer_core import sweep
 if __name__ == "__main__":
     for duration in ("0.01 s", "0.02 s"):
@@ -197,7 +197,9 @@ def test_logs_need_a_directory_that_workers_see(strip, cluster, tmp_path, monkey
     assert sorted(row.log for row in found.rows) == [f"logs/{k:06d}.mcap" for k in range(8)]
     assert results(read_results(tmp_path / "here")) == results(found)  # the table is there as well
     read = read_sweep(strip | {"logs": "all"}, tmp_path / "here")
-    monkeypatch.setattr("bilayer_core.sweeps.opening.LOGS", "only_here")  # which workers look for elsewhere
+    monkeypatch.setattr(
+        "bilayer_core.studies.sweeps.open_processes.LOGS", "only_here"
+    )  # which workers look for elsewhere
     with pytest.raises(InputError, match="does not see it; logs need a directory that all workers share"):
         with open_engine(read.job, Processes(scheduler=cluster)):
             pass

@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from itertools import combinations
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,8 @@ BASE = {"names", "printable", "errors", "extras", "processes", "jit"}
 GEOMETRY = BASE | {"kinematics", "contact"}
 MECHANICS = GEOMETRY | {"scene", "model", "forces"}
 ENGINE = MECHANICS | {"integrators", "engine"}
-RECORDS = BASE | {"kinematics", "observed", "record"}
-NUMERICS = ENGINE | {"observed", "record", "simulation"}
+LOG = BASE | {"kinematics", "observed", "log"}
+NUMERICS = ENGINE | {"observed", "log", "simulation"}
 ALLOWED = {
     "names": set(),
     "printable": set(),
@@ -31,22 +32,17 @@ ALLOWED = {
     "integrators": MECHANICS,
     "engine": MECHANICS | {"integrators"},
     "observed": set(),
-    "record": RECORDS,
-    "simulation": ENGINE | {"observed", "record"},
+    "log": LOG,
+    "simulation": ENGINE | {"observed", "log"},
     "runs": NUMERICS,
     "view": NUMERICS | {"runs"},
-    "converge": NUMERICS,
-    "fitting": NUMERICS,
-    "beam2d": {"printable", "errors", "scene", "model"},
-    "validate": NUMERICS | {"beam2d"},
-    "bench": NUMERICS | {"converge", "validate"},
-    "stress": NUMERICS | {"converge", "validate", "bench"},
-    "testing": NUMERICS | {"stress"},
-    "sweeps": NUMERICS | {"view"},
-    "cli": NUMERICS | {"runs", "view", "converge", "fitting", "validate", "bench", "stress", "sweeps"},
+    "testing": NUMERICS,
+    "studies": NUMERICS | {"view"},
+    "verification": NUMERICS | {"studies", "testing"},
+    "cli": NUMERICS | {"runs", "view", "studies", "verification"},
 }
 # The package's own face, and its command line as `python -m bilayer_core`.
-FACES = {"__init__": NUMERICS | {"converge", "fitting", "sweeps"}, "__main__": {"cli"}}
+FACES = {"__init__": NUMERICS | {"studies"}, "__main__": {"cli"}}
 TOP = "bilayer_core"
 
 
@@ -124,10 +120,27 @@ def test_no_modules_import_each_other_in_a_circle():
     assert sorted(left) == []
 
 
+def test_no_module_has_the_name_of_one_beside_it_or_next_door():
+    """The folders next door are those in the same folder, the one around it, and those inside."""
+    found = {}
+    for path in (*modules(), *sorted((ROOT / "bilayer_sim_ros").rglob("*.py"))):
+        if not path.stem.startswith("__") and "." not in path.stem and path.parent != ROOT / TOP / "cli":
+            found.setdefault(path.stem, []).append(path)
+    near = [
+        (str(one.relative_to(ROOT)), str(other.relative_to(ROOT)))
+        for paths in found.values()
+        for one, other in combinations(paths, 2)
+        if one.parent.parent == other.parent.parent
+        or one.parent.parent == other.parent
+        or other.parent.parent == one.parent
+    ]
+    assert near == []
+
+
 PUBLIC_NUMBA = {"numba", "numba.extending", "numba.core.types", "numba.core.cgutils", "numba.types"}
 OFFERED = {"numba.core": {"cgutils", "types"}}
 """What numba's documentation of extensions imports from its inside."""
-EXCEPTION = "bilayer_core/jit/unofficial.py"
+EXCEPTION = "bilayer_core/jit/undocumented.py"
 
 
 def test_only_one_short_file_uses_what_numba_does_not_document():

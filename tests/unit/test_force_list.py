@@ -3,14 +3,14 @@
 from dataclasses import replace
 
 import pytest
-from planar_scenes import AHEAD, everything_in_plane
-from sample_scenes import everything, layer, rod, scene
+from support.planar_scenes import AHEAD, everything_in_plane
+from support.sample_scenes import everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.errors import ForceError
 from bilayer_core.model import force_list
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.force_list import FORCES, Force, Kind, markdown_table
 from bilayer_core.model.force_slots import NAMES, slot_of
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from budgets import driven
+from support.budgets import driven
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.forces import register
+from bilayer_core.forces import force_register
 from bilayer_core.jit import piece, record
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.problem import Problem
@@ -46,16 +46,18 @@ def end_diary(diary, p, at, stage):
 @pytest.fixture(autouse=True)
 def with_diary(monkeypatch):
     """A force more than there are, beside that of bending."""
-    diary = register.Term(
+    diary = force_register.Term(
         ("bending",),
         lambda model, of: Diary(first=of["memory"]),
         add_diary,
         end=end_diary,
         memory=lambda model: 1 + model.node_count,
     )
-    place, inertia = next(pair for pair in enumerate(register.TERMS) if "inertia" in pair[1].names)
+    place, inertia = next(pair for pair in enumerate(force_register.TERMS) if "inertia" in pair[1].names)
     other = replace(inertia, memory=lambda model: 3)
-    monkeypatch.setattr(register, "TERMS", (*register.TERMS[:place], other, *register.TERMS[place + 1 :], diary))
+    monkeypatch.setattr(
+        force_register, "TERMS", (*force_register.TERMS[:place], other, *force_register.TERMS[place + 1 :], diary)
+    )
 
 
 @pytest.mark.parametrize("steps", [{"dt": 1e-3}, {"dt": 1e-3, "integrator": "implicit_midpoint"}, {"tolerance": 1e-4}])

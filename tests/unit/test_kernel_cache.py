@@ -18,7 +18,7 @@ import math
 from bilayer_core import load_scene
 from bilayer_core.engine.engine import error_norm_of
 from bilayer_core.engine.error_norm import step_defect
-from bilayer_core.model.build import build_model
+from bilayer_core.model.build_model import build_model
 from bilayer_core.model.records.step import StateArrays
 from bilayer_core.model.state import initial_state
 

@@ -9,7 +9,7 @@ from pathlib import Path
 PROGRAM = """
 import gc, json
 from numba.extending import is_jitted
-from sample_scenes import everything
+from support.sample_scenes import everything
 from bilayer_core import Simulator, load_scene
 from bilayer_core.jit.piece import PIECES
 

@@ -1,7 +1,7 @@
 """Each warning about the validity of the model: given beyond its limit, and not within it."""
 
 import pytest
-from sample_scenes import contact, layer, rod, scene
+from support.sample_scenes import contact, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.model.validity import EdgeFigures, validity_figures, validity_warnings

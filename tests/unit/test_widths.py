@@ -5,7 +5,7 @@ import pytest
 
 from bilayer_core.engine.linear.widths import factorise_band, go_backward, go_forward
 from bilayer_core.jit import kernel
-from bilayer_core.model.layout import HALF_BANDWIDTH
+from bilayer_core.model.unknown_order import HALF_BANDWIDTH
 
 
 @kernel

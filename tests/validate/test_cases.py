@@ -4,14 +4,14 @@ import dataclasses
 import math
 
 import pytest
-from sample_scenes import fixed, rod, scene
+from support.sample_scenes import fixed, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SimulationError
-from bilayer_core.validate import torsion
-from bilayer_core.validate.case import Case
-from bilayer_core.validate.references import timoshenko_as_printed
-from bilayer_core.validate.register import CASES, FAMILIES, select
+from bilayer_core.verification.validate import torsion
+from bilayer_core.verification.validate.case_register import CASES, FAMILIES, select
+from bilayer_core.verification.validate.closed_forms import timoshenko_as_printed
+from bilayer_core.verification.validate.validation_case import Case
 
 
 @pytest.mark.parametrize(

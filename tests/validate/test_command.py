@@ -10,8 +10,8 @@ import pytest
 from PIL import Image
 
 from bilayer_core.cli import main
-from bilayer_core.validate import register, report
-from bilayer_core.validate.case import Case, Result
+from bilayer_core.verification.validate import case_register, case_report
+from bilayer_core.verification.validate.validation_case import Case, Result
 
 KEYS = {"case", "computed", "reference", "error", "limit", "pass"}
 
@@ -24,7 +24,7 @@ def few(monkeypatch):
         Case("first/near", "itself", 0.01, lambda: (1.001, 1.0), long=True),
         Case("second/wrong", "itself", 0.01, lambda: (1.5, 1.0)),
     )
-    monkeypatch.setattr(register, "CASES", cases)
+    monkeypatch.setattr(case_register, "CASES", cases)
 
 
 def test_the_table_has_a_line_for_each_case_and_the_exit_code_says_that_one_fails(few, tmp_path, capsys):
@@ -48,8 +48,8 @@ def test_quick_leaves_long_cases_out_and_list_computes_nothing(few, capsys):
 
 
 def test_a_limit_that_is_broken_is_exit_code_1(monkeypatch):
-    strict = [replace(case, limit=1e-12) for case in register.select("bending/two_rod/m = 10")]
-    monkeypatch.setattr(register, "CASES", strict)
+    strict = [replace(case, limit=1e-12) for case in case_register.select("bending/two_rod/m = 10")]
+    monkeypatch.setattr(case_register, "CASES", strict)
     assert main(["validate"]) == 1
 
 
@@ -66,7 +66,7 @@ def test_one_command_makes_figure_3_and_its_tables(tmp_path, capsys):
     table = json.loads((tmp_path / "validation.json").read_text())["cases"]
     with (tmp_path / "validation.csv").open() as file:
         lines = list(csv.DictReader(file))
-    assert len(lines) == len(table) == len(register.select("bending"))
+    assert len(lines) == len(table) == len(case_register.select("bending"))
     assert [line["case"] for line in lines] == [line["case"] for line in table]
     assert float(lines[0]["computed"]) == table[0]["computed"]
     assert (tmp_path / "validation.md").read_text().startswith("### bending")
@@ -103,7 +103,7 @@ def test_a_directory_that_cannot_be_made_is_bad_input(tmp_path, capsys):
 
 def test_a_page_says_the_same_where_only_rounding_differs():
     case = Case("family/case", "zero", 1e-6, lambda: (0.0, 0.0), scale=1.0)
-    pages = {report.page([Result(case, noise, 0.0, noise, 0.1)]) for noise in (3e-13, 2e-10)}
+    pages = {case_report.page([Result(case, noise, 0.0, noise, 0.1)]) for noise in (3e-13, 2e-10)}
     assert len(pages) == 1
     assert "| case | zero | < 1e-08 | 0 | 1e-8 | 1e-06 | pass |" in pages.pop()
 
@@ -112,7 +112,7 @@ def test_the_page_of_results_has_every_case_in_order_with_its_reference_and_limi
     text = (root / "docs/validation.md").read_text(encoding="utf-8")
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     written = [(row[0], row[1], row[5], row[6]) for row in rows if row[0] != "case"]
-    present = [(case.name.split("/", 1)[1], case.against, f"{case.limit:g}", "pass") for case in register.CASES]
+    present = [(case.name.split("/", 1)[1], case.against, f"{case.limit:g}", "pass") for case in case_register.CASES]
     assert written == present, "cases have changed; make the tables anew, as the page says"
 
 

@@ -8,8 +8,8 @@ from oracles.strip_elasticity import section_torsion
 from scipy.optimize import brentq
 from scipy.special import jv
 
-from bilayer_core.validate import references
-from bilayer_core.validate.contacts import resting_gap
+from bilayer_core.verification.validate import closed_forms
+from bilayer_core.verification.validate.contacts import resting_gap
 
 
 @pytest.mark.parametrize(
@@ -19,9 +19,9 @@ def test_timoshenkos_curvature_is_that_of_two_bonded_beams_in_balance(m, n, expe
     # forces ±P at the bond, moments E I κ: κ = η/(H (1/2 + 2 (ΣEI)(1/EA₁ + 1/EA₂)/H²)), Timoshenko 1925
     top = 1.0 / (1.0 + n)
     stiffness, area = (m * (n * top) ** 3 + top**3) / 12.0, 1.0 / (m * n * top) + 1.0 / top
-    assert references.timoshenko(m, n) == pytest.approx(1.0 / (0.5 + 2.0 * stiffness * area), rel=1e-12)
-    assert references.timoshenko(m, n) == pytest.approx(expected, rel=1e-5)
-    assert references.timoshenko_as_printed(m, n) == references.timoshenko(n, m)
+    assert closed_forms.timoshenko(m, n) == pytest.approx(1.0 / (0.5 + 2.0 * stiffness * area), rel=1e-12)
+    assert closed_forms.timoshenko(m, n) == pytest.approx(expected, rel=1e-5)
+    assert closed_forms.timoshenko_as_printed(m, n) == closed_forms.timoshenko(n, m)
 
 
 @pytest.mark.parametrize(
@@ -38,44 +38,44 @@ def test_timoshenkos_curvature_is_that_of_two_bonded_beams_in_balance(m, n, expe
     ],
 )
 def test_helices_of_least_energy_are_those_found_with_other_minimisers(torsion, curvature, twist, radius, pitch):
-    found = 1e3 * np.array(references.bonded_helix(curvature, twist, torsion))
+    found = 1e3 * np.array(closed_forms.bonded_helix(curvature, twist, torsion))
     assert found == pytest.approx([radius, pitch], rel=1e-5)
 
 
 def test_a_heavy_cantilever_that_hardly_bends_sinks_as_beam_theory_says():
-    tip = references.heavy_cantilever(1e-3, 1.0, 1e6, 1.0)
+    tip = closed_forms.heavy_cantilever(1e-3, 1.0, 1e6, 1.0)
     assert tip[1] == pytest.approx(-1e-3 / 8.0, rel=1e-4)
 
 
 def test_the_tip_of_the_common_cantilever_is_known_to_many_digits():
-    tip = references.heavy_cantilever(0.1962, 1e6 * 0.01 * 8e-9 / 12.0, 20.0, 0.1)
+    tip = closed_forms.heavy_cantilever(0.1962, 1e6 * 0.01 * 8e-9 / 12.0, 20.0, 0.1)
     assert tip == pytest.approx([0.0347151882735, -0.0871807525051], rel=1e-7)
 
 
 def test_greenhills_number_is_from_the_zero_of_a_bessel_function():
     zero = brentq(lambda x: jv(-1.0 / 3.0, x), 1.5, 2.2)
-    assert references.GREENHILL == pytest.approx(2.25 * zero**2, rel=1e-6)
+    assert closed_forms.GREENHILL == pytest.approx(2.25 * zero**2, rel=1e-6)
 
 
 def test_the_first_mode_is_the_root_of_its_equation():
-    k = references.FIRST_MODE
+    k = closed_forms.FIRST_MODE
     assert math.cos(k) * math.cosh(k) == pytest.approx(-1.0, abs=1e-5)
 
 
 def test_the_bonded_stiffness_of_equal_layers_is_that_of_one_beam():
     one = 2e8 * 0.01 * 2e-3**3 / 12.0
-    assert references.bonded_bending_stiffness((2e8, 2e8), (1e-3, 1e-3), 0.01) == pytest.approx(one)
+    assert closed_forms.bonded_bending_stiffness((2e8, 2e8), (1e-3, 1e-3), 0.01) == pytest.approx(one)
 
 
 def test_a_bonded_strip_is_four_times_as_stiff_in_torsion_as_its_thin_layers():
-    stiffness = references.strip_torsion((1e6, 1e6), (1e-3, 1e-3), 1.0)
+    stiffness = closed_forms.strip_torsion((1e6, 1e6), (1e-3, 1e-3), 1.0)
     assert stiffness["laminate"] / stiffness["layers"] == pytest.approx(4.0 * (1 - 0.00126) / (1 - 0.00063), rel=1e-5)
 
 
 def test_torsion_of_a_strip_in_layers_lies_between_bounds_of_finite_elements():
     for moduli, thickness, width in (((1.0, 0.3), (0.7, 1.6), 10.0), ((1.0, 200.0), (2.0, 3.0), 1.0)):
         low, high = section_torsion(moduli, thickness, width, 20)
-        assert low < references.strip_torsion(moduli, thickness, width)["laminate"] < high < 1.001 * low
+        assert low < closed_forms.strip_torsion(moduli, thickness, width)["laminate"] < high < 1.001 * low
 
 
 def test_the_resting_gap_is_known():
@@ -83,5 +83,5 @@ def test_the_resting_gap_is_known():
 
 
 def test_sliding_along_an_axis_is_coulombs_friction():
-    v = references.oblique_slide((1.5, 0.0), (0.1, 0.4), 9.81, 0.3)
+    v = closed_forms.oblique_slide((1.5, 0.0), (0.1, 0.4), 9.81, 0.3)
     assert v == pytest.approx([0.3 * (1.5 - 0.1 * 9.81), 0.0], rel=1e-4, abs=1e-12)

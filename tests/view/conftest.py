@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-import synthetic_run
+from support import synthetic_run
 
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 
 TIMES = np.arange(0, 101) * 0.04
 

@@ -8,7 +8,7 @@ import time
 
 import psutil
 import pytest
-from processes import environment
+from support.processes import environment
 
 from bilayer_core.view.bound_process import EXIT_LIMIT, BoundProcess
 

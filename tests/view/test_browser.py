@@ -11,16 +11,15 @@ from types import SimpleNamespace
 from urllib.parse import urlsplit
 
 import numpy as np
-import processes
 import pytest
-import synthetic_run
 from PIL import Image
 from playwright.sync_api import sync_playwright
+from support import processes, synthetic_run
 
-from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.view.branches import FIRST
-from bilayer_core.view.layout import CHANNEL_COLOURS
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.log_reader import read_log
+from bilayer_core.view.branch_recording import FIRST
+from bilayer_core.view.recording_layout import CHANNEL_COLOURS
 from bilayer_core.view.rerun_view import write_branches
 from bilayer_core.view.theme import BACKGROUND, BALL_COLOURS
 

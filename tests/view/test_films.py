@@ -4,8 +4,8 @@ import subprocess
 
 import numpy as np
 import pytest
-from pictures import is_ball, is_blue, is_red, pixels
 from PIL import Image
+from support.pictures import is_ball, is_blue, is_red, pixels
 
 from bilayer_core.cli import main
 from bilayer_core.view import sheet

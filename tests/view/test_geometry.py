@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import synthetic_run
+from support import synthetic_run
 
+from bilayer_core.log.messages.colours import strain_colours
+from bilayer_core.log.run.memory import MemoryRecorder
 from bilayer_core.observed.frame import ShapeInfo
-from bilayer_core.record.colours import strain_colours
-from bilayer_core.record.memory import MemoryRecorder
 from bilayer_core.view import geometry
 from bilayer_core.view.colouring import choose_colouring
-from bilayer_core.view.layout import summary
+from bilayer_core.view.recording_layout import summary
 from bilayer_core.view.scales import VIEW_ASPECT, VIEW_DIRECTION, choose_scales, place_eye, rounded_up
 
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_typestore
-from sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.record.colours import strain_colours
-from bilayer_core.record.description_text import from_text, to_text
-from bilayer_core.record.encoders import FrameEncoder
-from bilayer_core.record.markers import STRAIN_LIMIT
-from bilayer_core.record.memory import MemoryRecorder
-from bilayer_core.record.node_frames import layer_rows
+from bilayer_core.log.messages.colours import strain_colours
+from bilayer_core.log.messages.description_text import from_text, to_text
+from bilayer_core.log.messages.encoders import FrameEncoder
+from bilayer_core.log.messages.markers import STRAIN_LIMIT
+from bilayer_core.log.messages.node_frames import layer_rows
+from bilayer_core.log.run.memory import MemoryRecorder
 from bilayer_core.view.geometry import ribbon_vertices
 
 ARC = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.05, "angle": 2.0}

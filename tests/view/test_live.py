@@ -12,20 +12,18 @@ import time
 from contextlib import contextmanager
 
 import numpy as np
-import processes
 import psutil
 import pytest
-import recordings
-import synthetic_run
 from PIL import Image
+from support import processes, recordings, synthetic_run
 
 from bilayer_core.errors import InputError
-from bilayer_core.record.arriving import ArrivingRun
-from bilayer_core.record.growing_log import GrowingLog
-from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.packing import pack, unpack
-from bilayer_core.record.topics import Rate, output_topics
+from bilayer_core.log.file.growing_log import GrowingLog
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.packing import pack, unpack
+from bilayer_core.log.messages.topics import Rate, output_topics
+from bilayer_core.log.run.log_reader import read_log
+from bilayer_core.log.run.unfinished_run import ArrivingRun
 from bilayer_core.view import viewer_process
 from bilayer_core.view.live import LiveView
 from bilayer_core.view.server import ViewServer

@@ -5,11 +5,11 @@ import re
 import matplotlib
 import numpy as np
 import pytest
-import synthetic_run
+from support import synthetic_run
 
 from bilayer_core import read_log
 from bilayer_core.cli import main
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.view.plot import MOST_POINTS, STYLE, Line, draw, lines_of
 
 matplotlib.use("agg")

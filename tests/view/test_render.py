@@ -5,15 +5,15 @@ import sys
 
 import numpy as np
 import pytest
-import synthetic_run
-from pictures import is_ball, is_blue, is_red, pixels
 from PIL import Image
+from support import synthetic_run
+from support.pictures import is_ball, is_blue, is_red, pixels
 
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.mcap_log import McapRecorder
-from bilayer_core.record.run_data import RunData
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.log_reader import read_log
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.view import stage, window
 from bilayer_core.view.arrows import reaction_arrows
 from bilayer_core.view.camera import HALF_SLOPE, Insets, Shot

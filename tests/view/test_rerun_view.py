@@ -10,8 +10,8 @@ import time
 import numpy as np
 import psutil
 import pytest
-import synthetic_run
 from PIL import Image
+from support import synthetic_run
 
 from bilayer_core.errors import InputError
 from bilayer_core.view import rerun_view, viewer_process

@@ -9,12 +9,12 @@ import pyarrow as pa
 import pytest
 import rerun as rr
 import rerun.blueprint as rrb
-import synthetic_run
 from rerun.chunk import RrdReader
+from support import synthetic_run
 
 from bilayer_core.cli import main
-from bilayer_core.record.log_reader import read_log
-from bilayer_core.record.mcap_log import McapRecorder
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.log_reader import read_log
 from bilayer_core.view import viewer_process
 from bilayer_core.view.rerun_view import write_branches, write_rrd
 

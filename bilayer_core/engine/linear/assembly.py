@@ -7,10 +7,10 @@ factors −1, +1 and ±½ or ±1. This is the only file that joins second deriva
 
 from __future__ import annotations
 
-from ...jit import kernel, piece
-from ...jit.stack import stack_matrix
-from ...model.records.problem import Problem
-from ...model.records.status import READY
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
 
 
 @kernel
@@ -116,7 +116,7 @@ def _add_bonds(space, strands, sums, band):
     """Blocks of bonds of paired edges.
 
     The unknowns of a bond are consecutive: x_b0, x_t0, θ_b, θ_t of one station and x_b1, x_t1 of the next
-    (`model.layout`). Their local matrix is collected first, its lower triangle then added.
+    (`model.unknown_order`). Their local matrix is collected first, its lower triangle then added.
     """
     local, of_pairs, cross = stack_matrix(14, 14), sums.pair_hessian, sums.cross_hessian
     top, bottom = space.first_hessian, space.second_hessian

@@ -12,9 +12,9 @@ attached nodes leave the band for the border U and the corner D of free bodies.
 
 from __future__ import annotations
 
-from ...jit import kernel
-from ...jit.stack import stack_matrix
-from ...kinematics.vector import dot, row
+from bilayer_core.jit import kernel
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.kinematics.vector import dot, row
 
 
 @kernel

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from ...jit import kernel, piece
-from ...jit.stack import stack_matrix
-from ...kinematics.copying import copy
-from ...model.records.problem import Problem
-from ...model.records.status import READY
-from ...model.records.step import Configuration
-from .arms import stencil_jacobian, stencil_rows
-from .attachments import condense_clamp_edges, condense_clamp_edges_in_plane, condense_nodes
-from .contact_columns import condense_contacts_to_bodies
-from .dense import count_negative_dense, factor_dense, solve_dense
+from bilayer_core.engine.linear.arms import stencil_jacobian, stencil_rows
+from bilayer_core.engine.linear.attachments import condense_clamp_edges, condense_clamp_edges_in_plane, condense_nodes
+from bilayer_core.engine.linear.contact_columns import condense_contacts_to_bodies
+from bilayer_core.engine.linear.dense import count_negative_dense, factor_dense, solve_dense
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.kinematics.copying import copy
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration
 
 
 @piece(int, Problem, Configuration)

@@ -10,17 +10,17 @@ the unknowns of these nodes and R all others,
 
 Of each two strands in contact the nodes that are fewer have such *contact columns*. So the border has three columns for
 each of some contacting nodes, and the cost stays linear in the number of nodes. Nodes where a closed rod closes have
-columns in the border anyhow (`engine.linear.joins`).
+columns in the border anyhow (`engine.linear.closed_rods`).
 """
 
 from __future__ import annotations
 
-from ...jit import kernel, piece
-from ...model.records.problem import Problem
-from ...model.records.status import READY
-from .assembly import hold_unknowns
-from .attachments import arm_jacobian
-from .new_columns import add_columns
+from bilayer_core.engine.linear.assembly import hold_unknowns
+from bilayer_core.engine.linear.attachments import arm_jacobian
+from bilayer_core.engine.linear.new_columns import add_columns
+from bilayer_core.jit import kernel, piece
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
 
 CONTACTS, NODES = 0, 1
 """Places in `ContactColumns.counts`."""

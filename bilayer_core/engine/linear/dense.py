@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from ...jit import kernel
+from bilayer_core.jit import kernel
 
 
 @kernel

@@ -6,7 +6,7 @@
 A is factorised as L D Lᵀ in linear time; S = D − Uᵀ A⁻¹ U is dense and small. U and D are first restricted to the
 motions that bodies are allowed. While no free body touches or holds a rod, U vanishes and is left out.
 Some nodes of rods that touch have their columns in the border, too (`engine.linear.contact_columns`), and those where
-closed rods close (`engine.linear.joins`).
+closed rods close (`engine.linear.closed_rods`).
 
 If a pivot is not positive the matrix is not convex there; what is negative in the contact of rods is left out, then
 multiples of the mass matrix are added until it is, so that the step is a descent direction.
@@ -16,20 +16,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...forces.rod_contact import rods_touch
-from ...jit import piece
-from ...model.records.outcome import REGULARISED, SHIFT, SIMPLIFIED
-from ...model.records.problem import Problem
-from ...model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
-from ...model.records.step import Configuration, Stage
-from ..modes import SLOWEST_GROWTH, WITHOUT_INERTIA
-from .arms import assemble_arms
-from .assembly import assemble_in_space, hold_unknowns
-from .bordered_system import assemble_bodies, count_border, factor_border, restrict_bodies, solve_bordered
-from .contact_columns import gather_columns, move_to_border, scatter_columns, take_rod_contacts
-from .joins import gather_joins, move_joins_to_border, scatter_joins
-from .planar_assembly import assemble_in_plane, gradient_in_plane, step_in_plane
-from .widths import eliminate, factorise_band, go_backward, go_forward
+from bilayer_core.engine.linear.arms import assemble_arms
+from bilayer_core.engine.linear.assembly import assemble_in_space, hold_unknowns
+from bilayer_core.engine.linear.bordered_system import (
+    assemble_bodies,
+    count_border,
+    factor_border,
+    restrict_bodies,
+    solve_bordered,
+)
+from bilayer_core.engine.linear.closed_rods import gather_joins, move_joins_to_border, scatter_joins
+from bilayer_core.engine.linear.contact_columns import (
+    gather_columns,
+    move_to_border,
+    scatter_columns,
+    take_rod_contacts,
+)
+from bilayer_core.engine.linear.planar_assembly import assemble_in_plane, gradient_in_plane, step_in_plane
+from bilayer_core.engine.linear.widths import eliminate, factorise_band, go_backward, go_forward
+from bilayer_core.engine.request_modes import SLOWEST_GROWTH, WITHOUT_INERTIA
+from bilayer_core.forces.rod_contact import rods_touch
+from bilayer_core.jit import piece
+from bilayer_core.model.records.outcome import REGULARISED, SHIFT, SIMPLIFIED
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
+from bilayer_core.model.records.step import Configuration, Stage
 
 FIRST_SHIFT = 0.01  # of the inertial part, where the Hessian is indefinite
 SHIFT_GROWTH = 10.0

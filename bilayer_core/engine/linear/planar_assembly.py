@@ -13,12 +13,12 @@ is what is solved for.
 
 from __future__ import annotations
 
-from ...jit import kernel, piece
-from ...kinematics.vector import dot, row
-from ...model.records.problem import Problem
-from ...model.records.status import READY
-from ...model.records.step import Configuration
-from .assembly import add, add_twice
+from bilayer_core.engine.linear.assembly import add, add_twice
+from bilayer_core.jit import kernel, piece
+from bilayer_core.kinematics.vector import dot, row
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration
 
 
 @piece(int, Problem, Configuration, float)
@@ -123,7 +123,7 @@ def _put_edges(plane, strands, length, node_hessian, factor, band):
 @kernel
 def _add_bonds(plane, strands, band):
     """Add the blocks of paired edges; their unknowns are consecutive: x_b0, x_t0 of one station and x_b1, x_t1 of the
-    next (`model.layout`).
+    next (`model.unknown_order`).
     """
     frame, pair_hessian, mixed_hessian = plane.frame, plane.pair_hessian, plane.mixed_hessian
     for k in range(strands.joint_a.shape[0] - strands.bend_count):

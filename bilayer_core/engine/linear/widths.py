@@ -1,4 +1,4 @@
-"""The band solver as pieces, one set for each half-bandwidth that models have (`model.layout.HALF_BANDWIDTH`).
+"""The band solver as pieces, one set for each half-bandwidth that models have (`model.unknown_order.HALF_BANDWIDTH`).
 
 With the half-bandwidth known to the compiler inner loops have fixed lengths, and what the next row needs stays in
 registers: for 200 nodes in space two to three times as fast as one set for all widths.
@@ -6,12 +6,12 @@ registers: for 200 nodes in space two to three times as fast as one set for all 
 
 from __future__ import annotations
 
-from ...jit import kernel, piece
-from ...jit.piece import Piece
-from ...jit.record import Matrix, Vector
-from ...model.records.problem import BorderedSystem
-from ...model.records.status import READY
-from .band import backward_band, eliminate_band, factor_band, forward_band, width
+from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, forward_band, width
+from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.piece import Piece
+from bilayer_core.jit.record import Matrix, Vector
+from bilayer_core.model.records.problem import BorderedSystem
+from bilayer_core.model.records.status import READY
 
 
 def _declare(function, suffix: str, *arguments) -> Piece:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ...contact.broad_phase import RodSearch
-from ...jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
+from bilayer_core.contact.broad_phase import RodSearch
+from bilayer_core.jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
 
 
 @record

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...jit.record import Flags, Indices, Matrix, Stack, Vector, record
+from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector, record
 
 
 @record

@@ -6,12 +6,12 @@ program serves all scenes of a dimension.
 
 from __future__ import annotations
 
-from ...jit.record import Flags, IndexTable, Indices, Matrix, Stack, Vector, record
+from bilayer_core.jit.record import Flags, IndexTable, Indices, Matrix, Stack, Vector, record
 
 
 @record
 class Strands:
-    """Numbering, sections and joints of rods; see `model.Model` and `model.layout`."""
+    """Numbering, sections and joints of rods; see `model.Model` and `model.unknown_order`."""
 
     size: int  # unknowns of the matrix
     dimension: int  # of them at each node
@@ -151,7 +151,7 @@ class Attachments:
 
 @record
 class Joins:
-    """Unknowns of nodes and edges that closed rods have twice; see `engine.linear.joins`."""
+    """Unknowns of nodes and edges that closed rods have twice; see `engine.linear.closed_rods`."""
 
     first: Indices  # rows of the matrix
     copy: Indices  # that move as these

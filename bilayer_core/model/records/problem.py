@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...jit.record import Flags, Indices, Matrix, Stack, Vector, record
-from .contacts import ContactColumns, Restitution, RodContact, Sliding, Slips, Surfaces
-from .light import Light
-from .parts import (
+from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector, record
+from bilayer_core.model.records.contacts import ContactColumns, Restitution, RodContact, Sliding, Slips, Surfaces
+from bilayer_core.model.records.light import Light
+from bilayer_core.model.records.parts import (
     Attachments,
     Bodies,
     Bonds,
@@ -106,7 +106,7 @@ class BorderedSystem:
 class ForceTable:
     """Forces that act, a row each: the address of its own record, and those of its pieces, 0 where it has none.
 
-    The first `lasting` of them stay as they are while others are made anew; see `forces.register`.
+    The first `lasting` of them stay as they are while others are made anew; see `forces.force_register`.
     """
 
     own: Indices
@@ -161,7 +161,7 @@ class Problem:
     followers: PointForces
     moments: Moments
     sums: Sums
-    memory: Vector  # what forces carry from step to step; see `forces.register`
+    memory: Vector  # what forces carry from step to step; see `forces.force_register`
     system: System
     forces: ForceTable
     outcome: Outcome

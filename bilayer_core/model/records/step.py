@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...jit.record import Indices, Matrix, Stack, Tensor, Vector, record
+from bilayer_core.jit.record import Indices, Matrix, Stack, Tensor, Vector, record
 
 
 @record

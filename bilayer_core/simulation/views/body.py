@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...kinematics.rotation import quaternion_from_matrix
-from .motion import Motion, motion_of
-from .present import ByName, Present
+from bilayer_core.kinematics.rotation import quaternion_from_matrix
+from bilayer_core.simulation.views.motion import Motion, motion_of
+from bilayer_core.simulation.views.present import ByName, Present
 
 Array = np.ndarray
 

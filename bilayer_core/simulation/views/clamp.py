@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .present import ByName, Present
+from bilayer_core.simulation.views.present import ByName, Present
 
 Array = np.ndarray
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .motion import Motion, motion_of, slots_of_owner
-from .present import ByName, Present
+from bilayer_core.simulation.views.motion import Motion, motion_of, slots_of_owner
+from bilayer_core.simulation.views.present import ByName, Present
 
 Array = np.ndarray
 

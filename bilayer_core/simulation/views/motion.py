@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...forces.mechanisms import REMEMBERED
-from .present import Present
+from bilayer_core.forces.mechanisms import REMEMBERED
+from bilayer_core.simulation.views.present import Present
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import TypeVar
 
-from ...errors import UnknownName
-from ...model.model import Model
-from ...model.state import State
-from ..parts import Parts
-from ..stepper import Stepper
+from bilayer_core.errors import UnknownName
+from bilayer_core.model.model import Model
+from bilayer_core.model.state import State
+from bilayer_core.simulation.parts import Parts
+from bilayer_core.simulation.stepper import Stepper
 
 View = TypeVar("View")
 MOST_TOLD = 12

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model.model import Model
-from ...model.strand_arrays import StrandArrays
-from ...observed.frame import Strand
-from .. import observation as observe
-from .present import ByName, Present
+from bilayer_core.model.model import Model
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.observed.frame import Strand
+from bilayer_core.simulation import observation as observe
+from bilayer_core.simulation.views.present import ByName, Present
 
 Array = np.ndarray
 

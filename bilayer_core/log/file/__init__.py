@@ -1,0 +1,1 @@
+"""Files of logs and bags: written, read, locked and repaired."""

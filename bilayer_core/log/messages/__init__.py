@@ -1,0 +1,1 @@
+"""Messages of a run: topics, schemas, encoders, markers, events."""

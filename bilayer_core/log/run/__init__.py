@@ -1,0 +1,1 @@
+"""Runs as quantities over time: recorded, read, compared, exported."""

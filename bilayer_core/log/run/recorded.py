@@ -1,0 +1,97 @@
+"""Recorded quantities of a run, by name: from a log, or from memory."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bilayer_core.extras import require
+from bilayer_core.log.run.quantities import AXES, Entry, Quantity, unknown_quantity
+from bilayer_core.observed.frame import Description
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+class Recorded(ABC):
+    """Quantities over time by name, with units; see `log.run.quantities` for the names.
+
+    Attributes
+    ----------
+    description : Description
+    times : ndarray
+        Of all but shapes of rods [s], shape (frames,).
+    shape_times : ndarray
+        Of shapes of rods [s], shape (shapes,).
+    """
+
+    description: Description
+    times: np.ndarray
+    shape_times: np.ndarray
+
+    @property
+    @abstractmethod
+    def quantities(self) -> Mapping[str, Quantity]:
+        """All quantities by name."""
+
+    @abstractmethod
+    def entries(self) -> dict[str, Entry]:
+        """Return the entry of each quantity, by name: all that is known of it besides its values."""
+
+    def why_not(self, name: str) -> str | None:
+        """Why a quantity that others have is not in this one; None if it is, or if nobody has it."""
+        return None
+
+    def __getitem__(self, name: str) -> Quantity:
+        """The quantity of a name.
+
+        Raises
+        ------
+        InputError
+            If there is none, with the nearest names.
+        """
+        known = self.quantities
+        if name not in known:
+            raise unknown_quantity(name, known, self.why_not(name))
+        return known[name]
+
+    def blocks(self, wanted: Sequence[Entry]) -> Iterator[tuple[slice, dict[str, np.ndarray]]]:
+        """Values of quantities that come at one rate, in blocks of rows, by name."""
+        if wanted:
+            found = {entry.name: self.quantities[entry.name].values for entry in wanted}
+            yield slice(0, len(found[wanted[0].name])), found
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """All but shapes of rods as columns over time, such as ``body/ball/position.z``; needs pandas."""
+        require("to_dataframe", "pandas")
+        import pandas
+
+        columns = {}
+        for name in [name for name in self.quantities if not name.startswith("rod/")]:
+            quantity = self.quantities[name]
+            if not quantity.axes:
+                columns[quantity.name] = quantity.values
+            for k, label in enumerate(quantity.labels):
+                columns[f"{quantity.name}.{label}"] = quantity.values[:, k]
+        return pandas.DataFrame(columns, index=pandas.Index(self.times, name="time"))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """All quantities with their units; those of rods are over ``shape_time`` and have nodes of their own; needs
+        xarray.
+        """
+        require("to_xarray", "xarray")
+        import xarray
+
+        variables = {}
+        for quantity in self.quantities.values():
+            of_shape = quantity.name.startswith("rod/")
+            strand = quantity.name.rpartition("/")[0]
+            names = {"node": f"node of {strand}", "axis": "axis", "part": f"part of {len(quantity.labels)}"}
+            axes = ("shape_time" if of_shape else "time", *(names[axis] for axis in quantity.axes))
+            variables[quantity.name] = (axes, quantity.values, {"units": quantity.unit})
+        coordinates = {"time": self.times, "shape_time": self.shape_times, "axis": list(AXES)}
+        return xarray.Dataset(variables, coordinates, {"scene": self.description.scene_name})

@@ -1,0 +1,110 @@
+"""Displacements and velocities in edge space: what forces must be multiplied with to give works and powers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bilayer_core.kinematics.rotation import rotation_vector
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.problem import Sums
+from bilayer_core.model.records.step import Configuration
+from bilayer_core.model.state import State
+
+Array = np.ndarray
+PARTS = ("node", "edge", "pair", "body", "contact")
+
+
+@dataclass(frozen=True)
+class Gradient:
+    """First derivatives of one force: shapes as in `model.records.problem.Sums`.
+
+    Of `contact`, rows of free bodies are zero, because theirs are in `body`.
+    """
+
+    node: Array
+    edge: Array
+    pair: Array
+    body: Array
+    contact: Array
+
+    @classmethod
+    def copy_of(cls, first: Sums, model: Model) -> Gradient:
+        """The present ones."""
+        found = cls(*(getattr(first, part).copy() for part in PARTS))
+        found.contact[model.bodies.body_of_free] = 0.0
+        return found
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Displacement [m, rad] or velocity [m/s, rad/s] of everything that a force may differentiate by: shapes as in
+    `model.records.problem.Sums`.
+    """
+
+    node: Array
+    edge: Array
+    pair: Array
+    body: Array
+    contact: Array
+
+    def work(self, gradient: Gradient) -> float:
+        """Work [J] of forces with the given gradient over this displacement; power [W] if it is a velocity."""
+        return -sum(float(np.vdot(getattr(gradient, part), getattr(self, part))) for part in PARTS)
+
+
+def compose(model: Model, node: Array, turn: Array, clamp_edge: Array, contact: Array) -> Motion:
+    """A motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of all bodies."""
+    i = model.edge_node
+    edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), clamp_edge])
+    top0, top1, bottom0, bottom1 = (node[of_pairs] for of_pairs in model.pair_node.T)
+    body = contact[model.bodies.body_of_free]
+    return Motion(node, edge, 0.5 * (top0 + top1 - bottom0 - bottom1), body, contact)
+
+
+def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:
+    """From one configuration to another; turns, each by less than half a turn, are those beyond parallel transport."""
+    edges = model.edge_count
+    turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
+    clamp_edge = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
+    contact = np.hstack([end.pose_position - start.pose_position, np.zeros_like(end.pose_position)])
+    for b in range(len(model.bodies.names)):
+        contact[b, 3:] = rotation_vector(end.rotation[b] @ start.rotation[b].T)
+    return compose(model, end.position - start.position, turn[:edges], clamp_edge, contact)
+
+
+def velocity(model: Model, at: Configuration, state: State) -> Motion:
+    """Velocities of a state whose configuration is `at`."""
+    world = np.zeros((1, 6))
+    contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
+    tangent = at.tangent[model.edge_count :]
+    spin = contact[model.clamp_edge_body, 3:]
+    clamp_edge = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
+    return compose(model, state.velocity, state.spin, clamp_edge, contact)
+
+
+def of_prescribed(model: Model, motion: Motion) -> Motion:
+    """The part of a motion that prescribed bodies impose: on held nodes, clamps' directions, points and surfaces."""
+    prescribed = model.bodies.free_index < 0
+    held = np.zeros(model.node_count, dtype=bool)
+    held[model.attached_node] = model.attached_free < 0
+    clamp_edges = motion.edge[model.edge_count :]
+    return compose(
+        model,
+        np.where(held[:, None], motion.node, 0.0),
+        np.zeros(model.edge_count),
+        np.where(prescribed[model.clamp_edge_body, None], clamp_edges, 0.0),
+        np.where(prescribed[:, None], motion.contact, 0.0),
+    )
+
+
+def _turn(tangent: Array, director: Array, new_tangent: Array, new_director: Array) -> Array:
+    """Angle about the new tangent from the transported director to the new one [rad], shape (n,)."""
+
+    def dot(u: Array, v: Array) -> Array:
+        return np.einsum("ki,ki->k", u, v)
+
+    factor = dot(director, new_tangent) / (1.0 + dot(tangent, new_tangent))
+    carried = director - factor[:, None] * (tangent + new_tangent)
+    return np.arctan2(dot(np.cross(carried, new_director), new_tangent), dot(carried, new_director))

@@ -1,0 +1,1 @@
+"""Many runs: convergence, fits, sweeps and searches."""

@@ -1,0 +1,292 @@
+"""The smallest gap of a scene, and whether anything passed through anything: found anew from positions alone.
+
+Nothing here is shared with the solver but the geometry of the scene: what has which thickness, which radius, which
+half edges. All pairs are looked at, without lists of near ones, but for robots of thousands of edges, whose near pairs
+scipy's k-d tree finds anew at every look; distances are computed by other formulas.
+
+- Rods are capsules about their edges, with the radius that the model gives them. They meet where the model has points
+  on them, no farther apart than that radius: where two cross between points, the capsules may overlap by a thirtieth
+  of the radius at most, √(4 + 1/4) − 2 = 0.06 for two together. On one rod, edges count that are at least as far apart
+  along it as the model's own exclusion (`model.rod_surfaces`).
+- Surfaces are met by rods, by balls and by the corners and rims of bodies (`testing.surfaces`).
+
+A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
+look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
+than half way inside another in between has *crossed* it. What moves in one step by more than twelve times its size goes
+another way than the straight one: of that nothing is said. Nor is it of two parts of one rod that move against each
+other by more than half of the length between them: where that straightens and bends the other way, they swing past.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from bilayer_core.model.model import Model
+from bilayer_core.observed.frame import Frame
+from bilayer_core.testing.surfaces import MeetingPoints, surfaces_of
+
+Array = np.ndarray
+MOST_PAIRS = 45_000
+"""Pairs of edges that every step is checked for: those of 300 nodes."""
+MOST_EDGES = 2000
+"""Of which all pairs are listed."""
+MOST_TOGETHER = 20_000
+"""Points whose distances from edges are found at a time."""
+MOST_PARTS = 24
+"""Into which the way of a step is cut at most."""
+LARGEST_TURN = 0.3
+"""Of a surface from look to look [rad], up to which straight lines stand for the ways about it."""
+DEEP = 0.5
+"""Part of a radius, or of a half edge, from which on something is inside."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """Where everything is at one time."""
+
+    nodes: Array  # of rods [m], shape (n_node, 3)
+    points: Array  # what meets surfaces, in the order of `GapCheck` [m], shape (n_point, 3)
+    surface_position: Array  # [m], shape (n_surface, 3)
+    surface_rotation: Array  # columns are its axes, shape (n_surface, 3, 3)
+
+
+class GapCheck:
+    """Checks the gaps of a model in frames of its run.
+
+    Attributes
+    ----------
+    every : int
+        Number of steps from one look to the next: 1 but for scenes with very many pairs.
+    """
+
+    def __init__(self, model: Model):
+        self._model = model
+        self._edge = model.edge_node
+        self._pairs = None if model.rod_surfaces is None else PairsOfEdges(model)
+        self.every = max(1, math.ceil(self._pairs.count / MOST_PAIRS)) if self._pairs else 1
+        self._points = MeetingPoints(model)
+        self._surfaces = surfaces_of(model, self._points)
+        radius = self._points.node_radius
+        self._edge_radius = np.zeros(0) if model.rod_surfaces is None else model.rod_surfaces.edge_radius
+        self._fractions = fractions_of_points(model)
+        self._smallest_radius = float(radius[model.node_length > 0.0].min())
+        if self._pairs:
+            self._leave_out_joined()
+        self._before: Moment | None = None
+
+    def _leave_out_joined(self) -> None:
+        """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
+        rods, start = self._model.rod_surfaces, self._model.start_position
+        first, second = self._pairs.at(start)
+        joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
+        gap, _ = self._rod_gaps(start)
+        self._pairs.leave_out(joined & (gap < self._model.scene.contact.barrier_distance))
+
+    @property
+    def checks_anything(self) -> bool:
+        """True if the scene has anything that could meet."""
+        return bool((self._pairs and self._pairs.count) or self._surfaces)
+
+    def moment(self, frame: Frame) -> Moment:
+        """Return the places of nodes, points and surfaces to be looked at in a frame."""
+        poses = [
+            (position, Rotation.from_quat(quaternion).as_matrix())
+            for position, quaternion in zip(frame.body_positions, frame.body_quaternions, strict=True)
+        ]
+        poses.append((np.zeros(3), np.eye(3)))  # the world
+        return Moment(
+            frame.positions[: self._model.node_count],
+            self._points.places(frame),
+            np.array([poses[s.body][0] + poses[s.body][1] @ s.position for s in self._surfaces]).reshape(-1, 3),
+            np.array([poses[s.body][1] @ s.rotation for s in self._surfaces]).reshape(-1, 3, 3),
+        )
+
+    def smallest(self, at: Moment) -> float:
+        """The smallest gap [m], infinite without anything that could meet."""
+        gaps = [math.inf]
+        if self._pairs:
+            gaps.append(float(self._rod_gaps(at.nodes)[0].min(initial=math.inf)))
+        gaps += [float(gap.min()) for gap in self._surface_gaps(at) if gap.size]
+        return min(gaps)
+
+    def crossed(self, at: Moment) -> str:
+        """Describe a deep overlap on the straight way from the last look to this one; empty if there was none."""
+        before, self._before = self._before, at
+        if before is None:
+            return ""
+        turns = zip(before.surface_rotation, at.surface_rotation, strict=True)
+        if max((_angle(one.T @ other) for one, other in turns), default=0.0) > LARGEST_TURN:
+            return ""
+        rods = _parts(_largest(at.nodes - before.nodes), self._smallest_radius) if self._pairs else 0
+        points, positions = at.points - before.points, at.surface_position - before.surface_position
+        surfaces = [
+            _parts(_largest(points[surface.points] - way), surface.smallest)
+            for surface, way in zip(self._surfaces, positions, strict=True)
+        ]
+        ends = list(zip(vars(before).values(), vars(at).values(), strict=True))
+        for part in np.linspace(0.0, 1.0, max([rods, *surfaces]) + 1)[1:-1]:
+            between = Moment(*(a + part * (b - a) for a, b in ends))
+            if found := self._deep(between, at.nodes - before.nodes, rods > 1, [parts > 1 for parts in surfaces]):
+                return found
+        return ""
+
+    def _deep(self, at: Moment, way: Array, with_rods: bool, with_surfaces: list[bool]) -> str:
+        """Describe a deep overlap of nodes that move by `way` [m] from look to look; empty if there is none."""
+        if with_rods:
+            gap, radii = self._rod_gaps(at.nodes)
+            deep = np.flatnonzero(gap < -DEEP * radii)
+            if deep.size:
+                first, second = (edges[deep] for edges in self._pairs.at(at.nodes))
+                middle = 0.5 * (way[self._edge] + way[self._edge + 1])
+                against = np.linalg.norm(middle[first] - middle[second], axis=1)
+                if (2.0 * against <= self._pairs.length_between(first, second)).any():
+                    return "a rod passed through a rod"
+        gaps = self._surface_gaps(at)
+        for surface, gap, wanted in zip(self._surfaces, gaps, with_surfaces, strict=True):
+            if wanted and gap.size and float(gap.min()) < -DEEP * surface.smallest:
+                return f"something passed through {surface.name}"
+        return ""
+
+    def _rod_gaps(self, nodes: Array) -> tuple[Array, Array]:
+        """Gap of each pair of edges, or a lower bound where that is above the barrier distance, and their radii [m]."""
+        edge, (first, second) = self._edge, self._pairs.at(nodes)
+        begin, end = nodes[edge], nodes[edge + 1]
+        middle, half = 0.5 * (begin + end), 0.5 * np.linalg.norm(end - begin, axis=1)
+        radii = self._edge_radius[first] + self._edge_radius[second]
+        bound = np.linalg.norm(middle[first] - middle[second], axis=1) - half[first] - half[second] - radii
+        near = np.flatnonzero(bound < self._model.scene.contact.barrier_distance)
+        if near.size:
+            one, other = first[near], second[near]
+            for a, b in ((one, other), (other, one)):
+                apart = self._from_points(begin, end, a, b) - radii[near]
+                bound[near] = apart if a is one else np.minimum(bound[near], apart)
+        return bound, radii
+
+    def _from_points(self, begin: Array, end: Array, a: Array, b: Array) -> Array:
+        """Smallest distance of the points on each edge of `a` from the edge of `b` beside it [m]."""
+        smallest = np.full(len(a), math.inf)
+        together = max(1, MOST_TOGETHER // len(a))
+        for first in range(0, self._fractions.shape[1], together):
+            own = self._fractions[a, first : first + together, None]
+            points = (1.0 - own) * begin[a, None] + own * end[a, None]
+            segments = (np.repeat(nodes[b], own.shape[1], axis=0) for nodes in (begin, end))
+            distances = from_segment(points.reshape(-1, 3), *segments).reshape(len(a), -1)
+            smallest = np.fmin(smallest, np.fmin.reduce(distances, axis=1))
+        return smallest
+
+    def _surface_gaps(self, at: Moment) -> list[Array]:
+        """Gaps of all that can meet each surface [m]."""
+        return [
+            surface.distance((at.points[surface.points] - position) @ rotation) - surface.radii
+            for surface, position, rotation in zip(
+                self._surfaces, at.surface_position, at.surface_rotation, strict=True
+            )
+        ]
+
+
+def from_segment(p: Array, a: Array, b: Array) -> Array:
+    """Distance of points p from segments ab [m], each of shape (n, 3), to (n,)."""
+    along = b - a
+    t = np.clip(((p - a) * along).sum(1) / np.maximum((along * along).sum(1), 1e-300), 0.0, 1.0)
+    return np.linalg.norm(p - a - t[:, None] * along, axis=1)
+
+
+def _parts(way: float, size: float) -> int:
+    """Into how many a way is cut that could pass through something of a size [m]; 0 if they would be too many."""
+    parts = math.ceil(way / (0.5 * size))
+    return parts if parts <= MOST_PARTS else 0
+
+
+def _largest(way: Array) -> float:
+    return float(np.linalg.norm(way, axis=1).max()) if len(way) else 0.0
+
+
+def _angle(rotation: Array) -> float:
+    return math.acos(min(max(0.5 * (float(np.trace(rotation)) - 1.0), -1.0), 1.0))
+
+
+class PairsOfEdges:
+    """The pairs of edges of a model that may not come together, all of them or, of very many, those that are near.
+
+    Parameters
+    ----------
+    model : Model
+        In which rods meet.
+    most : int
+        Number of edges up to which all pairs are listed.
+
+    Attributes
+    ----------
+    count : int
+        Of pairs; of very many edges, of all that there are.
+    """
+
+    def __init__(self, model: Model, most: int = MOST_EDGES):
+        self._model, self._edges = model, len(model.rod_surfaces.edge_rod)
+        self._all: tuple[Array, Array] | None = None
+        self._left_out = np.empty(0, dtype=np.int64)
+        self.count = self._edges * (self._edges - 1) // 2
+        if self._edges <= most:
+            self._all = self._allowed(*np.triu_indices(self._edges, 1))
+            self.count = len(self._all[0])
+
+    def at(self, nodes: Array) -> tuple[Array, Array]:
+        """Two arrays of edges, all pairs that may be nearer than the barrier distance among them; nodes [m]."""
+        if self._all is not None:
+            return self._all
+        edge = self._model.edge_node
+        middle, along = 0.5 * (nodes[edge] + nodes[edge + 1]), nodes[edge + 1] - nodes[edge]
+        reach = np.linalg.norm(along, axis=1).max() + 2.0 * self._model.rod_surfaces.edge_radius.max()
+        reach += self._model.scene.contact.barrier_distance
+        near = KDTree(middle).query_pairs(reach, output_type="ndarray")
+        first, second = self._allowed(near[:, 0], near[:, 1])
+        keep = ~np.isin(self._number(first, second), self._left_out)
+        return first[keep], second[keep]
+
+    def leave_out(self, out: Array) -> None:
+        """Leave out pairs, of those at the start, from now on."""
+        first, second = self.at(self._model.start_position)
+        if self._all is not None:
+            self._all = first[~out], second[~out]
+        else:
+            self._left_out = self._number(first[out], second[out])
+
+    def length_between(self, first: Array, second: Array) -> Array:
+        """Length of rod between two edges [m], infinite between rods."""
+        surfaces = self._model.rod_surfaces
+        same = surfaces.edge_rod[first] == surfaces.edge_rod[second]
+        arc = surfaces.edge_arc.mean(axis=1)
+        return np.where(same, np.abs(arc[first] - arc[second]), math.inf)
+
+    def _number(self, first: Array, second: Array) -> Array:
+        return np.minimum(first, second) * self._edges + np.maximum(first, second)
+
+    def _allowed(self, first: Array, second: Array) -> tuple[Array, Array]:
+        """Those pairs that may not come together."""
+        surfaces = self._model.rod_surfaces
+        rod_a, rod_b = surfaces.edge_rod[first], surfaces.edge_rod[second]
+        arc, length = surfaces.edge_arc.mean(axis=1), surfaces.rod_length[rod_a]
+        apart = np.abs(arc[first] - arc[second])
+        around = np.where(np.isfinite(length), np.minimum(apart, length - apart), apart)
+        edge = surfaces.edge_arc[:, 1] - surfaces.edge_arc[:, 0]
+        same = rod_a == rod_b
+        far = around - 0.5 * (edge[first] + edge[second]) >= surfaces.rod_exclusion[rod_a]
+        keep = surfaces.rod_can_collide[rod_a, rod_b] & (~same | far)
+        return first[keep], second[keep]
+
+
+def fractions_of_points(model: Model) -> Array:
+    """Where the points of each edge are on it, 0 … 1, shape (n_edge, most points of an edge); NaN beyond the last."""
+    rods = model.rod_surfaces
+    if rods is None:
+        return np.empty((0, 0))
+    counts = np.diff(rods.first_point)
+    found = np.full((len(counts), int(counts.max())), math.nan)
+    for edge, (first, count) in enumerate(zip(rods.first_point, counts, strict=False)):
+        found[edge, :count] = rods.point_fraction[first : first + count]
+    return found

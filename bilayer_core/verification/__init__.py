@@ -1,0 +1,1 @@
+"""Evidence: cases with known answers, stress tests, benchmarks, and Appendix A's beam."""

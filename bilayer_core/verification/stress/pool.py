@@ -1,0 +1,95 @@
+"""Worker processes that run cases: they stay, as kernels take time to load, and are killed at the limits of a case."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import FIRST_COMPLETED, wait
+from multiprocessing import get_context
+from pathlib import Path
+
+from bilayer_core.extras import require
+from bilayer_core.verification.stress.stress_case import Outcome, Record, StressCase
+
+MEMORY = 3 * 2**30
+"""Address space that a worker may take beyond what it has when it begins, on Linux [bytes]."""
+MEMORY_FILE = Path("/proc/self/statm")
+"""Linux says there what a process has; other systems do not, and most of them heed no such limit."""
+CASES_A_WORKER = 100
+"""Then another takes its place: memory that cases gave back is not always of use to the next one."""
+GRACE, LEAST_TIME = 12.0, 120.0
+"""Wall time after which a worker is killed, over the case's limit of CPU time (a run, a finer one, and a remedy), and
+the least [s].
+"""
+
+
+def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record], None]) -> None:
+    """Run cases, and hand on what comes of each as soon as it has.
+
+    Parameters
+    ----------
+    cases : iterable of StressCase
+    workers : int
+        Processes.
+    done : callable
+        Called with each record.
+
+    Raises
+    ------
+    InputError
+        If the library for it is not installed.
+    """
+    require("stress", "pebble")
+    from pebble import ProcessExpired, ProcessPool
+
+    left = list(reversed(list(cases)))
+    with ProcessPool(workers, CASES_A_WORKER, context=get_context("spawn"), initializer=_begin) as pool:
+        waiting = {}
+        try:
+            while left or waiting:
+                while left and len(waiting) < 2 * workers:
+                    case = left.pop()
+                    waiting[pool.schedule(_run, (case,), timeout=_time_of(case))] = case
+                finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
+                for job in finished:
+                    case = waiting.pop(job)
+                    try:
+                        record = Record.from_line(job.result())
+                    except TimeoutError:
+                        record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
+                    except ProcessExpired as death:
+                        record = _lost(case, f"its process died with exit code {death.exitcode}")
+                    except Exception as fault:  # of the worker, such as no memory while it tells what came
+                        record = _lost(case, f"{type(fault).__name__}: {fault}")
+                    done(record)
+        except BaseException:  # such as that of Ctrl-C: cases that run are not waited for
+            pool.stop()
+            raise
+
+
+def _time_of(case: StressCase) -> float:
+    return max(LEAST_TIME, GRACE * case.cpu_limit)
+
+
+def _lost(case: StressCase, why: str) -> Record:
+    return Record(case.name, case.axis, not case.outside, list(case.outside), Outcome.FAILED, why)
+
+
+def _begin() -> None:
+    """Prepare a worker: load numpy and scipy, and then limit its address space."""
+    from bilayer_core.verification.stress import execute_case  # noqa: F401 (loads all that cases need)
+
+    try:
+        import resource
+    except ImportError:
+        return
+    if not MEMORY_FILE.exists():
+        return
+    present = int(MEMORY_FILE.read_text(encoding="ascii").split()[0]) * os.sysconf("SC_PAGE_SIZE")
+    resource.setrlimit(resource.RLIMIT_AS, (present + MEMORY, present + MEMORY))
+
+
+def _run(case: StressCase) -> str:
+    from bilayer_core.verification.stress.execute_case import execute
+
+    return execute(case).line()

@@ -1,0 +1,86 @@
+"""Free curvature of a bilayer strip of which one layer grows (paper, section 3.1, Fig. 3).
+
+Both models compute it: two bonded rods, and the planar beam of Appendix A. The strip is 2 mm thick and clamped at one
+end; the curvature is that of its middle.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.verification.beam2d.scene import beam_of, set_stimuli
+from bilayer_core.verification.validate.closed_forms import timoshenko
+from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
+from bilayer_core.verification.validate.validation_case import Case
+
+RATIOS = np.logspace(-1.0, 1.0, 15)
+FIGURE_STRAIN = 0.01
+PAIRS = ((1.0, 1.0), (2.0, 1.0), (1.0, 2.0), (5.0, 0.5), (0.2, 3.0))
+"""(m, n) of `docs/equations.md`: 1.5, 1.45455, 1.33333, 1.49584, 1.47541."""
+THICKNESS, STATIONS = 2e-3, 41
+
+
+def strip(m: float, n: float, eigenstrain: float, stations: int = STATIONS) -> dict:
+    """A clamped bilayer of m = E₂/E₁, n = h₂/h₁ (bottom over top), whose top layer grows by `eigenstrain`."""
+    top = THICKNESS / (1.0 + n)
+    layers = [
+        layer("bottom", thickness=n * top, material="base"),
+        layer("top", thickness=top, eigenstrain={"stimulus": "heat", "gain": eigenstrain}),
+    ]
+    return scene(
+        [rod(layers, length=0.05, stations=stations, clamp_start="wall")],
+        bodies=[fixed()],
+        materials={"gel": GEL, "base": {**GEL, "youngs_modulus": m * GEL["youngs_modulus"]}},
+        stimuli={"heat": {"schedule": {"type": "hold", "value": 1}}},
+    )
+
+
+@cache
+def two_rod(m: float, n: float, eigenstrain: float) -> float:
+    """κH/η from two bonded rods."""
+    simulator = Simulator(load_scene(strip(m, n, eigenstrain)))
+    simulator.solve_static()
+    return -simulator.curvatures[STATIONS // 2] * THICKNESS / eigenstrain
+
+
+@cache
+def beam2d(m: float, n: float, eigenstrain: float) -> float:
+    """κH/η from the planar beam."""
+    config = load_scene(strip(m, n, eigenstrain))
+    beam = beam_of(config)
+    set_stimuli(beam, config, {"heat": 1.0})
+    beam.solve_static()
+    return -beam.curvatures[STATIONS // 2] * THICKNESS / eigenstrain
+
+
+MODELS = {"two_rod": (two_rod, 0.01), "beam2d": (beam2d, 0.001)}
+SWEEPS = {
+    "m": [(ratio, 1.0) for ratio in RATIOS],
+    "n": [(1.0, ratio) for ratio in RATIOS],
+}
+
+
+def _case(name: str, model: str, m: float, n: float, eigenstrain: float) -> Case:
+    compute, limit = MODELS[model]
+    return Case(
+        name,
+        "Timoshenko's bilayer (1925), formula corrected",
+        limit,
+        lambda: (compute(m, n, eigenstrain), timoshenko(m, n)),
+    )
+
+
+CASES = [
+    _case(f"bending/{model}/{sweep} = {dict(m=m, n=n)[sweep]:.3g}", model, m, n, FIGURE_STRAIN)
+    for sweep, ratios in SWEEPS.items()
+    for model in MODELS
+    for m, n in ratios
+] + [
+    _case(f"bending/pair m = {m:g}, n = {n:g}/{100 * strain:g} %", "two_rod", m, n, strain)
+    for m, n in PAIRS
+    for strain in (0.005, 0.05)
+]

@@ -1,0 +1,84 @@
+"""Results as json, csv and a page."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+
+from bilayer_core.log.file.output_paths import draft_of, write_text
+from bilayer_core.verification.validate.validation_case import Result
+
+NOTHING = 1e-8
+
+
+def as_json(results: Sequence[Result]) -> str:
+    """``{"cases": [{case, computed, reference, error, limit, pass, …}, …]}``."""
+    return json.dumps({"cases": [result.record() for result in results]}, indent=2, allow_nan=False)
+
+
+def write_json(results: Sequence[Result], path: Path) -> None:
+    """The same, as a file."""
+    write_text(path, as_json(results) + "\n", force=True)
+
+
+def write_csv(results: Sequence[Result], path: Path) -> None:
+    """The same, a line each."""
+    with draft_of(path, force=True) as draft, draft.open("w", newline="", encoding="utf-8") as file:
+        table = csv.DictWriter(file, list(results[0].record()))
+        table.writeheader()
+        table.writerows(result.record() for result in results)
+
+
+def write_page(results: Sequence[Result], path: Path) -> None:
+    """Tables in Markdown, one a family."""
+    write_text(path, page(results), force=True)
+
+
+def page(results: Sequence[Result]) -> str:
+    """Return the text that `write_page` writes.
+
+    Errors are rounded up to one digit, so that the page says the same on every machine.
+    """
+    lines = []
+    for family, members in groupby(results, lambda result: result.case.family):
+        lines += [
+            f"### {family}",
+            "",
+            "| case | against | computed | reference | error below | limit | |",
+            "|---" * 7 + "|",
+        ]
+        lines += [_row(result) for result in members]
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _row(result: Result) -> str:
+    case = result.case
+    unit = "" if case.unit == "1" else f" {case.unit}"
+    numbers = (f"{shown(result.computed)}{unit}", f"{shown(result.reference)}{unit}", shown_error(result.error))
+    cells = (
+        case.name.split("/", 1)[1],
+        case.against,
+        *numbers,
+        f"{case.limit:g}",
+        "pass" if result.passed else "**fail**",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def shown(value: float) -> str:
+    """Five digits; what is smaller than `NOTHING` is rounding, and another on each machine."""
+    if not math.isfinite(value):
+        return "–"
+    return f"{value:.5g}" if value == 0.0 or abs(value) >= NOTHING else f"< {NOTHING:g}"
+
+
+def shown_error(error: float) -> str:
+    """Next power of ten above an error, `NOTHING` at least."""
+    if not math.isfinite(error):
+        return "–"
+    return f"1e{math.ceil(math.log10(max(error, NOTHING))):d}"

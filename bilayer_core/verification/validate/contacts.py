@@ -1,0 +1,226 @@
+"""Resting, creeping, sliding, rolling: contact and friction on a plane."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from scipy.optimize import brentq
+
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.verification.validate.closed_forms import oblique_slide
+from bilayer_core.verification.validate.parts import GROUND, ball, contact, fixed, layer, rod, scene
+from bilayer_core.verification.validate.validation_case import Case
+
+GRAVITY = 9.81
+MESHES = (10, 20, 40)
+STEEP, GENTLE = 0.5, 0.2
+"""Angles of slopes [rad]: a block slides down the first and creeps down the second."""
+SLIPPERY, ROUGH = 0.3, 0.5
+"""Friction coefficients there."""
+
+
+def tilted_gravity(angle: float) -> list[float]:
+    """Gravity on level ground that acts like a slope down to +x [m/s²]."""
+    return [GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle)]
+
+
+def block(gravity: list[float], friction: dict, dt: float = 1e-3) -> Simulator:
+    """A short stiff strip that lies along x on the ground; `friction` as in a scene."""
+    strip = rod([layer(thickness=2e-3)], length=0.02, stations=5, start=(0, 0, 1.99e-3))
+    surroundings = {"obstacles": [GROUND], "contact": {**contact(), "friction": friction}}
+    solver = {"dt": dt, "integrator": "implicit_euler"}
+    return Simulator(load_scene(scene([strip], gravity=gravity, solver=solver, **surroundings)))
+
+
+def acceleration(simulator: Simulator, settle: float = 0.05, time: float = 0.2) -> np.ndarray:
+    """Mean acceleration of the nodes over `time` [s], after `settle` [s], shape (3,)."""
+    simulator.run(settle)
+    before = simulator.velocities.mean(axis=0)
+    simulator.run(time)
+    return (simulator.velocities.mean(axis=0) - before) / time
+
+
+@cache
+def resting_gap() -> float:
+    """Gap d [m] at which the barrier carries 10 mm × 2 mm of density 1000: K_c [2(d − d̂) log(d/d̂) + (d − d̂)²/d] = q."""
+    limit, stiffness, weight = 1e-3, 1e7, 1000.0 * GRAVITY * 0.01 * 2e-3
+
+    def excess(d: float) -> float:
+        return stiffness * (2.0 * (d - limit) * math.log(d / limit) + (d - limit) ** 2 / d) - weight
+
+    return brentq(excess, 0.5 * limit, limit * (1.0 - 1e-9), xtol=1e-16)
+
+
+def compression(edges: int) -> tuple[float, float]:
+    """d̂ − d of the node that is worst off, and as it should be [µm]."""
+    layers = [layer("bottom"), layer("top")]
+    strip = rod(layers, stations=edges + 1, start=(0, 0, 2e-3))
+    config = scene([strip], gravity=[0, 0, -GRAVITY], obstacles=[GROUND], contact=contact())
+    simulator = Simulator(load_scene(config))
+    simulator.solve_static()
+    gaps = simulator.positions[: edges + 1, 2] - 0.5e-3
+    worst = gaps[np.argmax(np.abs(gaps - resting_gap()))]
+    return 1e6 * (1e-3 - worst), 1e6 * (1e-3 - resting_gap())
+
+
+def slide() -> tuple[float, float]:
+    """Acceleration of a block down a steep slope [m/s²]."""
+    simulator = block(tilted_gravity(STEEP), {"coefficient": SLIPPERY, "speed_threshold": 1e-4})
+    answer = GRAVITY * (math.sin(STEEP) - SLIPPERY * math.cos(STEEP))
+    return acceleration(simulator, settle=0.1)[0], answer
+
+
+def creep() -> tuple[float, float]:
+    """Speed of a block on a gentle slope [µm/s]: where the smoothed law's friction carries it."""
+    threshold = 1e-3
+    simulator = block(tilted_gravity(GENTLE), {"coefficient": ROUGH, "speed_threshold": threshold})
+    simulator.run(0.5)
+    answer = threshold * (1.0 - math.sqrt(1.0 - math.tan(GENTLE) / ROUGH))
+    return 1e6 * simulator.velocities[:, 0].mean(), 1e6 * answer
+
+
+DIRECTIONS = {
+    "forward": ([4.0, 0.0, -GRAVITY], 0.1),
+    "backward": ([-4.0, 0.0, -GRAVITY], 0.3),
+    "left": ([0.0, 4.0, -GRAVITY], 0.2),
+    "right": ([0.0, -4.0, -GRAVITY], 0.2),
+}
+
+
+def slide_toward(direction: str) -> tuple[float, float]:
+    """Acceleration [m/s²] of a strip with a friction coefficient for each direction."""
+    gravity, coefficient = DIRECTIONS[direction]
+    friction = {"coefficient": 0.5, "speed_threshold": 1e-4, "forward": 0.1, "backward": 0.3, "sideways": 0.2}
+    found = acceleration(block(gravity, friction))
+    return float(found[:2] @ np.sign(gravity[:2])), 4.0 - coefficient * GRAVITY
+
+
+@cache
+def _oblique() -> tuple[np.ndarray, np.ndarray]:
+    along, across, time = 0.1, 0.4, 0.3
+    friction = {"coefficient": 0.5, "speed_threshold": 1e-4, "forward": along, "sideways": across}
+    simulator = block([1.5, 6.0, -GRAVITY], friction)
+    simulator.run(time)
+    return simulator.velocities.mean(axis=0)[:2], oblique_slide((1.5, 6.0), (along, across), GRAVITY, time)
+
+
+def rebound() -> tuple[float, float]:
+    """Energy of a soft strip that has fallen flat on the ground from 10 m, over that before; the barrier is elastic."""
+    soft = {"gel": {"youngs_modulus": 1e4, "poisson_ratio": 0.5, "density": 1000.0}}
+    strip = rod([layer(thickness=2e-3)], length=0.05, start=(0, 0, 10))
+    law = {**contact(barrier_distance=1e-4), "stiffness": 1e9}
+    config = scene([strip], gravity=[0, 0, -GRAVITY], obstacles=[GROUND], contact=law, materials=soft)
+    simulator = Simulator(load_scene({**config, "solver": {"tolerance": 1e-7}}))
+    begin = GRAVITY * simulator.com[2]
+    simulator.run(1.6)
+    return (GRAVITY * simulator.com[2] + 0.5 * simulator.velocities[:, 2].mean() ** 2) / begin, 1.0
+
+
+WIDTH, THICKNESS = 3e-3, 2e-3
+"""Of a strip that stands on a slope across it, on its lower border: up to the slope (w − h)/h."""
+
+
+def upright(part: float) -> float:
+    """Cosine of the roll of a strip after half a second on a slope that is a part of the steepest."""
+    angle = math.atan(part * (WIDTH - THICKNESS) / THICKNESS)
+    strip = rod([layer(thickness=THICKNESS)], length=0.02, stations=5, start=(0, 0, 1.99e-3), width=WIDTH)
+    gravity = [0.0, GRAVITY * math.sin(angle), -GRAVITY * math.cos(angle)]
+    content = scene([strip], gravity=gravity, obstacles=[GROUND], contact=contact(coefficient=2.0))
+    simulator = Simulator(load_scene(content))
+    simulator.run(0.5)
+    return float(simulator.frame().directors[:, 2].mean())
+
+
+BALLS = {"solid": (False, 5.0 / 7.0), "hollow": (True, 3.0 / 5.0)}
+
+
+@cache
+def _rolling(kind: str) -> tuple[float, float, float]:
+    """Acceleration [m/s²], speed [m/s] and ω r [m/s] of a ball on a slope."""
+    angle, radius = 0.3, 0.02
+    far_away = rod([layer()], length=0.02, stations=3, start=(0, 5, 5), clamp_start="wall")
+    config = scene(
+        [far_away],
+        gravity=tilted_gravity(angle),
+        obstacles=[GROUND],
+        bodies=[fixed(position=(0, 5, 5)), ball((0, 0, 0.0208), radius, shell=BALLS[kind][0])],
+        contact=contact(coefficient=0.6, speed_threshold=1e-4),
+        solver={"integrator": "implicit_euler"},
+    )
+    simulator = Simulator(load_scene(config))
+    simulator.run(0.1)
+    before = simulator.frame()
+    simulator.run(0.2)
+    after = simulator.frame()
+    speed = after.body_velocities[1, 0]
+    return (speed - before.body_velocities[1, 0]) / 0.2, speed, after.body_angular_velocities[1, 1] * radius
+
+
+def rolling_acceleration(kind: str) -> tuple[float, float]:
+    """Return the acceleration of a ball down a slope of 0.3 rad, simulated and exact [m/s²]."""
+    return _rolling(kind)[0], BALLS[kind][1] * GRAVITY * math.sin(0.3)
+
+
+def rolling_slip(kind: str) -> tuple[float, float]:
+    """Speed of its surface [m/s] against that of its centre."""
+    return _rolling(kind)[2], _rolling(kind)[1]
+
+
+CASES = [
+    *(
+        Case(
+            f"contact/resting gap/{edges} edges",
+            "barrier law: the force on each length is its weight (gap 0.9974448 mm, below d̂ by)",
+            0.01,
+            lambda edges=edges: compression(edges),
+            "µm",
+        )
+        for edges in MESHES
+    ),
+    Case("contact/slide", "g (sin α − μ cos α)", 0.005, slide, "m/s²"),
+    Case(
+        "contact/stands on its width",
+        "level while the slope across is below (w − h)/h, here 0.95 of it: cosine of the roll",
+        1e-4,
+        lambda: (upright(0.95), 1.0),
+    ),
+    Case("contact/rebound at 14 m/s", "energy of a flat strip with sound at 3 m/s, over that before", 0.005, rebound),
+    Case("contact/creep", "ε_v (1 − √(1 − tan α/μ))", 0.01, creep, "µm/s"),
+    *(
+        Case(
+            f"contact/slide {direction}",
+            "g_x − μ g with the coefficient of that direction",
+            0.01,
+            lambda direction=direction: slide_toward(direction),
+            "m/s²",
+        )
+        for direction in DIRECTIONS
+    ),
+    *(
+        Case(
+            f"contact/slide obliquely/{axis}",
+            "greatest dissipation, μ = 0.1 along and 0.4 across, by Runge–Kutta",
+            0.01,
+            lambda k=k: (_oblique()[0][k], _oblique()[1][k]),
+            "m/s",
+        )
+        for k, axis in enumerate("xy")
+    ),
+    *(
+        Case(
+            f"contact/rolling ball/{kind}/{figure}",
+            against,
+            0.01,
+            lambda kind=kind, measure=measure: measure(kind),
+            unit,
+        )
+        for kind in BALLS
+        for figure, against, measure, unit in (
+            ("acceleration", "g sin α/(1 + J/m r²)", rolling_acceleration, "m/s²"),
+            ("surface speed", "that of its centre: no slip", rolling_slip, "m/s"),
+        )
+    ),
+]

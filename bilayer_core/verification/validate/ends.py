@@ -1,0 +1,95 @@
+"""Ends of layers in two bonded rods: beside a free end of the strip, and where a layer covers a part of it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.verification.validate import bending, helix
+from bilayer_core.verification.validate.closed_forms import bonded_helix, timoshenko
+from bilayer_core.verification.validate.parts import GEL
+from bilayer_core.verification.validate.validation_case import Case
+
+PAIRS = ((1.0, 1.0), (3.3, 6.7), (0.2, 3.0))
+"""(m, n): the second is the one that is off most where nothing bends the last half edge."""
+STRAIN, LENGTH, PATCH, STATIONS = 0.02, 0.1, (0.04, 0.05), 81
+
+
+def beside_free_end(m: float, n: float, dimension: int) -> tuple[float, float]:
+    """κH/η of the node before the free end, and Timoshenko's."""
+    simulator = Simulator(load_scene(bending.strip(m, n, STRAIN)), dimension=dimension)
+    simulator.solve_static()
+    return -simulator.curvatures[bending.STATIONS - 2] * bending.THICKNESS / STRAIN, timoshenko(m, n)
+
+
+@cache
+def patched(m: float, n: float, dimension: int, stations: int = STATIONS) -> tuple[float, float]:
+    """Angle [rad] and sag [m] of the end of a strip with a growing layer on a tenth of it."""
+    config = bending.strip(m, n, STRAIN, stations)
+    config["rods"][0]["path"]["length"] = LENGTH
+    config["rods"][0]["layers"][1]["interval"] = list(PATCH)
+    simulator = Simulator(load_scene(config), dimension=dimension)
+    simulator.solve_static()
+    bottom = simulator.positions[:stations]
+    last = bottom[-1] - bottom[-2]
+    return float(-np.arctan2(last[2], last[0])), float(bottom[0, 2] - bottom[-1, 2])
+
+
+def beam(m: float, n: float) -> tuple[float, float]:
+    """The same of two beams: straight but for the patch, an arc of Timoshenko's curvature κ per rest length, where the
+    bottom layer has the strain ΣEI κ/(c EA), since nothing holds the section: ΣEI κ = N c.
+    """
+    top = bending.THICKNESS / (1.0 + n)
+    bottom, modulus, width = n * top, m * GEL["youngs_modulus"], 0.01
+    curvature, length = timoshenko(m, n) * STRAIN / bending.THICKNESS, PATCH[1] - PATCH[0]
+    stiffness = (modulus * bottom**3 + GEL["youngs_modulus"] * top**3) * width / 12.0
+    strain = stiffness * curvature / (0.5 * bending.THICKNESS * modulus * width * bottom)
+    angle = curvature * length
+    arc = (1.0 + strain) * length * (1.0 - np.cos(angle)) / angle
+    return angle, arc + (LENGTH - PATCH[1]) * np.sin(angle)
+
+
+def last_turn(torsion: str, natural: tuple[float, float]) -> tuple[float, float]:
+    """Pitch [m] of a bonded helix through its last four points, and that of least energy."""
+    points = helix.middle_curve(torsion, *natural)
+    return helix.screw(points[-4:])[1], bonded_helix(*natural, torsion)[1]
+
+
+CASES = [
+    *(
+        Case(
+            f"ends/free end m = {m:g}, n = {n:g}/{dimension}-D",
+            "Timoshenko's bilayer (1925), formula corrected",
+            1e-3,
+            lambda m=m, n=n, dimension=dimension: beside_free_end(m, n, dimension),
+        )
+        for m, n in PAIRS
+        for dimension in (2, 3)
+    ),
+    *(
+        Case(
+            f"ends/patch m = {m:g}, n = {n:g}/{figure}, {dimension}-D",
+            "an arc of Timoshenko's curvature between straight parts",
+            1e-3,
+            lambda m=m, n=n, i=i, dimension=dimension: (patched(m, n, dimension)[i], beam(m, n)[i]),
+            ("rad", "m")[i],
+        )
+        for m, n in PAIRS
+        for i, figure in enumerate(("angle", "tip"))
+        for dimension in (2, 3)
+    ),
+    *(
+        Case(
+            f"ends/last turn {torsion} ({natural[0]:g}, {natural[1]:g})/pitch",
+            "pitch of least energy per length",
+            2e-3,
+            lambda torsion=torsion, natural=natural: last_turn(torsion, natural),
+            "m",
+        )
+        for torsion in helix.TORSIONS
+        for natural in helix.NATURAL
+    ),
+]

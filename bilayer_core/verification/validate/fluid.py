@@ -1,0 +1,82 @@
+"""The inertia of a fluid that a strip takes along."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.verification.validate.closed_forms import kirchhoff_plate
+from bilayer_core.verification.validate.motion import let_go
+from bilayer_core.verification.validate.parts import GEL, layer, rod, scene
+from bilayer_core.verification.validate.validation_case import Case
+
+WIDTH, THICKNESS, DENSITY = 0.01, 2e-3, 1000.0
+OWN = DENSITY * WIDTH * THICKNESS
+ADDED = {
+    "through": 0.25 * math.pi * DENSITY * WIDTH**2,
+    "sideways": 0.25 * math.pi * DENSITY * THICKNESS**2,
+    "along": 0.0,
+}
+"""Mass per length that an ellipse of the strip's axes takes along [kg/m] (Lamb 1932)."""
+AXES = {"through": 2, "sideways": 1, "along": 0}
+WATER = {"drag_along": 0.0, "drag_across": 0.0, "added_mass": True}
+LENGTH, EDGES = 0.05, 10
+
+
+WHOLE, HALVES = [layer(thickness=THICKNESS)], [layer("bottom"), layer("top")]
+
+
+def strip(layers: list[dict], **more) -> dict:
+    """A free strip in a fluid without drag."""
+    return scene([rod(layers, LENGTH, EDGES + 1)], fluid=WATER, **more)
+
+
+def acceleration(direction: str, layers: list[dict]) -> tuple[float, float]:
+    """Return the acceleration [m/s²], measured and expected, of a strip driven by a force per own mass of 1 m/s²."""
+    axis = AXES[direction]
+    simulator = Simulator(load_scene(strip(layers, gravity=[float(k == axis) for k in range(3)])))
+    simulator.run(0.1)
+    return simulator.velocities[:, axis].mean() / 0.1, OWN / (OWN + ADDED[direction])
+
+
+def munk(across: float) -> tuple[float, float]:
+    """Angle [rad] to which a stiff strip turns in 0.1 s that is thrown aslant."""
+    stiff = {"gel": {**GEL, "youngs_modulus": 1e10}}
+    solver = {"dt": 5e-4, "newton_tolerance": 1e-9, "integrator": "sdirk2"}
+    simulator = Simulator(load_scene(strip(WHOLE, materials=stiff, solver=solver)))
+    let_go(simulator, np.tile([0.3, 0.0, across], (EDGES + 1, 1)))
+    simulator.run(0.1)
+    chord = simulator.positions[-1] - simulator.positions[0]
+    weights = simulator.model.node_mass / simulator.model.node_mass.sum()
+    arms = np.linspace(-0.5, 0.5, EDGES + 1) * LENGTH
+    own, whole = OWN * LENGTH, (OWN + ADDED["through"]) * LENGTH
+    expected = kirchhoff_plate((0.3, across), own, whole, whole * float(weights @ arms**2), 0.1)
+    return math.atan2(chord[2], chord[0]), expected
+
+
+CASES = [
+    *(
+        Case(
+            f"fluid/acceleration/{direction}, {name}",
+            "own mass over the sum with that of an ellipse's fluid",
+            1e-9,
+            lambda direction=direction, layers=layers: acceleration(direction, layers),
+            "m/s²",
+        )
+        for direction in AXES
+        for name, layers in (("one layer", WHOLE), ("two layers", HALVES))
+    ),
+    *(
+        Case(
+            f"fluid/Munk's moment/{name}",
+            "Kirchhoff's equations of a rigid plate, by Runge–Kutta",
+            0.002,
+            lambda across=across: munk(across),
+            "rad",
+        )
+        for name, across in (("from below", 0.2), ("from above", -0.2))
+    ),
+]

@@ -1,0 +1,254 @@
+"""Friction under normal forces that change, and what sticks and slips: a block on a belt."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from scipy.optimize import brentq
+
+from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.verification.validate.closed_forms import StickSlip, stick_slip
+from bilayer_core.verification.validate.parts import GROUND, contact, fixed, layer, rod, scene
+from bilayer_core.verification.validate.validation_case import Case
+
+GRAVITY, MASS = 10.0, 0.01
+SIZE = (0.04, 0.04, 0.002)
+FAR = (0.0, 5.0, 5.0)
+"""Where a rod is that takes no part: a scene has one at least."""
+SPEED, COEFFICIENT = 4.0, 0.1
+"""Of the block under a growing load at the start [m/s], and of its friction."""
+BELT = StickSlip(
+    mass=MASS,
+    stiffness=10.0,
+    coefficient=0.3,
+    threshold=1e-3,
+    normal_force=MASS * GRAVITY,
+    amplitude=0.5 * MASS * GRAVITY,
+    period=0.13,
+    travel=0.2,
+    duration=1.0,
+)
+SAMPLES = 250
+SECOND_ORDER = ("sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint")
+
+
+def block(position: tuple[float, float, float], velocity: float = 0.0) -> dict:
+    """A flat block with its speed along x [m/s]."""
+    motion = {"type": "free", "mass": MASS, "inertia": [1e-5] * 3, "velocity": [velocity, 0, 0]}
+    return {
+        "name": "block",
+        "position": list(position),
+        "motion": motion,
+        "surface": {"shape": "box", "size": list(SIZE)},
+    }
+
+
+def resting_gap(law: dict, corner_length: float) -> float:
+    """Gap at which the barrier carries the block's weight on four corners [m]."""
+    limit = law["barrier_distance"]
+
+    def excess(d: float) -> float:
+        force = 2.0 * (d - limit) * math.log(d / limit) + (d - limit) ** 2 / d
+        return law["stiffness"] * corner_length * force - 0.25 * MASS * GRAVITY
+
+    return brentq(excess, 1e-9 * limit, limit * (1.0 - 1e-12), xtol=1e-18)
+
+
+def at_rest(content: dict, height: str = "block") -> Simulator:
+    """The scene with its block at the height at which it rests on what is below z = 0."""
+    model = Simulator(load_scene(content)).model
+    gap = resting_gap(content["contact"], float(model.contact_points.weight[model.node_count]))
+    for body in content["bodies"]:
+        if body["name"] == height:
+            body["position"][2] = 0.5 * SIZE[2] + gap
+    return Simulator(load_scene(content))
+
+
+def under_a_growing_load(solver: dict) -> tuple[float, float]:
+    """Speed [m/s] after a second in which the normal force has grown threefold; solver {} is the default."""
+    spectator = rod([layer()], length=0.02, stations=3, start=FAR, clamp_start="wall")
+    growing = {"type": "ramp", "start": 0, "end": 1.0, "from": 0, "to": 1}
+    content = scene(
+        [spectator],
+        gravity=[0, 0, -GRAVITY],
+        obstacles=[GROUND],
+        contact=contact(coefficient=COEFFICIENT),
+        bodies=[fixed(position=FAR), block((0, 0, SIZE[2]), SPEED)],
+        loads=[{"name": "press", "body": "block", "force": [0, 0, -2.0 * MASS * GRAVITY], "schedule": growing}],
+    )
+    content["solver"] = solver
+    simulator = at_rest(content)
+    simulator.run(1.0)
+    return float(simulator.frame().body_velocities[1, 0]), SPEED - 2.0 * COEFFICIENT * GRAVITY
+
+
+def on_a_belt(solver: dict) -> np.ndarray:
+    """Displacements of the block [m] at `SAMPLES` equal times, shape (SAMPLES,).
+
+    A belt draws it along, a ribbon without mass holds it, and what presses on it comes and goes: it sticks, slips, and
+    swings back.
+    """
+    length, width, thickness = 0.1, 0.01, 1e-3
+    modulus = BELT.stiffness * length / (width * thickness)
+    ribbon = rod(
+        [layer(material="thread")],
+        length=length,
+        stations=3,
+        start=(-length - 0.5 * SIZE[0], 0, SIZE[2]),
+        clamp_start="wall",
+        clamp_end="block",
+    )
+    press = {"type": "sine", "mean": 0, "amplitude": 1, "period": BELT.period}
+    motion = {"type": "prescribed", "times": [0, BELT.duration], "displacements": [[0, 0, 0], [BELT.travel, 0, 0]]}
+    content = scene(
+        [ribbon],
+        gravity=[0, 0, -GRAVITY],
+        materials={"thread": {"youngs_modulus": modulus, "poisson_ratio": 0.5, "density": 1e-3}},
+        contact=contact(1e-4, BELT.coefficient, BELT.threshold) | {"stiffness": 1e9},
+        bodies=[
+            fixed(position=(-length - 0.5 * SIZE[0], 0, SIZE[2])),
+            block((0, 0, SIZE[2])),
+            {
+                "name": "belt",
+                "position": [0, 0, -0.02],
+                "motion": motion,
+                "surface": {"shape": "box", "size": [2.0, 0.1, 0.04]},
+            },
+        ],
+        loads=[{"name": "press", "body": "block", "force": [0, 0, -BELT.amplitude], "schedule": press}],
+        output={"rate": SAMPLES / BELT.duration},
+    )
+    content["solver"] = solver
+    simulator, found = at_rest(content), []
+    for _ in range(SAMPLES):
+        simulator.run(BELT.duration / SAMPLES)
+        found.append(simulator.bodies["block"].position[0])
+    return np.array(found)
+
+
+@cache
+def _swing() -> np.ndarray:
+    return stick_slip(BELT, np.linspace(0.0, BELT.duration, SAMPLES + 1)[1:])
+
+
+def error_on_a_belt(solver: dict) -> tuple[float, float]:
+    """Largest error of the displacement over the run, as a part of the largest displacement, and 0."""
+    return float(np.abs(on_a_belt(solver) - _swing()).max() / np.abs(_swing()).max()), 0.0
+
+
+GRAIN = (0.2, 0.6, 0.4)
+"""Coefficients along a grain, against it, and across it."""
+PULL = 0.5
+"""Force along the ground on the block on a grain, as a part of its weight: between the first two of these."""
+
+
+def pulled_over_grain(
+    angle: float, off: float, solver: dict, grain: dict | None = None, time: float = 0.5
+) -> np.ndarray:
+    """Velocity of a block after `time` [s], turned back by `angle` [m/s], shape (3,).
+
+    Ground and pull are turned by `angle` about the normal together: the pull is at `off` [rad] from the grain. `grain`
+    says what has the grain, in keys of the ground; by default the ground itself.
+    """
+    spectator = rod([layer()], length=0.02, stations=3, start=FAR, clamp_start="wall")
+    axis = [math.cos(angle), math.sin(angle), 0.0]
+    law = contact(coefficient=GRAIN[2], speed_threshold=1e-5)
+    law["friction"] |= dict(zip(("forward", "backward", "sideways"), GRAIN, strict=True))
+    pull = PULL * GRAVITY * np.array([math.cos(angle + off), math.sin(angle + off)])
+    content = scene(
+        [spectator],
+        gravity=[*pull.tolist(), -GRAVITY],
+        obstacles=[GROUND | ({"grain": axis} if grain is None else {})],
+        contact=law,
+        bodies=[fixed(position=FAR), block((0, 0, SIZE[2]))],
+    )
+    if grain == {"of": "block"}:  # the block slides with it: forward is where the ground goes
+        content["bodies"][1]["surface"]["grain"] = [-c for c in axis]
+    elif grain == {"of": "world"}:
+        content["contact"]["friction"]["axis"] = axis
+    content["solver"] = solver
+    simulator = at_rest(content)
+    simulator.run(time)
+    x, y, z = simulator.frame().body_velocities[1, :3]
+    return np.array([axis[0] * x + axis[1] * y, axis[0] * y - axis[1] * x, z])
+
+
+def acceleration_on_grain(off: float) -> np.ndarray:
+    """Return the acceleration of a block from rest, along the grain and across it [m/s²], shape (2,).
+
+    The block goes straight on, along a unit vector d at which pull and friction M² d/|M d| leave nothing across d; M
+    has the coefficients along and across the grain.
+    """
+    pull = PULL * np.array([math.cos(off), math.sin(off)])
+
+    def left(angle: float) -> np.ndarray:
+        d = np.array([math.cos(angle), math.sin(angle)])
+        m = np.array([GRAIN[0] if d[0] >= 0.0 else GRAIN[1], GRAIN[2]])
+        return pull - m * m * d / np.linalg.norm(m * d)
+
+    if abs(math.sin(off)) < 1e-12:
+        angle = off
+    else:
+        ends = off - 0.5 * math.pi, off + 0.5 * math.pi
+        angle = brentq(lambda a: float(left(a) @ [-math.sin(a), math.cos(a)]), *ends, xtol=1e-15)
+    along = float(left(angle) @ [math.cos(angle), math.sin(angle)])
+    return GRAVITY * max(along, 0.0) * np.array([math.cos(angle), math.sin(angle)])
+
+
+def speed_over_grain(angle: float, off: float, solver: dict) -> tuple[float, float]:
+    """Error of the velocity after half a second [m/s], and 0."""
+    error = pulled_over_grain(angle, off, solver)[:2] - 0.5 * acceleration_on_grain(off)
+    return float(np.linalg.norm(error)), 0.0
+
+
+def _named(solver: dict) -> str:
+    if "integrator" in solver:
+        return f"{solver['integrator']}, {1e3 * solver['dt']:g} ms"
+    return f"tolerance {solver['tolerance']:g}" if solver else "default"
+
+
+CASES = [
+    *(
+        Case(
+            f"friction/growing load/{_named(solver)}",
+            "v₀ − μ ∫N dt/m while N grows from m g to 3 m g in 1 s",
+            limit,
+            lambda solver=solver: under_a_growing_load(dict(solver)),
+            "m/s",
+        )
+        for solver, limit in (
+            ({}, 1e-3),
+            ({"tolerance": 1e-6}, 1e-5),
+            *(({"integrator": name, "dt": 4e-3}, 1e-5) for name in SECOND_ORDER),
+        )
+    ),
+    *(
+        Case(
+            f"friction/stick and slip/{_named(solver)}",
+            "own equation, by Radau's method to 1e-10: a block on a belt, held by a spring, pressed in turns",
+            limit,
+            lambda solver=solver: error_on_a_belt(dict(solver)),
+            scale=1.0,
+        )
+        for solver, limit in (
+            ({}, 0.02),
+            ({"tolerance": 1e-6}, 1e-3),
+            *(({"integrator": name, "dt": 1e-3}, 2e-3) for name in SECOND_ORDER),
+        )
+    ),
+    *(
+        Case(
+            f"friction/grain at {angle:g}°/{what}",
+            "velocity after 0.5 s, m a = pull − N M² d/|M d|, a along d; M: 0.2 along, 0.6 against, 0.4 across grain",
+            2e-5,
+            lambda angle=angle, off=off: speed_over_grain(math.radians(angle), math.radians(off), {}),
+            "m/s",
+            scale=1.0,
+        )
+        for angle in (0.0, 77.0)
+        for what, off in (("along it", 0.0), ("against it, stuck", 180.0), ("40° off it", 40.0), ("100° off it", 100.0))
+    ),
+]
