@@ -24,7 +24,7 @@ TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS.parent)]
 
 import rclpy  # noqa: E402
-import synthetic_run  # noqa: E402
+from support import synthetic_run  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
 from rcl_interfaces.srv import SetParameters  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
