@@ -167,7 +167,7 @@ def _own_laws(pattern) -> str:
 
 
 def _millimetres(limits: tuple[float, float]) -> str:
-    """A length, or the range of one that varies."""
+    """Format a length, or the range of one that varies [m], in mm."""
     least, most = (f"{1e3 * limit:.4g}" for limit in limits)
     return f"{least} mm" if least == most else f"{least} to {most} mm"
 
@@ -215,21 +215,21 @@ def _time(report: dict[str, Any]) -> str:
 
 
 def _size(size: int) -> str:
-    """A size as told to users."""
+    """Format a number of bytes as users read it."""
     return (
         f"{size / 1e9:.3g} GB" if size >= 999.5e6 else f"{size / 1e6:.2g} MB" if size >= 1e5 else f"{size / 1e3:.2g} kB"
     )
 
 
 def _block(name: str, lines: list[str]) -> Iterator[str]:
-    """A name, and lines beside it; long ones go on with an indent."""
+    """Yield lines with a name at the left and text beside it; long lines continue with an indent."""
     parts = [part for line in lines for part in textwrap.wrap(line, WIDTH, subsequent_indent="  ")]
     for index, part in enumerate(parts):
         yield f"  {name if index == 0 else '':{max(14, len(name) + 2)}}{part}"
 
 
 def _forces(terms: dict[str, str]) -> Iterator[str]:
-    """The terms that are computed on one line, the others by the reason for which they are skipped."""
+    """Yield a line with the terms that are computed, then the skipped terms by reason."""
     yield "forces"
     yield from _block("active", [", ".join(name for name, state in terms.items() if state == "active")])
     skipped: dict[str, list[str]] = {}

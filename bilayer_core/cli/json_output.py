@@ -12,14 +12,14 @@ STANDARD_OUTPUT = "-"
 
 
 def json_option(help: str) -> Callable:
-    """The option ``--json``; gives the argument `json_file`."""
+    """Return the option ``--json``, which gives the argument `json_file`."""
     text = f"{help}; - is standard output, and all else goes to standard error."
     return click.option("--json", "json_file", metavar="FILE.json|-", help=text)
 
 
 @contextmanager
 def json_to(path: str | None, force: bool = True) -> Iterator[Callable[[str], None]]:
-    """Yields what takes the text, once; where `path` is ``-``, what is printed meanwhile goes to standard error.
+    """Yield a function that takes the text, once. If `path` is ``-``, all prints meanwhile go to standard error.
 
     Raises
     ------

@@ -81,7 +81,7 @@ class Rate(click.ParamType):
     name = "rate"
 
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
-        """The rate [Hz]."""
+        """Return the rate [Hz]."""
         from pydantic import TypeAdapter, ValidationError
 
         from bilayer_core.scene.units import PositiveRate
@@ -101,7 +101,7 @@ class Duration(click.ParamType):
         self._from_zero = from_zero
 
     def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
         from pydantic import TypeAdapter, ValidationError
 
         from bilayer_core.scene.units import NonNegativeTime, PositiveTime
@@ -120,12 +120,12 @@ def say_renamed(old: str, new: str) -> None:
 
 
 def output_directory(out: str) -> Path:
-    """The directory of ``--out``, made if it is not there.
+    """Return the directory of ``--out``; create it if it does not exist.
 
     Raises
     ------
     InputError
-        If it cannot be.
+        If it cannot be created.
     """
     directory = Path(out)
     try:

@@ -110,7 +110,7 @@ def run_program(arguments: Sequence[str] | None, signals: Signals) -> int:
 
 
 def _explain(settings: Settings, message: str) -> None:
-    """The message, after the traceback of the exception in hand if the user asked for it."""
+    """Print the message, after the traceback of the current exception if the user asked for it."""
     if settings.debug:
         traceback.print_exc()
     say(f"bilayer: {message}", err=True)

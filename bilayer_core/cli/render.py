@@ -150,7 +150,7 @@ def render(
 def _moments(
     studio: Any, times: tuple[float, ...], frames: int | None, rate: float, speed: float | None, longest: float
 ) -> tuple[list[float], str]:
-    """Times of a film's pictures [s], and what is said of its speed."""
+    """Return the times of a film's pictures [s] and a note about its speed."""
     from bilayer_core.errors import InputError
 
     span = studio.last - studio.first

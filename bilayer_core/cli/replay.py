@@ -237,7 +237,7 @@ def _go_on(
 
 
 def _time_left(log: str, time: float) -> float:
-    """Simulated time from an instant to the end of a log's run [s]."""
+    """Return the simulated time from an instant to the end of a log's run [s]."""
     from bilayer_core.log.run.log_reader import read_info
 
     left = read_info(log).last_time - time

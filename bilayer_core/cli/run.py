@@ -150,7 +150,7 @@ class _Judge:
 
 
 def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
-    """The recorders; whatever cannot be written is refused here, before anything is computed."""
+    """Return the recorders. An output that cannot be written raises an error here, before anything is computed."""
     from bilayer_core.log.file.output_paths import check_output_path
 
     force, output = options["force"], config.output
@@ -178,7 +178,7 @@ def _open_outputs(config: SceneConfig, options: dict[str, Any]) -> list:
 def _make_simulator(
     config: SceneConfig, from_state: str | None, at: float | None, budget: bool, quiet: bool
 ) -> Simulator:
-    """A simulator that is ready to step."""
+    """Return a simulator that is ready to step."""
     from bilayer_core.simulation.simulator import Simulator
 
     if at is not None and from_state is None:
@@ -196,7 +196,7 @@ def _make_simulator(
 
 
 def _duration(simulator: Simulator, asked: float | None) -> float:
-    """Simulated time of this run [s]."""
+    """Return the simulated time of this run [s]."""
     if asked is not None:
         return asked
     left = simulator.scene.duration - simulator.time

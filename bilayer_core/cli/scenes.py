@@ -19,7 +19,7 @@ def scenes() -> None:
 
 
 def titles(files: dict[str, Path]) -> str:
-    """A line for each file of scenes or sweeps: its name and its title."""
+    """Return a line for each file of scenes or sweeps: its name and its title."""
     from bilayer_core.scene.text import read_yaml
 
     width = max(map(len, files))

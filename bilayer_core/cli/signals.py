@@ -50,7 +50,10 @@ class Interruption(BaseException):
 
 
 def interruption_behind(error: BaseException | None) -> Interruption | None:
-    """The interruption of which an exception was made: Python makes a RuntimeError where a class is being made."""
+    """Return the interruption that led to an exception.
+
+    Python raises a RuntimeError in its place while a class is being created.
+    """
     behind, seen = [error], set()
     while behind:
         found = behind.pop()
@@ -117,8 +120,9 @@ class Signals:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
 
     def behind(self, error: BaseException) -> Interruption | None:
-        """The interruption of which an exception was made, if need be the one that was raised before it: compiled
-        libraries make others of it that do not say so.
+        """Return the interruption that led to an exception, otherwise the last one that was raised.
+
+        Compiled libraries turn interruptions into other exceptions that do not mention them.
         """
         return interruption_behind(error) or self._interruption
 

@@ -67,7 +67,7 @@ def _print_result(result: Result) -> None:
 
 
 def _print_line(columns: tuple[str, ...], style: str) -> None:
-    """The first column to the left, numbers to the right, the last in colour if this is a terminal."""
+    """Print the first column at the left, numbers at the right, and the last column in colour if this is a terminal."""
     from rich.console import Console
     from rich.text import Text
 

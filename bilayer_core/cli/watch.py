@@ -76,7 +76,7 @@ def compile_kernels(quiet: bool) -> None:
 
 @contextmanager
 def pieces_bar(total: int) -> Iterator[Callable[[int, int], None]]:
-    """A bar on stderr over pieces that are compiled. Yields the function that takes how many are done, of how many."""
+    """Show a bar on stderr for pieces that are compiled. Yield a function that takes the number done and the total."""
     if not sys.stderr.isatty():
         yield lambda done, total: None
         return
@@ -90,7 +90,7 @@ def pieces_bar(total: int) -> Iterator[Callable[[int, int], None]]:
 
 @contextmanager
 def progress_bar(name: str, begin: float, end: float, quiet: bool) -> Iterator[Callable[[float], None]]:
-    """A bar on stderr: simulated time, real-time factor, time left. Yields the function that takes the simulated time.
+    """Show a bar on stderr with the simulated time, real-time factor and time left. Yield a function to set the time.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def progress_bar(name: str, begin: float, end: float, quiet: bool) -> Iterator[C
 
 @contextmanager
 def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """A bar on stderr over many measurements. Yields the function that takes what is done next.
+    """Show a bar on stderr for many measurements. Yield a function that takes the name of the next one.
 
     Parameters
     ----------
@@ -158,9 +158,9 @@ def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def runs_bar(total: int, there: int, quiet: bool) -> Iterator[Callable[[str], None]]:
-    """A bar on stderr over many runs: how many, how many a second, time left, how many are not done.
+    """Show a bar on stderr for many runs: how many are done, how many a second, the time left, how many failed.
 
-    Without a screen a line tells now and then. Yields the function that takes the outcome of each run.
+    Without a terminal, print a line now and then. Yield a function that takes the outcome of each run.
 
     Parameters
     ----------
