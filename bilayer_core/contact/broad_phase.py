@@ -131,9 +131,10 @@ RUN = 2.0
 
 @kernel
 def _run_about(search, first, last, near):
-    """The run [begin, end) of edges of one strand about those from `first` to `last`, no two of which come nearer to
-    each other than `near` [m], if they are on the path as far apart as a rod has to be to see itself; empty if there is
-    none.
+    """Return a run [begin, end) of edges of one strand about those from `first` to `last`.
+
+    No two of these edges come nearer to each other than `near` [m] if they are so far apart along the path that a rod
+    has to check for contact with itself. The run is empty if there is no such one.
     """
     position, tip, edge_first, edge_arc = search.base, search.tip, search.edge_first, search.edge_arc
     exclusion = search.rod_exclusion[search.edge_rod[first]]

@@ -37,7 +37,7 @@ def note_start(surfaces, at):
 
 @kernel
 def crossing(strands, surfaces, at):
-    """The first edge whose centreline goes through a surface between its nodes.
+    """Find the first edge whose centreline goes through a surface between its nodes.
 
     Only edges whose nodes both meet the surface count: a rod may grow out of a body that holds it. A plane lies on one
     side of every edge whose nodes it has on that side.

@@ -120,7 +120,7 @@ def _covered_by_shape(light, s, x, toward, soft):
 
 @kernel
 def _in_frame(light, s, b, r):
-    """A vector of the world in the frame of a surface."""
+    """Return a vector of the world in the frame of a surface."""
     turn, axes = light.body_rotation, light.rotation
     u = (
         turn[b, 0, 0] * r[0] + turn[b, 1, 0] * r[1] + turn[b, 2, 0] * r[2],

@@ -95,7 +95,7 @@ def _turn_of_edge(surfaces, strands, system, at, e):
 
 @kernel
 def _turn_at_node(surfaces, strands, system, at, i):
-    """The largest of `_turn_of_edge` of the edges at a node."""
+    """Return the largest values of `_turn_of_edge` over the edges at a node."""
     before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
     slope, angle, change = _turn_of_edge(surfaces, strands, system, at, before)
     slope_, angle_, change_ = _turn_of_edge(surfaces, strands, system, at, after)
@@ -104,7 +104,7 @@ def _turn_at_node(surfaces, strands, system, at, i):
 
 @kernel
 def _motion_of_rod_points(surfaces, strands, system, at):
-    """A bound of the motion in a step of all contact points with an arm from their node [m].
+    """Return a bound of the motion in a step of all contact points with an arm from their node [m].
 
     The angle between an edge and where it is by a part α of a step is at most π/2 α |ė|/l, or π if |ė|/l is above 1.
     """
@@ -144,7 +144,7 @@ def motion_of_surfaces(surfaces, system):
 
 @kernel
 def _carry(t0, t1, t2, m0, m1, m2, angle, u0, u1, u2):
-    """A vector m normal to the unit tangent t, carried to the unit tangent u and turned about it."""
+    """Return a vector m normal to the unit tangent t, carried to the unit tangent u and turned about it."""
     scale = (m0 * u0 + m1 * u1 + m2 * u2) / (1.0 + t0 * u0 + t1 * u1 + t2 * u2)
     m0, m1, m2 = m0 - scale * (t0 + u0), m1 - scale * (t1 + u1), m2 - scale * (t2 + u2)
     c, s = math.cos(angle), math.sin(angle)

@@ -85,7 +85,7 @@ def _skew(a, out):
 
 @piece(int, Problem, Matrix, Vector, Vector, Vector, float, int, int, int, int)
 def add_contact_to_bodies(p, m, g, arm, lever, turning, i, r, a, b):
-    """The part of `add_second_derivative` that free bodies have; at least one of the two is free."""
+    """Add the part of `add_second_derivative` that concerns free bodies; at least one of the two bodies is free."""
     sums, free = p.sums, p.surfaces.free_index
     jacobian, upper = stack_matrix(3, 12), stack_matrix(12, 12)  # by (x or X_A, φ_A, X_B, φ_B)
     crossed_arm, crossed_lever, crossed = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)

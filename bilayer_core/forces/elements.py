@@ -83,7 +83,7 @@ def measure_strains(p, at, strain_out):
 
 @kernel
 def slot_of_pair(strands, k, c):
-    """The force that component c of the vector between layers k belongs to."""
+    """Return the force to which component c of the vector between layers k belongs."""
     return BOND if k < strands.joint_a.shape[0] - strands.bend_count else TWISTING if c == 1 else BENDING
 
 

@@ -160,7 +160,7 @@ def memory_size(model: Model) -> int:
 
 
 def force_table(model: Model, records: dict[str, Any]) -> ForceTable:
-    """The terms that act in a model.
+    """Return the terms that act in a model.
 
     Parameters
     ----------

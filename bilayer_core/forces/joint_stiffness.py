@@ -28,7 +28,7 @@ def scatter_pair(first, second, block, out):
 
 
 def across(axis: Sequence[float]) -> np.ndarray:
-    """A unit vector across an axis, shape (3,)."""
+    """Return a unit vector perpendicular to an axis, shape (3,)."""
     found = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     return found / np.linalg.norm(found)
 

@@ -194,7 +194,7 @@ def add_joints(joints, p, at, stage, with_hessian):
 
 
 def joints_of(model: Model) -> Joints:
-    """The record of a model; absent where its scene has no joints."""
+    """Return the record of a model; absent if its scene has no joints."""
     joints, bodies = model.scene.joints, model.bodies
     if not joints:
         return Joints.absent()

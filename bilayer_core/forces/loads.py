@@ -73,7 +73,7 @@ def add_point_forces(loads, p, at, stage, with_hessian):
 
 @piece(int, PointForces, Problem, Configuration, Stage)
 def start_dead_loads(loads, p, start, stage):
-    """Forces of fixed direction by their factors at the stage."""
+    """Set the forces of fixed direction from their factors at the stage."""
     for k in range(loads.node.shape[0]):
         for c in range(3):
             loads.on_nodes[k, c] = stage.load_factor[loads.node_load[k]] * loads.node_vector[k, c]

@@ -271,14 +271,14 @@ def end_mechanisms(mechanisms, p, at, stage):
 
 
 def memory_at(mechanisms: Mechanisms, first: int) -> Mechanisms:
-    """The record, which remembers from slot `first` of `Problem.memory` on."""
+    """Return the record with its memory beginning at slot `first` of `Problem.memory`."""
     if mechanisms.exists:
         mechanisms.memory[:] = first
     return mechanisms
 
 
 def mechanisms_record(model: Model) -> Mechanisms:
-    """The record of a model; absent where nothing is resisted."""
+    """Return the record of a model; absent if nothing is resisted."""
     found, bodies = model.mechanisms, model.bodies
     if not found:
         return Mechanisms.absent()

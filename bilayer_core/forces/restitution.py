@@ -59,7 +59,7 @@ def damping_of(restitution: float) -> float:
 
 
 def with_memory(restitution: Restitution, first: int) -> Restitution:
-    """The record, which remembers from slot `first` of `Problem.memory` on."""
+    """Return the record with its memory beginning at slot `first` of `Problem.memory`."""
     restitution.memory[:] = first
     return restitution
 

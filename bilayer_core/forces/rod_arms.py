@@ -163,7 +163,7 @@ def copy_rate(rate, k, rate_out, r):
 
 @kernel
 def new_arm(sums, i):
-    """A slot in the list of contacts with an arm, for one at node i."""
+    """Take a slot in the list of contacts with an arm for a contact at node i, and return it."""
     r = sums.arms[0]
     sums.arm_node[r], sums.arm_curved[r] = i, False
     sums.arms[0] = r + 1

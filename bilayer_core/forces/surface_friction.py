@@ -93,7 +93,7 @@ def _forward(sliding, edges, start, on_rod, i, n0, n1, n2):
 
 @kernel
 def _tangential(x, y, z, n0, n1, n2):
-    """Unit vector along the part of (x, y, z) in the plane across the unit vector n."""
+    """Return the unit vector along the part of (x, y, z) in the plane perpendicular to the unit vector n."""
     for _ in range(2):
         along = x * n0 + y * n1 + z * n2
         x, y, z = x - along * n0, y - along * n1, z - along * n2

@@ -107,7 +107,7 @@ class Method:
         return (self.history.momenta[-1] if self.history else 0.0, *self.couplings[-1], self.diagonal)
 
     def arrays(self) -> MethodArrays:
-        """The coefficients as the engine takes them; couplings are over γ, and `weights` are a row more of them."""
+        """Return the coefficients as the engine takes them: couplings divided by γ, with `weights` as one more row."""
         stages, history = len(self.nodes), self.history
         rows = self.couplings if self.weights is None else (*self.couplings, self.weights)
         couplings = np.zeros((len(rows), stages))

@@ -41,5 +41,5 @@ def _unit(a):
 
 @kernel
 def _tangent(positions, start):
-    """Unit tangent of the edge from node `start` to the next."""
+    """Return the unit tangent of the edge from node `start` to the next."""
     return _unit(combine(1.0, row(positions, start + 1), -1.0, row(positions, start)))

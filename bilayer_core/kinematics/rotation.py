@@ -64,7 +64,7 @@ def quaternion_of(m00, m01, m02, m10, m11, m12, m20, m21, m22):
 
 
 def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Unit quaternion x y z w (w ≥ 0) of a rotation matrix, shape (4,)."""
+    """Return the unit quaternion x y z w (w ≥ 0) of a rotation matrix, shape (4,)."""
     quaternion = np.array(quaternion_of(*(entry for row in matrix.tolist() for entry in row)))
     return quaternion if quaternion[3] >= 0.0 else -quaternion
 

@@ -24,7 +24,7 @@ def dot(a, b):
 
 @kernel
 def cross(a, b):
-    """a × b"""
+    """Return a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
