@@ -87,7 +87,7 @@ class Remedy:
         return self.text
 
     def overrides(self) -> tuple[str, ...]:
-        """The changes as ``KEY=VALUE`` for ``--set``."""
+        """Return the changes as ``KEY=VALUE`` for ``--set``."""
         return tuple(f"{key}={'null' if value is None else value}" for key, value in self.changes.items())
 
 

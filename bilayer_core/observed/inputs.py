@@ -89,7 +89,7 @@ class Input:
 
 
 def values_of_pose(position: Values | None, quaternion: Values | None, over: float) -> tuple[float, ...]:
-    """The values of a pose as it was asked for."""
+    """Return the values of a pose as it was requested."""
     at = (math.nan,) * 3 if position is None else tuple(map(float, position))
     turned = (math.nan,) * 4 if quaternion is None else tuple(map(float, quaternion))
     return (*at, *turned, float(over))

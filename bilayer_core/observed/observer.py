@@ -24,7 +24,7 @@ class Observed(Protocol):
     def description(self) -> Description: ...
 
     def frame(self) -> Frame:
-        """A snapshot."""
+        """Return a snapshot."""
 
 
 class Observer(Protocol):
@@ -37,10 +37,13 @@ class Observer(Protocol):
     rate: float
 
     def start(self, description: Description) -> None:
-        """Called once, before the first frame."""
+        """Begin to observe a run. The simulator calls this once, before the first frame."""
 
     def observe(self, frame: Frame) -> None:
-        """Called with every frame that is due, the first and the last included."""
+        """Take a frame. The simulator calls this for every frame that is due, including the first and the last."""
 
     def close(self, complete: bool, termination: str = "") -> None:
-        """Called once at the end; `complete` is false if the run was cut short, `termination` says why it ended."""
+        """End the observation. The simulator calls this once.
+
+        `complete` is false if the run was cut short; `termination` says why it ended.
+        """

@@ -200,7 +200,7 @@ def _verified(path: Path, tolerance: float | None, derived: bool) -> Verificatio
 
 
 def simulator_of(path: str | Path, overrides: Sequence[str] = ()) -> Simulator:
-    """A simulator of the scene in a log, with the steps that its run made, at the scene's start.
+    """Return a simulator of the scene in a log at the scene's start, with the step settings of the log's run.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def simulator_of(path: str | Path, overrides: Sequence[str] = ()) -> Simulator:
 
 
 def _number(path: str | Path, settings: Mapping[str, str], key: str) -> float:
-    """A setting of a log's run as a number."""
+    """Return a setting of a log's run as a number."""
     try:
         number = float(settings[key])
     except ValueError:
@@ -244,7 +244,7 @@ def branch(
     stimuli: Mapping[str, float | None] | None = None,
     loads: Mapping[str, float | None] | None = None,
 ) -> tuple[Simulator, list[Input]]:
-    """A run that goes on from an instant of a log, with changes.
+    """Continue a run from an instant of its log, with changes.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ class GapCheck:
         )
 
     def smallest(self, at: Moment) -> float:
-        """The smallest gap [m], infinite without anything that could meet."""
+        """Return the smallest gap [m]; infinite if nothing can meet."""
         gaps = [math.inf]
         if self._pairs:
             gaps.append(float(self._rod_gaps(at.nodes)[0].min(initial=math.inf)))

@@ -63,7 +63,7 @@ class RobotRun:
         return f"RobotRun({self.simulator.scene.name} to t = {self.simulator.time:g} s: {said})"
 
     def __getitem__(self, name: str) -> Quantity:
-        """A quantity over time."""
+        """Return a quantity over time."""
         return self.data[name]
 
     def _run(self, judged: bool) -> RunResult:

@@ -91,8 +91,9 @@ class Trial:
         return steps >= self._most_steps or clock.thread_time() - self._cpu_start > self._cpu_limit
 
     def ends(self, parts: int) -> list[float]:
-        """Ends of so many equal parts of the scene [s]; with fixed steps, of what the allowed steps cover of it, each
-        at the end of a step.
+        """Return the ends of so many equal parts of the scene [s].
+
+        With fixed steps these are parts of what the allowed steps cover of the scene, each at the end of a step.
         """
         steps, duration = self.simulator.steps, self.simulator.scene.duration
         if steps.adaptive:

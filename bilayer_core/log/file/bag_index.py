@@ -217,7 +217,10 @@ def _type(name: str) -> str:
 
 
 def _separate_runs(stamped: list[Track]) -> Array:
-    """Number the runs: another one begins where the stamps of a topic go back. Returns when these begin [ns]."""
+    """Assign a number to each run, and return when the second and later ones begin [ns].
+
+    A run begins where a topic's stamps go back.
+    """
     if not stamped:
         return np.empty(0, np.int64)
     back = [np.flatnonzero(np.diff(of.stamps) < 0) + 1 for of in stamped]

@@ -128,7 +128,7 @@ class IndexedLog:
             yield heapq.heappop(waiting)[-1]
 
     def latest(self, channel: int, before: int, count: int) -> list[Message]:
-        """The last messages of a channel before a time [ns], at most `count`, by time."""
+        """Return the last messages of a channel before a time [ns], at most `count`, sorted by time."""
         found: list[_Placed] = []
         starts, ends = self._summary.starts, self._summary.ends
         for chunk in sorted(self._chunks, key=ends.__getitem__, reverse=True):

@@ -131,7 +131,7 @@ class LogFile:
         return [number for number, channel in self.channels.items() if topics is None or channel.topic in topics]
 
     def _take(self, summary: Summary, file: BinaryIO) -> None:
-        """The file's own index."""
+        """Take the places of messages from the file's own index."""
         self._definitions = summary.definitions
         for channel in summary.definitions.channels.values():
             self._add_channel(channel)
@@ -145,7 +145,7 @@ class LogFile:
                 self._look_into(file)
 
     def _scan(self, file: BinaryIO) -> None:
-        """A file without an index, from record to record."""
+        """Index a file without an index of its own, record by record."""
         indexed, known = True, False
         for place in walk(file):
             if place.opcode == MESSAGE_INDEX and self._chunks and self._chunks[-1].opcode == CHUNK:

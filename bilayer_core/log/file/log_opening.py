@@ -21,7 +21,7 @@ _OTHER_BAGS = {b"SQLite f": "is a bag stored with sqlite3", b"\x28\xb5\x2f\xfd":
 
 @contextmanager
 def open_log(path: Path) -> Iterator[BinaryIO]:
-    """The open file; what shows that it is not a log, or is damaged, becomes an InputError."""
+    """Yield the open file. If it is not a log, or is damaged, raise an InputError."""
     try:
         with path.open("rb") as file, damage_told(path):
             if (begin := file.read(len(MAGIC))) != MAGIC:

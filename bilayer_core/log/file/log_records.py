@@ -93,7 +93,7 @@ class Place:
 
 
 def walk(file: BinaryIO, begin: int = len(MAGIC)) -> Iterator[Place]:
-    """The whole records from an offset on, up to the end of the file or to what does not fit into it."""
+    """Yield the complete records from an offset on, up to the end of the file or the first record that does not fit."""
     size = file.seek(0, 2)
     while begin + HEAD.size <= size:
         file.seek(begin)
@@ -122,7 +122,7 @@ def content(file: BinaryIO, place: Place) -> bytes:
 
 
 def parse(kind: type, data: bytes):
-    """A record of `mcap.records` from its content; DamagedChunk if it has none of its form."""
+    """Return a record of `mcap.records` from its content; raise DamagedChunk if the content has another form."""
     from mcap.data_stream import ReadDataStream
     from mcap.exceptions import McapError
 
@@ -159,7 +159,7 @@ def read_metadata(data: bytes, wanted: Collection[str] | None = None) -> tuple[s
 
 
 def _text(data: bytes, place: int) -> tuple[str, int]:
-    """A text in a record, and where it ends."""
+    """Return a text in a record, and the offset at which it ends."""
     (length,) = _LENGTH.unpack_from(data, place)
     place += _LENGTH.size
     if place + length > len(data):

@@ -248,7 +248,10 @@ class McapRecorder:
         return f"it can be read up to t = {info.last_time:.6g} s ({info.size / 1e6:.3g} MB)"
 
     def _write(self, log: _LogFile) -> None:
-        """The writer's thread: until the ending comes or something fails, which the other thread then raises."""
+        """Write until the ending comes or something fails; the other thread then raises the failure.
+
+        The writer's thread runs this.
+        """
         failure = None
         for work in (lambda: self._write_all(log), log.close):
             try:

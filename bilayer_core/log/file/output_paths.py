@@ -12,7 +12,9 @@ from bilayer_core.log.file.private_directory import private_directory
 
 
 def check_output_path(path: str | Path, force: bool = False, suffix: str = "") -> Path:
-    """The path of a file that can be written now: its directory exists and is writable, and it is not there yet.
+    """Return the path of a file after checking that it can be written now.
+
+    Its directory must exist and be writable, and the file must not exist yet.
 
     Parameters
     ----------

@@ -292,7 +292,7 @@ class _Repair:
                 self._definitions.take(opcode, inside[start:end])
 
     def _new_number(self, number: int) -> int | None:
-        """The number of a channel in the new file."""
+        """Return the number of a channel in the new file."""
         channel = self._definitions.channels.get(number)
         if channel is None or channel.schema_id and channel.schema_id not in self._definitions.schemas:
             return None

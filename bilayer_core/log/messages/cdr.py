@@ -26,7 +26,7 @@ SEPARATOR = ","
 
 
 def nanoseconds(time: float) -> int:
-    """Simulation time [s] as a whole number of nanoseconds."""
+    """Return a simulation time [s] as a whole number of nanoseconds."""
     return round(time * NANOSECONDS)
 
 
@@ -37,7 +37,7 @@ def seconds_text(time: int) -> str:
 
 
 def stamp_of(time: int) -> bytes:
-    """A ``builtin_interfaces/Time``, without padding before it, of a time [ns]."""
+    """Return a ``builtin_interfaces/Time``, without padding before it, of a time [ns]."""
     return _STAMP.pack(*divmod(time, NANOSECONDS))
 
 
@@ -121,7 +121,7 @@ class Template:
         return len(self._buffer)
 
     def to_bytes(self) -> bytes:
-        """A copy of the message as it stands."""
+        """Return a copy of the message in its present state."""
         return bytes(self._buffer)
 
 

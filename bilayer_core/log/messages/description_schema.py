@@ -24,7 +24,7 @@ UNIT_TOLERANCE = 1e-3
 
 
 def _numbers(value: Any) -> np.ndarray:
-    """A list of finite numbers as an array."""
+    """Return a list of finite numbers as an array."""
     if not (isinstance(value, list) and all(type(number) in (float, int) for number in value)):
         raise ValueError("must be a list of numbers")
     try:

@@ -96,12 +96,12 @@ def to_json(description: Description) -> str:
 
 
 def from_json(text: str) -> Description:
-    """The description of which `text` is `to_json`.
+    """Return the description from its text as written by `to_json`.
 
     Raises
     ------
     InputError
-        With the key, if it is none, or that of another version.
+        With the key, if the text is not a description, or is one of another version.
     """
     values = read_json(text, "the description of a run")
     if not (isinstance(values, dict) and isinstance(values.get("scene_text"), str)):

@@ -25,7 +25,7 @@ _FLOAT32_FIELD = 7  # sensor_msgs/PointField.FLOAT32
 
 
 def state_template(description: Description) -> Template:
-    """A state: each name is ``name:shape`` of a part, for example ``positions:393x3``."""
+    """Return the template of a state; each name is ``name:shape`` of a part, for example ``positions:393x3``."""
     layout = description.state_layout
     names = (f"{name}:{'x'.join(map(str, shape))}" for name, shape in layout)
     return multi_array_template(names, sum(math.prod(shape) for _, shape in layout))
@@ -61,7 +61,10 @@ def multi_array_template(names: Iterable[str], size: int | None = None) -> Templ
 
 
 def stamped_template(numbers: int) -> Template:
-    """A header and some float64: PointStamped (3), WrenchStamped (6), PoseStamped (7); field ``data``."""
+    """Return the template of a header and some float64 in a field ``data``.
+
+    These are PointStamped (3 numbers), WrenchStamped (6) and PoseStamped (7).
+    """
     template = Template()
     template.header(FRAME_ID)
     template.array("data", "<f8", (numbers,))
@@ -96,14 +99,14 @@ def point_cloud_template(count: int, fields: tuple[str, ...] = POINT_FIELDS) -> 
 
 
 def encode_float64(value: float) -> bytes:
-    """A ``std_msgs/Float64``."""
+    """Return a ``std_msgs/Float64`` as bytes."""
     template = float64_template()
     template.views()["data"][0] = value
     return template.to_bytes()
 
 
 def encode_input(told: Input) -> bytes:
-    """An input, as a message of `topics.INPUTS`."""
+    """Return an input as a message of `topics.INPUTS`."""
     template = multi_array_template(("step", "time", f"{told.kind}:{told.name}"), 2 + len(told.values))
     template.views()["data"][:] = (told.step, told.time, *told.values)
     return template.to_bytes()
@@ -175,7 +178,7 @@ class FrameEncoder:
                 )
 
     def encode(self, name: str, frame: Frame) -> bytes:
-        """The message of topic `name` (a `TopicSpec.name`) for `frame`; give it to ``publish`` as it is."""
+        """Return the message of topic `name` (a `TopicSpec.name`) for `frame`, ready for ``publish``."""
         return self._encoders[name](frame)
 
     def least_size(self, name: str) -> int:
@@ -186,7 +189,7 @@ class FrameEncoder:
         return len(templates.get(name) or self._encoders[name].template)
 
     def small_messages(self, frame: Frame) -> dict[str, SmallMessage]:
-        """Encoders of all topics of `Rate.OUTPUT` but `TF` by name, in order; of the run of which `frame` is one."""
+        """Return the encoders by name, in order, of all topics of `Rate.OUTPUT` but `TF`, for the run of `frame`."""
         names = [spec.name for spec in self.topics if spec.rate is Rate.OUTPUT and spec is not TF]
         return {name: self._encoders[name] for name in names} | {"energy": self._energy_message(frame)}
 
@@ -220,7 +223,7 @@ class SmallMessage:
         self._data = next(iter(template.views().values()), None)
 
     def __call__(self, frame: Frame) -> bytes:
-        """The message for `frame`."""
+        """Return the message for `frame`."""
         if self.values is not None:
             self._data[:] = self.values(frame)
         self.template.set_time(frame.time)

@@ -11,7 +11,7 @@ _HEAD = struct.Struct("<iIB")
 
 
 def encode_event(event: Event) -> bytes:
-    """The message; file, function and line are empty."""
+    """Return the message of an event; its file, function and line are empty."""
     template = Template()
     template.stamp()
     template.put("u1", event.level)
@@ -23,7 +23,7 @@ def encode_event(event: Event) -> bytes:
 
 
 def decode_event(data: bytes) -> Event:
-    """The event of such a message."""
+    """Return the event in a message of `encode_event`."""
     seconds, rest, level = _HEAD.unpack_from(data, len(HEADER))
     place, texts = len(HEADER) + _HEAD.size, []
     for _ in range(2):

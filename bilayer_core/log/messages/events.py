@@ -110,17 +110,17 @@ class EventDetector:
 
 
 def late_stimulus(time: float, missing: str, acting: str) -> Event:
-    """A controller is late: what is missing, and what acts instead."""
+    """Return the event that a controller is late: what is missing, and what acts instead."""
     return Event(time, WARN, STIMULUS, f"stimulus late: {missing}; {acting}")
 
 
 def changed_setting(time: float, text: str) -> Event:
-    """A node goes on with another setting."""
+    """Return the event that a node continues with another setting."""
     return Event(time, INFO, SETTING, text)
 
 
 def ended_run(time: float, reason: str) -> Event:
-    """A run is ended from outside."""
+    """Return the event that a run was ended from outside."""
     return Event(time, INFO, END, f"run {reason}")
 
 

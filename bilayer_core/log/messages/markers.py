@@ -66,7 +66,9 @@ _MARKERS_START = len(HEADER) + _COUNT.size
 
 
 def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarray = ARROW_FORCE) -> np.ndarray:
-    """Ends of the lines of arrows: a shaft and two barbs each; those of a zero force are all where it acts.
+    """Return the end points of the lines that draw arrows.
+
+    Each arrow has a shaft and two barbs; all points of a zero force are at its origin.
 
     Parameters
     ----------
@@ -198,7 +200,7 @@ class MarkerEncoder:
         self._carried = [(body, _Carried(own), views[field]) for body, own, field in carried]
 
     def encode(self, frame: Frame) -> bytes:
-        """The message for `frame`."""
+        """Return the message for `frame`."""
         nodes = self._nodes
         nodes.update(frame)
         self._ribbons.show(frame)

@@ -19,7 +19,7 @@ def pack(parts: Sequence[tuple[str, bytes]]) -> tuple[str, bytes]:
 
 
 def unpack(label: str, data: bytes) -> list[tuple[str, bytes]]:
-    """The messages by their topics.
+    """Return the messages of a frame with their topics.
 
     Raises
     ------

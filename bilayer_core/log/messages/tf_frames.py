@@ -58,7 +58,7 @@ class TfEncoder:
         self._poses = np.empty((len(self.names), 7))
 
     def encode(self, frame: Frame) -> bytes:
-        """The message of a frame."""
+        """Return the message of a frame."""
         poses, bodies = self._poses, self._bodies
         poses[:bodies, :3], poses[:bodies, 3:] = frame.body_positions, frame.body_quaternions
         if len(self._rows):

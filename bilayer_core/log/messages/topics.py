@@ -155,7 +155,7 @@ LIVE = TopicSpec("live", "std_msgs/msg/UInt8MultiArray", Rate.DISPLAY, depth=5)
 
 
 def stimulus_topics(description: Description) -> tuple[TopicSpec, ...]:
-    """The topics on which single channels are set; a log holds each value at the time from which it acted."""
+    """Return the topics that set single channels; a log holds each value at the time from which it acted."""
     return tuple(TopicSpec(f"stimulus/{name}", "std_msgs/msg/Float64", Rate.EVENT) for name in description.channels)
 
 

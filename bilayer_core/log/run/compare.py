@@ -69,7 +69,7 @@ class Comparison:
         return not any(self.only) and all(found.largest == 0.0 for found in self.differences)
 
     def __getitem__(self, name: str) -> QuantityDifference:
-        """The difference of a quantity."""
+        """Return the difference of a quantity."""
         return next(found for found in self.differences if found.name == name)
 
     def __repr__(self) -> str:

@@ -191,7 +191,7 @@ def _write_npz(source: LogSource, wanted: list[Entry], path: Path) -> None:
 
 
 def _write_parts(source: LogSource, wanted: list[Entry], count: int, directory: Path) -> None:
-    """The array of each quantity as a file of its own, which grows as the log is read."""
+    """Write the array of each quantity to a file of its own, which grows while the log is read."""
     with ExitStack() as open_files:
         files = [open_files.enter_context((directory / f"{k}.npy").open("wb")) for k in range(len(wanted))]
         begun = False

@@ -187,7 +187,7 @@ def _counts(topics: dict[str, str], spans: dict[str, tuple[int, int, int]]) -> d
 
 
 def _span(spans: dict[str, tuple[int, int, int]]) -> tuple[int, int]:
-    """Times of the first and the last message [ns]; zero if there is none."""
+    """Return the times of the first and the last message [ns]; zeros if there are none."""
     times = [time for _, first, last in spans.values() for time in (first, last)] or [0]
     return min(times), max(times)
 
@@ -197,7 +197,7 @@ def _date(time: int) -> str:
 
 
 def read_description(path: str | Path) -> Description:
-    """The description that the log was written with."""
+    """Return the description that the log was written with."""
     return read_head(Path(path)).description
 
 
@@ -236,8 +236,9 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
 
 
 def read_log(path: str | Path) -> RunData:
-    """A run as arrays over time, which are read when they are asked for: of a log, or of a bag of ``ros2 bag record``
-    (`opened_run.open_run` says how runs in one are named).
+    """Return a run as arrays over time, which are read on demand.
+
+    The file is a log, or a bag of ``ros2 bag record`` (`opened_run.open_run` says how the runs in a bag are named).
 
     ``run["com"]`` reads that quantity alone, so that also logs larger than the memory can be looked into; attributes
     such as ``run.positions`` read all that comes at one rate. Times are those at which the log has all topics of a

@@ -156,7 +156,7 @@ class LogSource:
         return None
 
     def read(self, entry: Entry) -> Quantity:
-        """A quantity, from all of the log's messages that hold it."""
+        """Return a quantity from all messages of the log that hold it."""
         values = self._values([entry])[entry.name]
         return entry.filled(self.times[_group(entry)], values)
 
@@ -309,7 +309,7 @@ class LogSource:
             )
 
     def _template(self, name: str) -> tuple[Template, str]:
-        """The message of a topic whose layout the description fixes, and the name of its array."""
+        """Return the message of a topic whose layout the description fixes, and the name of its array."""
         kind = name.partition("/")[0]
         if kind == "nodes":
             return encoders.pose_array_template(len(node_order(self.description))), "poses"
@@ -351,7 +351,7 @@ def _group(entry: Entry) -> str:
 
 
 def _taken(queues: Iterable[_Queue], rows: int) -> dict[str, Array]:
-    """The next rows of all quantities that are wanted."""
+    """Remove and return the next rows of all quantities that are wanted."""
     found = {}
     for queue in queues:
         whole = queue.topic.stack(queue.messages[:rows])

@@ -26,7 +26,10 @@ class LoggedRun(RunData):
         )
 
     def __getattr__(self, name: str) -> object:
-        """Called for what is not there yet: what a log holds at one rate is read at once."""
+        """Read all values that a log holds at one rate when the first of them is used.
+
+        Python calls this for attributes that do not exist yet.
+        """
         if name not in self.__dataclass_fields__:
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         self.__dict__.update(self._source.attributes_with(name))

@@ -35,7 +35,7 @@ class MemoryRecorder:
         self.complete = complete
 
     def run_data(self) -> RunData:
-        """The frames as arrays over time."""
+        """Return the frames as arrays over time."""
         if self.description is None:
             raise RuntimeError("no run has been observed yet")
         frames = self.frames

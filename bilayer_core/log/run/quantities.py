@@ -128,7 +128,7 @@ class Entry:
         return self.filled(run.shape_times if self.of_shape else run.times, values)
 
     def filled(self, times: Array, values: Array) -> Quantity:
-        """The quantity with values."""
+        """Return the quantity with its values."""
         return Quantity(self.name, self.unit, times, _read_only(values), self.axes, self.labels)
 
 
@@ -167,7 +167,7 @@ def quantities_of(run: Run) -> Iterator[Quantity]:
 
 
 def unknown_quantity(name: str, known: Iterable[str], reason: str | None = None) -> InputError:
-    """The error that says that there is no such quantity, and which names are near it."""
+    """Return the error for a quantity that does not exist, with the names nearest to it."""
     near = ", ".join(get_close_matches(name, known, n=3, cutoff=0.3)) or "none is like it"
     return InputError(
         f"quantity {name!r}: {reason or f'there is none; near it: {near} (`bilayer info --quantities` lists all)'}"

@@ -47,7 +47,7 @@ class Recorded(ABC):
         return None
 
     def __getitem__(self, name: str) -> Quantity:
-        """The quantity of a name.
+        """Return the quantity of a name.
 
         Raises
         ------

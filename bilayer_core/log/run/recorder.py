@@ -91,7 +91,7 @@ class Recorder(Recorded):
     # what the simulator tells
 
     def start(self, description: Description) -> None:
-        """Called when it is attached."""
+        """Begin to record a run. The simulator calls this when the recorder is attached."""
 
     def observe(self, frame: Frame) -> None:
         """Keep the quantities of a frame."""
@@ -106,10 +106,10 @@ class Recorder(Recorded):
             self._values[name].append(self._value(entry, frame))
 
     def close(self, complete: bool, termination: str = "") -> None:
-        """Called when it is detached."""
+        """End the recording. The simulator calls this when the recorder is detached."""
 
     def _value(self, entry: Entry, frame: Frame) -> Array:
-        """A copy of a quantity in a frame; those of nodes in single precision, as logs have them."""
+        """Return a copy of a quantity in a frame; quantities of nodes have single precision, as in logs."""
         if entry.attribute == "energy":
             return np.array(frame.energy[str(entry.index)])
         if entry.attribute == "solver":

@@ -81,7 +81,7 @@ def _read(path: Path, size: int) -> tuple[tuple, np.ndarray]:
 
 
 def _array(members: zipfile.ZipFile, name: str, most: int) -> np.ndarray:
-    """An array of a ``.npz``, of which no more is unpacked than `most` bytes, whatever sizes it declares."""
+    """Return an array of a ``.npz``; read at most `most` bytes of it, whatever sizes it declares."""
     if members.getinfo(f"{name}.npy").compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"{name} is compressed in a way that numpy never uses")
     with members.open(f"{name}.npy") as file:

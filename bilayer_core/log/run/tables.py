@@ -19,7 +19,7 @@ PATTERN = set("*?[")
 
 
 def chosen(source: LogSource, names: Sequence[str]) -> list[Entry]:
-    """The quantities of some names, such as ``com`` or ``energy/*``; all of a log by default.
+    """Return the quantities of some names, such as ``com`` or ``energy/*``; all of a log by default.
 
     Raises
     ------
@@ -35,7 +35,7 @@ def chosen(source: LogSource, names: Sequence[str]) -> list[Entry]:
 
 
 def chosen_names(known: Iterable[str], name: str, why_not: Callable[[str], str | None]) -> list[str]:
-    """The names that a pattern such as ``energy/*`` means, or the name itself.
+    """Return the names that match a pattern such as ``energy/*``, or the name itself.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def chosen_names(known: Iterable[str], name: str, why_not: Callable[[str], str |
 
 
 def component_unit(unit: str, label: str) -> str:
-    """Unit of one component: of a wrench, ``N, N m``, the forces have the first and the moments the second."""
+    """Return the unit of one component. Of a wrench, ``N, N m``, forces have the first unit and moments the second."""
     force, comma, moment = unit.partition(", ")
     return (moment if label.startswith("m") else force) if comma else unit
 
@@ -97,7 +97,7 @@ class Table:
                 self.columns.append((name.rpartition("/")[2] if own else name, entry.unit))
 
     def arrays(self, times: Array, block: dict[str, Array]) -> list[Array]:
-        """The columns of some rows of time."""
+        """Return the columns of some rows of time."""
         found = [times]
         if self.of_shape:
             nodes = block[self.entries[0].name].shape[1]
@@ -130,5 +130,5 @@ def one_table(entries: list[Entry], path: str) -> Table:
 
 
 def time_of(source: LogSource, table: Table) -> Array:
-    """The times of a table's rows [s]."""
+    """Return the times of a table's rows [s]."""
     return source.times[SHAPE_TIME if table.of_shape else TIME]

@@ -77,7 +77,7 @@ class ArrivingRun:
                 del waiting[next(iter(waiting))]
 
     def take(self) -> RunData | None:
-        """The frames that have become whole; None if there are none, whose events then wait."""
+        """Return the frames that have become complete, or None. Events wait until there are frames."""
         taken: list[tuple[str, int, bytes]] = []
         for number, names in enumerate(self._groups):
             whole = set.intersection(*(set(self._waiting[name]) for name in names))
