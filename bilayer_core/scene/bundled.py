@@ -45,12 +45,12 @@ def _recorded() -> Iterator[Path]:
 
 
 def bundled_directory(kind: str) -> Path:
-    """The directory of the bundled ``scenes``, ``templates`` or ``sweeps``.
+    """Return the directory of the bundled ``scenes``, ``templates`` or ``sweeps``.
 
     Raises
     ------
     SceneError
-        If there is none; lists where it was looked for.
+        If it is not found; the message lists the places searched.
     """
     looked = []
     for directory in (candidate / kind for candidate in _candidates()):

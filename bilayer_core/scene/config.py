@@ -159,7 +159,7 @@ class AddedMass(Part):
 
 
 def _with_or_without(value: Any) -> Any:
-    """`true` stands for the multiples by default, `false` for no added mass."""
+    """Return the default multiples for `true`, and no added mass for `false`."""
     if isinstance(value, bool):
         return {} if value else None
     if value is None or isinstance(value, dict | AddedMass):
@@ -300,7 +300,7 @@ class SceneConfig(Part):
 
 
 def faults_of_range(stimulus: Stimulus) -> list[Fault]:
-    """The range of a channel, and the values that its schedule takes."""
+    """Return the faults of a channel's range and of the values that its schedule takes."""
     low, high = stimulus.minimum, stimulus.maximum
     if stimulus.light is not None and low != 0.0:
         return [(("minimum",), low, "must be 0 for a light: that is what layers in the dark see")]

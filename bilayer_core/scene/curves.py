@@ -35,8 +35,9 @@ Vectors = tuple[tuple[float, float, float], ...]
 
 @lru_cache(CURVES_KEPT)
 def curve_through(shape: str, points: Vectors, normals: Vectors | None, closed: bool = False) -> Curve:
-    """The `polyline` or `spline` through points [m] with normals at them, or with none; a closed one leads from the
-    last point back to the first.
+    """Return the `polyline` or `spline` through points [m], with normals at them or without.
+
+    A closed curve leads from the last point back to the first.
     """
     kind = {"polyline": Polyline, "spline": Spline}[shape]
     once_more = slice(None, 1 if closed else 0)
@@ -148,7 +149,7 @@ class Polyline(Curve):
         return _products(_rotations(self._tangents[:-1], self._tangents[1:]))
 
     def _segment(self, arc: Array) -> Array:
-        """The segment of each length `arc` [m], at a point the one after it."""
+        """Return the segment of each length `arc` [m]; at a point it is the segment after it."""
         return np.clip(np.searchsorted(self.knots, arc, side="right") - 1, 0, len(self._tangents) - 1)
 
     def carried(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
@@ -211,7 +212,7 @@ class Spline(Curve):
         return width * (speed @ weights)
 
     def _located(self, arc: Array) -> tuple[Array, Array]:
-        """The curve's parameter at lengths `arc` [m], by Newton's method on the length, and the cell before it."""
+        """Return the curve's parameter at lengths `arc` [m] by Newton's method on the length, and the cell before."""
         cell = np.clip(np.searchsorted(self.sharpest, arc, side="right") - 1, 0, len(self._grid) - 2)
         at = np.interp(arc, self.sharpest, self._grid)
         for _ in range(NEWTON):
@@ -266,7 +267,7 @@ def unit(vectors: Array) -> Array:
 
 
 def across(normals: Array, tangents: Array) -> Array:
-    """Normals made perpendicular to tangents, unit, shape (n, 3); where they are parallel, any that is."""
+    """Return normals made perpendicular to tangents, unit, shape (n, 3); where both are parallel, any perpendicular."""
     parts = normals - (normals * tangents).sum(axis=1, keepdims=True) * tangents
     length = np.linalg.norm(parts, axis=1, keepdims=True)
     other = np.cross(tangents, np.eye(3)[np.abs(tangents).argmin(axis=1)])
@@ -297,7 +298,7 @@ def _double_reflections(points: Array, tangents: Array, next_points: Array, next
 
 
 def _products(matrices: Array) -> Array:
-    """The identity, and each product of all matrices up to one, the last to the left, shape (n + 1, 3, 3)."""
+    """Return the identity and the products of the first 1 to n matrices, the last at the left, shape (n + 1, 3, 3)."""
     found = np.empty((len(matrices) + 1, 3, 3))
     found[0] = np.eye(3)
     for index, matrix in enumerate(matrices):

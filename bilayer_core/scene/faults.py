@@ -45,7 +45,7 @@ _DEMANDS = {
 
 
 def refuse(demand: str, note: str = "") -> PydanticCustomError:
-    """The exception by which a validator of one value says what is allowed; `note` is about the value found."""
+    """Return the exception by which a validator says what is allowed for a value; `note` is about the value found."""
     return PydanticCustomError("fault", "{demand}", {"demand": demand, "note": note})
 
 
@@ -57,7 +57,7 @@ def refuse_all(title: str, faults: Sequence[Fault]) -> None:
 
 
 def one_of(what: str, found: object, allowed: Iterable[str]) -> str:
-    """The demand that a name be one of those allowed, with the nearest one suggested."""
+    """Return the demand that a name be one of those allowed, with the nearest one as a suggestion."""
     names = [str(name) for name in allowed]
     return f"must be one of the {what} ({listed(names) or 'there are none'}){suggestion(found, names)}"
 
@@ -68,7 +68,7 @@ def listed(names: Iterable[str]) -> str:
 
 
 def suggestion(found: object, allowed: Iterable[str]) -> str:
-    """The name nearest to the one found, as a question; empty if none is near."""
+    """Return the name nearest to the one found, as a question; empty if none is near."""
     near = difflib.get_close_matches(str(found), list(allowed), n=1)
     return f", did you mean {near[0]}?" if near else ""
 
@@ -161,7 +161,7 @@ def _shown(value: Any) -> str:
 
 
 def _bare(annotation: Any) -> Any:
-    """An annotation without ``Annotated`` and without ``| None``."""
+    """Return an annotation without ``Annotated`` and without ``| None``."""
     while True:
         if get_origin(annotation) is Annotated:
             annotation = get_args(annotation)[0]
@@ -208,7 +208,7 @@ def _is_model(annotation: Any) -> bool:
 
 
 def _only_model(annotation: Any) -> Any:
-    """The class of which a value is, or may be beside a plain one."""
+    """Return the class of a value's annotation; where plain values are allowed as well, the class among them."""
     return annotation if _is_model(annotation) else next(filter(_is_model, get_args(annotation)), BaseModel)
 
 

@@ -19,7 +19,7 @@ from bilayer_core.scene.config import SceneConfig
 
 @cache
 def notes(model: type[BaseModel]) -> dict[str, str]:
-    """Description of each field of a class that has one, those of its base classes included."""
+    """Return the description of each field of a class that has one, including fields of its base classes."""
     found: dict[str, str] = {}
     for ancestor in reversed(model.__mro__):
         if issubclass(ancestor, BaseModel) and ancestor is not BaseModel:
@@ -37,7 +37,7 @@ def _own_notes(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
 
 
 def models_in(annotation: Any) -> list[type[BaseModel]]:
-    """The classes that occur in an annotation, in its order; of one with parameters, the class without them."""
+    """Return the classes in an annotation, in its order; for a class with parameters, the class without them."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation.__pydantic_generic_metadata__["origin"] or annotation]
     return [model for part in get_args(annotation) for model in models_in(part)]
@@ -60,7 +60,7 @@ def scene_models() -> list[type[BaseModel]]:
 
 
 def json_schema() -> dict[str, Any]:
-    """The JSON Schema of scene files, with the descriptions of all keys."""
+    """Return the JSON Schema of scene files, with the descriptions of all keys."""
     schema = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **SceneConfig.model_json_schema(by_alias=True),

@@ -40,7 +40,7 @@ class Kind:
 
 
 def page() -> str:
-    """The page, with a section for each class."""
+    """Return the page, with a section for each class."""
     places = _places()
     sections = [INTRODUCTION, _contents(places)]
     for model in scene_models():
@@ -54,7 +54,7 @@ def page() -> str:
 
 
 def _contents(places: dict[type[BaseModel], list[str]]) -> str:
-    """The sections by the paths at which they stand; where one of several mappings may stand, on one line."""
+    """List the sections by the paths at which they stand; alternatives at one path share a line."""
     sections: dict[str, list[str]] = {}
     for model, paths in places.items():
         sections.setdefault(paths[0], []).append(_link(model))
@@ -63,7 +63,7 @@ def _contents(places: dict[type[BaseModel], list[str]]) -> str:
 
 
 def _about(model: type[BaseModel]) -> str:
-    """The docstring of a class as Markdown."""
+    """Return the docstring of a class as Markdown."""
     return "\n\n".join(" ".join(part.split()) for part in (model.__doc__ or "").split("\n\n")).replace("``", "`")
 
 
@@ -76,7 +76,7 @@ def _link(model: type[BaseModel]) -> str:
 
 
 def _tag(model: type[BaseModel]) -> tuple[str, Any] | None:
-    """The key that says which of several mappings this is, and its value."""
+    """Return the key and value that distinguish this mapping from its alternatives."""
     for name in ("type", "shape"):
         field = model.model_fields.get(name)
         if field is not None and get_origin(field.annotation) is Literal:
@@ -140,7 +140,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def _written(value: Any) -> str:
-    """A value as in a scene file."""
+    """Return a value as a scene file has it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple | list):

@@ -86,7 +86,7 @@ def load_content(content: dict[str, Any], overrides: Overrides, source: str = "s
 
 
 def find_scene(scene: str | Path) -> Path:
-    """A path if it is one or looks like one, else that of the bundled scene of this name."""
+    """Return a path if the argument is or looks like one, otherwise the path of the bundled scene of this name."""
     return Path(scene) if is_file_name(scene) else bundled_scene(str(scene))
 
 

@@ -60,13 +60,14 @@ class Override:
 
 
 def read_overrides(overrides: Overrides) -> list[Override]:
-    """Changes as users give them: ``PATH=VALUE`` texts, whose values are YAML, such as ``rods.arm.stations=100`` or
-    ``gravity.2=-9.81``, or a mapping of paths to values.
+    """Return the changes that users give as texts or as a mapping of paths to values.
+
+    A text is ``PATH=VALUE`` with a YAML value, such as ``rods.arm.stations=100`` or ``gravity.2=-9.81``.
 
     Raises
     ------
     SceneError
-        If one is none.
+        If a text is not of this form.
     """
     if isinstance(overrides, Mapping):
         return [_override(str(path), value, f"{path}={value}") for path, value in overrides.items()]

@@ -25,7 +25,7 @@ UNIT_LENGTH_TOLERANCE = 1e-14
 
 
 def unit_vector(vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """The vector at length 1, or a fault if it has none."""
+    """Return the vector at length 1; raise a fault if its length is zero."""
     length = math.hypot(*vector)
     if length == 0.0:
         raise refuse("must be a direction, with a length above 0")
@@ -54,7 +54,7 @@ class _Kept(dict[Any, tuple[tuple, Any]]):
 
 
 def _bare(part: Derived) -> Derived:
-    """A part without what was derived of it."""
+    """Return a part after removing the values derived from it."""
     values, fields = vars(part), type(part).model_fields
     if len(values) > len(fields):
         for name in values.keys() - fields.keys():
@@ -83,7 +83,7 @@ class Part(BaseModel):
         return found[1]
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy with other values, and with nothing derived of the old ones."""
+        """Return a copy with other values, and without the values derived from the old ones."""
         return _bare(super().model_copy(update=update, deep=deep))
 
     def __copy__(self) -> Self:

@@ -57,7 +57,7 @@ class Path(Part):
         return _demand_perpendicular(normal, self.direction, "the path")
 
     def key_of_radius(self, arc: float) -> str:
-        """The key that sets the radius of curvature at a length along it [m]."""
+        """Return the key that sets the radius of curvature at a length along the path [m]."""
         return "radius"
 
     def describe(self) -> str:
@@ -256,7 +256,7 @@ class SpiralPath(Path):
         return _along_normal(_side(self.toward) * (radius**2 + 2.0 * growth**2) / (radius**2 + growth**2) ** 1.5)
 
     def key_of_radius(self, arc: float) -> str:
-        """The key that sets the radius of curvature at one of its ends."""
+        """Return the key that sets the radius of curvature at one of the ends."""
         return "start_radius" if arc == 0.0 else "end_radius"
 
     def describe(self) -> str:

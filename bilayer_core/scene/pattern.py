@@ -54,7 +54,7 @@ class Placement:
 
 
 def placed(matrix: Any = None, center: Any = (0.0, 0.0, 0.0), shift: Any = (0.0, 0.0, 0.0)) -> Placement:
-    """A placement from what of it is not that of the rod itself."""
+    """Return a placement; parts that are not given are those of the rod itself."""
     return Placement(np.eye(3) if matrix is None else matrix, np.array(center, float), np.array(shift, float))
 
 
@@ -107,7 +107,7 @@ class Pattern(Part):
         """Return the placement of each copy, computed anew."""
 
     def per_copy(self) -> Iterator[tuple[Location, list]]:
-        """Lists that have an entry for each copy, with their keys."""
+        """Yield the lists that have an entry for each copy, with their keys."""
         yield from ((("stimuli", name), channels) for name, channels in self.stimuli.items())
         for key in ("gains", "clamp_start", "clamp_end"):
             if getattr(self, key) is not None:
@@ -242,7 +242,7 @@ class Listed(Pattern):
 
 
 def _with_type(value: Any) -> Any:
-    """A pattern without its type is a rotation."""
+    """Return a pattern with its type; without one it is a rotation."""
     return {"type": "rotation", **value} if isinstance(value, dict) and "type" not in value else value
 
 

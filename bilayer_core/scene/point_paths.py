@@ -118,7 +118,7 @@ class PointPath(Path):
         return ""
 
     def key_of_radius(self, arc: float) -> str:
-        """The key that sets the radius of curvature."""
+        """Return the key that sets the radius of curvature."""
         return "points"
 
     def describe(self) -> str:

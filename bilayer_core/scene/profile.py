@@ -41,7 +41,7 @@ class Profile(Part, Generic[Value]):
 
 
 def _quantity(annotation: Any) -> Quantity:
-    """The validator in an annotation from `scene.units`."""
+    """Return the validator in an annotation from `scene.units`."""
     return annotation.__metadata__[0].func
 
 
@@ -58,7 +58,7 @@ class _Varying:
         return f"{self._quantity.describe()}, or a profile {{at: [...], value: [...]}} along the path"
 
     def __call__(self, value: Any) -> Any:
-        """The number or the profile, in SI."""
+        """Return the number or the profile, in SI units."""
         return (self._profile if isinstance(value, dict | Profile) else self._number).validate_python(value)
 
 

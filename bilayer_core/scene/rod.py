@@ -59,7 +59,10 @@ class Layer(Part):
     """Of the layer by itself, about the path, beside the twist of the path."""
 
     def driven_by(self, channels: dict[str, str], gain: float) -> Layer:
-        """This layer with other channels in its laws, by those that it has, and its gains multiplied by a number."""
+        """Return this layer with other channels in its laws and with its gains multiplied by `gain`.
+
+        `channels` maps the present channels to the new ones.
+        """
         laws = [
             law.model_copy(update={"stimulus": channels.get(law.stimulus, law.stimulus), "gain": gain * law.gain})
             for law in self.eigenstrain
@@ -68,7 +71,7 @@ class Layer(Part):
 
     @field_serializer("eigenstrain")
     def _as_written(self, laws: list[Eigenstrain]) -> Any:
-        """A single law without its list, as scenes state it, so that overrides find its keys."""
+        """Return a single law without its list, as scenes state it, so that overrides find its keys."""
         return laws if len(laws) > 1 else laws[0] if laws else None
 
 
@@ -144,7 +147,7 @@ class Rod(Part):
         return tuple(RodCopy(name, self._copy(index), place) for index, (name, place) in enumerate(places))
 
     def _copy(self, index: int) -> Rod:
-        """This rod with what the pattern has for one copy, and without the pattern."""
+        """Return this rod with the pattern's values for one copy, and without the pattern."""
         own: dict[str, Any] = {"pattern": None}
         for end in ("clamp_start", "clamp_end"):
             bodies = getattr(self.pattern, end)

@@ -23,7 +23,7 @@ class Hold(Spans):
     """In the unit of the channel."""
 
     def span(self, t: float) -> Span:
-        """The only one."""
+        """Return the only span."""
         return Span(math.inf, self.held_value)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
@@ -139,7 +139,10 @@ class Sequence(Spans):
 
 
 def _as_table(schedule: BaseModel, info: ValidationInfo) -> BaseModel:
-    """The table that a csv file holds, any other schedule as it is: a validated scene needs no further file."""
+    """Return the table that a csv file holds, and any other schedule unchanged.
+
+    A validated scene therefore needs no further file.
+    """
     if not isinstance(schedule, TableFile):
         return schedule
     times, values = read_table_file(schedule, (info.context or {}).get("directory", ""))

@@ -56,7 +56,7 @@ class Span(NamedTuple):
         return value_of_span(t, *self[1:])
 
     def later(self, delay: float, until: float) -> Span:
-        """The same `delay` [s] later, cut off at `until` [s]."""
+        """Return the same span `delay` [s] later, cut off at `until` [s]."""
         return self._replace(begin=self.begin + delay, until=min(self.until + delay, until))
 
     def jump_to(self, following: Span) -> bool:
@@ -73,7 +73,7 @@ class Spans(BaseModel):
 
     @abstractmethod
     def span(self, t: float) -> Span:
-        """The span that time `t` [s] lies in; where two meet, that which begins."""
+        """Return the span that contains time `t` [s]; where two meet, the one that begins there."""
 
     def value(self, t: float) -> float:
         """Value at time `t` [s], in the unit of the channel."""

@@ -74,7 +74,7 @@ class CsvFile:
         return [line for line, _ in self._rows]
 
     def numbers(self, column: str) -> list[float]:
-        """The numbers of a column."""
+        """Return the numbers of a column."""
         if column not in self.columns:
             self.refuse(f"must have a column {column}; its columns are {longest(self.columns) or 'none'}")
         if not self._rows:
@@ -92,7 +92,7 @@ class CsvFile:
 
 
 def read_table_file(source: TableFile, directory: str | Path) -> tuple[list[float], list[float]]:
-    """Times [s] and values of a csv file; `directory` is where relative file names begin.
+    """Return the times [s] and values of a csv file; relative file names begin at `directory`.
 
     Raises
     ------

@@ -24,7 +24,7 @@ _Base = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def _checked(construct: Callable, what: str) -> Callable:
-    """A constructor of numbers whose errors say where they are."""
+    """Return a constructor of numbers whose errors say where they are."""
 
     def number(reader: _Reader, node: yaml.Node) -> Any:
         try:
@@ -54,7 +54,7 @@ class _Reader(_Base):
     }
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[str, Any]:
-        """The mapping of a node; keys merged from elsewhere (``<<``) are no repetition."""
+        """Return the mapping of a node; keys merged from elsewhere (``<<``) are no repetition."""
         if not isinstance(node, yaml.MappingNode):
             raise yaml.constructor.ConstructorError(None, None, "this is not a mapping", node.start_mark)
         seen, merges = set(), False

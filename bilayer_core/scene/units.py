@@ -51,7 +51,7 @@ USUAL_UNITS = {
 
 @cache
 def _registry():
-    """The units library. It counts in decimals, so that ``53.9 mm`` is the very number that ``0.0539`` is."""
+    """Return the units library. It calculates in decimals, so that ``53.9 mm`` equals ``0.0539`` exactly."""
     from pint import UnitRegistry
 
     return UnitRegistry(non_int_type=Decimal)
@@ -87,7 +87,7 @@ def parse_quantity(text: str, unit: str) -> float:
 
 @cache
 def _unit(text: str) -> Any:
-    """The unit that a text such as ``m/s^2`` or ``/s`` names; those with another zero or a logarithm are none."""
+    """Return the unit of a text such as ``m/s^2`` or ``/s``; refuse units with an offset zero or a logarithm."""
     try:
         unit = _registry().Unit(f"1{text}" if text.startswith("/") else text)
         _registry().Quantity(Decimal(1), unit).to_root_units()
@@ -136,7 +136,7 @@ class Quantity:
         return f"{self.what}{unit}" + (f" {' and '.join(limits)}" if limits else "") + example
 
     def __call__(self, value: Any) -> float:
-        """The number in SI, or a fault that says what is allowed."""
+        """Return the number in SI units, or raise a fault that says what is allowed."""
         number = self._number(value)
         tiny = 0.0 < abs(number) < SMALLEST
         inside = (
@@ -179,7 +179,7 @@ class Count:
         return text if self.at_most == LARGEST_COUNT else f"{text} and at most {self.at_most}"
 
     def __call__(self, value: Any) -> int:
-        """The number, or a fault that says what is allowed."""
+        """Return the number, or raise a fault that says what is allowed."""
         whole_number = isinstance(value, numbers.Integral) and not isinstance(value, bool)
         if not (whole_number and self.at_least <= value <= self.at_most):
             raise refuse(f"must be {self.describe()}")

@@ -28,7 +28,10 @@ class Sine(Spans):
     """Until then the value at the start."""
 
     def span(self, t: float) -> Span:
-        """The start is a corner, and so is every quarter of a period: a longer step would not see the wave."""
+        """Return the span that contains time `t` [s].
+
+        The start is a corner, and so is every quarter of a period: a longer step would miss the wave.
+        """
         quarter = self.period / 4.0
         number = math.floor((t - self.start) / quarter + ROUNDING)
         if number < 0:
@@ -102,7 +105,7 @@ class Square(_Pulses):
         return self
 
     def span(self, t: float) -> Span:
-        """The span that time `t` [s] lies in."""
+        """Return the span that contains time `t` [s]."""
         return self._span(t, self.duty * self.period, math.inf)
 
 
@@ -123,5 +126,5 @@ class PulseTrain(_Pulses):
         return self
 
     def span(self, t: float) -> Span:
-        """The span that time `t` [s] lies in."""
+        """Return the span that contains time `t` [s]."""
         return self._span(t, self.width, self.count)
