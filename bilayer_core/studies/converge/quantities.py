@@ -122,7 +122,7 @@ def check_names(simulator: Simulator, asked: Sequence[str]) -> None:
 
 
 def unit_of(name: str) -> tuple[str, float]:
-    """Unit in which a quantity is shown, and the factor from SI to it."""
+    """Return the unit in which a quantity is shown, and the factor from SI units to it."""
     if name.endswith(("take_off", "time", "first_contact")):
         return "s", 1.0
     if name.endswith("curvature"):

@@ -78,13 +78,13 @@ class Study:
 
 
 def runs_over_steps(scene: SceneConfig) -> list[Run]:
-    """The scene's own run, and those at twice and half its time step."""
+    """Return the scene's own run, and those at twice and half its time step."""
     others = ((COARSER_STEP, 2.0), (FINER_STEP, 0.5))
     return [Run(BASE, (), 1.0, 1.0), *(Run(name, _with_steps(scene, part), part, 1.0) for name, part in others)]
 
 
 def planned_runs(scene: SceneConfig) -> list[Run]:
-    """The five runs; the edges of every rod are halved or doubled."""
+    """Return the five runs; two of them halve and double the edges of every rod."""
     edges = {rod.name: rod.stations - 1 for rod in scene.rods}
     halved = {name: max(LEAST_EDGES, round(count / 2)) for name, count in edges.items()}
     doubled = {name: 2 * count for name, count in edges.items()}
@@ -97,7 +97,7 @@ def planned_runs(scene: SceneConfig) -> list[Run]:
 
 
 def _with_steps(scene: SceneConfig, part: float) -> tuple[str, ...]:
-    """Overrides with which steps are `part` as long."""
+    """Return overrides that multiply the step by `part`."""
     method = INTEGRATORS[make_plan(scene).integrator]
     steps = choose_steps(scene, method)
     first = f"solver.dt={part * steps.dt!r}"

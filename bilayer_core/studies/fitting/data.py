@@ -167,7 +167,7 @@ def read_data(
 
 
 def with_sigma(data: Data, sigma: Sequence[str] | Mapping[str, float | str]) -> Data:
-    """Data with the standard deviations that a user gives for whole columns, checked.
+    """Return data with the standard deviations that a user gives for whole columns, after checking them.
 
     Parameters
     ----------
@@ -334,7 +334,7 @@ def _factor(source: str, heading: str, written: str | None, unit: str) -> float:
 
 
 def _si(unit: str) -> str:
-    """A unit of quantities as `scene.units` writes it."""
+    """Return a unit of quantities as `scene.units` writes it."""
     return unit.replace("N m", "N*m") or "1"
 
 

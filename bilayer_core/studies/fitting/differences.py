@@ -18,7 +18,7 @@ Array = np.ndarray
 
 
 def jacobian(runs: Runs, point: Array, steps: Sequence[Step]) -> Array:
-    """Derivatives of all values.
+    """Return the derivatives of all values.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def jacobian(runs: Runs, point: Array, steps: Sequence[Step]) -> Array:
 
 
 def _one_sided(runs: Runs, point: Array, k: int, step: float) -> Array:
-    """The derivative from the side on which there is more room, else from the other one."""
+    """Return the derivative from the side with more room, otherwise from the other side."""
     here, failures = runs.evaluate(point), []
     for side in sorted((1.0, -1.0), key=lambda side: side * (point[k] - 0.5)):
         near, far = (_moved(point, k, side * times * step) for times in (1.0, 2.0))

@@ -117,7 +117,7 @@ class FitResult:
         return found
 
     def __getitem__(self, path: str) -> Fitted:
-        """The parameter of a key path."""
+        """Return the parameter of a key path."""
         for parameter in self.parameters:
             if parameter.path == path:
                 return parameter

@@ -168,7 +168,7 @@ def refuse_undetermined(
 
 
 def _directions(parameters: Sequence[Parameter], parts: Array, space: Array) -> tuple[Direction, ...]:
-    """A basis of a space of directions, shape (parameters, n), in relative changes."""
+    """Return a basis of a space of directions, shape (parameters, n), in relative changes."""
     relative = np.array([p.relative(u) for p, u in zip(parameters, parts.tolist(), strict=True)])
     space = space * relative[:, None]
     _, _, order = qr(space.T, pivoting=True, mode="economic")

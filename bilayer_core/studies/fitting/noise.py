@@ -73,7 +73,7 @@ class _Roughness:
     resolved: bool
 
     def step(self) -> Step:
-        """The step with the smallest error."""
+        """Return the step with the smallest error."""
         step = LARGEST_STEP
         if self.third > 0.0:
             step = min(max((3.0 * self.noise / self.third) ** (1.0 / 3.0), self.spacing / AROUND), LARGEST_STEP)
@@ -81,7 +81,7 @@ class _Roughness:
 
 
 def choose_steps(runs: Runs, start: Array, weights: Array) -> list[Step]:
-    """The step of each parameter.
+    """Choose the step of each parameter.
 
     Parameters
     ----------

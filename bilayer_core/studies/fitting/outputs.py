@@ -79,7 +79,7 @@ def write_files(result: FitResult, directory: Path, report: str, force: bool) ->
 
 
 def residuals_text(result: FitResult) -> str:
-    """A row for each value of the data as csv, in the units of the data."""
+    """Return a csv row for each value of the data, in the units of the data."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(HEADINGS)

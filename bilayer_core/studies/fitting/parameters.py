@@ -66,13 +66,13 @@ class Parameter:
         return math.log(self.high / self.low) if self.logarithmic else self.high - self.low
 
     def value(self, part: float) -> float:
-        """The parameter at a part of the way from `low` to `high`."""
+        """Return the parameter at a part of the way from `low` to `high`."""
         if part in (0.0, 1.0):
             return self.high if part else self.low
         return self.low * math.exp(part * self.extent) if self.logarithmic else self.low + part * self.extent
 
     def part(self, value: float) -> float:
-        """The part of the way at which a value is."""
+        """Return the part of the way from `low` to `high` at which a value is."""
         return (math.log(value / self.low) if self.logarithmic else value - self.low) / self.extent
 
     def relative(self, part: float) -> float:
@@ -81,7 +81,7 @@ class Parameter:
         return slope / (abs(self.value(part)) or 1.0)
 
     def shown(self, value: float, digits: int = 5) -> str:
-        """A value in the unit of the bounds."""
+        """Return a value in the unit of the bounds, as text."""
         return f"{value / self.factor:.{digits}g}{f' {self.unit}' if self.unit else ''}"
 
 
@@ -91,7 +91,7 @@ def told(parameters: Sequence[Parameter], parts: Array) -> str:
 
 
 def content_of(scene: SceneConfig) -> dict[str, Any]:
-    """The complete content of a scene, to which overrides can be applied."""
+    """Return the complete content of a scene, to which overrides can be applied."""
     content: dict[str, Any] = scene.model_dump(mode="json", by_alias=True)
     return content
 
@@ -191,7 +191,7 @@ _NOWHERE = object()
 
 
 def _in_scene(content: dict[str, Any], path: str, change: Override) -> float:
-    """A bound as the scene has it, in SI units."""
+    """Return a bound as the scene has it, in SI units."""
     changed = copy.deepcopy(content)
     change.apply(changed)
     try:
@@ -205,7 +205,7 @@ def _in_scene(content: dict[str, Any], path: str, change: Override) -> float:
 
 
 def _unit(bounds: list[Any], values: list[float]) -> tuple[str, float]:
-    """Unit in which both bounds were given, and SI units in it."""
+    """Return the unit in which both bounds were given, and its size in SI units."""
     read = [_WITH_UNIT.fullmatch(bound) if isinstance(bound, str) else None for bound in bounds[:2]]
     units = {match["unit"] or "" if match else "" for match in read}
     if len(units) != 1 or units == {""}:

@@ -45,7 +45,7 @@ def write_picture(result: FitResult, path: Path, force: bool) -> None:
 
 
 def _draw_column(result: FitResult, k: int, left, right) -> None:  # type: ignore[no-untyped-def]
-    """Data, start and fit to the left, residuals to the right."""
+    """Draw data, start and fit at the left, and residuals at the right."""
     data, column = result.data, result.data.columns[k]
     here = data.present[:, k]
     times, factor = data.times, column.factor

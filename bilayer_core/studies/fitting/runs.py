@@ -27,7 +27,7 @@ KEPT = 2000
 
 
 def known_quantities(simulator: Simulator) -> tuple[dict[str, Entry], dict[str, int]]:
-    """The quantities of a scene by name, and how many nodes those have that are of nodes."""
+    """Return the quantities of a scene by name, and the number of nodes of those that nodes have."""
     frame = simulator.frame()
     known = {entry.name: entry for entry in entries(simulator.description, frame.energy, SOLVER_LABELS)}
     plain = {name: entry for name, entry in known.items() if entry.of_shape and entry.attribute != "material_frames"}
@@ -118,14 +118,14 @@ class Runs:
         return found
 
     def explained(self, point: Array, error: BilayerError) -> BilayerError:
-        """An error of a run with the values of the parameters."""
+        """Return an error of a run with the values of the parameters in its message."""
         values = told(self._parameters, point)
         if isinstance(error, SimulationError):
             return SimulationError(f"{error.reason}; this run has {values}", error.time, error.remedy)
         return type(error)(f"no run with {values}: {error}")
 
     def scene_at(self, point: Array) -> SceneConfig:
-        """The scene with values of the parameters."""
+        """Return the scene with given values of the parameters."""
         for parameter, part in zip(self._parameters, point.tolist(), strict=True):
             value = parameter.value(part)
             Override(tuple(parameter.path.split(".")), value, f"{parameter.path}={value}").apply(self._content)

@@ -38,12 +38,12 @@ TOPIC = "bilayer-sweep"
 
 
 def work(job: Job, points: Sequence[Point]) -> list[Row]:
-    """A piece of work, in the process that does it.
+    """Do a piece of work in the process that calls this.
 
     Raises
     ------
     InputError
-        If the process has other versions: one that came after the first run has not been asked yet.
+        If the process has other versions; a process that joined after the first run has not been checked yet.
     """
     from distributed import get_worker
 
@@ -175,12 +175,12 @@ class Engine:
         future.add_done_callback(lambda _: self._done.put(number))
 
     def wait(self) -> list[Row]:
-        """The rows of the next piece that is done; none of one whose process died and that is given away again.
+        """Return the rows of the next piece that is done; none if its process died and the piece is submitted again.
 
         Raises
         ------
         EngineError
-            If there are no processes any more.
+            If no processes are left.
         OutputError
             If a log could not be written.
         """

@@ -38,7 +38,7 @@ def count_of(spec: SweepSpec) -> int:
 
 
 def runs_of(spec: SweepSpec) -> Iterator[Values]:
-    """The values of each run, in order. With `repeats`, those of one design point follow each other."""
+    """Yield the values of each run, in order. With `repeats`, the repeats of one design point follow each other."""
     seeds = [{SEED: k} for k in range(spec.repeats.count)] if spec.repeats else [{}]
     for values in _points(spec):
         yield from (values | seed for seed in seeds)
@@ -62,9 +62,9 @@ def _levels(parameter: Parameter) -> list[Any]:
 
 
 def at(parameter: Parameter, u: float) -> Any:
-    """The value at a part `u` of the way through a parameter, from 0 to 1.
+    """Return the value at a part `u` of the way through a parameter, from 0 to 1.
 
-    Of a list it is the item there; of a range both ends are exact.
+    For a list this is the item there; for a range both ends are exact.
     """
     if parameter.levels is not None:
         return parameter.levels[min(int(u * len(parameter.levels)), len(parameter.levels) - 1)]

@@ -48,7 +48,7 @@ def warm() -> None:
 
 
 def scene_of(job: Job, parameters: dict[str, Any]) -> SceneConfig:
-    """The scene of a run.
+    """Return the scene of a run.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def execute(job: Job, points: Sequence[Point]) -> list[Row]:
 
 
 def row_of(job: Job, point: Point) -> Row:
-    """The row of a run of which nothing is known yet."""
+    """Return the row of a run without results yet."""
     version, metrics = job.expected["bilayer_sim_ros"], dict.fromkeys(job.metrics)
     return Row(point.number, point.key, point.parameters, job.scene_hash, version, metrics=metrics)
 
@@ -138,7 +138,10 @@ def _simulate(job: Job, point: Point, row: Row, begin: float, log: Path | None) 
 
 
 def simulator_of(scene: SceneConfig) -> Simulator:
-    """A simulator at the start of a scene: the last one of this thread, if it takes the scene, or a new one."""
+    """Return a simulator at the start of a scene.
+
+    It is the last one of this thread if that accepts the scene, otherwise a new one.
+    """
     last: Simulator | None = getattr(_local, "simulator", None)
     if last is not None and last.same_model(scene):
         last.reset(scene)

@@ -106,7 +106,10 @@ class Job:
         return digest(json.dumps([self.scene, self.paths, self.units, change, self.expected], sort_keys=True))
 
     def key_of(self, parameters: dict[str, Any]) -> str:
-        """The key of a run: the same scene, solver settings and function that changes it, parameters and version."""
+        """Return the key of a run.
+
+        It depends on the scene, solver settings, the function that changes the scene, parameters and version.
+        """
         return digest(self._common + json.dumps(parameters, sort_keys=True, default=str))
 
 
@@ -192,5 +195,5 @@ _ROWS = TypeAdapter(Row)
 
 
 def digest(text: str) -> str:
-    """A short name of a text, which is another for every other text."""
+    """Return a short name of a text, which differs for every other text."""
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]

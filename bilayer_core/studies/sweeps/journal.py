@@ -157,7 +157,7 @@ class Journal:
 
 
 def _locked(directory: Path) -> Any:
-    """The lock of a directory, which is made if it is not there."""
+    """Return the lock of a directory; create the directory if it does not exist."""
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -95,12 +95,12 @@ def _plain(value: Any) -> Any:
 
 
 def of_summary(path: str, summary: dict[str, Any]) -> Any:
-    """The value at a key path of a summary, such as ``com_end.0``; None where a list or a mapping is none.
+    """Return the value at a key path of a summary, such as ``com_end.0``; None where a list or a mapping is None.
 
     Raises
     ------
     InputError
-        If there is nothing of this name; with the nearest ones.
+        If there is nothing of this name; the message names the nearest ones.
     """
     here: Any = summary
     for key in path.split("."):
@@ -148,7 +148,7 @@ def _of_quantity(metric: OfQuantity, recording: Recorded | None) -> float | None
 
 
 def series(metric: OfQuantity, recording: Recorded) -> np.ndarray:
-    """The values over time that a metric looks at, shape (frames,).
+    """Return the values over time that a metric uses, shape (frames,).
 
     Raises
     ------

@@ -130,7 +130,7 @@ class Search:
         self.asked = max(self.asked, row.number + 1)
 
     def ask(self) -> Point:
-        """The next run."""
+        """Return the next run."""
         with _quiet():
             trial = self._study.ask(self._space)
         self._asked[self.asked] = trial
@@ -148,7 +148,7 @@ class Search:
             self._study.tell(self._asked.pop(number), state=optuna.trial.TrialState.FAIL)
 
     def ranked(self, rows: list[Row]) -> list[Row]:
-        """Runs that have a value, the best first."""
+        """Return the runs that have a value, the best first."""
         known = [row for row in rows if row.outcome is Outcome.DONE and _is_value(row.metrics.get(self.metric))]
         return sorted(known, key=lambda row: float(row.metrics[self.metric]), reverse=self.largest)
 
@@ -329,7 +329,10 @@ def _finer(search: Search, engine: Engine, row: Row) -> float | None:
 
 
 def finer_job(job: Job, parameters: Values) -> Job:
-    """The same runs with finer steps: a tenth of the tolerance, or a quarter of a fixed step, and without logs."""
+    """Return the same runs with finer steps, without logs.
+
+    Steps have a tenth of the tolerance, or a quarter of the fixed step.
+    """
     simulator = Simulator(scene_of(job, parameters))
     content = json.loads(job.scene)
     if simulator.tolerance is not None:

@@ -102,7 +102,7 @@ class Parameter(Part):
         return [self.in_unit(_bound_or_none(value)) for value in self.values]
 
     def in_unit(self, of: Bound) -> float:
-        """A number in the unit of this parameter. ValueError if it is of another kind."""
+        """Return a number in the unit of this parameter; raise ValueError if it is of another kind."""
         if of.unit == self.unit:
             return of.value
         return parse_quantity(f"{of.value!r} {of.unit}", self.unit)

@@ -107,7 +107,7 @@ class SweepResult:
         return [row[name] for row in found]
 
     def best(self, metric: str, largest: bool = True) -> Row:
-        """The row with the largest, or least, value of a metric.
+        """Return the row with the largest, or least, value of a metric.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class SweepResult:
         return (max if largest else min)(known, key=lambda row: row.metrics[metric])
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """A table with a row for each run; needs pandas."""
+        """Return a table with a row for each run; needs pandas."""
         require("to_dataframe", "pandas")
         import pandas
 
@@ -226,7 +226,7 @@ def _kind(pyarrow: Any, found: set[type]) -> Any:
 
 
 def _fitting(pyarrow: Any, schema: Any, row: Row) -> dict[str, Any]:
-    """The columns of a row as the table has them."""
+    """Return the columns of a row in the types of the table."""
     content = row.columns()
     for of in schema:
         value = content.get(of.name)
