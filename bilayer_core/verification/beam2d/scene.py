@@ -20,12 +20,12 @@ IN_PLANE = 1e-12  # of gravity's size: what its part across the plane may be
 
 
 def beam_of(scene: SceneConfig) -> PlanarBeam:
-    """The beam of a scene, straight and without eigenstrain.
+    """Return the beam of a scene, straight and without eigenstrain.
 
     Raises
     ------
     SceneError
-        If the scene has anything that the beam cannot be: the message says what.
+        If the scene has anything that the beam cannot represent; the message names it.
     """
     rod = _only_rod(scene)
     halves = [sections(rod, layer, scene.materials[layer.material], np.zeros(1)) for layer in rod.layers]

@@ -68,7 +68,7 @@ class Reference:
 
 
 def stored(problem: Problem, model: str) -> Reference:
-    """The reference of a problem in the stored file.
+    """Return the reference of a problem in the stored file.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def _limit(problem: Problem, family: Family, tell: Callable[[str], None]) -> tup
 
 
 def _thinned(problem: Problem, values: Array) -> Array:
-    """The instants that a reference keeps: those of the coarsest of its runs."""
+    """Return the values at the instants that a reference keeps: those of the coarsest of its runs."""
     spacing = getattr(problem.measure, "spacing", None)
     if spacing is None:
         return values
@@ -169,7 +169,7 @@ def _thinned(problem: Problem, values: Array) -> Array:
 
 
 def _write(content: dict) -> None:
-    """A line for each instant would be long: values on one line, the rest indented."""
+    """Write values on one line and the rest indented; a line for each instant would make the file long."""
     problems = []
     for problem, models in sorted(content.items()):
         entries = []

@@ -62,7 +62,7 @@ def run(problem: Problem, configuration: Configuration, longest: float = LONGEST
 
 
 def simulator_of(problem: Problem, configuration: Configuration) -> Simulator:
-    """The simulator of a run, at its start."""
+    """Return the simulator of a run, at its start."""
     family = configuration.family
     config = problem.config(configuration.stations)
     choice = {"model": family.model, "dimension": family.dimension, "integrator": family.integrator}

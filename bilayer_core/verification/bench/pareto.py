@@ -15,7 +15,10 @@ PENALTY = 10.0
 
 
 def front(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Indices of the points (cost, error) than which none is both cheaper and more accurate, the cheapest first."""
+    """Return the indices of the points (cost, error) on the Pareto front, the cheapest first.
+
+    No other point is both cheaper and more accurate than one of these.
+    """
     order = sorted(range(len(points)), key=lambda i: points[i])
     found, least = [], math.inf
     for i in order:
@@ -26,12 +29,12 @@ def front(points: Sequence[tuple[float, float]]) -> list[int]:
 
 
 def done(runs: Iterable[dict]) -> list[dict]:
-    """Runs that have a result."""
+    """Return the runs that have a result."""
     return [run for run in runs if run["outcome"] == "done"]
 
 
 def cheapest(runs: Iterable[dict], error: float) -> dict | None:
-    """The cheapest of the runs whose error is at most `error`."""
+    """Return the cheapest of the runs whose error is at most `error`."""
     reached = [run for run in done(runs) if run["error"] <= error]
     return min(reached, key=lambda run: run["cpu_time"], default=None)
 
@@ -72,7 +75,7 @@ def scores(by_problem: Mapping[str, Mapping[Family, float]]) -> dict[Family, flo
 
 
 def stand_in(family: Family, there: Iterable[Family]) -> Family | None:
-    """The family itself, or that the same in the other dimension that a scene accepts."""
+    """Return the family itself, or the same in the other dimension if the scene accepts only that."""
     there = list(there)
     if family in there:
         return family
@@ -80,5 +83,5 @@ def stand_in(family: Family, there: Iterable[Family]) -> Family | None:
 
 
 def recommended(runs: Sequence[dict]) -> Family | None:
-    """The family of least score, None if no run reached the aim."""
+    """Return the family with the least score, None if no run reached the aim."""
     return next(iter(scores(costs(runs))), None)

@@ -141,7 +141,7 @@ def scaling_figure(records: list[dict], path: Path) -> None:
 
 
 def _plain_times(axis) -> None:
-    """Marks at 1, 2 and 5 of each decade, or where there are many at 1 alone, as plain numbers."""
+    """Mark 1, 2 and 5 of each decade, or 1 alone where there are many decades, as plain numbers."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     first, last = axis.get_xlim()
@@ -155,6 +155,6 @@ def _columns(runs: list[dict]) -> np.ndarray:
 
 
 def _folded(label: str) -> str:
-    """A legend's entry on two lines."""
+    """Return a legend's entry on two lines."""
     head, _, tail = label.rpartition(", ")
     return f"{head},\n{tail}"

@@ -70,12 +70,12 @@ class Problem:
     quick_levels: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
     def config(self, stations: int | None = None, *more: str) -> SceneConfig:
-        """The scene, with a mesh."""
+        """Return the scene, with a mesh."""
         mesh = () if stations is None else (f"rods.{self.rod}.stations={stations}",)
         return load_scene(self.scene, [*self.changes, *mesh, *more])
 
     def configurations(self, family: Family, quick: bool) -> list[Configuration]:
-        """Runs of a family."""
+        """Return the runs of a family."""
         levels = self.quick_levels if quick else self.levels
         found = []
         for number, (stations, steps) in enumerate(levels):
@@ -217,7 +217,7 @@ PROBLEMS = (
 
 
 def problem(name: str) -> Problem:
-    """The problem of this name.
+    """Return the problem of this name.
 
     Raises
     ------

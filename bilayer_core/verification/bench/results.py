@@ -67,7 +67,7 @@ class Results:
         return content
 
     def find(self, part: str, identity: dict) -> dict | None:
-        """The record of a part that has these values."""
+        """Return the record of a part that has these values."""
         records = self.content[part]
         return next((r for r in records if all(r.get(key) == value for key, value in identity.items())), None)
 

@@ -38,7 +38,7 @@ def chosen_names(only: Sequence[str], quick: bool) -> list[str]:
 
 
 def chosen_problems(chosen: Sequence[str]) -> list[Problem]:
-    """The problems among these names."""
+    """Return the problems among these names."""
     return [problem for problem in PROBLEMS if problem.name in chosen]
 
 

@@ -19,7 +19,7 @@ NONE = "–"
 
 
 def write_csv(content: dict, directory: Path) -> list[Path]:
-    """A table DIR/<part>.csv for each part that has records, a line each."""
+    """Write a table DIR/<part>.csv for each part that has records, one line for each record."""
     paths = []
     for part in (work_precision.PART, cantilever.PART, scaling.PART, start.PART):
         records = [_flat(record) for record in content[part]]
@@ -79,7 +79,7 @@ def cantilever_table(content: dict) -> list[str]:
 
 
 def cantilever_series(content: dict) -> dict[str, list[dict]]:
-    """Runs of the common cantilever by tool: ours by model and dimension, peers by how they are clamped."""
+    """Return the runs of the common cantilever by tool: ours by model and dimension, peers by how they are clamped."""
     series: dict[str, list[dict]] = {}
     for run in content[work_precision.PART]:
         if run["problem"] == "cantilever":
@@ -212,7 +212,7 @@ def _seconds(value: float) -> str:
 
 
 def _flat(record: dict, prefix: str = "") -> dict:
-    """Records within a record become columns `outer.inner`."""
+    """Return a record in which nested records become columns `outer.inner`."""
     found = {}
     for key, value in record.items():
         found |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
@@ -231,12 +231,12 @@ def _write(path: Path, fill: Callable) -> None:
 
 
 def recommendation(content: dict) -> Family | None:
-    """The family to recommend."""
+    """Return the family to recommend."""
     return pareto.recommended(comparable(content))
 
 
 def comparable(content: dict) -> list[dict]:
-    """Runs of the problems whose references are sharp enough to compare families by."""
+    """Return the runs of the problems whose references are sharp enough to compare families by."""
     runs = content[work_precision.PART]
     models: dict[str, set[str]] = {}
     for run in runs:

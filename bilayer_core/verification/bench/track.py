@@ -48,7 +48,7 @@ class Track:
             self.points[name].append(body.position)
 
     def at(self, point: str, time: float) -> Array:
-        """Configuration of a point at the end of the step nearest to `time` [m], shape (3,)."""
+        """Return the position of a point at the end of the step nearest to `time` [m], shape (3,)."""
         return self.points[point][int(np.abs(np.array(self.times) - time).argmin())]
 
 
@@ -85,7 +85,7 @@ class Trajectory:
         return (self.until,)
 
     def values(self, track: Track) -> Array:
-        """Times [s] and places [m] that count, shape (n_time, 4)."""
+        """Return the times [s] and places [m] that count, shape (n_time, 4)."""
         way = np.column_stack([track.times, track.points[self.point]])
         return way[way[:, 0] <= self.until * (1.0 + 1e-9)]
 
@@ -121,7 +121,7 @@ class Headline:
         return f"relative error of {self.name}"
 
     def values(self, track: Track) -> Array:
-        """The number, shape (1, 1)."""
+        """Return the number, shape (1, 1)."""
         return np.array([[self.figure(track)]])
 
     def error(self, found: Array, reference: Array) -> float:
@@ -146,5 +146,5 @@ def rise(track: Track) -> float:
 
 
 def advance(point: str, axis: int, begin: float, end: float) -> Callable[[Track], float]:
-    """The figure: displacement of a point along an axis between two instants [m]."""
+    """Return a function for the displacement of a point along an axis between two instants [m]."""
     return lambda track: float(track.at(point, end)[axis] - track.at(point, begin)[axis])

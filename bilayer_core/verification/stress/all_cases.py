@@ -51,7 +51,7 @@ def _of_matrix(case: MatrixCase, is_chosen: bool) -> StressCase:
 
 @cache
 def quick_names() -> frozenset[str]:
-    """A seeded choice of cases of the matrix that are short, some of every group."""
+    """Return a seeded choice of short cases of the matrix, some of every group."""
     chosen, groups = np.random.default_rng(SEED), {}
     for name, case in all_cases().items():
         if case.most_steps <= MOST_STEPS and case.group not in ("stations", "long", "torture"):

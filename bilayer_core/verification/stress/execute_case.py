@@ -132,7 +132,7 @@ def _decide(case: StressCase, record: Record, trial: Trial, decision: Decision |
 
 
 def _error(case: StressCase, trial: Trial) -> tuple[float | None, str]:
-    """The largest error at the output times that the case reached; why it is not known, or what is wrong."""
+    """Return the largest error at the output times that the case reached, and why it is unknown or what is wrong."""
     steps = trial.simulator.steps
     if steps.adaptive:
         overrides = [f"solver.tolerance={FINER_TOLERANCE * (steps.tolerance or DEFAULT_TOLERANCE):g}"]

@@ -21,7 +21,7 @@ def head_of(cases: dict[str, StressCase]) -> dict[str, object]:
 
 
 def digest(cases: dict[str, StressCase]) -> str:
-    """Changes whenever a case is another one."""
+    """Return a digest of the cases, which changes whenever a case changes."""
     content = {name: [case.scene(), case.most_steps] for name, case in cases.items()}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 

@@ -84,7 +84,7 @@ class Torture:
 
 
 def _whole(decide: Callable[[Trial], Decision], trial: Trial) -> Decision:
-    """A decision, which does not hold if its run was cut."""
+    """Return a decision, which does not hold if its run was cut."""
     decision = decide(trial)
     if not trial.cut:
         return decision
@@ -106,11 +106,11 @@ def torture_scenes() -> dict[str, Path]:
 
 
 def content_of(scene: str, overrides: tuple[str, ...] = ()) -> dict:
-    """The content of a torture scene, or else of a bundled one, with changes."""
+    """Return the content of a torture scene, or else of a bundled one, with changes."""
     path = (bundled_scenes() | torture_scenes())[scene]
     return read_yaml(scene_text(load_scene(path, overrides)), scene)
 
 
 def first_broken(*decisions: Decision) -> Decision:
-    """The first decision that does not hold, else the first of all."""
+    """Return the first decision that does not hold, otherwise the first of all."""
     return next((decision for decision in decisions if not decision.holds), decisions[0])

@@ -35,13 +35,16 @@ def _unit(v: Array) -> Array:
 
 
 def longer(points: Array, axis: Array) -> Array:
-    """A curve that goes on straight at both ends, far before it and behind it along an axis."""
+    """Return a curve that continues straight at both ends, far before it and behind it along an axis."""
     far = FAR * np.linalg.norm(np.diff(points, axis=0), axis=1).sum() * axis
     return np.concatenate([[points[0] - far], points, [points[-1] + far]])
 
 
 def twist(points: Array, directors: Array) -> float:
-    """Turns of the directors of edges about the curve, shape (n − 1, 3), from edge to edge by less than half a turn."""
+    """Return the turns of the directors of edges about the curve, shape (n − 1, 3).
+
+    From edge to edge a director turns by less than half a turn.
+    """
     tangent = _unit(np.diff(points, axis=0))
     before, after = tangent[:-1], tangent[1:]
     carried = _carried(directors[:-1], before, after)

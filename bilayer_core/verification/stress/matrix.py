@@ -117,7 +117,7 @@ MILD = 0.15
 
 
 def _near_default(axis: str, part: float) -> float:
-    """A part of an axis' range near the default of the parameters."""
+    """Return a part of an axis' range near the default of the parameters."""
     center = CENTERS[axis]
     low = min(max(center - 0.5 * MILD, 0.0), 1.0 - MILD)
     return low + MILD * part
@@ -141,7 +141,7 @@ CENTERS = {axis: _part_of(axis, DEFAULTS[axis]) for axis in RANGES}
 
 
 def _long() -> Iterator[MatrixCase]:
-    """The named list of cases with more steps than the rest."""
+    """Yield the named cases that have more steps than the rest."""
     yield MatrixCase("long/ball in a box, 100 bounces", _set("box", speed=3.0), 60_000)
     yield MatrixCase("long/ball in a box with restitution", _set("box", speed=3.0, restitution=0.95), 60_000)
     yield MatrixCase("long/a million steps at rest", _set("crawler", eigenstrain=0.0, dt=1e-3), 1_000_000)

@@ -34,7 +34,7 @@ def draw(records: Sequence[Record], directory: Path) -> list[Path]:
 
 
 def _outcomes_by_axis(records: Sequence[Record], axes: Sequence[str], path: Path) -> Path:
-    """A heat map for each axis: the worst outcome of both models by value and robot; outside the region hatched."""
+    """Draw a heat map for each axis: the worst outcome of both models by value and robot; hatched outside the range."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch, Rectangle
 

@@ -124,7 +124,10 @@ class Range:
     logarithmic: bool = True
 
     def at(self, part: float) -> float:
-        """The value at a part of the interval, 0 … 1; three digits, so that files show what was run."""
+        """Return the value at a part of the interval, 0 … 1.
+
+        It is rounded to three digits, so that files show what was run.
+        """
         if self.logarithmic:
             value = math.exp((1.0 - part) * math.log(self.low) + part * math.log(self.high))
         else:

@@ -118,7 +118,7 @@ def strip_mass(p: Parameters) -> float:
 
 
 def scene_of(p: Parameters) -> dict:
-    """The content of the scene file of a case."""
+    """Return the content of the scene file of a case."""
     content = {
         "schema": 1,
         "name": f"stress_{p.robot}",
@@ -325,7 +325,7 @@ def _box(p: Parameters, content: dict) -> None:
 
 
 def _wall(p: Parameters, half: float, name: str, axis: int, inward: float) -> dict:
-    """A face of the box, a plate that ends beyond its corners."""
+    """Return a face of the box: a plate that ends beyond its corners."""
     deep = 0.5 * half
     position, size = [0.0] * 3, [2.0 * half + 4.0 * deep] * 3
     position[axis], size[axis] = -inward * (half + deep), 2.0 * deep

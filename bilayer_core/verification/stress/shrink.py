@@ -49,7 +49,7 @@ def _kind(record: Record) -> str:
 
 
 def _taken_back(parameters: Parameters) -> list[dict[str, object]]:
-    """The settings with one of them taken back, in the order in which that is tried."""
+    """Return the settings with one of them reset, in the order in which to try them."""
     changes = [
         {setting.name: setting.default}
         for setting in dataclasses.fields(Parameters)

@@ -36,7 +36,7 @@ PROMISES = (
 
 
 def worst(records: Sequence[Record], count: int) -> list[Record]:
-    """The cases to look at first: failures, refusals without a remedy that works, the largest errors inside."""
+    """Return the cases to look at first: failures, refusals without a remedy that works, the largest errors inside."""
 
     def rank(record: Record) -> tuple[int, float]:
         if record.outcome is Outcome.FAILED:
@@ -204,7 +204,7 @@ def _notes() -> Iterator[str]:
 
 
 def _table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> Iterator[str]:
-    """A table and an empty line; what a cell has of bars is no border of one."""
+    """Yield the lines of a table and an empty line; a bar within a cell becomes a slash."""
     for row in (titles, ["---"] * len(titles), *rows):
         yield f"| {' | '.join(str(cell).replace('|', '/') for cell in row)} |"
     yield ""

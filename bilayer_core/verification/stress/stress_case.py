@@ -47,12 +47,12 @@ class Decision:
 
     @classmethod
     def near(cls, what: str, computed: float, reference: float, limit: float, unit: str = "1") -> Decision:
-        """A figure within a relative limit of a reference."""
+        """Return the decision that a figure is within a relative limit of a reference."""
         width = limit * abs(reference)
         return cls(what, float(computed), reference - width, reference + width, unit)
 
     def text(self) -> str:
-        """The figure and its interval in one line."""
+        """Return the figure and its interval in one line."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         word = "" if self.holds else "not "
         return f"{self.what}: {self.computed:.5g}{unit} is {word}from {self.low:.5g} to {self.high:.5g}{unit}"

@@ -21,7 +21,7 @@ MOST_SHRUNK = 20
 
 
 def chosen_cases(only: Sequence[str], quick: bool, scenes: Sequence[str] = ()) -> dict[str, StressCase]:
-    """The cases to run, in order.
+    """Return the cases to run, in order.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def measure(cases: dict[str, StressCase], journal: Journal, workers: int, tell: 
 
 
 def write(cases: dict[str, StressCase], journal: Journal, directory: Path, shrinks: bool, workers: int) -> list[Path]:
-    """The stability_page, its outcome_pictures, and the scenes of failures and of the worst cases."""
+    """Write the stability_page, its outcome_pictures, and the scenes of failures and of the worst cases."""
     written = []
     records = list(journal.records.values())
     failed = [record for record in records if record.outcome is Outcome.FAILED]

@@ -18,7 +18,7 @@ Array = np.ndarray
 
 
 def met(trial: Trial) -> Decision:
-    """The smallest gap over the barrier distance: above 0, and below 1 if anything has met at all."""
+    """Return the smallest gap over the barrier distance: above 0, and below 1 if anything has met at all."""
     barrier = trial.simulator.scene.contact.barrier_distance
     return Decision("smallest gap over the barrier distance", trial.judge.min_gap / barrier, 1e-9, 1.0)
 
@@ -32,7 +32,7 @@ def stays_apart(trial: Trial) -> Decision:
 
 
 def carries(trial: Trial) -> Decision:
-    """The lowest place of a heavy box that falls on a strip, and its highest one after that."""
+    """Return the lowest place of a heavy box that falls on a strip, and its highest place after that."""
     simulator, scene = trial.simulator, trial.simulator.scene
     half, thickness = 0.5 * scene.bodies[0].surface.size[2], scene.rods[0].layers[0].thickness
     heights = []
@@ -46,7 +46,7 @@ def carries(trial: Trial) -> Decision:
 
 
 def keeps_linking(trial: Trial) -> Decision:
-    """The largest error of the linking of two rods: what the ends have turned."""
+    """Return the largest error of the linking of two rods, compared with the turns of the ends."""
     simulator = trial.simulator
     strands = [strand.nodes for strand in simulator.description.strands]
     before = _linking(simulator.positions, strands)
@@ -85,7 +85,7 @@ AT_REST = 0.05
 
 
 def clears_edges(trial: Trial) -> Decision:
-    """The smallest gap of whole edges over the barrier distance, not of their stations alone."""
+    """Return the smallest gap over the barrier distance of whole edges, not only of their stations."""
     simulator, smallest = trial.simulator, math.inf
     model = simulator.model
     surfaces = surfaces_of(model, MeetingPoints(model))
@@ -123,7 +123,7 @@ def is_pressed(trial: Trial) -> Decision:
 
 
 def _heap(side: int, layers: int) -> tuple[str, ...]:
-    """Changes that make the heap of so many noodles beside and above each other, twice."""
+    """Return the changes that make a heap with so many noodles side by side and on top of each other, twice."""
     return (
         f"rods.along.pattern.counts=[{side}, {layers}]",
         f"rods.across.pattern.counts=[{side}, {layers}]",

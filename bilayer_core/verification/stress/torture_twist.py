@@ -96,7 +96,7 @@ def leaves_line(trial: Trial) -> Decision:
 
 
 def turned(trial: Trial) -> float:
-    """Turns that the ends have made against each other in all, right-handed."""
+    """Return the total turns of the ends against each other, right-handed."""
     by = {
         body.name: body.motion.rotations for body in trial.simulator.scene.bodies if hasattr(body.motion, "rotations")
     }

@@ -46,7 +46,7 @@ def elastica_tip() -> tuple[float, float]:
 
 @cache
 def cantilever_tip(edges: int, dimension: int = 3) -> tuple[float, float]:
-    """The same from rods."""
+    """Return the tip (x, z) of the heavy cantilever [m], simulated with rods."""
     simulator = Simulator(load_scene(beam(edges + 1, (0.0, 0.0, -GRAVITY))), dimension=dimension)
     simulator.solve_static()
     return tuple(simulator.positions[-1, [0, 2]])

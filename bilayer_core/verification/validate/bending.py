@@ -25,7 +25,7 @@ THICKNESS, STATIONS = 2e-3, 41
 
 
 def strip(m: float, n: float, eigenstrain: float, stations: int = STATIONS) -> dict:
-    """A clamped bilayer of m = E₂/E₁, n = h₂/h₁ (bottom over top), whose top layer grows by `eigenstrain`."""
+    """Return a clamped bilayer of m = E₂/E₁, n = h₂/h₁ (bottom over top), whose top layer grows by `eigenstrain`."""
     top = THICKNESS / (1.0 + n)
     layers = [
         layer("bottom", thickness=n * top, material="base"),

@@ -21,12 +21,12 @@ def as_json(results: Sequence[Result]) -> str:
 
 
 def write_json(results: Sequence[Result], path: Path) -> None:
-    """The same, as a file."""
+    """Write the results as JSON to a file."""
     write_text(path, as_json(results) + "\n", force=True)
 
 
 def write_csv(results: Sequence[Result], path: Path) -> None:
-    """The same, a line each."""
+    """Write the results as csv, a line each."""
     with draft_of(path, force=True) as draft, draft.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, list(results[0].record()))
         table.writeheader()

@@ -25,7 +25,7 @@ def timoshenko(m: float, n: float) -> float:
 
 
 def timoshenko_as_printed(m: float, n: float) -> float:
-    """The paper's equation 30, in which the two ratios have changed places."""
+    """Return the curvature of the paper's equation 30, which swaps the two ratios."""
     return timoshenko(n, m)
 
 

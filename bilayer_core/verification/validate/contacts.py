@@ -28,7 +28,7 @@ def tilted_gravity(angle: float) -> list[float]:
 
 
 def block(gravity: list[float], friction: dict, dt: float = 1e-3) -> Simulator:
-    """A short stiff strip that lies along x on the ground; `friction` as in a scene."""
+    """Return a simulator of a short stiff strip along x on the ground; `friction` is as in a scene."""
     strip = rod([layer(thickness=2e-3)], length=0.02, stations=5, start=(0, 0, 1.99e-3))
     surroundings = {"obstacles": [GROUND], "contact": {**contact(), "friction": friction}}
     solver = {"dt": dt, "integrator": "implicit_euler"}

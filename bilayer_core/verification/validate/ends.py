@@ -39,8 +39,10 @@ def patched(m: float, n: float, dimension: int, stations: int = STATIONS) -> tup
 
 
 def beam(m: float, n: float) -> tuple[float, float]:
-    """The same of two beams: straight but for the patch, an arc of Timoshenko's curvature κ per rest length, where the
-    bottom layer has the strain ΣEI κ/(c EA), since nothing holds the section: ΣEI κ = N c.
+    """Return the angle [rad] and sag [m] of the end of two beams.
+
+    They are straight but for the patch, an arc of Timoshenko's curvature κ per rest length. There the bottom layer has
+    the strain ΣEI κ/(c EA), since nothing holds the section: ΣEI κ = N c.
     """
     top = bending.THICKNESS / (1.0 + n)
     bottom, modulus, width = n * top, m * GEL["youngs_modulus"], 0.01

@@ -30,7 +30,7 @@ WHOLE, HALVES = [layer(thickness=THICKNESS)], [layer("bottom"), layer("top")]
 
 
 def strip(layers: list[dict], **more) -> dict:
-    """A free strip in a fluid without drag."""
+    """Return a free strip in a fluid without drag."""
     return scene([rod(layers, LENGTH, EDGES + 1)], fluid=WATER, **more)
 
 

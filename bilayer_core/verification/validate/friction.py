@@ -36,7 +36,7 @@ SECOND_ORDER = ("sdirk2", "tr_bdf2", "generalised_alpha", "implicit_midpoint")
 
 
 def block(position: tuple[float, float, float], velocity: float = 0.0) -> dict:
-    """A flat block with its speed along x [m/s]."""
+    """Return a flat block with its speed along x [m/s]."""
     motion = {"type": "free", "mass": MASS, "inertia": [1e-5] * 3, "velocity": [velocity, 0, 0]}
     return {
         "name": "block",
@@ -58,7 +58,7 @@ def resting_gap(law: dict, corner_length: float) -> float:
 
 
 def at_rest(content: dict, height: str = "block") -> Simulator:
-    """The scene with its block at the height at which it rests on what is below z = 0."""
+    """Return a simulator of the scene with its block at its resting height above what is below z = 0."""
     model = Simulator(load_scene(content)).model
     gap = resting_gap(content["contact"], float(model.contact_points.weight[model.node_count]))
     for body in content["bodies"]:

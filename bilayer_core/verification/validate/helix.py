@@ -22,7 +22,7 @@ STATIONS, LENGTH = 61, 0.09
 
 
 def strip(torsion: str, curvature: float, twist: float, stations: int, length: float) -> dict:
-    """The clamped bilayer."""
+    """Return the clamped bilayer."""
     top = layer("top", natural_curvature=curvature, natural_twist=twist)
     ribbon = rod([layer("bottom"), top], length, stations, torsion=torsion, clamp_start="wall")
     return scene([ribbon], bodies=[fixed()], solver={"model": "auto"})

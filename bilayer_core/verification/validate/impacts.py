@@ -14,7 +14,7 @@ TOLERANCES = {"sdirk2": 1e-4, "tr_bdf2": 1e-4, "generalised_alpha": 1e-5}
 
 
 def thrown(stiffness: float, dimension: int, **contact_keys) -> dict:
-    """A ball of 2.7 g, 1 mm over a table, that flies towards it without gravity."""
+    """Return a scene with a ball of 2.7 g, 1 mm over a table, that flies towards it without gravity."""
     motion = {"type": "free", "mass": 2.7e-3, "velocity": [0, 0, -SPEED], "inertia": [4.3e-7] * 3}
     surface = {"shape": "sphere", "radius": 0.02}
     ball = {"name": "ball", "position": [0.05, 1.0, 0.021], "motion": motion, "surface": surface}

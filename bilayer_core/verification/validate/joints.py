@@ -94,7 +94,7 @@ def snapping_load(model: str, dimension: int) -> tuple[float, float]:
 
 
 def swinging(model: str, dimension: int, **steps) -> Simulator:
-    """A stiff strip on a hinge at its start, released at an angle of 2°."""
+    """Return a simulator of a stiff strip on a hinge at its start, released at an angle of 2°."""
     angle = math.radians(2.0)
     strip = rod(layers_of(model), LENGTH, EDGES + 1, width=WIDTH, clamp_start="pin", name="arm")
     strip["path"]["direction"] = [math.sin(angle), 0.0, -math.cos(angle)]
@@ -121,7 +121,7 @@ def period(model: str, dimension: int) -> tuple[float, float]:
 
 
 def hinged_link(model: str, start: tuple, angle: float, name: str, first: str, last: str | None = None) -> dict:
-    """A stiff strip that hangs at an angle from the vertical, or lies at 90°."""
+    """Return a stiff strip that hangs at an angle from the vertical, or lies at 90°."""
     link = rod(layers_of(model), LENGTH, 21, start=start, width=WIDTH, name=name, clamp_start=first, clamp_end=last)
     link["path"]["direction"] = [math.sin(angle), 0.0, -math.cos(angle)]
     return link | {"normal": [math.cos(angle), 0.0, math.sin(angle)]}

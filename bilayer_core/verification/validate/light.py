@@ -27,7 +27,10 @@ TURN, TIME, LAG = 1.9 * math.pi, 1.0, 0.2
 def lit_strip(
     angle: float, gain: float = GAIN, stations: int = 81, lag: float = 0.1, light: dict | None = None, **more
 ) -> dict:
-    """A strip along x that light from the direction (sin, 0, cos) of `angle` [rad] bends; its top layer follows it."""
+    """Return a strip along x that bends in light from the direction (sin, 0, cos) of `angle` [rad].
+
+    Its top layer follows the light.
+    """
     top = layer("top", eigenstrain={"stimulus": "sun", "gain": gain, "time_constant": lag})
     shines = {"from": [math.sin(angle), 0, math.cos(angle)], **(light or {})}
     content = {

@@ -36,7 +36,7 @@ def spring_period(model: str, dimension: int) -> tuple[float, float]:
 
 
 def _crossings(simulator: Simulator, value, count: int) -> list[float]:
-    """Times at which a value changes its sign [s]."""
+    """Return the times at which a value changes its sign [s]."""
     times, last = [], value()
     while len(times) < count:
         before = simulator.time
@@ -49,18 +49,21 @@ def _crossings(simulator: Simulator, value, count: int) -> list[float]:
 
 
 def _idle() -> dict:
-    """A rod far from everything, since every scene has one."""
+    """Return a rod far from everything, since every scene needs one."""
     return rod([layer()], 0.01, 5, start=(0.5, 0.0, 0.0), name="idle", clamp_start="post")
 
 
 def rigid(bodies: list[dict], joints: list[dict] = (), gravity: float = GRAVITY) -> dict:
-    """A scene of rigid bodies, and an idle rod."""
+    """Return a scene of rigid bodies and an idle rod."""
     post = fixed("post", (0.5, 0.0, 0.0))
     return scene([_idle()], bodies=[post, *bodies], joints=list(joints), gravity=[0, 0, -gravity])
 
 
 def pendulum(angle: float, axis: tuple = (0, -1, 0), **turning) -> dict:
-    """A rigid body on a hinge to a wall, at an angle from where it hangs; about +y it falls to greater angles."""
+    """Return a rigid body on a hinge to a wall, at an angle from its hanging position.
+
+    About +y it falls to greater angles.
+    """
     body = {
         "name": "bob",
         "position": [ARM * math.sin(angle), 0.0, -ARM * math.cos(angle)],
@@ -71,7 +74,7 @@ def pendulum(angle: float, axis: tuple = (0, -1, 0), **turning) -> dict:
 
 
 def _extremes(simulator: Simulator, value, count: int) -> list[float]:
-    """The first values at which a value turns back, from parabolas through three steps."""
+    """Return the first values at which a value turns back, from parabolas through three steps."""
     found, row = [], [value()]
     while len(found) < count:
         simulator.step()

@@ -28,7 +28,7 @@ def let_go(simulator: Simulator, velocity: Array) -> None:
 
 
 def free_bilayer(**solver) -> Simulator:
-    """A strip of two layers, 20 mm long, in space."""
+    """Return a simulator of a strip of two layers, 20 mm long, in free space."""
     layers = [layer("passive"), layer("active", thickness=1.5e-3)]
     return Simulator(load_scene(scene([rod(layers, length=0.02, stations=9)], solver=solver)))
 

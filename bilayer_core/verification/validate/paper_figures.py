@@ -124,7 +124,7 @@ def _axis(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _ideal_helix(points: np.ndarray, radius: float, pitch: float) -> np.ndarray:
-    """The helix of given radius and pitch about z through the middle of points and along them, shape (400, 3)."""
+    """Return the helix of given radius and pitch about z through the middle of points, along them, shape (400, 3)."""
     center = len(points) // 2
     x, d = points[center], points[center + 1] - points[center]
     sense = np.sign(x[0] * d[1] - x[1] * d[0])
@@ -134,7 +134,7 @@ def _ideal_helix(points: np.ndarray, radius: float, pitch: float) -> np.ndarray:
 
 
 def figure_of(rows: int, columns: int, size: tuple[float, float], **axes):
-    """A figure of `size` [in] without a window, and its axes."""
+    """Return a figure of `size` [in] without a window, and its axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -16,7 +16,7 @@ def layer(name="only", thickness=1e-3, material="gel", **more):
 
 
 def rod(layers, length=0.1, stations=21, start=(0, 0, 0), name="rod", width=0.01, **more):
-    """A straight rod along x, its normal along z."""
+    """Return a straight rod along x, its normal along z."""
     path = {"shape": "straight", "start": list(start), "direction": [1, 0, 0], "length": length}
     return {
         "name": name,
@@ -30,7 +30,7 @@ def rod(layers, length=0.1, stations=21, start=(0, 0, 0), name="rod", width=0.01
 
 
 def scene(rods, solver=None, **more):
-    """A scene without gravity, contact, stimuli or bodies, solved by the paper's method but for what `solver` says."""
+    """Return a scene without gravity, contact, stimuli or bodies, solved by the paper's method changed by `solver`."""
     base = {
         "schema": 1,
         "name": "sample",
@@ -45,12 +45,12 @@ def scene(rods, solver=None, **more):
 
 
 def fixed(name="wall", position=(0, 0, 0), **more):
-    """A body at rest that holds clamps."""
+    """Return a body at rest that holds clamps."""
     return {"name": name, "position": list(position), "motion": {"type": "prescribed"}, **more}
 
 
 def ball(position, radius=0.02, mass=2.7e-3, **motion):
-    """A free ball."""
+    """Return a free ball."""
     return {
         "name": "ball",
         "position": list(position),

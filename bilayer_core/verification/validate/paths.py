@@ -39,7 +39,7 @@ FORCE, MOMENT = 1e-6, 1e-8
 
 
 def spring(pitch_angle: float, layers: list[dict], stations: int, load: dict) -> dict:
-    """The spring between a wall and a body on its axis, the z axis."""
+    """Return the spring between a wall and a body on its axis, the z axis."""
     pitch = 2.0 * math.pi * RADIUS * math.tan(math.radians(pitch_angle))
     ribbon = {
         "name": "ribbon",
@@ -94,7 +94,7 @@ def _stiffnesses() -> tuple[float, float, float]:
 
 
 def expected(pitch_angle: float) -> np.ndarray:
-    """The same by theory."""
+    """Return the theoretical compliance of the spring, as `compliance` does."""
     sine, cosine = math.sin(math.radians(pitch_angle)), math.cos(math.radians(pitch_angle))
     twisting, bending, axial = _stiffnesses()
     length = 2.0 * math.pi * RADIUS * TURNS / cosine

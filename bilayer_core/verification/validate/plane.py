@@ -35,7 +35,10 @@ def tip() -> tuple[float, float]:
 
 
 def blade(part: float) -> dict:
-    """A blade that stands on edge, under a part of the force on its tip that turns it over: 4.013 √(E I₂ G J)/L²."""
+    """Return a blade that stands on edge under a force on its tip.
+
+    The force is a part of the one that turns the blade over: 4.013 √(E I₂ G J)/L².
+    """
     length, width, thickness, modulus = 0.1, 0.6e-3, 12e-3, GEL["youngs_modulus"]
     stiff, shear = modulus * thickness * width**3 / 12.0, modulus / 3.0
     torsion = shear * thickness * width**3 / 3.0 * (1.0 - 0.63 * width / thickness)

@@ -55,7 +55,7 @@ def _lag(dimension: int) -> float:
 
 
 def _lag_of_recursion() -> float:
-    """The same from x → x + part (goal − x) + T s (1 − s)² v, over and over, with s = period/T."""
+    """Return the same lag [s] from repeating x → x + part (goal − x) + T s (1 − s)² v with s = period/T."""
     s, x, v = PERIOD / LEAST_TIME, 0.0, 0.0
     for k in range(100):
         away = STREAM * PERIOD * k - x

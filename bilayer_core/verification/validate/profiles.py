@@ -19,7 +19,7 @@ LENGTH, MODULUS, EDGES = 0.1, GEL["youngs_modulus"], 80
 
 
 def linear(first: float, last: float) -> dict:
-    """A profile from one end of the path to the other."""
+    """Return a profile that is linear from one end of the path to the other."""
     return {"at": [0, LENGTH], "value": [first, last]}
 
 
@@ -29,7 +29,7 @@ def between(first: float, last: float, s: float | Array) -> float | Array:
 
 
 def settled(layers: list[dict], edges: int = EDGES, of_rod: dict | None = None, **more) -> Simulator:
-    """A clamped strip in equilibrium."""
+    """Return a simulator of a clamped strip in equilibrium."""
     strip = rod(layers, length=LENGTH, stations=edges + 1, clamp_start="wall", **(of_rod or {}))
     simulator = Simulator(load_scene(scene([strip], bodies=[fixed()], **more)))
     simulator.solve_static()

@@ -18,7 +18,7 @@ SIZES = [(model, dimension) for model in ("laminate", "two_rod") for dimension i
 
 
 def cantilever(model: str, dimension: int, retardation_time: float = 0.0, **steps) -> Simulator:
-    """A soft bilayer 60 mm long, which falls from its clamp."""
+    """Return a simulator of a soft bilayer 60 mm long, which falls from its clamp."""
     strip = rod(
         [layer("bottom"), layer("top", thickness=0.5e-3)], 0.06, 21, start=(0, 0, 0.02), name="arm", clamp_start="wall"
     )

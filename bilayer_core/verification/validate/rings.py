@@ -49,7 +49,7 @@ KINDS = {"laminate, 2-D": (ONE, "laminate", 2), "laminate": (PAIR, "laminate", 3
 
 
 def ring(layers: list[dict], edges: int = EDGES, **more) -> dict:
-    """A ring round the y axis, its normal inwards."""
+    """Return a ring round the y axis, its normal inwards."""
     path = {"shape": "arc", "start": [RADIUS, 0, 0], "direction": [0, 0, 1], "closed": True}
     path |= {"radius": RADIUS, "angle": "360 deg"}
     whole = rod(layers, stations=edges + 1, **({"width": WIDTH} | more))
@@ -91,7 +91,7 @@ def frequency(kind: str, waves: int, edges: int = EDGES, steps: int = 400) -> tu
 
 
 def _next(simulator: Simulator, dt: float, figure) -> float:
-    """A figure after one more step."""
+    """Return a figure after one more step."""
     simulator.run(dt)
     return figure()
 

@@ -36,7 +36,7 @@ def twisted_strip(
     thickness: tuple[float, float] = THICKNESS,
     width: float = 0.01,
 ) -> dict:
-    """A strip between a wall and a body on which a moment about the strip's axis acts [N m]."""
+    """Return a strip between a wall and a body on which a moment about the strip's axis acts [N m]."""
     layers = [
         layer(name, thickness=h, stiffness=of_modulus)
         for name, h, of_modulus in zip(("bottom", "top"), thickness, multiples, strict=True)

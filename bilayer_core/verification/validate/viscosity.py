@@ -19,7 +19,7 @@ METHODS = tuple(name for name in INTEGRATORS if name not in ("implicit_euler", "
 
 
 def gel(time: float, youngs_modulus: float = 1e6) -> dict:
-    """A material with a retardation time [s]."""
+    """Return a material with a retardation time [s]."""
     return {"youngs_modulus": youngs_modulus, "poisson_ratio": 0.5, "density": 1000.0, "retardation_time": time}
 
 

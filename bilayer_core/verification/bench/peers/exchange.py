@@ -57,7 +57,7 @@ class Case:
         return -0.5 * self.element_length(beam) if self.shifted else 0.0
 
     def stride(self, beam: Cantilever) -> int:
-        """Steps from one sample to the next."""
+        """Return the number of steps from one sample to the next."""
         return max(1, round(beam.sampling / self.dt))
 
 

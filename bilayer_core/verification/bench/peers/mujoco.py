@@ -28,7 +28,7 @@ POISSON = 0.499
 
 
 def simulate(beam: Cantilever, case: Case) -> Answer:
-    """The cantilever; its first edge is pinned."""
+    """Simulate the cantilever; its first edge is pinned."""
     h = case.element_length(beam)
     xml = XML.format(
         dt=case.dt,
@@ -65,7 +65,7 @@ def simulate(beam: Cantilever, case: Case) -> Answer:
 
 
 def _tip(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
-    """Configuration of the last node [m] at the end of the step: positions in `data` are those at its start."""
+    """Return the position of the last node [m] at the end of the step; positions in `data` are those at its start."""
     body = model.flex_vertbodyid[-1]
     address = model.jnt_qposadr[model.body_jntadr[body]]
     return model.body_pos[body] + data.qpos[address : address + 3]

@@ -15,7 +15,7 @@ class _Simulator(elastica.BaseSystemCollection, elastica.Constraints, elastica.F
 
 
 def simulate(beam: Cantilever, case: Case) -> Answer:
-    """The cantilever; the rectangular section is put in the place of a circle of the same area."""
+    """Simulate the cantilever; its rectangular section replaces the circle of the same area."""
     h = case.element_length(beam)
     rod = elastica.CosseratRod.straight_rod(
         case.elements,
