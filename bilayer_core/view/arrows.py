@@ -52,7 +52,7 @@ def reaction_arrows(run: RunData, scales: Scales) -> dict[str, Arrows]:
 
 
 def reaction_references(run: RunData, size: float) -> dict[str, float]:
-    """The sizes that these are scaled by, of those that act [N, N m]; `size` is that of the robot [m]."""
+    """Return the sizes by which to scale the reactions that act [N, N m]; `size` is that of the robot [m]."""
     arms = {"clamp_forces": 1.0, "clamp_moments": size}
     acting = {name: run.clamp_wrenches[:, :, part] for name, part in REACTIONS.items()}
     references = {name: reference_of(of) for name, of in acting.items() if of.any()}

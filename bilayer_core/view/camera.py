@@ -89,12 +89,12 @@ class Insets:
 
 
 def parse_camera(text: str) -> Camera:
-    """The camera that an option names.
+    """Return the camera that an option names.
 
     Raises
     ------
     InputError
-        With what is allowed.
+        If the option names none; the message says what is allowed.
     """
     name = text.strip().lower()
     if name in (AUTO, FOLLOW, "iso"):

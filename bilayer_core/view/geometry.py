@@ -49,7 +49,7 @@ def ribbon_vertices(strand: Strand, positions: np.ndarray, material_frames: np.n
 
 
 def ribbon_normals(material_frames: np.ndarray) -> np.ndarray:
-    """Normals of those corners, each of the face that it is on, shape (times, nodes, CORNERS, 3), float32."""
+    """Return the normals of those corners, each that of its face, shape (times, nodes, CORNERS, 3), float32."""
     across, along = rotated(material_frames, 0), rotated(material_frames, 1)
     faces = (across, across, -across, -across, -along, -along, along, along)
     return np.stack(faces, axis=-2).astype(np.float32)
@@ -66,7 +66,7 @@ FIRST_END, LAST_END = (4, 5, 7, 6), (4, 6, 7, 5)  # corners of the first and las
 
 
 def ribbon_faces(nodes: int) -> np.ndarray:
-    """The same without the ends."""
+    """Return the vertex indices of the surface of a ribbon without its ends, shape (triangles, 3)."""
     first = CORNERS * np.arange(nodes - 1)[:, None, None]
     quads = np.array([[a, b, b + CORNERS, a + CORNERS] for a, b in _FACES])
     return two_triangles((first + quads).reshape(-1, 4))
@@ -135,7 +135,7 @@ ARC_STEPS = 12  # rows of vertices along a quarter of a circle
 
 
 def shape_mesh(shape: ShapeInfo, colours: Colours) -> Mesh:
-    """A sphere, box or cylinder in the frame of its owner, in patches of two colours that show how it turns.
+    """Return a sphere, box or cylinder in the frame of its owner, in patches of two colours that show how it turns.
 
     Returns
     -------
@@ -206,7 +206,7 @@ def shape_extent(shape: ShapeInfo) -> np.ndarray:
 
 
 def plane_axes(plane: ShapeInfo) -> np.ndarray:
-    """Unit vectors along the sides of the squares of a plane, and its normal, as rows."""
+    """Return the unit vectors along the sides of the squares of a plane, and its normal, as rows."""
     normal = rotated(np.array(plane.quaternion), 2)
     across = np.cross([0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0], normal)
     across /= np.linalg.norm(across)
@@ -216,7 +216,7 @@ def plane_axes(plane: ShapeInfo) -> np.ndarray:
 def plane_mesh(
     plane: ShapeInfo, center: np.ndarray, half_size: float, cell: float, colours: tuple[tuple[int, ...], ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A chequered disc on a plane round the point below `center`, fading out at its rim.
+    """Return a chequered disc on a plane round the point below `center`, fading out at its rim.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ class LiveView:
 
 
 def _layout(run: RunData, scales: LiveScales) -> rrb.Blueprint:
-    """The window of a run of which only the beginning is known: all curves that may come have their place."""
+    """Return the window of a run of which only the beginning is known; all possible curves have a place in it."""
     description = run.description
     if scales.moves:
         eye, target = place_moving_eye(run)

@@ -91,7 +91,7 @@ class LiveScales:
 
 
 def _scene_of(description: Description) -> SceneConfig | None:
-    """The scene, None where this version does not understand it: it then says nothing about what will come."""
+    """Return the scene; None if this version cannot read it, so that nothing is known about the rest of the run."""
     try:
         return parse_scene(description.scene_text, description.scene_name)
     except SceneError:

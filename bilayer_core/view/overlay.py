@@ -55,7 +55,7 @@ class Overlay:
         self._legend = self._legend.crop(self._box)
 
     def write(self, picture: Image.Image, time: str = "") -> Image.Image:
-        """The picture with bars and time, in place."""
+        """Draw bars and time onto the picture, and return it."""
         if picture.mode == "RGBA":
             picture.alpha_composite(self._legend, self._box[:2])
         else:
@@ -113,7 +113,7 @@ def text_size_of(height: int) -> int:
 
 
 def round_length(metres: float) -> tuple[float, str]:
-    """The greatest of 1, 2, 5, 10, … that is no longer, with its unit: ``(0.02, "20 mm")``."""
+    """Return the greatest of 1, 2, 5, 10, … that is no longer, with its unit: ``(0.02, "20 mm")``."""
     power = 10.0 ** np.floor(np.log10(metres))
     length = power * max(step for step in _STEPS if step * power <= metres * (1 + 1e-9))
     scale, unit = next((of for of in _LENGTHS if length >= of[0] * (1 - 1e-9)), _LENGTHS[-1])

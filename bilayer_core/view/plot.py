@@ -76,7 +76,7 @@ class Line:
 
 
 def lines_of(run: RunData, number: int, wanted: Sequence[str], node: int | None = None) -> list[Line]:
-    """The curves of some quantities of a run.
+    """Return the curves of some quantities of a run.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def plot(
 
 
 def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "single"):
-    """A figure of curves, by unit in panels; `names` are those of the runs."""
+    """Return a figure of curves, with a panel for each unit; `names` are those of the runs."""
     import matplotlib.pyplot as pyplot
 
     panels: dict[str, list[Line]] = {}
@@ -222,7 +222,7 @@ class _Legend:
 
     @classmethod
     def of(cls, held: list[Line], names: Sequence[str], several: bool, width: float) -> _Legend:
-        """The legend of curves, in as many columns as fit into a width [mm]."""
+        """Return the legend of curves, in as many columns as fit into a width [mm]."""
         short = _without_common(list(dict.fromkeys(line.name for line in held)))
         labels = [", ".join([short[line.name]] * (len(short) > 1) + [names[line.run]] * several) for line in held]
         columns = int((width - FRAME_HEIGHT) / (HANDLE + LETTER * max(map(len, labels))))
@@ -293,7 +293,7 @@ def _prefix(unit: str, held: list[Line]) -> tuple[float, str]:
 
 
 def _thinned(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A long curve by the extremes of its parts, which look the same."""
+    """Return the extremes of the parts of a long curve, which look the same."""
     if len(times) <= MOST_POINTS:
         return times, values
     parts = np.array_split(np.arange(len(times)), MOST_POINTS // 2)

@@ -76,8 +76,10 @@ def entity_name(name: str) -> str:
 
 
 def blueprint(run: RunData, scales: Scales, colouring: Colouring) -> rrb.Blueprint:
-    """The robot at the left, large, over its legend; curves at the right, in tabs with each energy on axes of its own
-    and with what happened.
+    """Return the layout of a finished run.
+
+    The robot is large at the left, over its legend. Curves are at the right, in tabs, with axes for each energy and
+    with the events.
     """
     description = run.description
     plots = [Plot("stimulus", "Stimulus", len(description.channels))] if description.channels else []
@@ -128,7 +130,7 @@ class Curves:
         )
 
     def view(self, plot: Plot, legend: bool = True) -> rrb.TimeSeriesView:
-        """The view of a plot, with the legend to the right of the curves."""
+        """Return the view of a plot, with the legend at the right of the curves."""
         return rrb.TimeSeriesView(
             name=plot.title,
             origin=f"plots/{plot.path}",
@@ -138,7 +140,7 @@ class Curves:
         )
 
     def stack(self, plots: Sequence[Plot], name: str | None = None) -> rrb.Vertical:
-        """Plots below each other, each as high as its legend needs."""
+        """Return plots below each other, each as high as its legend needs."""
         heights = [max(plot.curves + 1, LEAST_ROWS) for plot in plots]
         return rrb.Vertical(*map(self.view, plots), row_shares=heights, name=name)
 
@@ -152,8 +154,9 @@ def arranged(
     events: bool,
     play: str = "paused",
 ) -> rrb.Blueprint:
-    """The window with these views: `colours` is the title of the legend of colours, plots `alone` have a tab of their
-    own.
+    """Return the window with these views.
+
+    `colours` is the title of the legend of colours; plots `alone` have a tab of their own.
     """
     legend = rrb.Spatial2DView(
         name=colours,
@@ -176,7 +179,7 @@ def arranged(
 
 
 def _robot(run: RunData, scales: Scales) -> rrb.Spatial3DView:
-    """The robot; the eye follows it where it would be small for one that stands still."""
+    """Return the view of the robot; the eye follows the robot where it would look small to an eye at rest."""
     eye, target = place_moving_eye(run)
     still, moving = (float(np.linalg.norm(a - b)) for a, b in ((scales.eye, scales.target), (eye, target)))
     follows = is_worth_following(still, moving)
@@ -186,7 +189,7 @@ def _robot(run: RunData, scales: Scales) -> rrb.Spatial3DView:
 
 
 def robot_view(eye: np.ndarray, target: np.ndarray, follows: bool) -> rrb.Spatial3DView:
-    """The robot from an eye, which may follow it, to what it looks at [m], shape (3,)."""
+    """Return the view of the robot from an eye, which may follow it, towards a target [m], shape (3,)."""
     return rrb.Spatial3DView(
         name="Robot",
         origin="world",
@@ -203,7 +206,7 @@ def robot_view(eye: np.ndarray, target: np.ndarray, follows: bool) -> rrb.Spatia
 
 
 def whole(content: rrb.Container | rrb.View, time_panel: str, play: str = "paused") -> rrb.Blueprint:
-    """The layout of a window; `play` is how time goes in it."""
+    """Return the layout of a window; `play` is how time runs in it."""
     return rrb.Blueprint(
         content,
         rrb.TimePanel(timeline=TIMELINE, state=time_panel, play_state=play),
@@ -254,7 +257,7 @@ def explanation(
 
 
 def _short(text: str) -> str:
-    """A number with four digits, which a log has with all of them; other text as it is."""
+    """Return a number with four digits, which a log has with all of them; other text unchanged."""
     try:
         return f"{float(text):.4g}"
     except ValueError:

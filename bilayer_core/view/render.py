@@ -116,7 +116,7 @@ class Studio:
         )
 
     def spread(self, count: int) -> list[float]:
-        """Times evenly over the run, from its start to its end [s]."""
+        """Return times evenly over the run, from its start to its end [s]."""
         return np.linspace(self.first, self.last, count).tolist() if count > 1 else [self.last]
 
     def picture(self, path: str | Path, time: float | None = None) -> None:
@@ -263,7 +263,7 @@ def _aspect_of(camera: Camera, found: list[Shot], every: list[np.ndarray], robot
 
 
 def time_text(times: Sequence[float], note: str = "") -> list[str]:
-    """Times with decimals that tell them apart."""
+    """Return times with as many decimals as tell them apart, as texts."""
     from bilayer_core.view.sheet import decimals_for
 
     decimals = decimals_for(list(times))

@@ -113,7 +113,7 @@ def screenshot(path: str | Path, png_path: str | Path, time: float | None = None
 
 @contextmanager
 def _as_recording(path: str | Path, colour: str) -> Iterator[Path]:
-    """The file itself, or the recording that a log was converted to, deleted afterwards."""
+    """Yield the file itself, or a recording converted from a log, which is deleted afterwards."""
     path = Path(path)
     if path.suffix.lower() == RRD_SUFFIX:
         if not path.is_file():

@@ -281,7 +281,7 @@ def plain_text(text: str) -> rr.TextDocument:
 
 
 def log_obstacles(recording: rr.RecordingStream, description: Description, scales: Scales) -> None:
-    """Fixed surfaces."""
+    """Write the fixed surfaces."""
     for obstacle in description.obstacles:
         shape = obstacle.shape
         mesh = _plane(shape, scales) if shape.kind == "plane" else _mesh(geometry.shape_mesh(shape, OBSTACLE_COLOURS))

@@ -60,7 +60,7 @@ class Moments:
         self.rows = layer_rows(run.description)
 
     def at(self, time: float) -> Moment:
-        """The run at a time [s] within it."""
+        """Return the run at a time [s] within it."""
         run = self._run
         shape, frame = _between(run.shape_times, time), _between(run.times, time)
         return Moment(
@@ -108,7 +108,7 @@ class Moments:
 
 
 def _between(times: np.ndarray, time: float) -> tuple[int, int, float]:
-    """The frames before and after a time, and how far it is from one to the other."""
+    """Return the frames before and after a time, and how far it is from one to the other."""
     after = int(np.clip(np.searchsorted(times, time), 1, len(times) - 1)) if len(times) > 1 else 0
     before = max(after - 1, 0)
     length = times[after] - times[before]
@@ -120,7 +120,7 @@ def _line(of: np.ndarray, before: int, after: int, part: float) -> np.ndarray:
 
 
 def _turned(of: np.ndarray, before: int, after: int, part: float) -> np.ndarray:
-    """Unit quaternions between two, which stand for the nearer of both ways round."""
+    """Return unit quaternions between two, along the shorter way round."""
     first, last = of[before].astype(float), of[after].astype(float)
     last = np.where((first * last).sum(axis=-1, keepdims=True) < 0.0, -last, last)
     mixed = (1.0 - part) * first + part * last

@@ -23,7 +23,7 @@ VIEW_FRAMES = 200  # how many frames of a run decide on the camera
 
 
 def rounded_up(value: float) -> float:
-    """The next number 1, 1.5, 2, 3, 4, 5, 6, 7, 8 times a power of ten."""
+    """Return the next number 1, 1.5, 2, 3, 4, 5, 6, 7, 8 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * _STEPS[np.searchsorted(_STEPS, value / power - 1e-9)])
 
@@ -103,7 +103,9 @@ def _of_rods(run: RunData) -> np.ndarray:
 
 
 def reference_of(forces: np.ndarray) -> float:
-    """The size that arrows are scaled by: a few frames of impact would make all others invisible; 1 without any.
+    """Return the size by which to scale arrows, 1 if there are no forces.
+
+    It is not the largest one: a few frames of impact would make all other arrows invisible.
 
     Parameters
     ----------
@@ -141,7 +143,7 @@ def seen_from(eye: np.ndarray, target: np.ndarray, points: np.ndarray) -> np.nda
 
 
 def _picture_axes(back: np.ndarray) -> np.ndarray:
-    """Unit vectors to the right, upwards and towards the eye, as rows; z is up in the picture."""
+    """Return the unit vectors to the right, upwards and towards the eye, as rows; z is up in the picture."""
     right = np.cross([0.0, 0.0, 1.0], back)
     right /= np.linalg.norm(right)
     return np.stack([right, np.cross(back, right), back])

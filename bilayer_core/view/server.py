@@ -145,7 +145,7 @@ def has_screen() -> bool:
 
 
 def open_window(server: ViewServer) -> subprocess.Popen:
-    """A viewer with a window that shows what a server has."""
+    """Open a viewer with a window that shows what a server has."""
     command = [str(viewer_executable()), "--connect", server.url, "--bind", LOCAL, "--port", "auto"]
     return subprocess.Popen(command, env=viewer_environment(), stdin=subprocess.DEVNULL)
 
@@ -183,5 +183,5 @@ _TAKEN = (98, 48, 10048)
 
 
 def suffixed(path: Path, number: int) -> Path:
-    """The name of a run's file: those after a reset are numbered, as logs are."""
+    """Return the name of a run's file; files after a reset are numbered, as logs are."""
     return path.with_stem(f"{path.stem}_{number}") if number else path

@@ -46,7 +46,7 @@ def width_of(columns: int, scale: float, size: tuple[int, int]) -> int:
 
 
 def put_together(pictures: list[Image.Image], texts: list[str], footer: Overlay, theme: Theme) -> Image.Image:
-    """A sheet of equal pictures with their times, row by row, over one line of bars."""
+    """Return a sheet of equal pictures with their times, row by row, over one line of bars."""
     from bilayer_core.view.overlay import font_of
 
     (width, height), mode = pictures[0].size, pictures[0].mode

@@ -113,7 +113,7 @@ class Stage:
             self._background.close()
 
     def draw(self, moment: Moment, shot: Shot) -> Image.Image:
-        """The run at a time, from an eye: RGB, or RGBA with a transparent background."""
+        """Draw the run at a time, from an eye: RGB, or RGBA with a transparent background."""
         from PIL import Image
 
         points = [self._fixed, self._place_ribbons(moment)]
@@ -135,7 +135,7 @@ class Stage:
         return Image.frombytes("RGB", self._size, picture, "raw", "RGBX")
 
     def _part(self, shot: Shot, points: np.ndarray) -> Part | None:
-        """The part of the picture that shows points, as large as the last one unless that is much too large."""
+        """Return the part of the picture that shows points, as large as the last one unless that is much too large."""
         part = part_around(shot, points, self._size)
         if part is not None:
             width, height = part[2] - part[0], part[3] - part[1]
@@ -146,7 +146,7 @@ class Stage:
         return part
 
     def _picture_behind(self, shot: Shot) -> np.ndarray:
-        """The ground alone, RGBA, colours times opacity: the last one as long as the eye stays where it is."""
+        """Return the ground alone, RGBA, colours times opacity: the last one as long as the eye stays where it is."""
         if self._behind is None or not (self._background is None or _equal(shot, self._behind[0])):
             self._behind = shot, self._ground_alone(shot)
         return self._behind[1].copy()
@@ -165,7 +165,7 @@ class Stage:
     # what is there
 
     def _add(self, data: Any, ambient: float, diffuse: float, specular: float = 0.0) -> Any:
-        """An actor that draws points with colours."""
+        """Add an actor that draws points with colours, and return it."""
         from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper
 
         mapper = vtkPolyDataMapper()
@@ -184,7 +184,7 @@ class Stage:
         return actor
 
     def _add_shape(self, shape: ShapeInfo, colours: geometry.Colours) -> tuple[Any, np.ndarray]:
-        """An actor, and corners of a box that holds it in the frame of its owner [m]."""
+        """Add an actor. Return it and the corners of a box that holds it, in the frame of its owner [m]."""
         if shape.kind == "plane":
             return add_plane(self._renderer, shape, self._ground, self._theme), self._ground.corners(shape)
         vertices, normals, shades, triangles = geometry.shape_mesh(shape, colours)

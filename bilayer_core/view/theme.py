@@ -39,12 +39,14 @@ class Theme:
 
 
 def theme_of(background: str) -> Theme:
-    """The theme of a background: ``dark``, ``white``, ``transparent``, or a colour that Pillow knows (``#f4f1e8``).
+    """Return the theme of a background.
+
+    A background is ``dark``, ``white``, ``transparent``, or a colour that Pillow knows (``#f4f1e8``).
 
     Raises
     ------
     InputError
-        If it is none.
+        If it is none of these.
     """
     from PIL import ImageColor
 

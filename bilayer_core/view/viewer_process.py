@@ -56,7 +56,7 @@ def take_picture(recording: Path, time: float | None = None) -> bytes:
 
 
 def viewer_executable() -> Path:
-    """The viewer's own program: killing the script of that name on PATH would leave the viewer running."""
+    """Return the viewer's own program: killing the script of that name on PATH would leave the viewer running."""
     spec = importlib.util.find_spec("rerun_cli")
     if spec is None or spec.origin is None:
         raise missing_library("the viewer", "rerun_cli")
@@ -71,7 +71,10 @@ def viewer_environment() -> dict[str, str]:
 
 
 def drawing_environment() -> dict[str, str]:
-    """The same for drawing without a screen: with Mesa's software driver unless the user has chosen one."""
+    """Return the viewer's environment for drawing without a screen.
+
+    It selects Mesa's software driver unless the user has chosen a driver.
+    """
     environment = viewer_environment()
     if sys.platform != "linux" or any(environment.get(name) for name in DRIVER_VARIABLES):
         return environment
@@ -161,7 +164,7 @@ class HeadlessViewer:
         ]
 
     def _ask(self, what: str, deadline: float, question: Callable[[], Answer]) -> Answer:
-        """The viewer's answer; it may need several attempts, because the viewer gives up on each after 15 s."""
+        """Return the viewer's answer. It may need several attempts, because the viewer gives up on each after 15 s."""
         while True:
             try:
                 return question()
@@ -171,7 +174,7 @@ class HeadlessViewer:
 
     @staticmethod
     def _timeline(recording):
-        """The timeline of simulated time, None while nothing is on it."""
+        """Return the timeline of simulated time, None while nothing is on it."""
         return next((item for item in recording.timelines if item.name == TIMELINE and item.end is not None), None)
 
     def _wait_for(self, port: int) -> None:

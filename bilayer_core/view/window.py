@@ -34,7 +34,7 @@ def require_vtk() -> None:
 
 
 def _offscreen() -> Any:
-    """A window without a screen; InputError where none can be."""
+    """Return a window without a screen; raise InputError where there can be none."""
     from vtkmodules import vtkRenderingOpenGL2 as rendering
     from vtkmodules.vtkCommonCore import vtkObject
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
@@ -99,7 +99,7 @@ class Window:
         self._window.Finalize()
 
     def draw(self, shot: Shot, part: Part, finer: int) -> np.ndarray:
-        """A part of the picture.
+        """Draw a part of the picture.
 
         Parameters
         ----------
@@ -130,7 +130,7 @@ class Window:
         self.renderer.AddLight(light)
 
     def _look(self, shot: Shot, part: Part) -> None:
-        """The camera of the whole picture, of which it sees a part: the same lines of sight."""
+        """Aim the camera of the whole picture so that it sees a part along the same lines of sight."""
         width, height = self._size
         left, upper, right, lower = part
         share = (lower - upper) / height
@@ -187,12 +187,14 @@ def lay_over(picture: np.ndarray, drawn: np.ndarray, part: Part) -> None:
 
 
 def _both(lanes: np.ndarray) -> np.ndarray:
-    """Sums over two pixels beside each other, and what rounds a quarter of them."""
+    """Return sums over two pixels beside each other, with an offset that rounds a quarter of them."""
     return ((lanes + (lanes >> 32)) & 0xFFFFFFFF) + 0x20002
 
 
 def part_around(shot: Shot, points: np.ndarray, size: tuple[int, int], least: tuple[int, int] = (1, 1)) -> Part | None:
-    """The part of a picture that shows points, with some room; all of it if one is beside the eye or behind it.
+    """Return the part of a picture that shows points, with some room.
+
+    It is the whole picture if a point is beside the eye or behind it.
 
     Parameters
     ----------
