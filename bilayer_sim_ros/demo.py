@@ -85,7 +85,7 @@ def node_command(module: str, **parameters: str | float | bool) -> list[str]:
 
 @contextmanager
 def process(command: list[str]):
-    """A process that is asked to end, and then made to, when the block is left."""
+    """Run a process; when the block is left, ask it to end, and kill it if it does not."""
     child = subprocess.Popen(command)
     try:
         yield child

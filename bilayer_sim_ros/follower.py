@@ -63,7 +63,7 @@ def _parse(arguments: list[str]) -> argparse.Namespace:
 
 
 def _wait_for_the_end(stop: Stop) -> None:
-    """The node holds the other end of the standard input, which closes with it."""
+    """Wait until the node closes the standard input, of which it holds the other end, then stop."""
     while os.read(STANDARD_INPUT, 1024):  # past Python's buffer, which would be in use where the program ends
         pass
     stop.set()

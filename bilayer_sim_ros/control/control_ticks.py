@@ -73,17 +73,17 @@ class Control:
             self._lockstep.wait_anew()
 
     def start(self, time: float) -> None:
-        """A run starts at `time` [s], which is the first tick."""
+        """Start a run at `time` [s], which is the first tick."""
         self._ticks.start(time)
         self._count = 0
         self._open_tick(time)
         self._stands = False
 
     def reset(self) -> None:
-        """The run is given up; forget what was heard.
+        """Give up the run and forget its messages.
 
-        But not the answer to its start if controllers have heard of no later time: they do not hear that time goes
-        back, and so will not give it again.
+        Keep the answer to its start if controllers have seen no later time: they do not notice that time goes back, and
+        so will not send it again.
         """
         self._stands = self._lockstep is not None and self._count == 0
         self._inputs.reset(keep_first=self._stands)
@@ -112,7 +112,7 @@ class Control:
         return self._lockstep is not None and self._ticks.complete(time) > self._count
 
     def advance_to(self, time: float) -> None:
-        """A step has ended at `time` [s]: open a tick if it has reached one."""
+        """Note that a step has ended at `time` [s]; open a tick if it has reached one."""
         count = self._ticks.complete(time)
         if count > self._count:
             self._count = count

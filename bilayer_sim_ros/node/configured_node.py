@@ -150,7 +150,7 @@ def descriptor_of(parameter: NodeParameter) -> ParameterDescriptor:
 
 
 def _range_of(parameter: NodeParameter) -> list[FloatingPointRange]:
-    """The range of a number that has a least one, which the default keeps to as well; that of others is in words."""
+    """Return the range of a number that has a minimum which its default meets; the range of others is in words."""
     has_least = isinstance(parameter.default, float) and -math.inf < parameter.minimum <= parameter.default
     if not has_least or parameter.above_minimum:
         return []

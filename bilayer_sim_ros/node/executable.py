@@ -106,7 +106,7 @@ def leave(code: int) -> None:
 def _parse(
     executable: str, table: Sequence[NodeParameter], arguments: list[str], argument: str | None
 ) -> argparse.Namespace:
-    """The command line without its ROS part; refuses arguments that nobody would read."""
+    """Parse the command line without its ROS part; refuse unknown arguments."""
     width = max(18, *(len(parameter.name) for parameter in table)) + 2
     lines = [f"  {p.name:{width}}{p.description} (default: {p.default!r})" for p in table]
     taken = f"[{argument.upper()}] " if argument else ""

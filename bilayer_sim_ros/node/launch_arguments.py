@@ -63,7 +63,7 @@ def arguments_of(parameter: NodeParameter) -> list[tuple[str, str]]:
 
 
 def value_of(parameter: NodeParameter, text: str) -> Value:
-    """A text as a value of a parameter; a list is ``[a, b]`` or ``a, b``."""
+    """Return a text as a value of a parameter; a list is ``[a, b]`` or ``a, b``."""
     if isinstance(parameter.default, str):
         return parameter.accept(text)
     try:

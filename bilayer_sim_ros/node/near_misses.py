@@ -10,7 +10,7 @@ LIKENESS = 0.75
 
 
 def nearest(name: str, names: Iterable[str], prefix: str = "") -> str:
-    """The name that was meant, or an empty text; what all have in common, a prefix, does not count."""
+    """Return the name that was meant, or an empty text; a prefix that all names share does not count."""
     tails = {other.removeprefix(prefix): other for other in names}
     close = difflib.get_close_matches(name.removeprefix(prefix), tails, n=1, cutoff=LIKENESS)
     return tails[close[0]] if close else ""

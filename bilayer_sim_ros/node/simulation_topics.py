@@ -72,7 +72,7 @@ class Simulation:
 def wire(
     node: Node, parameters: Mapping[str, Value], finished: Callable[[], None], end: Callable[[str], None]
 ) -> Simulation:
-    """The simulation that parameters ask for, on topics and services of a node.
+    """Return the simulation that parameters describe, connected to topics and services of a node.
 
     Parameters
     ----------

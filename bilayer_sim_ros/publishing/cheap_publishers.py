@@ -11,8 +11,10 @@ from rclpy.qos import QoSProfile
 
 
 def create_output(node: Node, message_type: type, topic: str, quality: QoSProfile | int) -> Publisher[Any]:
-    """A publisher without rclpy's watch for subscribers that cannot hear it, for which an executor looks twice a topic
-    at each message that comes in: a third of what a message costs. `GraphWatch` tells of them instead.
+    """Return a publisher without rclpy's watch for incompatible subscribers; `GraphWatch` reports these instead.
+
+    Because of that watch an executor looks twice at each topic whenever a message arrives, a third of the cost of a
+    message.
     """
     unwatched = PublisherEventCallbacks(use_default_callbacks=False)
     return node.create_publisher(message_type, topic, quality, event_callbacks=unwatched)

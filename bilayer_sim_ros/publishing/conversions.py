@@ -19,13 +19,13 @@ PATIENCE = 5.0
 
 
 def to_time(seconds: float) -> Time:
-    """Simulated time [s] as a message, to the nearest nanosecond."""
+    """Return a simulated time [s] as a message, to the nearest nanosecond."""
     whole, part = divmod(to_nanoseconds(seconds), NANOSECONDS)
     return Time(sec=whole, nanosec=part)
 
 
 def to_nanoseconds(seconds: float) -> int:
-    """Simulated time [s] as ROS counts it [ns]."""
+    """Return a simulated time [s] as ROS counts it [ns]."""
     return round(seconds * NANOSECONDS)
 
 

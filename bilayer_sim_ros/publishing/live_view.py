@@ -36,7 +36,7 @@ class Viewers(Protocol):
         """Return once the first frame would be `seen`, or the node is to end."""
 
     def end(self) -> None:
-        """The run is over."""
+        """Note that the run is over."""
 
 
 class Nobody:
@@ -50,12 +50,12 @@ class Nobody:
 
 
 def live_view(node: Node, parameters: Mapping[str, Value]) -> Viewers:
-    """The live view that the parameters ask for.
+    """Return the live view that the parameters select.
 
     Raises
     ------
     InputError
-        If rerun is not installed, or the port is none.
+        If rerun is not installed, or the port is not valid.
     """
     if parameters["rerun"] != SERVE:
         return Nobody()

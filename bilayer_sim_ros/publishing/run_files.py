@@ -99,7 +99,7 @@ class Recording:
             self._log.set_rates(rate, marker_rate)
 
     def of_next_run(self) -> Recording:
-        """The files of the run that begins with a reset."""
+        """Return the files of the run that begins with a reset."""
         return Recording(*self._settings, run=self._run + 1)
 
     @property

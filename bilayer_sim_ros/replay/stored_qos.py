@@ -73,7 +73,7 @@ def _profile(entry: dict) -> QoSProfile:
 
 
 def _policy(kind: type[IntEnum], value: object) -> IntEnum | None:
-    """A policy by its number or name; None where the log leaves it to the system, or does not know it."""
+    """Return a policy by its number or name; None where the log leaves it to the system, or does not know it."""
     if value is None:
         return None
     known = {policy.name.lower(): policy for policy in kind} | {str(policy.value): policy for policy in kind}

@@ -163,7 +163,7 @@ def _services(srv: Any, worker: Worker, entities: Entities, quit: Callable[[str]
 
 
 def state_of(simulator: Simulator, paused: bool) -> int:
-    """The standard's word for it: paused at the start is stopped."""
+    """Return the standard's word for the state; a simulator that is paused at the start is stopped."""
     if not paused:
         return PLAYING
     return PAUSED if simulator.time > 0.0 else STOPPED
@@ -242,7 +242,7 @@ def _done(value: Any) -> Future:
 
 
 def _then(first: Future, following: Callable[[Any], Future]) -> Future:
-    """The future of what follows; an error of the first is its own."""
+    """Return the future of the second call; an error of the first becomes its own."""
     whole: Future = Future()
 
     def take_result(last: Future) -> None:

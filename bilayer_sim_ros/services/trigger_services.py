@@ -46,7 +46,7 @@ class Service:
 
 
 def trigger(name: str, ask: Callable[[], Future]) -> Service:
-    """A service without arguments, whose answer is a text: the future's, or why it was refused."""
+    """Return a service without arguments, whose answer is a text: that of the future, or the reason of a refusal."""
     return Service(name, Trigger, lambda _: ask(), _say)
 
 
