@@ -65,7 +65,12 @@ class Input:
     values: tuple[float, ...] = ()
 
     def apply(self, simulator: Acted) -> None:
-        """Do to a simulator what was done to the one that this is from; ends of steps are for who makes steps."""
+        """Repeat the input on a simulator. Ends of steps are left to the caller that makes steps.
+
+        Parameters
+        ----------
+        simulator : Simulator
+        """
         match self.kind:
             case "stimulus":
                 simulator.set_stimulus(self.name, _given(self.values[0]), over=self._over)

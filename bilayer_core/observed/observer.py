@@ -37,13 +37,29 @@ class Observer(Protocol):
     rate: float
 
     def start(self, description: Description) -> None:
-        """Begin to observe a run. The simulator calls this once, before the first frame."""
+        """Begin to observe a run. The simulator calls this once, before the first frame.
+
+        Parameters
+        ----------
+        description : Description
+            The constant part of the run.
+        """
 
     def observe(self, frame: Frame) -> None:
-        """Take a frame. The simulator calls this for every frame that is due, including the first and the last."""
+        """Take a frame. The simulator calls this for every frame that is due, including the first and the last.
+
+        Parameters
+        ----------
+        frame : Frame
+        """
 
     def close(self, complete: bool, termination: str = "") -> None:
         """End the observation. The simulator calls this once.
 
-        `complete` is false if the run was cut short; `termination` says why it ended.
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short.
+        termination : str
+            Why it ended.
         """

@@ -109,6 +109,11 @@ class McapRecorder:
     def start(self, description: Description) -> None:
         """Open the file; write scene and settings, and flush them.
 
+        Parameters
+        ----------
+        description : Description
+            The constant part of the run.
+
         Raises
         ------
         InputError
@@ -125,7 +130,17 @@ class McapRecorder:
         self._thread.start()
 
     def observe(self, frame: Frame) -> None:
-        """Hand a frame to the writer, as `patience` says; without it, SimulationError is raised once writing failed."""
+        """Hand a frame to the writer, as `patience` says.
+
+        Parameters
+        ----------
+        frame : Frame
+
+        Raises
+        ------
+        SimulationError
+            If writing failed before, and there is no patience.
+        """
         self._refuse_unstarted()
         if self._patience is None:
             self._put(frame)
@@ -141,12 +156,23 @@ class McapRecorder:
         return len(self._backlog)
 
     def set_rates(self, rate: float, marker_rate: float) -> None:
-        """Go on with frames at another rate, and the large messages at another one [Hz]."""
+        """Continue with frames, and with the large messages, at other rates.
+
+        Parameters
+        ----------
+        rate, marker_rate : float
+            Rate of frames, and of the large messages [Hz].
+        """
         self.rate = rate
         self._gate.set_rates(rate, marker_rate)
 
     def note(self, told: Input) -> None:
-        """Log something that acts from outside; likewise, but it is never left out."""
+        """Log an input from outside; like a frame, but it is never left out.
+
+        Parameters
+        ----------
+        told : Input
+        """
         self._refuse_unstarted()
         if self._patience is None:
             self._put(told)
@@ -158,7 +184,12 @@ class McapRecorder:
         return self._failure is None and self._backlog.put(frame, self._patience if self._left_out is None else 0.0)
 
     def tell(self, event: Event) -> None:
-        """Log an event that frames do not show; it is not left out either."""
+        """Log an event that frames do not show; it is not left out either.
+
+        Parameters
+        ----------
+        event : Event
+        """
         self._refuse_unstarted()
         if self._patience is None:
             self._put(event)

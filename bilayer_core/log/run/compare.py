@@ -69,7 +69,17 @@ class Comparison:
         return not any(self.only) and all(found.largest == 0.0 for found in self.differences)
 
     def __getitem__(self, name: str) -> QuantityDifference:
-        """Return the difference of a quantity."""
+        """Return the difference of a quantity.
+
+        Parameters
+        ----------
+        name : str
+            Such as ``com``.
+
+        Returns
+        -------
+        QuantityDifference
+        """
         return next(found for found in self.differences if found.name == name)
 
     def __repr__(self) -> str:
@@ -80,6 +90,16 @@ class Comparison:
 
 def compare(first: Recorded | str | Path, second: Recorded | str | Path) -> Comparison:
     """Compare two runs, or logs, over the time that both have.
+
+    Parameters
+    ----------
+    first, second : Recorded, str or Path
+        A run, or the path of its log.
+
+    Returns
+    -------
+    Comparison
+        The largest difference of each quantity that both have.
 
     Raises
     ------

@@ -238,16 +238,24 @@ def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray,
 def read_log(path: str | Path) -> RunData:
     """Return a run as arrays over time, which are read on demand.
 
-    The file is a log, or a bag of ``ros2 bag record`` (`opened_run.open_run` says how the runs in a bag are named).
+    ``run["com"]`` reads that quantity alone, so it works on logs larger than the memory. Attributes such as
+    ``run.positions`` read all values that come at one rate. Times are those at which the log has all topics of a rate:
+    a log that was cut off, or repaired, may hold parts of a frame.
 
-    ``run["com"]`` reads that quantity alone, so that also logs larger than the memory can be looked into; attributes
-    such as ``run.positions`` read all that comes at one rate. Times are those at which the log has all topics of a
-    rate: a log that was cut off, or repaired, may hold parts of a frame.
+    Parameters
+    ----------
+    path : str or Path
+        A log, or a bag of ``ros2 bag record`` (`opened_run.open_run` says how the runs in a bag are named).
+
+    Returns
+    -------
+    RunData
+        The run; time is the first axis of its arrays.
 
     Raises
     ------
     InputError
-        If the file is no log; where something is asked for, if that is damaged, or the log does not hold it.
+        If the file is no log; at the first use of a quantity, if its data are damaged, or the log does not hold it.
     """
     return LoggedRun(LogSource(path))
 

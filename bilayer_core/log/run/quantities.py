@@ -122,13 +122,34 @@ class Entry:
         return "node" in self.axes
 
     def of(self, run: Run) -> Quantity:
-        """Its values in a run."""
+        """Return the quantity with its values in a run.
+
+        Parameters
+        ----------
+        run : Run
+
+        Returns
+        -------
+        Quantity
+        """
         held = getattr(run, self.attribute)
         values = held[self.index] if isinstance(held, dict) else held[(slice(None), *self.index)]
         return self.filled(run.shape_times if self.of_shape else run.times, values)
 
     def filled(self, times: Array, values: Array) -> Quantity:
-        """Return the quantity with its values."""
+        """Return the quantity with its values.
+
+        Parameters
+        ----------
+        times : ndarray
+            [s], shape (n,).
+        values : ndarray
+            In `unit`, shape (n, ...).
+
+        Returns
+        -------
+        Quantity
+        """
         return Quantity(self.name, self.unit, times, _read_only(values), self.axes, self.labels)
 
 

@@ -40,19 +40,43 @@ class Recorded(ABC):
 
     @abstractmethod
     def entries(self) -> dict[str, Entry]:
-        """Return the entry of each quantity, by name: all that is known of it besides its values."""
+        """Return the entry of each quantity, by name: all that is known of it besides its values.
+
+        Returns
+        -------
+        dict of str to Entry
+        """
 
     def why_not(self, name: str) -> str | None:
-        """Why a quantity that others have is not in this one; None if it is, or if nobody has it."""
+        """Explain why a quantity that other runs have is missing.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        str or None
+            The reason; None if the quantity is there, or no run has it.
+        """
         return None
 
     def __getitem__(self, name: str) -> Quantity:
         """Return the quantity of a name.
 
+        Parameters
+        ----------
+        name : str
+            Such as ``body/ball/position``.
+
+        Returns
+        -------
+        Quantity
+
         Raises
         ------
         InputError
-            If there is none, with the nearest names.
+            If there is none; the message has the nearest names.
         """
         known = self.quantities
         if name not in known:
@@ -60,13 +84,31 @@ class Recorded(ABC):
         return known[name]
 
     def blocks(self, wanted: Sequence[Entry]) -> Iterator[tuple[slice, dict[str, np.ndarray]]]:
-        """Values of quantities that come at one rate, in blocks of rows, by name."""
+        """Yield the values of quantities that come at one rate, in blocks of rows.
+
+        Parameters
+        ----------
+        wanted : sequence of Entry
+
+        Yields
+        ------
+        rows : slice
+            Of all frames.
+        values : dict of str to ndarray
+            By name of the quantity, in its unit, shape (rows, ...).
+        """
         if wanted:
             found = {entry.name: self.quantities[entry.name].values for entry in wanted}
             yield slice(0, len(found[wanted[0].name])), found
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """All but shapes of rods as columns over time, such as ``body/ball/position.z``; needs pandas."""
+        """Return all but shapes of rods as columns over time, such as ``body/ball/position.z``; needs pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Its index is the time [s].
+        """
         require("to_dataframe", "pandas")
         import pandas
 
@@ -80,8 +122,13 @@ class Recorded(ABC):
         return pandas.DataFrame(columns, index=pandas.Index(self.times, name="time"))
 
     def to_xarray(self) -> xarray.Dataset:
-        """All quantities with their units; those of rods are over ``shape_time`` and have nodes of their own; needs
-        xarray.
+        """Return all quantities with their units; needs xarray.
+
+        Quantities of rods are over ``shape_time`` and have nodes of their own.
+
+        Returns
+        -------
+        xarray.Dataset
         """
         require("to_xarray", "xarray")
         import xarray

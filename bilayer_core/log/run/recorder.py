@@ -91,10 +91,21 @@ class Recorder(Recorded):
     # what the simulator tells
 
     def start(self, description: Description) -> None:
-        """Begin to record a run. The simulator calls this when the recorder is attached."""
+        """Begin to record a run. The simulator calls this when the recorder is attached.
+
+        Parameters
+        ----------
+        description : Description
+            The constant part of the run.
+        """
 
     def observe(self, frame: Frame) -> None:
-        """Keep the quantities of a frame."""
+        """Keep the quantities of a frame.
+
+        Parameters
+        ----------
+        frame : Frame
+        """
         kept = int(np.searchsorted(self._times, frame.time))
         del self._times[kept:]
         for values in self._values.values():
@@ -106,7 +117,15 @@ class Recorder(Recorded):
             self._values[name].append(self._value(entry, frame))
 
     def close(self, complete: bool, termination: str = "") -> None:
-        """End the recording. The simulator calls this when the recorder is detached."""
+        """End the recording. The simulator calls this when the recorder is detached.
+
+        Parameters
+        ----------
+        complete : bool
+            False if the run was cut short.
+        termination : str
+            Why it ended.
+        """
 
     def _value(self, entry: Entry, frame: Frame) -> Array:
         """Return a copy of a quantity in a frame; quantities of nodes have single precision, as in logs."""
@@ -139,7 +158,12 @@ class Recorder(Recorded):
         return {name: entry.filled(times, np.array(self._values[name])) for name, entry in self._entries.items()}
 
     def entries(self) -> dict[str, Entry]:
-        """Return the entry of each quantity, by name: all that is known of it besides its values."""
+        """Return the entry of each quantity, by name: all that is known of it besides its values.
+
+        Returns
+        -------
+        dict of str to Entry
+        """
         return dict(self._entries)
 
 

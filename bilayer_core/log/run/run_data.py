@@ -76,7 +76,12 @@ class RunData(Recorded):
         return ()
 
     def entries(self) -> dict[str, Entry]:
-        """Return the entry of each quantity, by name: all that is known of it besides its values."""
+        """Return the entry of each quantity, by name: all that is known of it besides its values.
+
+        Returns
+        -------
+        dict of str to Entry
+        """
         return {entry.name: entry for entry in entries(self.description, self.energy, self.solver)}
 
     def __repr__(self) -> str:
@@ -88,5 +93,16 @@ class RunData(Recorded):
         )
 
     def strain_of(self, layer: Strand) -> np.ndarray:
-        """Axial strain in the middle of one of the description's `layers`, shape (shapes, its nodes)."""
+        """Return the axial strain in the middle of a layer.
+
+        Parameters
+        ----------
+        layer : Strand
+            One of the description's `layers`.
+
+        Returns
+        -------
+        ndarray
+            Strain [1], shape (shapes, its nodes).
+        """
         return layer.strain_of(self.strain[:, layer.nodes], self.curvature[:, layer.nodes])
