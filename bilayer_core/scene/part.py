@@ -72,9 +72,23 @@ class Part(BaseModel):
         return _Kept()
 
     def keep(self, what: Hashable, others: tuple, make: Callable[[], Derived]) -> Derived:
-        """Return an object derived from this part and others that do not change; `make` makes it when first asked for.
+        """Return an object derived from this part and others that do not change.
 
         It is no part of what is compared, written or copied.
+
+        Parameters
+        ----------
+        what : hashable
+            Name of the object.
+        others : tuple
+            The other parts.
+        make : callable
+            Makes the object when it is first needed.
+
+        Returns
+        -------
+        object
+            That of `make`.
         """
         key = what, *map(id, others)
         found = self._kept.get(key)
@@ -83,7 +97,20 @@ class Part(BaseModel):
         return found[1]
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Return a copy with other values, and without the values derived from the old ones."""
+        """Return a copy with other values, and without the values derived from the old ones.
+
+        Parameters
+        ----------
+        update : mapping, optional
+            New values by the names of attributes; they are not validated.
+        deep : bool
+            Copy the values of attributes as well.
+
+        Returns
+        -------
+        Part
+            Of the same class.
+        """
         return _bare(super().model_copy(update=update, deep=deep))
 
     def __copy__(self) -> Self:
