@@ -128,6 +128,11 @@ def converge(
     progress : callable, optional
         Called with the name of every run that is done.
 
+    Returns
+    -------
+    Study
+        The error bar of each number, in SI units.
+
     Raises
     ------
     SimulationError
@@ -148,16 +153,35 @@ def estimate_error(
     own: dict[str, float] | None = None,
     start: np.ndarray | None = None,
 ) -> Study:
-    """Global error of the headline numbers of a run that its time steps make, from runs at half and twice the step.
-
-    Its rows have no `mesh`. Parameters and errors are those of `converge`, and:
+    """Estimate the error of the headline numbers of a run due to its time steps, from runs at half and twice the step.
 
     Parameters
     ----------
+    scene : SceneConfig
+    duration : float, optional
+        Simulated time of every run [s]; default: the scene's.
+    quantities : sequence of str
+        Names from `bilayer_core.studies.converge.quantities`; default: the headline numbers of the scene.
+    workers : int
+        Processes that run side by side.
+    progress : callable, optional
+        Called with the name of every run that is done.
     own : dict, optional
         Figures of the scene's own run (`quantities.Watch`), if it was made already.
     start : ndarray, optional
         Saved state from which every run starts; default: that of the scene.
+
+    Returns
+    -------
+    Study
+        The error bar of each number, in SI units; its rows have no `mesh`.
+
+    Raises
+    ------
+    SimulationError
+        If the scene's own run or a finer one cannot go on.
+    InputError
+        If a quantity does not exist, or the run has none: nothing took off, a body was not touched.
     """
     return _study(scene, runs_over_steps(scene), duration, quantities, workers, progress, own, start)
 

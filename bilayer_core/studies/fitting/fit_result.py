@@ -117,7 +117,22 @@ class FitResult:
         return found
 
     def __getitem__(self, path: str) -> Fitted:
-        """Return the parameter of a key path."""
+        """Return the parameter of a key path.
+
+        Parameters
+        ----------
+        path : str
+            Such as ``materials.gel.youngs_modulus``.
+
+        Returns
+        -------
+        Fitted
+
+        Raises
+        ------
+        UnknownName
+            If it was not fitted; the message has the nearest path. It is a KeyError too.
+        """
         for parameter in self.parameters:
             if parameter.path == path:
                 return parameter

@@ -66,22 +66,68 @@ class Parameter:
         return math.log(self.high / self.low) if self.logarithmic else self.high - self.low
 
     def value(self, part: float) -> float:
-        """Return the parameter at a part of the way from `low` to `high`."""
+        """Return the parameter at a part of the way from `low` to `high`.
+
+        Parameters
+        ----------
+        part : float
+            From 0 to 1.
+
+        Returns
+        -------
+        float
+            In SI units.
+        """
         if part in (0.0, 1.0):
             return self.high if part else self.low
         return self.low * math.exp(part * self.extent) if self.logarithmic else self.low + part * self.extent
 
     def part(self, value: float) -> float:
-        """Return the part of the way from `low` to `high` at which a value is."""
+        """Return the part of the way from `low` to `high` at which a value is.
+
+        Parameters
+        ----------
+        value : float
+            In SI units.
+
+        Returns
+        -------
+        float
+            From 0 to 1.
+        """
         return (math.log(value / self.low) if self.logarithmic else value - self.low) / self.extent
 
     def relative(self, part: float) -> float:
-        """Change of the parameter over `part`, divided by its value there; with a value of 0, the change itself."""
+        """Return the change of the parameter over the whole way between its bounds, relative to its value.
+
+        Parameters
+        ----------
+        part : float
+            Part of the way at which the value and the slope are taken, from 0 to 1.
+
+        Returns
+        -------
+        float
+            Divided by the value; where that is 0, the change itself in SI units.
+        """
         slope = self.extent * (self.value(part) if self.logarithmic else 1.0)
         return slope / (abs(self.value(part)) or 1.0)
 
     def shown(self, value: float, digits: int = 5) -> str:
-        """Return a value in the unit of the bounds, as text."""
+        """Return a value in the unit of the bounds, as text.
+
+        Parameters
+        ----------
+        value : float
+            In SI units.
+        digits : int
+            Significant digits.
+
+        Returns
+        -------
+        str
+            With the unit.
+        """
         return f"{value / self.factor:.{digits}g}{f' {self.unit}' if self.unit else ''}"
 
 

@@ -160,7 +160,12 @@ class Row:
     log: str = ""
 
     def columns(self) -> dict[str, Any]:
-        """One value a column: what is varied, metrics, and the rest but the summary."""
+        """Return one value for each column: varied parameters, metrics, and the rest except the summary.
+
+        Returns
+        -------
+        dict
+        """
         rest = asdict(self)
         for name in ("parameters", "metrics", "summary"):
             del rest[name]
@@ -168,12 +173,25 @@ class Row:
         return {"number": rest.pop("number"), **self.parameters, **self.metrics, **rest}
 
     def text(self) -> str:
-        """One line of JSON."""
+        """Return the row as one line of JSON.
+
+        Returns
+        -------
+        str
+        """
         return json.dumps(asdict(self), allow_nan=True)
 
     @classmethod
     def from_content(cls, content: Any) -> Row:
         """Return the row that a mapping describes.
+
+        Parameters
+        ----------
+        content : mapping
+
+        Returns
+        -------
+        Row
 
         Raises
         ------
@@ -184,7 +202,21 @@ class Row:
 
     @classmethod
     def from_text(cls, text: str) -> Row:
-        """Return the row of a line of JSON; ValueError if there is none."""
+        """Return the row of a line of JSON.
+
+        Parameters
+        ----------
+        text : str
+
+        Returns
+        -------
+        Row
+
+        Raises
+        ------
+        ValueError
+            If the line describes none.
+        """
         try:
             return cls.from_content(json.loads(text))
         except RecursionError:

@@ -94,7 +94,16 @@ class SweepResult:
         return tuple(self._rows)
 
     def column(self, name: str) -> list[Any]:
-        """All values of a column.
+        """Return all values of a column, in the order of runs.
+
+        Parameters
+        ----------
+        name : str
+            A parameter, a metric, or an attribute of `Row`.
+
+        Returns
+        -------
+        list
 
         Raises
         ------
@@ -109,6 +118,16 @@ class SweepResult:
     def best(self, metric: str, largest: bool = True) -> Row:
         """Return the row with the largest, or least, value of a metric.
 
+        Parameters
+        ----------
+        metric : str
+        largest : bool
+            False for the least value.
+
+        Returns
+        -------
+        Row
+
         Raises
         ------
         InputError
@@ -121,7 +140,12 @@ class SweepResult:
         return (max if largest else min)(known, key=lambda row: row.metrics[metric])
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return a table with a row for each run; needs pandas."""
+        """Return a table with a row for each run; needs pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
         require("to_dataframe", "pandas")
         import pandas
 
@@ -143,6 +167,10 @@ def read_results(path: str | Path) -> SweepResult:
     ----------
     path : str or Path
         The directory of results, or its ``results.parquet``.
+
+    Returns
+    -------
+    SweepResult
 
     Raises
     ------
