@@ -63,7 +63,17 @@ class RobotRun:
         return f"RobotRun({self.simulator.scene.name} to t = {self.simulator.time:g} s: {said})"
 
     def __getitem__(self, name: str) -> Quantity:
-        """Return a quantity over time."""
+        """Return a quantity over time.
+
+        Parameters
+        ----------
+        name : str
+            Such as ``com``.
+
+        Returns
+        -------
+        Quantity
+        """
         return self.data[name]
 
     def _run(self, judged: bool) -> RunResult:
@@ -97,7 +107,12 @@ class RobotRun:
             raise AssertionError(f"{self.simulator.scene.name}: {self.verdict}")
 
     def assert_no_penetration(self, at_least: float = 0.0) -> None:
-        """Fail if the smallest gap of any step was not larger than this [m].
+        """Fail if the smallest gap of any step was not larger than a limit.
+
+        Parameters
+        ----------
+        at_least : float
+            The limit [m].
 
         Raises
         ------
@@ -113,7 +128,13 @@ class RobotRun:
             )
 
     def assert_energy(self, limit: float = MOST_MADE) -> None:
-        """Fail if steps made more energy than this part of the run's largest, beyond all that was supplied."""
+        """Fail if steps made more energy than a limit, beyond all that was supplied.
+
+        Parameters
+        ----------
+        limit : float
+            As a part of the largest energy of the run.
+        """
         self.assert_sound()
         if not self.energy_made <= limit:
             made = f"steps made {self.energy_made:.3g} of the largest energy of the run"
