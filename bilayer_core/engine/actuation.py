@@ -64,7 +64,7 @@ def _value(spans, row, k, time):
 
 @kernel
 def _span_until(spans, row, time):
-    """The first span that ends at `time` or later."""
+    """Return the first span that ends at `time` or later."""
     k = 0
     while k + 1 < spans.shape[1] and spans[row, k, UNTIL] < time:
         k += 1
@@ -94,7 +94,7 @@ def jumps_at(actuation, time, same):
 
 @piece(float, Actuation, float, float)
 def corner_after(actuation, time, same):
-    """The first time after `time` at which a schedule or a path has a corner or jumps [s]; infinity without one."""
+    """Return the first time after `time` at which a schedule or a path has a corner or jumps [s]; infinity if none."""
     first, paths = math.inf, actuation.paths
     for row in range(actuation.stimulus.shape[0]):
         k = _span_until(actuation.stimulus, row, time + same)
@@ -136,7 +136,7 @@ def drive_step(actuation, nodes, begin, h, same, inputs):
 
 @kernel
 def _keyframe_before(paths, first, last, time):
-    """The last of the keyframes from `first` to `last` − 1 that is not later than a time; first − 1 without one."""
+    """Return the last of the keyframes from `first` to `last` − 1 that is not later than a time; first − 1 if none."""
     low, high = first, last
     while low < high:
         middle = (low + high) // 2

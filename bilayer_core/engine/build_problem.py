@@ -53,7 +53,7 @@ ROUNDING_STRAIN = 1e-11
 
 
 def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
-    """The groups of a problem that stay as they are, but for that of its dimension; `sizes` as in `model.sizes`."""
+    """Return the groups of a problem that do not change, but for that of its dimension; `sizes` as in `model.sizes`."""
     layout, scene = model.solved_layout, model.scene
     bodies, free = model.bodies, model.free_count
     return dict(
@@ -323,7 +323,7 @@ def _flow(model: Model, sizes: dict[str, int]) -> Flow:
 
 
 def fluid_of(model: Model, sizes: dict[str, int]) -> Fluid:
-    """The fluid of a scene in which it has inertia."""
+    """Return the fluid of a scene in which it has inertia."""
     return Fluid.zeros(
         sizes,
         velocity=np.array(model.scene.fluid.velocity),

@@ -88,7 +88,7 @@ def _twice(needed: int, most: int, what: str, remedy: Remedy, why: str = "") -> 
 
 
 def _densest(model: Model) -> str:
-    """The strand with most points on an edge."""
+    """Return the strand with most points on an edge, as text."""
     surfaces = model.rod_surfaces
     counts = surfaces.first_point[1:] - surfaces.first_point[:-1]
     edge = int(counts.argmax())

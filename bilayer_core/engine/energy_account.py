@@ -201,7 +201,7 @@ def _supply_by_jumps(p, state, inputs, work):
 
 @kernel
 def _inertial(p, stage, at):
-    """The potential of inertia at a configuration [J]; see `forces.inertia`."""
+    """Return the potential of inertia at a configuration [J]; see `forces.inertia`."""
     strands, bodies, energy = p.strands, p.bodies, 0.0
     for i in range(strands.node_mass.shape[0]):
         x, y, z = row(at.departure, i)

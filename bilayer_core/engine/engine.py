@@ -136,7 +136,7 @@ class Engine:
         )
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
-        """Carry out a request (`engine.request_modes`) on a state at rest, with the drive set before; return a report."""
+        """Execute a request (`engine.request_modes`) on a state at rest, with the drive set; return a report."""
         self._storage.set_friction(state.friction)
         while True:
             run = self._parts_for(state)

@@ -19,7 +19,7 @@ from bilayer_core.model.records.step import Configuration, Stage
 
 @piece(int, Problem, Configuration, Stage, bool, bool)
 def evaluate_at(p, at, stage, with_hessian, expands):
-    """Sums of the selected forces at a configuration, however far it is from the last.
+    """Sum the selected forces at a configuration, however far it is from the last.
 
     Parameters
     ----------

@@ -90,7 +90,7 @@ class Evaluator:
     # configurations
 
     def new(self) -> Configuration:
-        """A configuration, of which only what does not move is in place."""
+        """Return a configuration in which only the parts that do not move are set."""
         return new_configuration(self.model, self._storage.sizes)
 
     def take_state(self, state: State, at: Configuration) -> None:
@@ -232,11 +232,12 @@ class Evaluator:
     # the matrix
 
     def assemble(self, at: Configuration) -> tuple[Array, Array, Array]:
-        """The matrix of the selected forces in the last evaluation with second derivatives, that of `at`: A as a band
-        (`engine.linear.band`), U and D of free bodies, shapes (size + half-bandwidth, half-bandwidth + 1),
-        (size, 6 n_free), (6 n_free, 6 n_free).
+        """Return the matrix of the selected forces in the last evaluation with second derivatives, that of `at`.
 
-        What contacts of rods couple between two edges is in none of them, see `newton_step`.
+        It is A as a band (`engine.linear.band`), and U and D of free bodies, shapes (size + half-bandwidth,
+        half-bandwidth + 1), (size, 6 n_free), (6 n_free, 6 n_free).
+
+        None of them has the coupling of two edges by contacts of rods, see `newton_step`.
         """
         problem, size, (length, momentum_length) = self.problem, self.model.solved_layout.size, self.stage.lengths
         selected = {name for k, name in enumerate(NAMES) if self.sums.selected[k]}

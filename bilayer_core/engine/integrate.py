@@ -122,7 +122,7 @@ class Integration:
 
 
 def empty_counts() -> Counts:
-    """Counts of no steps."""
+    """Return the counts of no steps."""
     return Counts(numbers=np.zeros(9, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
 
 
@@ -143,10 +143,10 @@ def _end_of_fixed(control, clock):
 
 @kernel
 def _jump_before(run, end):
-    """The next jump of what acts from outside, if it is before the end of a fixed step, else that end; schedules are
-    known so far.
+    """Return the next jump of an outside influence if it is before the end of a fixed step, otherwise that end.
 
-    The work of a jump within a step would depend on where stages happen to lie (`engine.energy_account`).
+    The schedules are known up to there. The work of a jump within a step would depend on where stages happen to lie
+    (`engine.energy_account`).
     """
     same, time = run.control.same, run.clock.time[0]
     while True:
@@ -159,7 +159,7 @@ def _jump_before(run, end):
 
 @kernel
 def _end_of_adaptive(run, until):
-    """The next time at which a step has to end: an output time, a corner, or `until`."""
+    """Return the next time at which a step has to end: an output time, a corner, or `until`."""
     control, begin = run.control, run.clock.time[0]
     output = next_end(begin + control.same, control.output_rate)
     end = output if output < until - TIME_ROUNDING / control.output_rate else until

@@ -186,8 +186,9 @@ COMPUTED = tuple(name for name in Observables.shapes if name not in ("touching",
 def observables_of(
     model: Model, owner_of_point: Array, owner_of_surface: Array, owners: int
 ) -> tuple[Observables, dict[str, tuple[int, int, tuple[int, ...]]]]:
-    """The record of a model, and of each part of its values by name where it begins and ends, and its shape; who owns
-    contact points and surfaces are numbers below `owners`.
+    """Return the record of a model, and the begin, end and shape of each part of its values by name.
+
+    The owners of contact points and surfaces are numbers below `owners`.
     """
     sizes = sizes_of(model) | {"observed point": model.node_count + model.point_count}
     sizes |= {"pair of owners": owners * (owners + 1) // 2, "owner squared": owners**2}

@@ -46,7 +46,7 @@ def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
 
 @piece(int, Problem, StateArrays, Configuration, Point)
 def start_step_point(p, state, start, first):
-    """The start of a step."""
+    """Set `first` to the start of a step."""
     bodies = p.bodies
     first.displacement[:] = 0.0
     first.body_displacement[:] = 0.0

@@ -253,7 +253,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
 
 @kernel
 def _collapsed(strands, at):
-    """The first edge that has less than `LEAST_LENGTH` of its length left; −1 without one."""
+    """Return the first edge that has less than `LEAST_LENGTH` of its length left; −1 if there is none."""
     for k in range(strands.edge_count):
         if not at.length[k] >= LEAST_LENGTH * strands.rest_length[k]:
             return k

@@ -31,9 +31,9 @@ HELD = 0.0
 
 @piece(int, Problem, StateArrays, Work, StageInputs, int, Configuration)
 def end_stage(p, state, work, inputs, n, end):
-    """The end of stage n, which was solved with the configuration `end`.
+    """Set the end of stage n, which was solved with the configuration `end`.
 
-    Velocities and displacements are those of inertia's motion and what the end departs from it.
+    Velocities and displacements are those of inertia's motion plus the departure of the end from it.
     """
     origin, point, stage, bodies = work.origin, work.end, work.stage, p.bodies
     position, rotation, length = inputs.position[n], inputs.rotation[n], stage.lengths[0]
@@ -196,7 +196,7 @@ def write_twist(at, state):
 
 @kernel
 def _write_orthonormal(matrix, f, out, b):
-    """The rotation nearest to `matrix[f]` to first order in its error: 1.5 R − 0.5 R Rᵀ R."""
+    """Write the rotation nearest to `matrix[f]` to first order in its error: 1.5 R − 0.5 R Rᵀ R."""
     for i in range(3):
         for j in range(3):
             total = 0.0

@@ -67,7 +67,7 @@ def after_rejection(order, h, error):
 
 @kernel
 def fit(h, left):
-    """A length near `h` with which steps end after exactly `left` [s], without a short one at last."""
+    """Return a length near `h` with which steps end after exactly `left` [s], without a short last step."""
     if left <= GROWTH_LIMIT * h:
         return left
     return 0.5 * left if left < 2.0 * h else h

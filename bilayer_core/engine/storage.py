@@ -85,7 +85,10 @@ class Storage:
         self._friction = none_given()  # as in `State.friction`
 
     def _lasting_sums(self) -> tuple[dict[str, Array], dict[str, Space | Plane]]:
-        """The parts of `Sums` that have no capacity, and the record of the dimension, whose hessians are among them."""
+        """Return the parts of `Sums` that have no capacity, and the record of the dimension.
+
+        The hessians of the dimension are among these parts.
+        """
         model, sizes = self._model, self.sizes
         declared, names = (Space, IN_SPACE) if model.plane is None else (Plane, IN_PLANE)
         own = shapes_of(declared, sizes, names)

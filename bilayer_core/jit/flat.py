@@ -9,7 +9,7 @@ from numba.extending import intrinsic
 
 @intrinsic
 def flat(typing_context, array):
-    """A view of a C-contiguous array with one index, for kernels; it must not outlive the array."""
+    """Return a view of a C-contiguous array with one index, for kernels; it must not outlive the array."""
     if not (isinstance(array, types.Array) and array.layout == "C"):
         return None
     kind = types.Array(array.dtype, 1, "C")

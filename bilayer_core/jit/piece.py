@@ -210,7 +210,7 @@ def declare_calls_of(of: Piece) -> None:
 
 
 def caller(name: str, signature: Callable):
-    """A function for kernels that calls what is at an address.
+    """Return a function for kernels that calls the code at an address.
 
     Parameters
     ----------

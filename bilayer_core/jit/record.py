@@ -132,7 +132,7 @@ class Record:
 
     @classmethod
     def absent(cls) -> typing.Self:
-        """The record that says so, with arrays of length zero and numbers that are zero: one of each class."""
+        """Return the absent record, with arrays of length zero and numbers that are zero: one of each class."""
         if "_absent" in cls.__dict__:
             return cls._absent
         values = {}
@@ -148,7 +148,7 @@ class Record:
 
     @classmethod
     def zeros(cls, sizes: Mapping[str, int], **values: Any) -> typing.Self:
-        """A record with the given values, and with arrays of zeros in all fields that declare a shape beside.
+        """Return a record with the given values; all other fields must declare a shape and become arrays of zeros.
 
         Parameters
         ----------
@@ -197,14 +197,14 @@ def record(declared: type) -> type:
 
 
 def shapes_of(declared: type[Record], sizes: Mapping[str, int], names: Iterable[str]) -> dict[str, tuple[int, ...]]:
-    """The declared shapes of some fields, in numbers."""
+    """Return the declared shapes of some fields, in numbers."""
     return {
         name: tuple(sizes[part] if isinstance(part, str) else part for part in declared.shapes[name]) for name in names
     }
 
 
 def zeros_in_one(shapes: Mapping[str, tuple[int, ...]]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """A flat array of zeros, and consecutive views of it with the given shapes: one loop clears them all."""
+    """Return a flat array of zeros, and consecutive views of it with the given shapes: one loop clears them all."""
     ends = list(accumulate(map(math.prod, shapes.values()), initial=0))
     flat = np.zeros(ends[-1])
     parts = zip(shapes.items(), ends[:-1], ends[1:], strict=True)
@@ -238,7 +238,7 @@ class _Block:
         self.addresses = np.array(addresses, dtype=np.int64)
 
     def arrays(self) -> tuple[int, dict[str, np.ndarray]]:
-        """The address of a block of zeros, and the arrays in it."""
+        """Return the address of a block of zeros, and the arrays in it."""
         block = np.zeros(self._size, np.uint8)
         return _address(block), {
             name: np.ndarray(shape, dtype, block, first) for name, shape, dtype, first in self._places
@@ -266,7 +266,7 @@ def type_in_kernels(declared: Any) -> types.Type:
 
 
 def record_at(declared: type[Record]):
-    """A function for kernels: the record of a class at an address."""
+    """Return a function for kernels that gives the record of a class at an address."""
 
     @intrinsic
     def at(typing_context, address):

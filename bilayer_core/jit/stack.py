@@ -9,7 +9,7 @@ from numba.extending import intrinsic
 
 
 def _on_stack(context, builder, array_type, shape):
-    """An uninitialised C-contiguous array of floats in the frame of the function; it must not outlive it."""
+    """Return an uninitialised C-contiguous array of floats in the frame of the function; it must not outlive it."""
     size = 1
     for n in shape:
         size *= n
@@ -35,8 +35,9 @@ def _on_stack(context, builder, array_type, shape):
 
 @intrinsic(prefer_literal=True)
 def stack_vector(typingctx, n):
-    """An uninitialised array of `n` floats, a literal, or as many as the tuple `n` has entries; it ends with the
-    function that asked for it.
+    """Return an uninitialised array of `n` floats, a literal, or as many as the tuple `n` has entries.
+
+    The array ends with the function that requested it.
     """
     if not isinstance(n, (types.IntegerLiteral, types.UniTuple)):
         return None
@@ -51,7 +52,10 @@ def stack_vector(typingctx, n):
 
 @intrinsic(prefer_literal=True)
 def stack_matrix(typingctx, rows, columns):
-    """An uninitialised array of rows × columns floats, two literals; it ends with the function that asked for it."""
+    """Return an uninitialised array of rows × columns floats, two literals.
+
+    The array ends with the function that requested it.
+    """
     if not (isinstance(rows, types.IntegerLiteral) and isinstance(columns, types.IntegerLiteral)):
         return None
     array_type = types.Array(types.float64, 2, "C")

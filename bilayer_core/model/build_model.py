@@ -162,7 +162,7 @@ def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
 
 
 def _joints_after(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int) -> np.ndarray:
-    """The joint between each edge and the next one of its strand, −1 without one, shape (n_edge,)."""
+    """Return the joint between each edge and the next one of its strand, −1 if there is none, shape (n_edge,)."""
     joints = np.full(edge_count, -1, dtype=np.int64)
     inner = np.flatnonzero((joint_a < edge_count) & (joint_b < edge_count))
     joints[joint_a[inner]] = inner
@@ -177,7 +177,7 @@ def _resolve(numbers: np.ndarray, count: int) -> np.ndarray:
 
 
 def _joints_of_clamp_edges(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int, clamp_edges: int) -> np.ndarray:
-    """The joint that each clamp edge takes part in, shape (n_clamp_edge,)."""
+    """Return the joint that each clamp edge takes part in, shape (n_clamp_edge,)."""
     joints = np.empty(clamp_edges, dtype=np.int64)
     for edges in (joint_a, joint_b):
         of_clamp = np.flatnonzero(edges >= edge_count)

@@ -114,7 +114,7 @@ BITS = 62
 
 
 def _distinct(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The rows of truths that there are, in ascending order, and which of them each row is."""
+    """Return the distinct rows of truth values in ascending order, and the number of each row among them."""
     count = rows.shape[1]
     if count > BITS:
         distinct, number = np.unique(rows, axis=0, return_inverse=True)

@@ -53,7 +53,7 @@ class Finding:
 
 
 def told(found: Iterable[Told]) -> tuple[str, ...]:
-    """A line for each kind, in the order in which they are found first."""
+    """Return a line for each kind, in the order in which the kinds occur first."""
     kinds: dict[Hashable, list[Told]] = {}
     for one in found:
         kinds.setdefault(one.kind, []).append(one)
@@ -71,7 +71,7 @@ def _line(found: list[Told]) -> str:
 
 
 def few(names: Sequence[str], shown: int = 2) -> str:
-    """The first names, and how many more there are."""
+    """Return the first names, and how many more there are."""
     if len(names) <= shown + 1:
         return ", ".join(names[:-1]) + (" and " if len(names) > 1 else "") + names[-1]
     return f"{', '.join(names[:shown])} and {len(names) - shown} more"

@@ -68,7 +68,10 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
 
 
 def conditions_of(scene: SceneConfig) -> int:
-    """A number of all that forces depend on and that may differ: it is another where a state's energy may be."""
+    """Return a number for the variable conditions that forces depend on.
+
+    It differs wherever a state's energy may differ.
+    """
     texts_and_steps = {"name", "title", "description", "duration", "solver", "output"}
     return _number({name: part for name, part in _content(scene).items() if name not in texts_and_steps})
 

@@ -240,7 +240,7 @@ def kinds() -> dict[str, Kind]:
 
 
 def markdown_table() -> str:
-    """The list as a table for `docs/equations.md`."""
+    """Return the list as a table for `docs/equations.md`."""
     rows = ["| force | its energy is | formula |", "| --- | --- | --- |"]
     for force in FORCES:
         meaning = force.kind.value if force.kind else "none of its own: it acts through other forces"

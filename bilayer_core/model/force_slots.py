@@ -9,7 +9,7 @@ NAMES = tuple(kinds())
 
 
 def slot_of(name: str) -> int:
-    """Configuration of a force, for the module that computes it: nothing else may ask."""
+    """Return the slot of a force. Only the module that computes the force may ask for it."""
     if name not in NAMES:
         raise LookupError(f"force {name!r}: is not in the list, bilayer_core/model/force_list.py: {', '.join(NAMES)}")
     return NAMES.index(name)

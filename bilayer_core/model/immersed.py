@@ -51,7 +51,7 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, copies: list[list[Span]]
 
 
 def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, copies: list[list[Span]]) -> None:
-    """Added mass of the whole section along each edge, shared by its layers in proportion to their thickness."""
+    """Add the added mass of the whole section along each edge, shared by its layers in proportion to thickness."""
     edges = stations_of(rod)[1]
     width, layers = outline(rod, np.arange(edges) + 0.5)
     thickness, shares = _shares(copies[0], layers)

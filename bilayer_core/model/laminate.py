@@ -104,7 +104,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
 def _strands(
     found: Collected, copies: list[RodCopy], axis: float, shape: StrandShape, faces: tuple[Array, Array]
 ) -> list[StrandArrays]:
-    """The strand of each copy; `faces` are heights of the two faces over the curve [m]."""
+    """Return the strand of each copy; `faces` are heights of the two faces over the curve [m]."""
     rod, (low, high) = copies[0].rod, faces
     nodes, layer = shape.lengths.shape[1] + 1, rod.layers[0].name if len(rod.layers) == 1 else NAME
     width, layers = outline(rod, np.arange(nodes))
@@ -242,8 +242,9 @@ def _add_eigenstrain(
     axis: float,
     joints: Array,
 ) -> None:
-    """The rest strains of edges and joints that follow the laws of layers, or where that is a light, of each edge: then
-    there is one strand.
+    """Add the rest strains of edges and joints that follow the laws of layers.
+
+    Where the stimulus of a law is a light, each edge has a law of its own; there is one strand then.
     """
     first_edge = np.array([[strand.first_edge] for strand in strands])
     of_edges: list[tuple[Array, ...]] = []

@@ -73,7 +73,7 @@ class LayerHalves:
 def layer_halves(
     scene: SceneConfig, rod: Rod, slot: int, axis: float, shape: StrandShape, stretch: Array, present: Array
 ) -> LayerHalves:
-    """A layer in the halves of edges; `stretch` is λ, shape (n_copy, n_edge)."""
+    """Return a layer in the halves of edges; `stretch` is λ, shape (n_copy, n_edge)."""
     layer = rod.layers[slot]
     stations = _of_halves(len(present))
     section = sections(rod, layer, scene.materials[layer.material], stations)

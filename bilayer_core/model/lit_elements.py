@@ -97,7 +97,7 @@ def light_of(model: Model) -> Light:
 
 
 def _sections(model: Model) -> Array:
-    """A number for each place along a rod, the same for the edges of both layers there, shape (n_edge,)."""
+    """Return a number for each place along a rod, the same for the edges of both layers there, shape (n_edge,)."""
     numbers: dict[tuple[str, int], int] = {}
     section = np.zeros(model.edge_count, dtype=np.int64)
     for strand in model.strands:

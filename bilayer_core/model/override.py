@@ -25,12 +25,12 @@ def no_overrides(count: int) -> Array:
 
 
 def jump_to(value: float | None) -> Array:
-    """A row that acts at once; without a value that of a schedule."""
+    """Return a row that acts at once; without a value, a row that leaves the schedule in force."""
     return np.full(PARTS, math.nan) if value is None else np.array([value, value, 0.0, 0.0])
 
 
 def ramp_to(value: float, start: float, begin: float, over: float) -> Array:
-    """A row that leads from a value to another, in a time from `begin` on [s]."""
+    """Return a row that leads from one value to another, in a time from `begin` on [s]."""
     return np.array([value, start, begin, begin + over])
 
 

@@ -122,7 +122,7 @@ def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[Fig
 
 
 def simplest_model(scene: SceneConfig) -> tuple[str, str]:
-    """The model with the fewest unknowns that computes what a scene asks for, and why it is that one."""
+    """Return the model with the fewest unknowns that computes all that a scene requires, and the reason."""
     if scene.coupling != Coupling():
         return "two_rod", "`coupling` is set: only the two-rod model has a bond that gives"
     for rod in scene.rods:

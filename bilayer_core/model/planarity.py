@@ -29,7 +29,7 @@ ROUNDING = 1e-9
 
 
 def find_plane(scene: SceneConfig) -> tuple[Plane | None, str]:
-    """The plane of a scene and why it stays in it, or None and what leaves the plane of its first rod."""
+    """Return the plane of a scene and why it stays in it, or None and what leaves the plane of its first rod."""
     return scene.keep("plane", (), lambda: _find_plane(scene))
 
 
@@ -40,7 +40,7 @@ def _find_plane(scene: SceneConfig) -> tuple[Plane | None, str]:
 
 
 def require_plane(scene: SceneConfig) -> Plane:
-    """The plane of a scene.
+    """Return the plane of a scene.
 
     Raises
     ------
@@ -202,7 +202,7 @@ class _Survey:
             yield from self._inertia(body)
 
     def _inertia(self, body: Body) -> Iterator[str]:
-        """The key of the inertia of a body that turns, if it would turn it out of the plane."""
+        """Yield the key of the inertia of a body that turns, if it would turn it out of the plane."""
         motion, rotation = body.motion, rotation_matrix(np.array(body.rotation))
         if motion.inertia is not None:
             inertia = np.diag(motion.inertia)

@@ -147,7 +147,7 @@ def redundant_joints(scene: SceneConfig, plane: Plane | None) -> Iterator[Findin
 
 
 def _basis(rows: Array) -> Array:
-    """An orthonormal basis of the space of some rows, shape (·, rank)."""
+    """Return an orthonormal basis of the space of some rows, shape (·, rank)."""
     if not rows.size:
         return np.zeros((rows.shape[1], 0))
     _, sizes, directions = np.linalg.svd(rows, full_matrices=False)
@@ -155,7 +155,7 @@ def _basis(rows: Array) -> Array:
 
 
 def _partners(rows: Array, left: Array, before: Array, owners: list[str]) -> str:
-    """The joints on whose rows those of a joint depend."""
+    """Return the joints on whose rows the rows of a joint depend, as text."""
     combinations, sizes, _ = np.linalg.svd(left)
     sizes = np.concatenate([sizes, np.zeros(len(combinations) - len(sizes))])
     dependent = combinations[:, sizes <= DEPENDENT].T @ rows

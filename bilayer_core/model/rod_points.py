@@ -52,7 +52,7 @@ class RodPoints:
 
 
 def rod_points(found: Collected, in_plane: bool) -> RodPoints:
-    """The contact points of all rods; in a plane none is across the width."""
+    """Return the contact points of all rods; in a plane none is across the width."""
     length = found.column("node_length")
     thickness, width, offset = (
         np.concatenate([getattr(strand, name) for strand in found.strands]) for name in ("thickness", "width", "offset")

@@ -61,7 +61,7 @@ class RodSurfaces(ReadOnlyArrays):
 
 
 def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | None:
-    """The surfaces of rods, or None if none of them can meet.
+    """Return the surfaces of rods, or None if none of them can meet.
 
     Raises
     ------

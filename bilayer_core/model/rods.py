@@ -127,7 +127,7 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
 
 
 def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, slot: int, strand: StrandArrays) -> None:
-    """The edges of a layer that follow its laws."""
+    """Add the edges of a layer that follow its laws."""
     layer = rod.layers[slot]
     first_edge = strand.first_edge - strand.first_station
     for law in layer.eigenstrain:

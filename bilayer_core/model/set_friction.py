@@ -29,8 +29,9 @@ def none_given() -> Array:
 
 
 def friction_law(scene: SceneConfig, forces: tuple[str, ...], given: Array) -> Friction | None:
-    """The law of a scene with what is set from outside, if friction is among its forces; keys that the scene leaves out
-    go with `coefficient`.
+    """Return the friction law of a scene with the coefficients set from outside, if friction is among its forces.
+
+    Keys that the scene leaves out go with `coefficient`.
     """
     law = scene.contact.friction if scene.contact is not None else None
     if not acts(forces):

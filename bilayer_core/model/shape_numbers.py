@@ -98,7 +98,7 @@ def axis_frame(axis: np.ndarray) -> np.ndarray:
 
 
 def shape_of(surface: scene_shapes.Surface | scene_shapes.Obstacle) -> Shape:
-    """The shape of a surface of a body, or of an obstacle (the rotation of a box obstacle is not part of it)."""
+    """Return the shape of a surface of a body, or of an obstacle (the rotation of a box obstacle is not part of it)."""
     kind = surface.shape if hasattr(surface, "shape") else surface.type
     if kind == "plane":
         return Shape(kind, np.zeros(3), 0.0, axis_frame(np.array(surface.normal)))

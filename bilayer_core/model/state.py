@@ -90,7 +90,7 @@ class State:
                 self.places_of_override = slice(start - part.size, start)
 
     def copy(self) -> State:
-        """A state of its own with the same values."""
+        """Return an independent state with the same values."""
         return State(*(getattr(self, name) for name in PARTS))
 
     def take(self, other: State) -> None:
@@ -137,7 +137,7 @@ class State:
 
 
 def sealed(values: Array, place: int) -> Array:
-    """A flat state of the values of one, with a seal at its place."""
+    """Return a copy of a flat state with a seal, its checksum, at `place`."""
     flat = values.copy()
     flat[place] = zlib.crc32(values)
     return flat

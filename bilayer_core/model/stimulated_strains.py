@@ -26,7 +26,7 @@ class RestStrains:
     joint: Array
 
     def halfway_to(self, other: RestStrains) -> RestStrains:
-        """The mean of both."""
+        """Return the mean of both."""
         joint = self.joint
         if other.joint is not joint:
             joint = 0.5 * (joint + other.joint)

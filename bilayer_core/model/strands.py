@@ -49,7 +49,7 @@ class Collected:
         return np.concatenate(parts).astype(dtype, order="C", copy=False)
 
     def law(self, scene: SceneConfig, law: Eigenstrain) -> int:
-        """Number of an eigenstrain law; equal laws are one."""
+        """Return the number of an eigenstrain law; equal laws share one."""
         numbers = _numbers_of(scene, law)
         if numbers not in self.laws:
             self.laws.append(numbers)
@@ -178,9 +178,9 @@ def _imperfect_frames(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
 def _tangents_beside(
     rod: Rod, arc: Array, tangents: Array, normals: Array, offset: tuple[Array, Array], slopes: tuple[Array, Array]
 ) -> Array:
-    """Unit tangents of a curve at the offset (f, g) from the path, x + f n + g t×n: those of
+    """Return the unit tangents of a curve at the offset (f, g) from the path, x + f n + g t×n.
 
-    (1 − χ f − ξ g) t + (f′ − τ g) n + (g′ + τ f) t×n
+    They are along (1 − χ f − ξ g) t + (f′ − τ g) n + (g′ + τ f) t×n.
     """
     (f, g), (slope_f, slope_g) = offset, slopes
     towards, across, twist = rod.curvatures_at(arc).T[..., None]
@@ -226,7 +226,7 @@ def _shape(
 
 
 def _across(normals: Array, tangents: Array) -> Array:
-    """Normals made perpendicular to tangents, unit, shape (..., n, 3)."""
+    """Return normals made perpendicular to tangents, unit, shape (..., n, 3)."""
     normals = normals - np.einsum("...j,...j->...", normals, tangents)[..., None] * tangents
     return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
@@ -334,7 +334,7 @@ def add_strands(
 
 
 def _clamps(rod: Rod, strand: StrandArrays) -> list[tuple[str, int]]:
-    """The bodies that hold an end of a strand, and which: 0 or −1."""
+    """Return the bodies that hold an end of a strand, and which: 0 or −1."""
     last = strand.first_station + strand.node_count - 1
     ends = ((rod.clamp_start, strand.first_station == 0, 0), (rod.clamp_end, last == rod.stations - 1, -1))
     return [(body, end) for body, reached, end in ends if body is not None and reached]

@@ -190,7 +190,7 @@ class TwistedRod:
         return float(np.abs(squares * self._width**4 / (360.0 * self._whole_twist)).max())
 
     def _stiffness(self) -> Array:
-        """A, D, GJ on the neutral axis, shape (3, n_edge)."""
+        """Return A, D, GJ on the neutral axis, shape (3, n_edge)."""
         bending = self._bend + self._axial * self._height_over_axis**2
         return np.array([self._axial.sum(axis=0), bending.sum(axis=0), self._whole_twist])
 

@@ -40,7 +40,7 @@ class ReadOnlyArrays:
 
 
 def _short(value: object) -> str:
-    """An array as its type and shape; of several parts, how many there are."""
+    """Describe an array by its type and shape, a tuple of parts by their number."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape}"
     parts = isinstance(value, tuple) and value and not isinstance(value[0], (str, int, float))
@@ -48,7 +48,7 @@ def _short(value: object) -> str:
 
 
 def columns(pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The two columns of an (n, 2) array, contiguous and read-only as what kernels are compiled for."""
+    """Return the two columns of an (n, 2) array, contiguous and read-only: kernels are compiled for such arrays."""
     both = np.ascontiguousarray(pairs.T)
     both.flags.writeable = False
     return both[0], both[1]
@@ -92,7 +92,10 @@ def number_unknowns(
     attached_node: np.ndarray,
     dimension: int = 3,
 ) -> Layout:
-    """Number the unknowns of rods, each a list of layers (first station, last station, first node, first edge)."""
+    """Assign numbers to the unknowns of rods.
+
+    Each rod is a list of layers (first station, last station, first node, first edge).
+    """
     turns = dimension == 3
     node = np.full(node_count, -1, dtype=np.int64)
     edge = np.full(edge_count if turns else 0, -1, dtype=np.int64)

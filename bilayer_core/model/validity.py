@@ -55,7 +55,7 @@ class Figure:
         return "worst" if self.outside else "nearest to the limit"
 
     def line(self, where: str) -> str:
-        """The figure, with the text that names the place."""
+        """Return the figure, with the text that names the place."""
         text = f"{where}: {self.what} {self.value} ({self.limit})"
         return f"{text}: {self.outside}" if self.outside else text
 
@@ -64,7 +64,7 @@ class Figure:
 
 
 def validity_warnings(scene: SceneConfig) -> Iterator[Figure]:
-    """The figures that are out of their range, each with the range and what that means."""
+    """Return the figures that are out of their range, each with the range and what that means."""
     return (figure for figure in validity_figures(scene) if figure.outside)
 
 

@@ -51,7 +51,7 @@ class CapturedFrame(Frame):
 
     @classmethod
     def of(cls, capture: Capture, **known: Any) -> CapturedFrame:
-        """A frame with those attributes that need not be computed."""
+        """Return a frame with those attributes that need not be computed."""
         frame = object.__new__(cls)
         frame.__dict__.update(known, _capture=capture)
         return frame
@@ -64,7 +64,7 @@ class CapturedFrame(Frame):
         return value
 
     def __reduce__(self) -> tuple:
-        """Copied and pickled with all attributes, without the model."""
+        """Copy and pickle the frame with all attributes, without the model."""
         return Frame, tuple(getattr(self, part.name) for part in fields(Frame))
 
 

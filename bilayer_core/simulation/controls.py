@@ -154,12 +154,17 @@ class Controls(Readings):
         return jumps
 
     def listen(self, note: Callable[[Input], None]) -> Callable[[], None]:
-        """Have all that acts from outside told from now on; returns what ends that.
+        """Report all inputs from outside to a listener from now on.
 
         Parameters
         ----------
         note : callable
             Called with each `observed.inputs.Input`, before the step from which on it acts.
+
+        Returns
+        -------
+        callable
+            Ends the reports.
         """
         self._listeners.append(note)
         self._until = math.nan  # who begins to listen hears where steps end

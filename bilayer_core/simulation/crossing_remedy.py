@@ -13,13 +13,13 @@ FINER = 2
 
 
 def crossed(model: Model, number: int) -> tuple[int, str]:
-    """The edge, and the name of the surface, of a number that `contact.crossing.crossing` gave."""
+    """Return the edge, and the name of the surface, of a number from `contact.crossing.crossing`."""
     surface, edge = divmod(number, model.edge_count)
     return edge, model.surfaces.names[surface]
 
 
 def edge_of_strand(model: Model, edge: int) -> str:
-    """An edge's number within its strand, and the strand."""
+    """Return an edge's number within its strand, and the strand, as text."""
     strand = next(s for s in reversed(model.strands) if s.first_edge <= edge)
     return f"{edge - strand.first_edge} of {strand.name}"
 

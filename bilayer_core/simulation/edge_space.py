@@ -31,7 +31,7 @@ class Gradient:
 
     @classmethod
     def copy_of(cls, first: Sums, model: Model) -> Gradient:
-        """The present ones."""
+        """Return a copy of the present first derivatives."""
         found = cls(*(getattr(first, part).copy() for part in PARTS))
         found.contact[model.bodies.body_of_free] = 0.0
         return found
@@ -55,7 +55,7 @@ class Motion:
 
 
 def compose(model: Model, node: Array, turn: Array, clamp_edge: Array, contact: Array) -> Motion:
-    """A motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of all bodies."""
+    """Return a motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of bodies."""
     i = model.edge_node
     edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), clamp_edge])
     top0, top1, bottom0, bottom1 = (node[of_pairs] for of_pairs in model.pair_node.T)
@@ -85,7 +85,7 @@ def velocity(model: Model, at: Configuration, state: State) -> Motion:
 
 
 def of_prescribed(model: Model, motion: Motion) -> Motion:
-    """The part of a motion that prescribed bodies impose: on held nodes, clamps' directions, points and surfaces."""
+    """Return the part of a motion that prescribed bodies impose on held nodes, clamps' directions, points, surfaces."""
     prescribed = model.bodies.free_index < 0
     held = np.zeros(model.node_count, dtype=bool)
     held[model.attached_node] = model.attached_free < 0

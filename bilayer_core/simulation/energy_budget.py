@@ -250,7 +250,7 @@ class EnergyLedger:
 
 
 def _resistance(model: Model, at: Configuration, rest: RestStrains) -> tuple[Array, Array]:
-    """Derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
+    """Return the derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
     strain = at.length[: model.edge_count] / model.rest_length - 1.0
     bend = at.joint_strain[:, 0] - rest.joint[:, 0]
     of_edges = np.concatenate([strain, np.zeros(model.clamp_edge_count)])
@@ -268,7 +268,7 @@ class _Way:
         self.state = end.copy()
 
     def at(self, part: float) -> Configuration:
-        """Configuration after a part of the way; `state` goes along, its velocities apart."""
+        """Return the configuration after a part of the way; move `state` along, except for its velocities."""
         begin, moved, state, evaluator = self._begin, self._moved, self.state, self._evaluator
         state.position[:] = begin.position + part * moved.node
         state.twist[:] = begin.joint_strain[:, 2]

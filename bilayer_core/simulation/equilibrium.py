@@ -186,7 +186,7 @@ class _Search:
         return StaticReport(unstable == 0, unstable, out_of_plane, residual, *counts)
 
     def _unstable(self, stepper: Stepper) -> int:
-        """Number of negative eigenvalues of the Hessian of a model at the equilibrium."""
+        """Return the number of negative eigenvalues of the Hessian of a model at the equilibrium."""
         counted = stepper.engine.do_once(self.state, COUNT)
         if not counted.converged:
             reason = FAILURES[counted.status]

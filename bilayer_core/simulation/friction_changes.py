@@ -50,6 +50,6 @@ def refuse_friction(model: Model, value: float | None, key: str) -> None:
 
 
 def coefficients(model: Model, state: State) -> dict[str, float]:
-    """The coefficients that act in a state by key; empty where nothing slides against friction."""
+    """Return the coefficients that act in a state by key; empty if nothing slides with friction."""
     law = friction_law(model.scene, model.forces, state.friction) if acts(model.forces) else None
     return dict(zip(COEFFICIENTS, (law.coefficient, *law.of_rods), strict=True)) if law is not None else {}

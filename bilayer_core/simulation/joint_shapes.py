@@ -77,7 +77,7 @@ def _rail(radius: float, place: np.ndarray, axis: np.ndarray, limits: tuple[floa
 
 
 def _axle(radius: float, length: float, place: np.ndarray, axis: np.ndarray) -> ShapeInfo:
-    """A cylinder, whose axis is z of its own frame."""
+    """Return a cylinder, whose axis is z of its own frame."""
     across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     rotation = np.stack([across, np.cross(axis, across), axis], axis=1)

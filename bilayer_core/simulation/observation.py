@@ -21,7 +21,7 @@ Array = np.ndarray
 
 
 def describe(model: Model, state: State, settings: dict[str, str], scene_text: str) -> Description:
-    """The unchanging part of what observers see."""
+    """Return the unchanging part of what observers see."""
     scene = model.scene
     bodies = model.bodies
     return Description(
@@ -64,7 +64,7 @@ def strand(s: StrandArrays) -> Strand:
 
 
 def _shape_info(shape: Shape, position: Array | None = None, rotation: Array | None = None) -> ShapeInfo:
-    """A shape of an owner at a pose, by default that of the owner's frame."""
+    """Return a shape of an owner at a pose, by default in the owner's frame."""
     place = (0.0, 0.0, 0.0) if position is None else tuple(position.tolist())
     rotation = shape.rotation if rotation is None else rotation @ shape.rotation
     rounding = 0.0 if shape.kind == "sphere" else shape.rounding

@@ -36,7 +36,7 @@ class Schedule:
         self._show(range(len(self._observers)))
 
     def next_due(self) -> float:
-        """The earliest time of a step's end at which an observer is to look [s]; infinite without any."""
+        """Return the earliest time of a step's end at which an observer is due [s]; infinity without observers."""
         due = zip(self._count, self._observers, strict=True)
         return min(((count + 1 - TIME_ROUNDING) / of.rate for count, of in due), default=math.inf)
 

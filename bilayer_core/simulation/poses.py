@@ -45,7 +45,7 @@ def goal_of(
     target: tuple[Array, Array],
     limits: tuple[float, float],
 ) -> Array:
-    """A goal as in `State.pose_goal`.
+    """Return a goal as in `State.pose_goal`.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def new_goal(
     quaternion: Sequence[float] | None,
     over: float,
 ) -> tuple[int, Array] | None:
-    """The index of a body among the controlled ones and its new goal, None if it has that already.
+    """Return the index of a body among the controlled ones and its new goal, None if it has that already.
 
     Raises
     ------
@@ -171,7 +171,7 @@ def rotation_vector_between(first: Array, last: Array) -> Array:
 
 
 def _least_duration(move: Array, rate: Array, limit: float, over: float) -> float:
-    """The shortest duration [s] from `over` up in which the speed stays below a limit, or below that of the start."""
+    """Return the shortest duration [s] from `over` up for which the speed stays within a limit or its initial value."""
     allowed = (1.0 + ROUNDING) * max(limit, float(np.linalg.norm(rate)))
 
     def too_fast(duration: float) -> bool:

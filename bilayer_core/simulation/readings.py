@@ -67,7 +67,13 @@ class Readings(ABC):
 
     @abstractmethod
     def compile(self) -> float:
-        """Have kernels ready, and the forces of the first state."""
+        """Compile all kernels that are not in the cache, and compute the forces of the first state.
+
+        Returns
+        -------
+        float
+            CPU time of this [s].
+        """
 
     @property
     def reasons(self) -> dict[str, str]:
@@ -140,7 +146,7 @@ class Readings(ABC):
         return Present(self.model, self._state, self._evaluated, self._seen)
 
     def _evaluated(self) -> Stepper:
-        """The stepper, with forces of the present state."""
+        """Return the stepper, with forces of the present state."""
         self.compile()
         self._stepper.engine.evaluate_end()
         return self._stepper
@@ -156,7 +162,13 @@ class Readings(ABC):
         return self._seen().curvature
 
     def energy(self) -> dict[str, float]:
-        """Energy of each term [J]."""
+        """Return the energy of each term.
+
+        Returns
+        -------
+        dict of str to float
+            By the name of the term [J].
+        """
         return observe.energies(self.model, self._seen())
 
     @property
@@ -165,12 +177,17 @@ class Readings(ABC):
         return self._state.account.copy()
 
     def budget(self) -> dict[str, Any]:
-        """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
+        """Return where the energy went since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
+
+        Returns
+        -------
+        dict
+            Energies by name [J].
 
         Raises
         ------
         InputError
-            If it is not kept.
+            If the simulator keeps no budget.
         """
         if self._ledger is None:
             raise InputError("budget: is not kept; make the simulator with budget=True")
@@ -192,6 +209,12 @@ class Readings(ABC):
         return observe.describe(self.model, self._state, settings, scene_text(self.scene))
 
     def frame(self) -> Frame:
-        """A snapshot."""
+        """Return a snapshot.
+
+        Returns
+        -------
+        Frame
+            The present values.
+        """
         self.compile()
         return make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)

@@ -40,7 +40,7 @@ SPENT = 1e-3
 def remedy(
     found: IntegrationReport, steps: Steps, method: Method, model: Model, gap: float, speed: float, folded: bool = False
 ) -> Remedy:
-    """The setting to change, and to what, for a run to get past the step that failed.
+    """Return the setting to change, and its new value, for a run to get past the step that failed.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def _adaptive(steps: Steps, method: Method) -> Remedy:
 
 
 def _with_adaptive_steps(first: Remedy, steps: Steps, method: Method) -> Remedy:
-    """A change, and adaptive steps unless there are."""
+    """Return a change combined with adaptive steps, unless steps are adaptive already."""
     if steps.adaptive:
         return first
     second = _adaptive(steps, method)

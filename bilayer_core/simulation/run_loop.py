@@ -40,7 +40,7 @@ class Callbacks:
 
 
 def time_left(now: float, end_of_scene: float, duration: float | None, until: float | None) -> float:
-    """Simulated time of a run that is asked for as in `Simulator.run` [s].
+    """Return the simulated time of a run with the arguments of `Simulator.run` [s].
 
     Raises
     ------

@@ -118,7 +118,7 @@ class Simulator(Controls):
         return Stepper(model, self._method, self.steps, self.scene.solver.max_newton_iterations)
 
     def _in_dimension(self, dimension: int) -> Stepper:
-        """A stepper of the same scene in a dimension."""
+        """Return a stepper of the same scene in a dimension."""
         same = dimension == self.plan.dimension
         return self._stepper_of(self.model if same else build_model(self.scene, self.plan.model, dimension))
 
@@ -143,10 +143,15 @@ class Simulator(Controls):
             self._stepper.ledger = self._ledger
 
     def compile(self) -> float:
-        """Compile all kernels that are not in the cache, and prepare the start; return the CPU seconds for this scene.
+        """Compile all kernels that are not in the cache, and prepare the start.
 
         Others are read from the cache when the simulation first needs them, and their time is counted here as well, not
         in `cpu_time`. Whatever needs kernels calls it.
+
+        Returns
+        -------
+        float
+            CPU time of this for the scene [s].
         """
         if self._compile_time is None:
             ensure_compiled()
@@ -167,6 +172,10 @@ class Simulator(Controls):
             Simulated time [s] at which an adaptive step ends at the latest, if the scene's next output time is not
             earlier; a fixed one is as long as ever.
 
+        Returns
+        -------
+        StepReport
+
         Raises
         ------
         SimulationError
@@ -180,7 +189,17 @@ class Simulator(Controls):
         return StepReport.of(found, self.time, self.time - begin)
 
     def advance(self, until: float = math.inf) -> StepReport:
-        """Advance by one step, or by one part of a fixed one; otherwise like `step`."""
+        """Advance by one step, or by one part of a fixed one; otherwise like `step`.
+
+        Parameters
+        ----------
+        until : float
+            As in `step` [s].
+
+        Returns
+        -------
+        StepReport
+        """
         self.compile()
         begin = self.time
         return StepReport.of(self._integrate_once(until), self.time, self.time - begin)
@@ -330,10 +349,19 @@ class Simulator(Controls):
         return RunResult(termination, self.time, self.time - begin, done, self.cpu_time - cpu, wall_time() - wall)
 
     def attach(self, observer: Observer) -> Callable[[], None]:
-        """Show frames to an observer from now on, at its rate, whoever makes steps; returns what ends that.
+        """Show frames to an observer from now on, at its rate, whoever makes steps.
 
         It also sees the last frame of each `run`, and the first after `load_state` and `reset`. It is closed when it is
         detached.
+
+        Parameters
+        ----------
+        observer : Observer
+
+        Returns
+        -------
+        callable
+            Detaches the observer.
         """
         schedule = Schedule([observer], self)
         schedule.start()
@@ -378,16 +406,28 @@ class Simulator(Controls):
                 self._begin_budget()
 
     def save_state(self) -> Array:
-        """Flat copy of the state; `load_state` continues from it bit for bit.
+        """Return a flat copy of the state; `load_state` continues from it bit for bit.
 
         Its last values are a fingerprint of the scene (`model.fingerprint`), so that no other scene takes it.
+
+        Returns
+        -------
+        ndarray
+            Shape (size,).
         """
         self.compile()
         return self._state.flat()
 
     def load_state(self, snapshot: Array) -> None:
-        """Go to a saved state of the same scene, or of one that differs only in schedules of stimuli, loads, gravity,
-        contact, friction, damping, drag, steps, tolerances or output.
+        """Go to a saved state of the same scene, or of a similar one.
+
+        The scenes may differ in schedules of stimuli, loads, gravity, contact, friction, damping, drag, steps,
+        tolerances and output.
+
+        Parameters
+        ----------
+        snapshot : ndarray
+            From `save_state`, shape (size,).
 
         Raises
         ------
@@ -428,8 +468,18 @@ class Simulator(Controls):
         self.load_state(self._initial_state().flat())
 
     def same_model(self, scene: SceneConfig) -> bool:
-        """Return whether `reset` takes a scene: one that differs at most in texts, duration, output, schedules of
-        stimuli and loads, steps and tolerances, and coefficients of friction that are and stay above 0.
+        """Return whether `reset` takes a scene.
+
+        Such a scene differs at most in texts, duration, output, schedules of stimuli and loads, steps and tolerances,
+        and coefficients of friction that are and stay above 0.
+
+        Parameters
+        ----------
+        scene : SceneConfig
+
+        Returns
+        -------
+        bool
         """
         return not differing(self.scene, scene)
 
@@ -454,7 +504,11 @@ class Simulator(Controls):
             self.plane_watch.take_scene(scene.duration, lambda stepper: stepper.take_scene(scene, steps, iterations))
 
     def summary(self) -> dict[str, Any]:
-        """Figures of the run since the start, the last `reset` or `load_state`; keys as documented for
-        ``--summary``.
+        """Return figures of the run since the start, the last `reset` or `load_state`.
+
+        Returns
+        -------
+        dict
+            Keys as documented for ``--summary``.
         """
         return summarise(self)

@@ -54,7 +54,7 @@ class Steps:
 
 
 def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, tolerance: float | None = None) -> Steps:
-    """The steps that a caller and a scene ask for; by default adaptive ones.
+    """Return the steps that a caller and a scene ask for; by default adaptive ones.
 
     A `tolerance` asks for adaptive steps, `dt` alone for fixed ones; what the caller asks for comes before what the
     scene says.

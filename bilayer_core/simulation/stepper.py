@@ -67,7 +67,20 @@ class StepReport:
 
     @classmethod
     def of(cls, found: IntegrationReport, time: float, length: float) -> StepReport:
-        """Return the report of a step of given length [s] that ended at a time [s]."""
+        """Return the report of a step.
+
+        Parameters
+        ----------
+        found : IntegrationReport
+        time : float
+            At its end [s].
+        length : float
+            [s].
+
+        Returns
+        -------
+        StepReport
+        """
         counts = found.done, found.rejected, found.iterations, found.factorisations
         return cls(time, length, *counts, found.largest_residual, found.inaccurate)
 
@@ -194,7 +207,10 @@ class Stepper:
         state.last_error[0] = 0.0
 
     def end_near(self, time: float) -> float:
-        """The output time that a time [s] is but for rounding, else the time itself: so a sum of periods is one."""
+        """Return the output time that a time [s] equals up to rounding, otherwise the time itself.
+
+        In this way a sum of periods counts as an output time.
+        """
         rate = self.model.scene.output.rate
         output = round(time * rate) / rate if math.isfinite(time) else time
         return output if abs(output - time) <= TIME_ROUNDING / rate else time

@@ -125,8 +125,9 @@ def _overridden(scheduled: list[float], override: Array, time: float) -> Array:
 
 
 def _next_spans(schedule: Spans, override: list[float], begin: float, end: float) -> list[Span]:
-    """The spans of what is set from outside, or else those of a schedule from the one that ends at `begin` or later to
-    one that does not end before `end`.
+    """Return the spans of a setting from outside, or those of a schedule over an interval.
+
+    They reach from the span that ends at `begin` or later to one that does not end before `end`.
     """
     if acts(override):
         return spans_of(override)
@@ -137,8 +138,9 @@ def _next_spans(schedule: Spans, override: list[float], begin: float, end: float
 
 
 def paths_of(model: Model, pose_goal: Array) -> Paths:
-    """The keyframes of prescribed bodies that move, those of controlled ones from their goals if they have one; absent
-    if none moves.
+    """Return the keyframes of prescribed bodies that move; absent if none moves.
+
+    A controlled body with a goal has the keyframes of its goal.
     """
     bodies, scene = model.bodies, model.scene.bodies
     moving = [b for b, body in enumerate(scene) if isinstance(body.motion, Prescribed) and body.motion.moves]

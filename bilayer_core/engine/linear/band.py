@@ -12,7 +12,7 @@ from bilayer_core.jit.stack import stack_vector
 
 
 def width(half_bandwidth: int) -> tuple[int, ...]:
-    """A half-bandwidth as the functions below take it."""
+    """Return a half-bandwidth as the functions below take it."""
     return (0,) * half_bandwidth
 
 

@@ -104,16 +104,17 @@ def factor_border(p):
 
 @piece(int, Problem)
 def count_border(p):
-    """Number of negative eigenvalues of S, −1 if it is not finite; S is overwritten."""
+    """Return the number of negative eigenvalues of S, −1 if it is not finite; overwrite S."""
     return count_negative_dense(p.bordered.schur, p.bordered.width[0])
 
 
 @piece(int, Problem)
 def solve_bordered(p):
-    """The step of free bodies and of nodes with contact columns; what it changes is taken off `System.right`, L⁻¹ times
-    that of all others.
+    """Compute the step of free bodies and of nodes with contact columns.
 
-    In `BorderedSystem.load` is what is wanted of nodes with contact columns.
+    Subtract its effect on all other unknowns from `System.right`, which holds L⁻¹ times the right-hand side of these.
+
+    On entry, `BorderedSystem.load` holds the right-hand side of nodes with contact columns.
     """
     bordered, freedom, size = p.bordered, p.bodies.freedom, p.strands.size
     right, body_step = p.system.right, p.system.body_step

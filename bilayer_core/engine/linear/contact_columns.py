@@ -216,7 +216,7 @@ def _move_from_band(columns, bordered, strands, base, band):
 
 @kernel
 def _column(columns, joins, freedom, base, row):
-    """The border's column of a row of the band, −1 without one."""
+    """Return the border's column of a row of the band, −1 if it has none."""
     if joins.exists and joins.column[row] >= 0:
         return freedom.shape[1] + joins.column[row]
     return base + columns.column[row] if columns.column[row] >= 0 else -1

@@ -69,11 +69,13 @@ PIVOT_RATIO = (1.0 + math.sqrt(17.0)) / 8.0
 
 @kernel
 def count_negative_dense(matrix, n):
-    """Number of negative eigenvalues of the first n rows and columns of a symmetric matrix, whose lower triangle is
-    overwritten; −1 if it is not finite.
+    """Return the number of negative eigenvalues of a symmetric matrix's first n rows and columns; −1 if not finite.
 
-    It is that of the negative eigenvalues of pivots (Sylvester's law of inertia), which are values on the diagonal or
-    blocks of two, the largest left each time (Bunch and Parlett 1971, SIAM J. Numer. Anal. 8): a block has one.
+    Overwrite the lower triangle of the matrix.
+
+    This is the number of negative eigenvalues of the pivots (Sylvester's law of inertia). Pivots are values on the
+    diagonal or blocks of two, the largest left each time (Bunch and Parlett 1971, SIAM J. Numer. Anal. 8); a block has
+    one.
     """
     total = 0.0
     for i in range(n):

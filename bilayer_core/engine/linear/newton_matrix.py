@@ -54,8 +54,9 @@ all that takes it once more.)"""
 
 @piece(int, Problem, Configuration, float, int)
 def assemble(p, at, factor, simplified):
-    """The matrix of the last evaluation, that of `at`, with `factor` times the masses [1/s²]: the band, and the border
-    and corner of free bodies. Nodes that bodies hold are rows of the identity.
+    """Assemble the matrix of the last evaluation, that of `at`, with `factor` times the masses [1/s²].
+
+    It has a band, and the border and corner of free bodies. Nodes that bodies hold are rows of the identity.
     """
     strands, band = p.strands, p.system.band
     band[:] = 0.0

@@ -26,7 +26,7 @@ def _eliminate(band, n, half_bandwidth, bordered):
 
 
 def _of_width(half_bandwidth: int) -> tuple[Piece, ...]:
-    """The set for a half-bandwidth."""
+    """Return the set of pieces for a half-bandwidth."""
     bandwidth = width(half_bandwidth)
 
     def factor(band, n, counts):

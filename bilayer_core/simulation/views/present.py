@@ -42,12 +42,20 @@ class ByName(Mapping[str, View]):
         self._kind, self._views = kind, dict(views)
 
     def __getitem__(self, name: str) -> View:
-        """The view of a name.
+        """Return the view of a name.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        view
 
         Raises
         ------
         UnknownName
-            If there is none, with the nearest names. It is a KeyError too.
+            If there is none; the message has the nearest names. It is a KeyError too.
         """
         if name in self._views:
             return self._views[name]
