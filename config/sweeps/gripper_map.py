@@ -9,7 +9,7 @@ WEIGHT = 0.027
 
 
 def change(content, parameters):
-    """Arms as long as `length` [mm], with stations as far apart as those of the scene."""
+    """Make the arms as long as `length` [mm], with stations as far apart as those of the scene."""
     arm, length = content["rods"][0], 1e-3 * parameters["length"]
     arm["stations"] = 1 + round((arm["stations"] - 1) * length / arm["path"]["length"])
     arm["path"]["length"] = length
@@ -18,7 +18,7 @@ def change(content, parameters):
 
 
 def holding_force(run):
-    """The largest force with which the arms pull upwards at the ball, which is held fast, while the hub rises [N].
+    """Return the largest upward force of the arms on the ball, which is held fast, while the hub rises [N].
 
     None if it would not lift the ball of the scene.
     """

@@ -7,7 +7,7 @@ BEATS, MEASURED = 8, 4
 
 
 def change(content, parameters):
-    """Whole beats of `period` [s], the part `lit` of each in light."""
+    """Set whole beats of `period` [s], with light during the part `lit` of each."""
     period = parameters["period"]
     content["stimuli"]["light"]["schedule"] |= {"period": period, "width": parameters["lit"] * period}
     content["duration"] = BEATS * period
@@ -15,13 +15,13 @@ def change(content, parameters):
 
 
 def speed(run):
-    """Mean speed of the mass centre upwards over the last beats [mm/s]."""
+    """Return the mean speed of the mass centre upwards over the last beats [mm/s]."""
     period, com = run.parameters["period"], run.recording["com"]
     z = np.interp([(BEATS - MEASURED) * period, BEATS * period], run.recording.times, com.values[:, 2])
     return 1e3 * float(z[1] - z[0]) / (MEASURED * period)
 
 
 def tip_distance(run):
-    """The least distance of the end of an arm from the axis during the run [mm]."""
+    """Return the least distance of the end of an arm from the axis during the run [mm]."""
     tip = run.recording["rod/arm_0/laminate/position"].values[:, -1]
     return 1e3 * float(np.hypot(tip[:, 0], tip[:, 1]).min())

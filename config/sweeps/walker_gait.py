@@ -9,7 +9,7 @@ CYCLES = 6
 
 
 def change(content, parameters):
-    """The content of the scene with a schedule and a place of the hind leg.
+    """Set a schedule of humidity and the place of the hind leg.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ KEYS = ("period", "rise", "wettest")
 
 
 def _schedule(period, rise, wettest):
-    """Half a wave of a sine up, from dry to wet, and one of another length down: with `rise` = 0.5 it is a sine."""
+    """Return half a sine wave up, from dry to wet, and one of another length down: with `rise` = 0.5 a sine."""
     parts = []
     for part, phase in ((rise, -0.5 * math.pi), (1.0 - rise, 0.5 * math.pi)):
         wave = {"mean": 0.5 * wettest, "amplitude": 0.5 * wettest, "period": 2.0 * part * period, "phase": phase}
@@ -76,12 +76,12 @@ def _move_hind_leg(content, hip):
 
 
 def stride(run):
-    """Mean way of the mass centre along x in one cycle, the first one left out [mm]."""
+    """Return the mean way of the mass centre along x in one cycle, the first one left out [mm]."""
     period, com = run.parameters["period"], run.recording["com"]
     x = np.interp([period, CYCLES * period], run.recording.times, com.values[:, 0])
     return 1e3 * float(x[1] - x[0]) / (CYCLES - 1)
 
 
 def speed(run):
-    """Mean speed of the mass centre along x, the first cycle left out [mm/s]."""
+    """Return the mean speed of the mass centre along x, the first cycle left out [mm/s]."""
     return stride(run) / run.parameters["period"]
