@@ -142,6 +142,7 @@ setup(
             "matplotlib>=3.8",
             "mcap-ros2-support>=0.5",
             "mypy>=1.15",
+            "numpydoc>=1.8",
             "optuna>=4",
             "pandas>=2.2",
             "pebble>=5.0",

@@ -1,13 +1,32 @@
-"""Docstrings say what a thing is or does, from the first word on."""
+"""Docstrings say what a thing is or does, from the first word on; those that users read name parameters and results."""
 
 import ast
+import inspect
+import re
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import is_dataclass
 from pathlib import Path
+
+from numpydoc.validate import validate
+
+import bilayer_core
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.observed.observer import Observer
+from bilayer_core.runs.replay import branch
+from bilayer_core.studies.converge.study import converge
+from bilayer_core.testing import run_scene
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = sorted(path for name in ("bilayer_core", "bilayer_sim_ros") for path in (ROOT / name).rglob("*.py"))
 REFUSED = {"What", "Whether", "Of", "As", "Until", "That", "Who"}
 """Words that begin half a sentence, whose other half the reader must find."""
 DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+CALLED = [getattr(bilayer_core, name) for name in bilayer_core.__all__ if name != "__version__"]
+CALLED += [run_scene, McapRecorder, branch, converge]
+"""Functions and classes that programs of users call."""
+CODES = {"PR01", "PR02", "PR03", "RT01", "YD01"}
+"""Codes of numpydoc: parameters are documented, under their names and in order; so are returned and yielded values."""
 
 
 def test_no_docstring_begins_with_half_a_sentence():
@@ -18,3 +37,50 @@ def test_no_docstring_begins_with_half_a_sentence():
             if text and text.split()[0] in REFUSED:
                 wrong.append(f"{path.relative_to(ROOT)}: {text.splitlines()[0]}")
     assert len(SOURCES) > 400 and wrong == []
+
+
+def test_public_names_document_their_parameters_and_results():
+    names = _public_names()
+    faults = {name: [fault for fault in validate(name)["errors"] if fault[0] in CODES] for name in names}
+    assert {f"{Observer.__module__}.Observer.observe", f"{run_scene.__module__}.RobotRun.assert_energy"} <= names
+    assert {name: found for name, found in faults.items() if found} == {}
+
+
+def _public_names() -> set[str]:
+    """Return the import paths of `CALLED`, and of the methods of all classes whose objects these return."""
+    names, seen, left = {_path_of(called) for called in CALLED}, set(), [*CALLED, Observer]
+    while left:
+        found = left.pop()
+        if found in seen:
+            continue
+        seen.add(found)
+        if not inspect.isclass(found):
+            names.add(_path_of(found))
+            left += _classes_in(found.__annotations__.get("return", ""), found)
+            continue
+        left += _methods_of(found)
+        if is_dataclass(found):
+            left += [of_field for field in found.__annotations__.values() for of_field in _classes_in(field, found)]
+    return names
+
+
+def _path_of(named: type | Callable) -> str:
+    return f"{named.__module__}.{named.__qualname__}"
+
+
+def _classes_in(annotation: object, owner: type | Callable) -> Iterator[type]:
+    """Yield the classes of the package that an annotation in the module of `owner` names."""
+    for word in re.findall(r"\w+", str(annotation)):
+        found = vars(sys.modules[owner.__module__]).get(word)
+        if inspect.isclass(found) and found.__module__.startswith("bilayer_core"):
+            yield found
+
+
+def _methods_of(owner: type) -> Iterator[Callable]:
+    """Yield the public methods and properties of a class, of its bases in the package as well."""
+    for base in owner.__mro__:
+        for name, member in list(vars(base).items()) if base.__module__.startswith("bilayer_core") else ():
+            for wrapped in ("__func__", "fget", "func"):  # of class methods, properties and cached ones
+                member = getattr(member, wrapped, member)
+            if inspect.isfunction(member) and (name == "__getitem__" or not name.startswith("_")):
+                yield member
