@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 import typing
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from itertools import accumulate
@@ -56,6 +57,8 @@ else:
     """Arrays of integers."""
     Flags, FlagTable = (types.Array(types.boolean, n, "C") for n in (1, 2))
     """Arrays of booleans."""
+UNALLOCATED: Mapping[str, int] = defaultdict(int)
+"""Sizes of a record whose arrays with a declared shape come later; see `Record.allocated`."""
 NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean}
 DTYPES = {types.float64: np.dtype(np.float64), types.int64: np.dtype(np.int64), types.boolean: np.dtype(np.bool_)}
 _ADDRESS_WORD = 4
@@ -169,6 +172,19 @@ class Record:
                 memory[kind.offset[name] : kind.offset[name] + len(words)] = words
         made._lie_in(memory)
         return made
+
+    def allocated(self, sizes: Mapping[str, int], **values: Any) -> typing.Self:
+        """Return the record with arrays of its own where its class declares a shape, or itself if it is absent.
+
+        Parameters
+        ----------
+        sizes : mapping of str to int
+            What the names in shapes stand for.
+        **values
+            In place of those of this record.
+        """
+        lasting = {name: getattr(self, name) for name in self.names if name not in self.shapes}
+        return self.zeros(sizes, **lasting | values) if self.exists else self
 
     @classmethod
     def numba_type(cls) -> RecordType:

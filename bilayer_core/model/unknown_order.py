@@ -9,9 +9,12 @@ In a plane (`model.plane`) a node has two unknowns and an edge none.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+
+from bilayer_core.jit import Record
 
 HALF_BANDWIDTH = {
     3: {1: 10, 2: 18},
@@ -30,13 +33,18 @@ class ReadOnlyArrays:
         return f"{type(self).__name__}({', '.join(f'{name}={_short(value)}' for name, value in vars(self).items())})"
 
     def __post_init__(self):
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-            elif isinstance(value, tuple):
-                for array in value:
-                    if isinstance(array, np.ndarray):
-                        array.setflags(write=False)
+        _lock(vars(self).values())
+
+
+def _lock(values: Iterable[object]) -> None:
+    """Make arrays read-only, those in tuples and those that stay in records among them."""
+    for value in values:
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+        elif isinstance(value, tuple):
+            _lock(value)
+        elif isinstance(value, Record):
+            _lock(getattr(value, name) for name in value.names if name not in value.shapes)
 
 
 def _short(value: object) -> str:
