@@ -93,8 +93,8 @@ def rod_contact_of(
     law: Friction | None,
     **motion: Array,
 ) -> RodContact:
-    """With contacts of now, and `old` ones of the start of a stage; `law` is the scene's or one with other coefficients,
-    `motion` that of the list of near rods.
+    """With contacts of now, and `old` ones of the start of a stage; `law` is the scene's or one with other
+    coefficients, `motion` that of the list of near rods.
     """
     contact = model.scene.contact
     return RodContact.zeros(

@@ -173,6 +173,9 @@ class Record:
         made._lie_in(memory)
         return made
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={shown(getattr(self, name))}' for name in self.names)})"
+
     def allocated(self, sizes: Mapping[str, int], **values: Any) -> typing.Self:
         """Return the record with arrays of its own where its class declares a shape, or itself if it is absent.
 
@@ -292,6 +295,14 @@ def record_at(declared: type[Record]):
         return declared.numba_type()(types.int64), generate
 
     return at
+
+
+def shown(value: object) -> str:
+    """Return an array as its type and shape; of several parts, how many there are."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape}"
+    parts = isinstance(value, tuple) and value and not isinstance(value[0], (str, int, float))
+    return f"({len(value)} x {type(value[0]).__name__})" if parts else repr(value)
 
 
 def _address(array: np.ndarray) -> int:

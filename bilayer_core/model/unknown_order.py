@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bilayer_core.jit import Record
+from bilayer_core.jit.record import shown
 
 HALF_BANDWIDTH = {
     3: {1: 10, 2: 18},
@@ -30,7 +31,7 @@ class ReadOnlyArrays:
             cls.__repr__ = ReadOnlyArrays.__repr__  # which dataclasses leave as it is
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{name}={_short(value)}' for name, value in vars(self).items())})"
+        return f"{type(self).__name__}({', '.join(f'{name}={shown(value)}' for name, value in vars(self).items())})"
 
     def __post_init__(self):
         _lock(vars(self).values())
@@ -45,14 +46,6 @@ def _lock(values: Iterable[object]) -> None:
             _lock(value)
         elif isinstance(value, Record):
             _lock(getattr(value, name) for name in value.names if name not in value.shapes)
-
-
-def _short(value: object) -> str:
-    """An array as its type and shape; of several parts, how many there are."""
-    if isinstance(value, np.ndarray):
-        return f"{value.dtype} {value.shape}"
-    parts = isinstance(value, tuple) and value and not isinstance(value[0], (str, int, float))
-    return f"({len(value)} x {type(value[0]).__name__})" if parts else repr(value)
 
 
 def columns(pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,7 @@
 """Sections, natural shapes and moduli that vary along the path."""
 
+from operator import attrgetter
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -40,7 +42,7 @@ def test_the_mass_is_the_integral_of_the_section():
     )
     flat = build_model(load_scene(scene([rod([layer()], length=LENGTH, width=width)])))
     exact = 1000.0 * 1e-3 * (0.02 * 4e-3 + 0.03 * 7e-3 + 0.03 * 8e-3 + 0.02 * 6e-3)
-    assert flat.node_mass.sum() == pytest.approx(exact, rel=1e-12)
+    assert flat.rods.node_mass.sum() == pytest.approx(exact, rel=1e-12)
 
 
 def test_a_tapered_strip_sinks_as_fast_as_a_uniform_one_and_does_not_turn():
@@ -76,8 +78,10 @@ def test_a_constant_profile_is_the_number_and_stiffness_multiplies_the_moduli():
     )
     materials = {"gel": GEL, "stiff": {**GEL, "youngs_modulus": 3e8}}
     one, other = (build_model(load_scene(scene([r], materials=materials))) for r in (strip, same))
-    for name in ("axial_stiffness", "joint_stiffness", "joint_rest", "pair_stiffness", "node_mass", "spin_inertia"):
-        assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-14, abs=1e-18), name
+    of_rods = [f"rods.{name}" for name in ("axial_stiffness", "joint_stiffness", "node_mass", "spin_inertia")]
+    for name in (*of_rods, "drives.joint_rest", "bonds.stiffness"):
+        own = attrgetter(name)
+        assert own(one) == pytest.approx(own(other), rel=1e-14, abs=1e-18), name
 
 
 def test_the_section_is_drawn_and_touches_as_it_is():
