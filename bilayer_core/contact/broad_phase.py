@@ -15,8 +15,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from bilayer_core.contact.segment import square_distance
 from bilayer_core.jit import kernel, piece, record
 from bilayer_core.jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Vector
@@ -24,35 +22,40 @@ from bilayer_core.jit.record import Flags, FlagTable, IndexTable, Indices, Matri
 
 @record
 class RodSearch:
-    """A search for points and segments that come near each other, and what it finds; see `model.rod_surfaces`."""
+    """A search for points and segments that come near each other, and what it finds; see `model.rod_surfaces`.
+
+    The size ``"tree"`` is that of the tree, ``"near pair"`` the capacity for pairs.
+    """
 
     start_position: Matrix  # of nodes at the start of the run [m], shape (n_node, 3)
-    base: Matrix  # where a straight motion of nodes begins [m], shape (n_node, 3)
-    tip: Matrix  # and ends
-    edge_node: Indices
-    edge_radius: Vector
-    edge_rod: Indices
-    edge_first: Flags
-    edge_before: Indices  # on the same strand, −1 without one
-    edge_after: Indices
-    edge_arc: Matrix
-    first_point: Indices  # points of edge k are first_point[k] … first_point[k + 1] − 1
-    point_edge: Indices
-    point_fraction: Vector
-    point_arc: Vector
-    rod_can_collide: FlagTable
-    rod_joined: FlagTable
-    rod_exclusion: Vector
-    rod_length: Vector  # once round, infinite for rods with ends [m]
-    box: Matrix  # scratch: boxes of the tree, where children of b are 2 b and 2 b + 1 and leaves come last
-    sweep: Matrix  # of edges: middle, its motion, half of the length and, where ends move differently, the difference
-    met: IndexTable  # scratch: edges
-    count: Indices  # of pairs, more than are written if there is no capacity for them, shape (1,)
-    point: Indices  # the pairs
-    edge: Indices
-    before: Flags  # whether the point also sees the segment before, and
-    after: Flags  # that after, on the same strand
-    until: Vector  # path before which each stays beyond the barrier distance [m], see `contact.rod_list`
+    base: Matrix = ("node", 3)  # where a straight motion of nodes begins [m]
+    tip: Matrix = ("node", 3)  # and ends
+    edge_node: Indices  # first node of each edge, shape (n_edge,)
+    edge_radius: Vector  # largest radius of its strand's nodes [m], shape (n_edge,)
+    edge_rod: Indices  # expanded rod of each edge, shape (n_edge,)
+    edge_first: Flags  # whether the edge is the first of its strand in memory, shape (n_edge,)
+    edge_before: Indices  # the edge on the same strand that ends where it begins, −1 without one, shape (n_edge,)
+    edge_after: Indices  # the edge that begins where it ends, likewise
+    edge_arc: Matrix  # from and to along the path of its rod [m], shape (n_edge, 2)
+    first_point: Indices  # points of edge k are first_point[k] … first_point[k + 1] − 1, shape (n_edge + 1,)
+    point_edge: Indices  # shape (n_point,)
+    point_fraction: Vector  # position on its edge, 0 … 1, shape (n_point,)
+    point_arc: Vector  # along the path of its rod [m], shape (n_point,)
+    rod_can_collide: FlagTable  # whether two rods, or one and itself, can meet, shape (n_rod, n_rod)
+    rod_joined: FlagTable  # whether one body holds both, or both ends of one, shape (n_rod, n_rod)
+    rod_exclusion: Vector  # arc distance from which on a rod sees itself [m], shape (n_rod,)
+    rod_length: Vector  # once round a closed rod along its path, infinite for others [m], shape (n_rod,)
+    box: Matrix = ("tree", 6)  # scratch: boxes, where children of b are 2 b and 2 b + 1 and leaves come last
+    sweep: Matrix = ("edge", 7)  # middle of edges, its motion, half of the length, the difference of motions of ends
+    met: IndexTable = (2, "edge")  # scratch: edges
+    count: Indices = (1,)  # of pairs, more than are written if there is no capacity for them
+    point: Indices = ("near pair",)  # the pairs
+    edge: Indices = ("near pair",)
+    before: Flags = ("near pair",)  # whether the point also sees the segment before, and
+    after: Flags = ("near pair",)  # that after, on the same strand
+    until: Vector = (
+        "near pair",
+    )  # path before which each stays beyond the barrier distance [m], see `contact.rod_list`
 
 
 @kernel
@@ -89,10 +92,9 @@ def _arc_between(search, rod, first, last, k):
     return min(max(begin - first, last - end), once_round - max(end - last, first - begin))
 
 
-def scratch(edges: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return scratch arrays of a search among edges: shapes (2 n_leaf, 6), (n_edge, 7), and (2, n_edge), int64."""
-    leaves = 1 << max(edges - 1, 0).bit_length()
-    return np.empty((2 * leaves, 6)), np.empty((edges, 7)), np.empty((2, edges), dtype=np.int64)
+def tree_size(edges: int) -> int:
+    """Return the number of boxes of the tree of so many edges."""
+    return 2 << max(edges - 1, 0).bit_length()
 
 
 GROUP = 4

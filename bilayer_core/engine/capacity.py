@@ -89,7 +89,7 @@ def _twice(needed: int, most: int, what: str, remedy: Remedy, why: str = "") -> 
 
 def _densest(model: Model) -> str:
     """Return the strand with most points on an edge, as text."""
-    surfaces = model.rod_surfaces
+    surfaces = model.rod_search
     counts = surfaces.first_point[1:] - surfaces.first_point[:-1]
     edge = int(counts.argmax())
     strand = next(s for s in model.strands if s.first_edge <= edge < s.first_edge + s.node_count - 1)

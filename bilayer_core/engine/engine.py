@@ -94,7 +94,7 @@ class Engine:
         self.extrema = RunExtrema.zeros(
             sizes,
             mass_moment=model.mass_moment,
-            mass=float(model.node_mass.sum()),
+            mass=float(model.rods.node_mass.sum()),
             voronoi_length=model.voronoi_length,
         )
         self.start_over(-math.inf)
@@ -229,7 +229,7 @@ class Engine:
         if pair < 0:
             return "a rod would reach another"
         near = self._storage.problem.surfaces
-        surface = self._model.surfaces.names[near.near_surface[pair]]
+        surface = self._model.surface_names[near.near_surface[pair]]
         return f"{contact_point_names(self._model)[near.near_contact_point[pair]]} would reach the surface of {surface}"
 
     @property
@@ -280,7 +280,7 @@ class Engine:
 def new_inputs(model: Model, sizes: dict[str, int], ends: int) -> StageInputs:
     """Arrays for what acts at so many ends of stages, with prescribed bodies at the start of their paths."""
     inputs = StageInputs.zeros(sizes | {"stage end": ends})
-    for b in np.flatnonzero(model.bodies.free_index[:-1] < 0):
+    for b in np.flatnonzero(model.free_bodies.free_index[:-1] < 0):
         inputs.position[:, b], inputs.rotation[:, b] = model.bodies.start_position[b], model.bodies.start_rotation[b]
     return inputs
 
@@ -293,7 +293,7 @@ def error_norm_of(model: Model) -> ErrorNorm:
         length=float(max(rod.path.length for rod in model.scene.rods)),
         first_node=np.array(ends, dtype=np.int64),
         weight=shares / np.repeat(np.add.reduceat(shares, ends[:-1]), np.diff(ends)),
-        half_width=model.half_width if model.plane is None else np.zeros(0),
-        body_of_free=model.bodies.body_of_free,
-        bounding_radius=model.bodies.bounding_radius,
+        half_width=np.zeros(0) if model.plane.exists else model.rods.half_width,
+        body_of_free=model.free_bodies.body_of_free,
+        bounding_radius=model.free_bodies.bounding_radius,
     )

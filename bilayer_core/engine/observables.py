@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.engine.build_problem import fluid_of
 from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.forces.bend_twist import bending_strain
@@ -195,14 +194,14 @@ def observables_of(
     values, parts = zeros_in_one(shapes_of(Observables, sizes, COMPUTED))
     ends = np.cumsum([0, *(parts[name].size for name in COMPUTED)]).tolist()
     places = {name: (*ends[k : k + 2], parts[name].shape) for k, name in enumerate(COMPUTED)}
-    bends = slice(model.bend_count)
+    bends = slice(model.rods.bend_count)
     record = Observables.zeros(
         sizes,
         voronoi_length=model.voronoi_length,
         joint_node=model.joint_node[bends].astype(np.int64),
         **_tables_of(model),
-        holder=model.attached_body.astype(np.int64),
-        fluid=fluid_of(model, sizes) if len(model.fluid_mass) else Fluid.absent(),
+        holder=model.constrained.body,
+        fluid=model.fluid.allocated(sizes),
         owner_of_point=owner_of_point,
         owner_of_surface=owner_of_surface,
         owners=owners,
@@ -221,7 +220,7 @@ def _tables_of(model: Model) -> dict[str, Array]:
         nodes.append(np.arange(first, last + 1))
         edges.append(np.stack([np.concatenate([own[:1], own]), np.concatenate([own, own[-1:]])], axis=1))
         shut += [(first, last - 1), (last, first + 1)] if s.closed else []
-        ends += [pair for pair in ((first, first + 1), (last, last - 1)) if pair[0] not in model.attached_node]
+        ends += [pair for pair in ((first, first + 1), (last, last - 1)) if pair[0] not in model.constrained.node]
     return {
         "node": np.concatenate(nodes).astype(np.int64),
         "edges": np.concatenate(edges).astype(np.int64),

@@ -7,12 +7,9 @@ import numpy as np
 from bilayer_core.engine.build_problem import (
     contact_columns_of,
     lasting_groups,
-    plane_of,
     restitution_of,
     rod_contact_of,
-    sliding_of,
     slips_of,
-    surfaces_of,
 )
 from bilayer_core.engine.capacity import (
     FIRST_POINTS,
@@ -35,7 +32,7 @@ from bilayer_core.model.records.problem import BorderedSystem, Outcome, Problem,
 from bilayer_core.model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEEDED, ROD_CAPACITY_EXCEEDED
 from bilayer_core.model.records.step import Configuration, Point, Stage, Work
 from bilayer_core.model.rod_surfaces import NearPairs
-from bilayer_core.model.set_friction import friction_law, none_given
+from bilayer_core.model.set_friction import friction_law, friction_values, none_given
 from bilayer_core.model.sizes import sizes_of
 
 Array = np.ndarray
@@ -68,15 +65,12 @@ class Storage:
     def __init__(self, model: Model):
         require_computed(model.forces)
         self._model, self.sizes = model, sizes_of(model)
-        points = len(model.rod_surfaces.point_edge) if model.rod_surfaces is not None else 0
+        points = len(model.rod_search.point_edge)
         near = self.sizes["contact_point"] if model.has_surface_contact and self.sizes["surface"] else 0
-        columns = model.bodies.freedom.shape[1] + model.joined_unknowns(model.solved_layout).shape[0]
+        columns = model.free_bodies.freedom.shape[1] + len(model.joins.first)
         first = min(points, FIRST_POINTS)
         self._capacity = Capacity(near, first, first, columns)
-        self._pairs: NearPairs | None = None
-        if points:
-            geometry = model.rod_surfaces, model.edge_node, model.start_position
-            self._pairs = NearPairs(*geometry, PAIRS_PER_POINT * first)
+        self._pairs = NearPairs(model.rod_search, PAIRS_PER_POINT * first) if points else None
         self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
         self._width, self._memory = np.zeros(1, dtype=np.int64), np.zeros(memory_size(model))
         self._sums, of_dimension = self._lasting_sums()
@@ -90,7 +84,7 @@ class Storage:
         The hessians of the dimension are among these parts.
         """
         model, sizes = self._model, self.sizes
-        declared, names = (Space, IN_SPACE) if model.plane is None else (Plane, IN_PLANE)
+        declared, names = (Plane, IN_PLANE) if model.plane.exists else (Space, IN_SPACE)
         own = shapes_of(declared, sizes, names)
         first, sums = zeros_in_one(shapes_of(Sums, sizes, FIRST))
         second, parts = zeros_in_one(shapes_of(Sums, sizes, SECOND) | {("own", name): own[name] for name in names})
@@ -98,9 +92,8 @@ class Storage:
         sums |= {"gradients": first, "hessians": second, "lasting": np.zeros_like(first)}
         sums["selected"] = np.ones(sizes["force"], dtype=bool)
         of_dimension = {name: parts["own", name] for name in names}
-        if model.plane is None:
-            return sums, {"space": Space(**of_dimension), "plane": Plane.absent()}
-        return sums, {"space": Space.absent(), "plane": plane_of(model, self.sizes, of_dimension)}
+        space = Space.absent() if model.plane.exists else Space(**of_dimension)
+        return sums, {"space": space, "plane": model.plane.allocated(sizes, **of_dimension)}
 
     @property
     def problem(self) -> Problem:
@@ -125,7 +118,7 @@ class Storage:
         records = dict(
             **self._groups,
             bordered=BorderedSystem.zeros(sizes, width=self._width) if border else BorderedSystem.absent(),
-            surfaces=Surfaces.absent() if not surfaces else before.surfaces if same else surfaces_of(model, sizes),
+            surfaces=Surfaces.absent() if not surfaces else before.surfaces if same else self._surfaces(sizes),
             restitution=restitution_of(model, sizes),
             mechanisms=mechanisms_record(model),
             sliding=self._sliding(before, sizes) if surfaces else Sliding.absent(),
@@ -142,8 +135,16 @@ class Storage:
         }
         return Problem(**records, outcome=self.outcome, forces=force_table(model, records))
 
+    def _surfaces(self, sizes: dict[str, int]) -> Surfaces:
+        """Points and surfaces, without a list of those that are near each other yet."""
+        stiffness = self._model.contact_stiffness
+        return self._model.surfaces.allocated(sizes, stiffness=stiffness, margin=np.full(1, -1.0))
+
     def _sliding(self, before: Problem | None, sizes: dict[str, int]) -> Sliding:
-        sliding = sliding_of(self._model, sizes, friction_law(self._model.scene, self._model.forces, self._friction))
+        model, of_bodies = self._model, self._model.surfaces.contact_point_body >= 0
+        law = friction_law(model.scene, model.forces, self._friction)
+        grains = model.sliding.surface_grain, model.sliding.point_grain
+        sliding = model.sliding.allocated(sizes, **friction_values(law, of_bodies, *grains))
         if before is not None:
             _take_over(before.sliding, sliding, int(before.sliding.count[0]))
         if not sliding.acts:

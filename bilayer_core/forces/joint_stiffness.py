@@ -35,5 +35,5 @@ def across(axis: Sequence[float]) -> np.ndarray:
 
 def stiffness_of_joints(model: Model) -> tuple[float, float]:
     """By default: force by distance [N/m], and moment by angle [N m]."""
-    edge = float((model.axial_stiffness / model.rest_length).max())
-    return STIFFER * edge, STIFFER * float(model.joint_stiffness.max())
+    edge = float((model.rods.axial_stiffness / model.rods.rest_length).max())
+    return STIFFER * edge, STIFFER * float(model.rods.joint_stiffness.max())

@@ -205,7 +205,7 @@ def joints_of(model: Model) -> Joints:
     edge, bend = stiffness_of_joints(model)
     return Joints(
         body=body.reshape(-1),
-        free=bodies.free_index[body].reshape(-1),
+        free=model.free_bodies.free_index[body].reshape(-1),
         arm=np.einsum("ksij,ksi->ksj", turned, arms).reshape(-1, 3),
         direction=np.einsum("ksij,ksni->ksnj", turned, directions).reshape(-1, 3, 3),
         aligned=np.array([ALIGNED[joint.type] for joint in joints]),

@@ -301,7 +301,7 @@ def mechanisms_record(model: Model) -> Mechanisms:
         memory=np.zeros(1, dtype=np.int64),
         slides=np.array([m.slides for m in found]),
         body=body.reshape(-1),
-        free=bodies.free_index[body].reshape(-1),
+        free=model.free_bodies.free_index[body].reshape(-1),
         arm=np.einsum("ksij,ksi->ksj", rotation, np.array([m.point for m in found])[:, None] - position).reshape(-1, 3),
         axis=np.einsum("kij,ki->kj", rotation[:, 0], axis),
         mark=np.einsum("ksij,ki->ksj", rotation, marks).reshape(-1, 3),

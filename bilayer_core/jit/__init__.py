@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from bilayer_core.jit.kernel import entry, kernel
 from bilayer_core.jit.piece import caller, piece
-from bilayer_core.jit.record import Record, record, record_at, shapes_of, zeros_in_one
+from bilayer_core.jit.record import UNALLOCATED, Record, record, record_at, shapes_of, zeros_in_one
 
-__all__ = ["Record", "record", "record_at", "shapes_of", "zeros_in_one"]
+__all__ = ["UNALLOCATED", "Record", "record", "record_at", "shapes_of", "zeros_in_one"]
 __all__ += ["caller", "entry", "kernel", "piece"]

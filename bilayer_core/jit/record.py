@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import math
 import typing
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from itertools import accumulate
@@ -56,6 +57,8 @@ else:
     """Arrays of integers."""
     Flags, FlagTable = (types.Array(types.boolean, n, "C") for n in (1, 2))
     """Arrays of booleans."""
+UNALLOCATED: Mapping[str, int] = defaultdict(int)
+"""Sizes of a record whose arrays with a declared shape come later; see `Record.allocated`."""
 NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean}
 DTYPES = {types.float64: np.dtype(np.float64), types.int64: np.dtype(np.int64), types.boolean: np.dtype(np.bool_)}
 _ADDRESS_WORD = 4
@@ -170,6 +173,22 @@ class Record:
         made._lie_in(memory)
         return made
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({', '.join(f'{name}={shown(getattr(self, name))}' for name in self.names)})"
+
+    def allocated(self, sizes: Mapping[str, int], **values: Any) -> typing.Self:
+        """Return the record with arrays of its own where its class declares a shape, or itself if it is absent.
+
+        Parameters
+        ----------
+        sizes : mapping of str to int
+            What the names in shapes stand for.
+        **values
+            In place of those of this record.
+        """
+        lasting = {name: getattr(self, name) for name in self.names if name not in self.shapes}
+        return self.zeros(sizes, **lasting | values) if self.exists else self
+
     @classmethod
     def numba_type(cls) -> RecordType:
         """Its type in kernels."""
@@ -276,6 +295,14 @@ def record_at(declared: type[Record]):
         return declared.numba_type()(types.int64), generate
 
     return at
+
+
+def shown(value: object) -> str:
+    """Return an array as its type and shape; of several parts, how many there are."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape}"
+    parts = isinstance(value, tuple) and value and not isinstance(value[0], (str, int, float))
+    return f"({len(value)} x {type(value[0]).__name__})" if parts else repr(value)
 
 
 def _address(array: np.ndarray) -> int:

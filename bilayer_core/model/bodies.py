@@ -5,21 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.model.model import Bodies
+from bilayer_core.model.model import PlacedBodies
 from bilayer_core.model.plane import Plane
+from bilayer_core.model.records.parts import Bodies
 from bilayer_core.model.shape_numbers import Shape, shape_of
 from bilayer_core.model.strands import Collected
 from bilayer_core.scene.body import Body, Free, Guided, Prescribed
 from bilayer_core.scene.config import SceneConfig
 
 
-def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = None) -> Bodies:
-    """Bodies of a scene; free ones move in `plane` alone if one is given."""
+def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = None) -> tuple[PlacedBodies, Bodies]:
+    """Return the bodies of a scene, and their numbers and inertia; free ones move in `plane` alone if one is given."""
     motions = np.eye(6) if plane is None else plane.motions
     free = [index for index, body in enumerate(scene.bodies) if not isinstance(body.motion, Prescribed)]
     count = len(scene.bodies)
     velocity, angular_velocity = np.zeros((count, 3)), np.zeros((count, 3))
-    freedom = []
+    allowed = []
     for slot, index in enumerate(free):
         motion = scene.bodies[index].motion
         if isinstance(motion, Free):
@@ -29,33 +30,40 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
             velocity[index] = motion.speed * np.array(motion.axis or (0.0, 0.0, 0.0))
             angular_velocity[index] = motion.angular_speed * np.array(motion.hinge or (0.0, 0.0, 0.0))
             own = guided_motions(motion, motions)
-        allowed = np.zeros((6 * len(free), own.shape[1]))
-        allowed[6 * slot : 6 * slot + 6] = own
-        freedom.append(allowed)
+        columns = np.zeros((6 * len(free), own.shape[1]))
+        columns[6 * slot : 6 * slot + 6] = own
+        allowed.append(columns)
     shapes = tuple(shape_of(body.surface) if body.surface else None for body in scene.bodies)
     free_index = np.full(count + 1, -1, dtype=np.int64)
     free_index[free] = np.arange(len(free))
     held = _inertia_of_held(found, count)
     moments = np.array([_second_moment(scene.bodies[i], shapes[i], held[i]) for i in free]).reshape(len(free), 3, 3)
+    mass = np.array([scene.bodies[index].motion.mass for index in free], dtype=float)
+    freedom = np.concatenate(allowed, axis=1) if free else np.zeros((0, 0))
     schedules = [b.motion if isinstance(b.motion, Prescribed) else Prescribed(type="prescribed") for b in scene.bodies]
-    return Bodies(
+    placed = PlacedBodies(
         names=tuple(body.name for body in scene.bodies),
-        free_index=free_index,
-        body_of_free=np.array(free, dtype=np.int64),
         start_position=np.array([body.position for body in scene.bodies], dtype=float).reshape(count, 3),
         start_rotation=np.array([rotation_matrix(np.array(b.rotation)) for b in scene.bodies]).reshape(count, 3, 3),
         start_velocity=velocity,
         start_angular_velocity=angular_velocity,
-        mass=np.array([scene.bodies[index].motion.mass for index in free]),
-        isotropic=np.array([np.array_equal(j, j[0, 0] * np.eye(3)) for j in moments], dtype=bool),
-        second_moment=moments,
-        freedom=np.concatenate(freedom, axis=1) if freedom else np.zeros((0, 0)),
-        bounding_radius=_bounding_radii(scene, found, shapes, free, moments),
         shapes=shapes,
         controlled=np.array([i for i, motion in enumerate(schedules) if motion.controlled], dtype=np.int64),
         times=tuple(np.array(motion.times, dtype=float) for motion in schedules),
         displacements=tuple(np.array(motion.displacements, dtype=float).reshape(-1, 3) for motion in schedules),
         rotations=tuple(np.array(motion.rotations, dtype=float).reshape(-1, 3) for motion in schedules),
+    )
+    return placed, Bodies(
+        free_index=free_index,
+        body_of_free=np.array(free, dtype=np.int64),
+        prescribed=np.flatnonzero(free_index[:-1] < 0),
+        mass=mass,
+        second_moment=moments,
+        inertia=np.ravel([np.repeat([m, np.trace(j)], 3) for m, j in zip(mass, moments, strict=True)]),
+        freedom=freedom,
+        freedom_first=6 * (np.argmax(freedom != 0.0, axis=0) // 6) if free else free_index[:0],
+        bounding_radius=_bounding_radii(scene, found, shapes, free, moments),
+        rotates=np.array([index in free or body.motion.turns for index, body in enumerate(scene.bodies)], dtype=bool),
     )
 
 

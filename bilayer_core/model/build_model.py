@@ -1,4 +1,4 @@
-"""Build the arrays of a `Model` from a scene."""
+"""Build the records and arrays of a `Model` from a scene."""
 
 from __future__ import annotations
 
@@ -6,21 +6,35 @@ from dataclasses import replace
 
 import numpy as np
 
+from bilayer_core.jit import UNALLOCATED
 from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.bodies import build_bodies
 from bilayer_core.model.contact_points import build_contact, refuse_penetration
 from bilayer_core.model.force_list import active_forces
+from bilayer_core.model.immersed import build_fluid
 from bilayer_core.model.impacts import stiffness_for_impacts
 from bilayer_core.model.laminate import add_laminate
-from bilayer_core.model.model import Bodies, Model
+from bilayer_core.model.lit_elements import build_light
+from bilayer_core.model.model import Model, PlacedBodies
 from bilayer_core.model.planarity import require_plane
-from bilayer_core.model.plane import InPlane, Plane
+from bilayer_core.model.plane import Plane as ScenePlane
 from bilayer_core.model.point_loads import add_point_masses, build_loads
+from bilayer_core.model.records.parts import (
+    Attachments,
+    Bonds,
+    Constrained,
+    Drives,
+    Joins,
+    OffAxis,
+    Plane,
+    Strands,
+    Viscosity,
+)
 from bilayer_core.model.rod_penetration import refuse_meeting_rods
 from bilayer_core.model.rod_surfaces import build_rod_surfaces
 from bilayer_core.model.rods import add_bonded_rods
 from bilayer_core.model.strands import Collected
-from bilayer_core.model.unknown_order import number_unknowns
+from bilayer_core.model.unknown_order import Layout, columns, number_unknowns
 from bilayer_core.scene.config import SceneConfig
 
 ADD_ROD = {"two_rod": add_bonded_rods, "laminate": add_laminate}
@@ -28,7 +42,7 @@ ADD_ROD = {"two_rod": add_bonded_rods, "laminate": add_laminate}
 
 
 def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) -> Model:
-    """Arrays of one of the models, `ADD_ROD`, of `scene`, in space or, with dimension 2, in its plane.
+    """Build one of the models, `ADD_ROD`, of `scene`, in space or, with dimension 2, in its plane.
 
     Raises
     ------
@@ -43,113 +57,187 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     for rod in scene.rods:
         ADD_ROD[model](found, scene, rod, body_index)
     add_point_masses(scene, found)
-    edge_count, bond_joints = found.edge_count, "bond_"
-    bodies = build_bodies(scene, found, plane)
-    contact_points, surfaces = build_contact(scene, found, bodies, plane is not None)
-    clamp_edges = found.column("clamp_edge_tangent", width=3)
-    clamp_a = _resolve(found.column("joint_a", np.int64), edge_count)
-    clamp_b = _resolve(found.column("joint_b", np.int64), edge_count)
-
-    def joined(name: str, dtype=float, width: int | None = None) -> np.ndarray:
-        return np.concatenate([found.column(name, dtype, width), found.column(bond_joints + name, dtype, width)])
-
-    def pairs(name: str, dtype=float, width: int | None = None) -> np.ndarray:
-        return np.concatenate([found.column(kind + name, dtype, width) for kind in ("pair_", "end_")])
-
-    attached = found.column("attached_node", np.int64)
-    numbered = found.rods, found.node_count, edge_count, attached
-    laws = np.array(found.laws, dtype=float).reshape(-1, 6)
-    mass_moment = found.column("mass_moment")
-    arrays = Model(
+    placed, bodies = build_bodies(scene, found, plane)
+    contact = build_contact(scene, found, placed, bodies.free_index, plane is not None)
+    numbered = found.rods, found.node_count, found.edge_count, found.column("attached_node", np.int64)
+    layout = number_unknowns(*numbered)
+    solved = layout if plane is None else number_unknowns(*numbered, dimension=2)
+    forces, rods = active_forces(scene, model, dimension), _rods(found, layout, solved, plane)
+    constrained = _constrained(found, bodies.free_index, layout, solved)
+    drives, bonds = _drives(found), _bonds(found, rods.bend_count)
+    joined_node, joined_edge = found.column("joined_node", np.int64, 2), found.column("joined_edge", np.int64, 2)
+    flow, fluid = build_fluid(scene.fluid, found, rods.edge_node)
+    loads, followers, moments = build_loads(scene, found, placed.names, bodies.free_index)
+    rod_search, rod_point_weight = build_rod_surfaces(scene, found)
+    strain_coupling, mass_moment = found.column("strain_coupling", width=2), found.column("mass_moment")
+    built = Model(
         scene=scene,
-        forces=active_forces(scene, model, dimension),
+        forces=forces,
         strands=tuple(found.strands),
-        layout=number_unknowns(*numbered),
-        plane=None
-        if plane is None
-        else InPlane(
-            axes=plane.axes,
-            normal=plane.normal,
-            side=_sides(plane, found, bodies),
-            joint_after=_joints_after(clamp_a, clamp_b, edge_count),
-            layout=number_unknowns(*numbered, dimension=2),
-        ),
-        bodies=bodies,
+        layout=layout,
+        solved_layout=solved,
+        rods=rods,
+        viscosity=_viscosity(found) if "viscosity" in forces else Viscosity.absent(),
+        drives=drives,
+        light=build_light(scene, found, placed, rods, drives.law_channel),
+        plane=Plane.absent() if plane is None else _plane(plane, found, placed, rods),
+        off_axis=OffAxis.absent() if bonds.exists else _off_axis(found, rods, strain_coupling),
+        bonds=bonds,
+        free_bodies=bodies,
+        constrained=constrained,
+        attachments=_attachments(constrained, solved, rods) if len(bodies.mass) else Attachments.absent(),
+        joins=_joins(joined_node, joined_edge, solved),
+        flow=flow,
+        fluid=fluid,
+        loads=loads,
+        followers=followers,
+        moments=moments,
+        rod_search=rod_search,
+        **contact,
+        bodies=placed,
         contact_stiffness=0.0 if scene.contact is None else scene.contact.stiffness,
-        contact_points=contact_points,
-        surfaces=surfaces,
-        dead_loads=build_loads(scene, found, bodies, "world"),
-        follower_loads=build_loads(scene, found, bodies, "material"),
-        rod_surfaces=build_rod_surfaces(scene, found),
+        rod_point_weight=rod_point_weight,
         node_count=found.node_count,
-        edge_count=edge_count,
-        clamp_edge_count=len(clamp_edges),
-        bend_count=len(clamp_a),
         start_position=found.column("position", width=3),
-        start_director1=np.concatenate([found.column(name, width=3) for name in ("director1", "clamp_edge_director1")]),
-        clamp_edge_tangent=clamp_edges,
-        joined_node=found.column("joined_node", np.int64, 2),
-        joined_edge=found.column("joined_edge", np.int64, 2),
-        attached_node=attached,
-        attached_body=found.column("attached_body", np.int64),
-        attached_position=found.column("attached_position", width=3),
-        clamp_edge_body=found.column("attached_body", np.int64),
-        clamp_edge_joint=_joints_of_clamp_edges(clamp_a, clamp_b, edge_count, len(clamp_edges)),
-        drag_node=found.column("drag_node", np.int64),
-        drag_edge=found.column("drag_edge", np.int64, 2),
-        drag_coefficient=found.column("drag_coefficient", width=3),
-        fluid_mass=found.column("fluid_mass", width=3),
+        joined_node=joined_node,
+        joined_edge=joined_edge,
         node_length=found.column("node_length"),
-        node_mass=found.column("node_mass"),
         mass_moment=mass_moment if mass_moment.any() else mass_moment[:0],
-        spin_inertia=found.column("spin_inertia"),
-        half_width=found.column("half_width"),
-        edge_node=found.column("edge_node", np.int64),
-        rest_length=found.column("rest_length"),
-        axial_stiffness=found.column("axial_stiffness"),
-        rest_strain=found.column("rest_strain"),
-        driven_edge=found.column("driven_edge", np.int64),
-        driven_law=found.column("driven_law", np.int64),
-        driven_weight=found.column("driven_weight"),
-        driven_joint=found.column("driven_joint", np.int64),
-        driven_joint_law=found.column("driven_joint_law", np.int64),
-        driven_joint_weight=found.column("driven_joint_weight"),
-        law_channel=laws[:, 0].astype(np.int64),
-        law_rising=laws[:, 1].copy(),
-        law_falling=laws[:, 2].copy(),
-        law_gain=laws[:, 3].copy(),
-        law_reference=laws[:, 4].copy(),
-        law_saturation=laws[:, 5].copy(),
-        lit_law=found.column("lit_law", np.int64),
-        lit_edge=found.column("lit_edge", np.int64),
-        lit_side=found.column("lit_side"),
-        lit_height=found.column("lit_height"),
-        lit_half=found.column("lit_half"),
-        lit_slenderness=found.column("lit_slenderness"),
-        joint_a=np.concatenate([clamp_a, found.column("bond_joint_a", np.int64)]),
-        joint_b=np.concatenate([clamp_b, found.column("bond_joint_b", np.int64)]),
-        joint_stiffness=joined("joint_stiffness", width=3),
-        joint_rest=joined("joint_rest", width=3),
-        joint_node=joined("joint_node", np.int64),
+        joint_node=_of_joints(found, "joint_node", np.int64),
         voronoi_length=found.column("voronoi_length"),
-        coupled_joint=found.column("coupled_joint", np.int64),
-        strain_coupling=found.column("strain_coupling", width=2),
-        edge_time=found.column("edge_time"),
-        joint_time=joined("joint_time", width=3),
-        pair_time=pairs("time", width=3),
-        pair_joint=_resolve(pairs("joint", np.int64), len(clamp_a)),
-        pair_node=pairs("node", np.int64, 4),
-        pair_weight=pairs("weight", width=2),
-        pair_stiffness=pairs("stiffness", width=3),
-        pair_rest=pairs("rest", width=3),
+        strain_coupling=strain_coupling,
     )
-    refuse_penetration(arrays)
-    refuse_meeting_rods(arrays)
-    stiffness = stiffness_for_impacts(arrays)
-    return arrays if stiffness == arrays.contact_stiffness else replace(arrays, contact_stiffness=stiffness)
+    refuse_penetration(built)
+    refuse_meeting_rods(built)
+    stiffness = stiffness_for_impacts(built)
+    return built if stiffness == built.contact_stiffness else replace(built, contact_stiffness=stiffness)
 
 
-def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
+def _of_joints(found: Collected, name: str, dtype: type = float, width: int | None = None) -> np.ndarray:
+    """Return a column of all joints, those of bonds last."""
+    return np.concatenate([found.column(kind + name, dtype, width) for kind in ("", "bond_")])
+
+
+def _of_pairs(found: Collected, name: str, dtype: type = float, width: int | None = None) -> np.ndarray:
+    """Return a column of all vectors between layers, those where a layer ends last."""
+    return np.concatenate([found.column(kind + name, dtype, width) for kind in ("pair_", "end_")])
+
+
+def _rods(found: Collected, layout: Layout, solved: Layout, plane: ScenePlane | None) -> Strands:
+    return Strands(
+        size=solved.size,
+        dimension=solved.dimension,
+        edge_count=found.edge_count,
+        bend_count=found.joint_count,
+        bandwidth=solved.half_bandwidth,
+        axes=np.eye(3) if plane is None else plane.axes,
+        row=solved.node,
+        node_unknown=layout.node,
+        edge_unknown=layout.edge,
+        edge_node=found.column("edge_node", np.int64),
+        **{name: found.column(name) for name in ("node_mass", "spin_inertia", "half_width")},
+        **{name: found.column(name) for name in ("rest_length", "axial_stiffness")},
+        joint_a=_resolve(_of_joints(found, "joint_a", np.int64), found.edge_count),
+        joint_b=_resolve(_of_joints(found, "joint_b", np.int64), found.edge_count),
+        joint_stiffness=_of_joints(found, "joint_stiffness", width=3),
+    )
+
+
+def _viscosity(found: Collected) -> Viscosity:
+    return Viscosity(
+        edge_time=found.column("edge_time"),
+        joint_time=_of_joints(found, "joint_time", width=3),
+        pair_time=_of_pairs(found, "time", width=3),
+    )
+
+
+def _drives(found: Collected) -> Drives:
+    channel, *numbers = np.array(found.laws, dtype=float).reshape(-1, 6).T.copy()
+    laws = ("law_rising", "law_falling", "law_gain", "law_reference", "law_saturation")
+    return Drives(
+        rest_strain=found.column("rest_strain"),
+        joint_rest=_of_joints(found, "joint_rest", width=3),
+        **{
+            f"driven_{name}": found.column(f"driven_{name}", np.int64) for name in ("edge", "law", "joint", "joint_law")
+        },
+        **{f"driven_{name}": found.column(f"driven_{name}") for name in ("weight", "joint_weight")},
+        law_channel=channel.astype(np.int64),
+        **dict(zip(laws, numbers, strict=True)),
+    )
+
+
+def _bonds(found: Collected, bend_count: int) -> Bonds:
+    joint = _resolve(_of_pairs(found, "joint", np.int64), bend_count)
+    if not len(joint):
+        return Bonds.absent()
+    widths = {"weight": 2, "stiffness": 3, "rest": 3}
+    arrays = {name: _of_pairs(found, name, width=width) for name, width in widths.items()}
+    return Bonds(joint=joint, node=_of_pairs(found, "node", np.int64, 4), **arrays)
+
+
+def _off_axis(found: Collected, rods: Strands, coupling: np.ndarray) -> OffAxis:
+    joint = found.column("coupled_joint", np.int64)
+    lengths = np.concatenate([rods.rest_length, np.ones(found.clamp_count)])
+    slope = coupling / lengths[np.stack([rods.joint_a, rods.joint_b], axis=1)[joint]]
+    return OffAxis.zeros(UNALLOCATED, joint=joint, slope=slope)
+
+
+def _plane(plane: ScenePlane, found: Collected, bodies: PlacedBodies, rods: Strands) -> Plane:
+    after = np.full(rods.edge_count, -1, dtype=np.int64)
+    first, second = rods.joint_a[: rods.bend_count], rods.joint_b[: rods.bend_count]
+    inner = np.flatnonzero((first < rods.edge_count) & (second < rods.edge_count))
+    after[first[inner]] = inner
+    return Plane.zeros(UNALLOCATED, normal=plane.normal, side=_sides(plane, found, bodies), joint_after=after)
+
+
+def _constrained(found: Collected, free_index: np.ndarray, layout: Layout, solved: Layout) -> Constrained:
+    body = found.column("attached_body", np.int64)
+    free = free_index[body]
+    return Constrained(
+        node=found.column("attached_node", np.int64),
+        unknown=layout.attached,
+        row=solved.attached,
+        body=body,
+        free=free,
+        position=found.column("attached_position", width=3),
+        clamp_edge_body=body,
+        clamp_edge_free=free,
+        clamp_edge_tangent=found.column("clamp_edge_tangent", width=3),
+        clamp_edge_director1=np.concatenate(
+            [found.column(name, width=3) for name in ("director1", "clamp_edge_director1")]
+        ),
+    )
+
+
+def _attachments(held: Constrained, solved: Layout, rods: Strands) -> Attachments:
+    joints = np.empty(len(held.clamp_edge_body), dtype=np.int64)
+    for edges in (rods.joint_a, rods.joint_b):
+        of_clamp = np.flatnonzero(edges >= rods.edge_count)
+        joints[edges[of_clamp] - rods.edge_count] = of_clamp
+    return Attachments(
+        holding=int((held.free >= 0).sum()),
+        unknown=solved.attached,
+        free=held.free,
+        of_unknown=solved.attached_of_unknown,
+        clamp_edge_free=held.clamp_edge_free,
+        clamp_edge_joint=joints,
+    )
+
+
+def _joins(node: np.ndarray, edge: np.ndarray, solved: Layout) -> Joins:
+    """Return the unknowns of nodes and edges that closed strands have twice, each with its copy; absent without any."""
+    if not len(node):
+        return Joins.absent()
+    of_nodes = solved.node[node][:, None] + np.arange(solved.dimension)[:, None]
+    of_edges = solved.edge[edge] if solved.dimension == 3 else edge[:0]
+    unknowns = np.concatenate([of_nodes.reshape(-1, 2), of_edges])
+    column = np.full(solved.size, -1, dtype=np.int64)
+    column[unknowns] = np.arange(len(unknowns))[:, None]
+    first, copy = columns(unknowns)
+    return Joins(first=first, copy=copy, column=column)
+
+
+def _sides(plane: ScenePlane, found: Collected, bodies: PlacedBodies) -> np.ndarray:
     """Sign σ of m1 = σ normal × t of edges and clamp edges, shape (n_edge + n_clamp_edge,)."""
     rotation = bodies.start_rotation[found.column("attached_body", np.int64)]
     columns = [found.column(f"clamp_edge_{name}", width=3) for name in ("tangent", "director1")]
@@ -161,25 +249,8 @@ def _sides(plane: Plane, found: Collected, bodies: Bodies) -> np.ndarray:
     return np.sign(np.einsum("ki,ki->k", director1, cross(np.broadcast_to(plane.normal, tangent.shape), tangent)))
 
 
-def _joints_after(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int) -> np.ndarray:
-    """Return the joint between each edge and the next one of its strand, −1 if there is none, shape (n_edge,)."""
-    joints = np.full(edge_count, -1, dtype=np.int64)
-    inner = np.flatnonzero((joint_a < edge_count) & (joint_b < edge_count))
-    joints[joint_a[inner]] = inner
-    return joints
-
-
 def _resolve(numbers: np.ndarray, count: int) -> np.ndarray:
     """Edges or joints; those after the first `count`, clamp edges or bonds, were entered as −1 − their own number
     because `count` was not known then.
     """
     return np.where(numbers < 0, count - 1 - numbers, numbers)
-
-
-def _joints_of_clamp_edges(joint_a: np.ndarray, joint_b: np.ndarray, edge_count: int, clamp_edges: int) -> np.ndarray:
-    """Return the joint that each clamp edge takes part in, shape (n_clamp_edge,)."""
-    joints = np.empty(clamp_edges, dtype=np.int64)
-    for edges in (joint_a, joint_b):
-        of_clamp = np.flatnonzero(edges >= edge_count)
-        joints[edges[of_clamp] - edge_count] = of_clamp
-    return joints

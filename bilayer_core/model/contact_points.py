@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from bilayer_core.errors import PenetrationError
+from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
-from bilayer_core.model.model import Bodies, ContactPoints, Model, Surfaces
+from bilayer_core.model.model import Model, PlacedBodies
+from bilayer_core.model.records import contacts
+from bilayer_core.model.records.contacts import Sliding, Surfaces
 from bilayer_core.model.rod_points import RodPoints, rod_points
+from bilayer_core.model.set_friction import friction_values
 from bilayer_core.model.shape_numbers import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import Collected
@@ -42,9 +47,11 @@ class _Point:
 
 
 def build_contact(
-    scene: SceneConfig, found: Collected, bodies: Bodies, in_plane: bool
-) -> tuple[ContactPoints, Surfaces]:
-    """Contact points, and the surfaces that they can meet."""
+    scene: SceneConfig, found: Collected, bodies: PlacedBodies, free_index: np.ndarray, in_plane: bool
+) -> dict[str, Any]:
+    """Return the parts of a model that are of contact points and the surfaces that they can meet, by their names;
+    `free_index` as in `Bodies`.
+    """
     of_bodies, _ = colliders(scene)
     owned = owned_shapes(scene, bodies)
     surfaces = owned if scene.contact is not None else []
@@ -71,7 +78,8 @@ def build_contact(
     held_by = np.full(nodes, -1, dtype=np.int64)
     held_by[found.column("attached_node", np.int64)] = found.column("attached_body", np.int64)
     own, free = np.array([p.body for p in others], dtype=np.int64), np.full(len(of_rods.node), -1)
-    clear = scene.contact.barrier_distance if scene.contact is not None else 0.0
+    contact, node_edges = scene.contact, found.column("node_edges", np.int64, 2)
+    clear = contact.barrier_distance if contact is not None else 0.0
     of_nodes = _nodes_can_collide(found, of_rods, bodies, of_bodies, surfaces, held_by, clear)
     of_others = np.array([p.can_collide for p in others], dtype=bool).reshape(len(others), len(surfaces))
     rows = np.concatenate([of_nodes & (of_rods.node_weight > 0.0)[:, None], of_others, of_nodes[of_rods.node]])
@@ -79,23 +87,29 @@ def build_contact(
     surfaces = [surface for surface, is_used in zip(surfaces, used, strict=True) if is_used]
     groups, group = _distinct(rows[:, used])
 
-    contact_points = ContactPoints(
-        weight=np.concatenate([of_rods.node_weight, [p.length for p in others], of_rods.weight]),
+    point_body, moved_by = np.concatenate([np.full(nodes, -1), own, free]), np.concatenate([held_by, own, free])
+    arms = np.linalg.norm(of_rods.arm, axis=1)
+    has_arms = len(arms) > 0
+    record = Surfaces.zeros(
+        UNALLOCATED,
+        d_hat=clear,
+        stiffness=0.0,
         radius=np.concatenate([of_rods.node_radius, [p.radius for p in others], of_rods.radius]),
-        grain=np.concatenate([np.zeros((nodes, 3)), *(p.grain[None] for p in others), np.zeros((len(free), 3))]),
-        node_edges=found.column("node_edges", np.int64, 2),
-        node_axis=found.column("node_axis", np.int64),
-        body=np.concatenate([np.full(nodes, -1), own, free]).astype(np.int64),
-        moved_by=np.concatenate([held_by, own, free]).astype(np.int64),
-        position=np.array([p.position for p in others], dtype=float).reshape(-1, 3),
-        rod_point_node=of_rods.node,
-        rod_point_arm=of_rods.arm,
-        rod_point_start=of_rods.position,
-        point_count=len(shown),
+        weight=np.concatenate([of_rods.node_weight, [p.length for p in others], of_rods.weight]),
+        contact_point_body=point_body,
+        free_index=free_index if (free_index >= 0).any() else free_index[:0],
+        moved_by=moved_by,
+        node_free=held_by < 0,
         group=group.astype(np.int64),
-    )
-    return contact_points, Surfaces(
-        names=tuple(s.collider.name for s in surfaces),
+        point_position=np.array([p.position for p in others], dtype=float).reshape(-1, 3),
+        point_body=own,
+        node_edges=node_edges,
+        rod_points=(
+            contacts.RodPoints(first=nodes + len(others), node=of_rods.node, arm=of_rods.arm, longest=float(arms.max()))
+            if has_arms
+            else contacts.RodPoints.absent()
+        ),
+        arm_factor=_arm_factor(found, arms, node_edges[of_rods.node]),
         kind=np.array([NUMBER[s.shape.kind] for s in surfaces], dtype=np.int64),
         size=np.array([s.shape.core for s in surfaces]).reshape(-1, 3),
         rounding=np.array([s.shape.rounding for s in surfaces]),
@@ -103,10 +117,38 @@ def build_contact(
         body=np.array([s.body for s in surfaces], dtype=np.int64),
         position=np.array([s.position for s in surfaces]).reshape(-1, 3),
         rotation=np.array([s.rotation @ s.shape.rotation for s in surfaces]).reshape(-1, 3, 3),
-        grain=np.array([s.grain for s in surfaces]).reshape(-1, 3),
         can_collide=np.ascontiguousarray(groups.T),
         edge_can_cross=_edges_can_cross(found, of_nodes[:, used], surfaces),
+        margin=np.zeros(1),
     )
+    surface_grain = np.array([s.grain for s in surfaces]).reshape(-1, 3)
+    point_grain = np.zeros((len(point_body), 3))
+    point_grain[nodes : nodes + len(others)] = np.array([p.grain for p in others]).reshape(-1, 3)
+    friction = contact.friction if contact is not None else None
+    return dict(
+        surfaces=record,
+        sliding=Sliding.zeros(
+            UNALLOCATED,
+            node_axis=found.column("node_axis", np.int64),
+            surface_grain=surface_grain,
+            point_grain=point_grain,
+            **friction_values(friction, point_body >= 0, surface_grain, point_grain),
+        ),
+        surface_names=tuple(s.collider.name for s in surfaces),
+        point_count=len(shown),
+        rod_point_start=of_rods.position,
+    )
+
+
+def _arm_factor(found: Collected, arm: np.ndarray, edges: np.ndarray) -> float:
+    """How many times farther than nodes, and borders of edges by a turn, a contact point of a rod moves at most.
+
+    Its arm [m], shape (n_rod_point,), turns with the edges next to it, shape (n_rod_point, 2), by at most the motion of
+    one end against the other over their length, of which half is left at least.
+    """
+    slope = arm / found.column("rest_length")[edges].min(axis=1)
+    turn = arm / found.column("half_width")[edges].min(axis=1)
+    return float(np.max(1.0 + 4.0 * slope + turn, initial=1.0))
 
 
 BITS = 62
@@ -128,7 +170,7 @@ def _grain(surface: Surface | Obstacle | None) -> np.ndarray:
     return np.zeros(3) if surface is None or surface.grain is None else np.array(surface.grain)
 
 
-def owned_shapes(scene: SceneConfig, bodies: Bodies) -> list[Owned]:
+def owned_shapes(scene: SceneConfig, bodies: PlacedBodies) -> list[Owned]:
     """Shapes of obstacles, then of bodies."""
     of_bodies, of_obstacles = colliders(scene)
     world = len(scene.bodies)
@@ -156,7 +198,7 @@ def _points_of(part: Owned, owners: list[Collider]) -> list[_Point]:
 def _nodes_can_collide(
     found: Collected,
     points: RodPoints,
-    bodies: Bodies,
+    bodies: PlacedBodies,
     of_bodies: list[Collider],
     surfaces: list[Owned],
     held_by: np.ndarray,
@@ -210,39 +252,37 @@ def contact_point_names(model: Model) -> list[str]:
     """Return the name of each contact point in messages."""
     names = [f"node {k} of {s.name}" for s in model.strands for k in range(s.node_count)]
     parts = [*model.bodies.names, "an obstacle"]
-    contact_points = model.contact_points
+    surfaces = model.surfaces
     of_rods = [
         f"the border of {names[node]}" if across else names[node]
-        for node, (_, across) in zip(contact_points.rod_point_node, contact_points.rod_point_arm, strict=True)
+        for node, (_, across) in zip(surfaces.rod_points.node, surfaces.rod_points.arm, strict=True)
     ]
-    for k, position in enumerate(contact_points.position):
-        body = contact_points.body[model.node_count + k]
-        centre = k >= contact_points.point_count and not position.any()
+    for k, (position, body) in enumerate(zip(surfaces.point_position, surfaces.point_body, strict=True)):
+        centre = k >= model.point_count and not position.any()
         names.append(f"body {parts[body]}" if centre else f"contact point {k} ({parts[body]})")
     return names + of_rods
 
 
 def start_contact_points(model: Model) -> np.ndarray:
     """Positions of all contact points at the start [m], shape (n_contact_point, 3)."""
-    bodies, contact_points = model.bodies, model.contact_points
-    body = contact_points.body[model.node_count :][: len(contact_points.position)]
+    bodies, body = model.bodies, model.surfaces.point_body
     base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[body]
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[body]
-    of_bodies = base + np.einsum("kij,kj->ki", rotation, contact_points.position)
-    return np.concatenate([model.start_position, of_bodies, contact_points.rod_point_start])
+    of_bodies = base + np.einsum("kij,kj->ki", rotation, model.surfaces.point_position)
+    return np.concatenate([model.start_position, of_bodies, model.rod_point_start])
 
 
 def refuse_penetration(model: Model) -> None:
     """Raise PenetrationError if a contact point starts behind a surface that it meets, or touching it."""
-    contact_points, surfaces, bodies = model.contact_points, model.surfaces, model.bodies
+    surfaces, bodies = model.surfaces, model.bodies
     position, faults = start_contact_points(model), []
     base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[surfaces.body]
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[surfaces.body]
-    for s, name in enumerate(surfaces.names):
+    for s, name in enumerate(model.surface_names):
         core = Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, rotation[s] @ surfaces.rotation[s])
         origin = base[s] + rotation[s] @ surfaces.position[s]
-        gap = signed_distance(core, position - origin) - surfaces.rounding[s] - contact_points.radius
-        behind = np.flatnonzero((gap <= 0.0) & surfaces.can_collide[s][contact_points.group])
+        gap = signed_distance(core, position - origin) - surfaces.rounding[s] - surfaces.radius
+        behind = np.flatnonzero((gap <= 0.0) & surfaces.can_collide[s][surfaces.group])
         faults += [(gap[i], i, name) for i in behind]
     if faults:
         depth, contact_point, surface = min(faults)

@@ -4,21 +4,43 @@ from __future__ import annotations
 
 import numpy as np
 
+from bilayer_core.jit import UNALLOCATED
+from bilayer_core.model.records.parts import Flow, Fluid
 from bilayer_core.model.section import outline
 from bilayer_core.model.strands import Collected, Span, stations_of
-from bilayer_core.scene.config import Fluid
+from bilayer_core.model.unknown_order import columns
+from bilayer_core.scene import config
 from bilayer_core.scene.rod import Rod
 
 Array = np.ndarray
 
 
-def add_fluid(found: Collected, fluid: Fluid | None, rod: Rod, copies: list[list[Span]]) -> None:
+def add_fluid(found: Collected, fluid: config.Fluid | None, rod: Rod, copies: list[list[Span]]) -> None:
     """Add what a fluid does to copies of a rod, each with one strand for each layer, or one for all."""
     if fluid is None:
         return
     _add_drag(found, fluid, rod, copies)
     if fluid.added_mass is not None:
         _add_added_mass(found, fluid, rod, copies)
+
+
+def build_fluid(fluid: config.Fluid | None, found: Collected, edge_node: Array) -> tuple[Flow, Fluid]:
+    """Return the records of drag and of added mass, absent without them; `edge_node` as in `Strands`."""
+    if fluid is None:
+        return Flow.absent(), Fluid.absent()
+    velocity, (before, after) = np.array(fluid.velocity), columns(found.column("drag_edge", np.int64, 2))
+    flow = Flow.zeros(
+        UNALLOCATED,
+        velocity=velocity,
+        node=found.column("drag_node", np.int64),
+        edge_before=before,
+        edge_after=after,
+        coefficient=found.column("drag_coefficient", width=3),
+    )
+    mass, joined = found.column("fluid_mass", width=3), found.column("joined_node", np.int64, 2)
+    if not len(mass):
+        return flow, Fluid.absent()
+    return flow, Fluid.zeros(UNALLOCATED, velocity=velocity, edge_node=edge_node, mass=mass, joined=joined)
 
 
 def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:
@@ -29,7 +51,7 @@ def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:
     return thickness, layers / thickness if len(spans) == len(layers) else np.ones((1, len(thickness)))
 
 
-def _add_drag(found: Collected, fluid: Fluid, rod: Rod, copies: list[list[Span]]) -> None:
+def _add_drag(found: Collected, fluid: config.Fluid, rod: Rod, copies: list[list[Span]]) -> None:
     """Drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts at
     the middle.
     """
@@ -50,7 +72,7 @@ def _add_drag(found: Collected, fluid: Fluid, rod: Rod, copies: list[list[Span]]
             found.add(drag_node=first_node + station, drag_edge=first_edge + edges, drag_coefficient=coefficient)
 
 
-def _add_added_mass(found: Collected, fluid: Fluid, rod: Rod, copies: list[list[Span]]) -> None:
+def _add_added_mass(found: Collected, fluid: config.Fluid, rod: Rod, copies: list[list[Span]]) -> None:
     """Add the added mass of the whole section along each edge, shared by its layers in proportion to thickness."""
     edges = stations_of(rod)[1]
     width, layers = outline(rod, np.arange(edges) + 0.5)

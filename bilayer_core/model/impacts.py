@@ -33,10 +33,10 @@ def stiffness_that_holds(energy_per_length: float, distance: float) -> float:
 def heaviest(model: Model) -> float:
     """Largest mass per length of contact, of free bodies and of nodes [kg/m]."""
     own = model.node_length > 0.0
-    points, found = model.contact_points, [float((model.node_mass[own] / model.node_length[own]).max())]
-    for slot, body in enumerate(model.bodies.body_of_free):
-        weights = points.weight[points.body == body]
-        found += [float(model.bodies.mass[slot] / weights.max())] if weights.size else []
+    found = [float((model.rods.node_mass[own] / model.node_length[own]).max())]
+    for slot, body in enumerate(model.free_bodies.body_of_free):
+        weights = model.surfaces.weight[model.surfaces.contact_point_body == body]
+        found += [float(model.free_bodies.mass[slot] / weights.max())] if weights.size else []
     return max(found)
 
 
@@ -87,22 +87,23 @@ def reason_of_stiffness(model: Model) -> dict[str, str]:
 
 def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
     """Name, mass [kg], length of contact [m] and speed towards the nearest plane of free bodies and rods [m/s]."""
-    bodies, points = model.bodies, model.contact_points
+    bodies, free, points = model.bodies, model.free_bodies, model.surfaces
     if not model.has_surface_contact:
         return
-    for slot, body in enumerate(bodies.body_of_free):
-        own = np.flatnonzero(points.body == body)
+    for slot, body in enumerate(free.body_of_free):
+        own = np.flatnonzero(points.contact_point_body == body)
         if own.size:
             positions = (
-                bodies.start_position[body] + points.position[own - model.node_count] @ bodies.start_rotation[body].T
+                bodies.start_position[body]
+                + points.point_position[own - model.node_count] @ bodies.start_rotation[body].T
             )
             speed = _speed(model, positions, points.radius[own], bodies.start_velocity[body])
-            yield f"body {bodies.names[body]!r}", float(bodies.mass[slot]), float(points.weight[own].max()), speed
+            yield f"body {bodies.names[body]!r}", float(free.mass[slot]), float(points.weight[own].max()), speed
     for strand in model.strands:
         nodes = strand.first_node + np.arange(strand.node_count)
-        if not np.isin(nodes, model.attached_node).any():
+        if not np.isin(nodes, model.constrained.node).any():
             speed = _speed(model, model.start_position[nodes], points.radius[nodes], np.zeros(3))
-            mass, length = model.node_mass[nodes].sum(), model.node_length[nodes].sum()
+            mass, length = model.rods.node_mass[nodes].sum(), model.node_length[nodes].sum()
             yield f"rod {strand.name!r}", float(mass), float(length), speed
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.contact.light import brightness, look_at_light
-from bilayer_core.jit import piece
+from bilayer_core.jit import UNALLOCATED, piece
 from bilayer_core.model.contact_points import owned_shapes
-from bilayer_core.model.model import Model
+from bilayer_core.model.model import Model, PlacedBodies
 from bilayer_core.model.records.light import Light
+from bilayer_core.model.records.parts import Strands
 from bilayer_core.model.section import outline
 from bilayer_core.model.shape_numbers import NUMBER
 from bilayer_core.model.sizes import sizes_of
@@ -55,34 +56,31 @@ def add_lit_elements(
     return numbers
 
 
-def light_of(model: Model) -> Light:
+def build_light(scene: SceneConfig, found: Collected, bodies: PlacedBodies, rods: Strands, law_channel: Array) -> Light:
     """Return the elements that lights shine on, and directions to the lights at the start; absent if no layer
     follows a light.
     """
-    if not len(model.lit_law):
+    law = found.column("lit_law", np.int64)
+    if not len(law):
         return Light.absent()
-    scene, bodies = model.scene, model.bodies
     names = list(scene.stimuli)
     lights = [name for name in names if scene.stimuli[name].light is not None]
     number = {names.index(name): k for k, name in enumerate(lights)}
     casts = np.array([scene.stimuli[name].light.shadow for name in lights])
     shapes = owned_shapes(scene, bodies) if casts.any() else []
-    light = Light.zeros(
-        sizes_of(model),
-        law=model.lit_law,
-        edge=model.lit_edge,
-        side=model.lit_side,
-        height=model.lit_height,
-        half=model.lit_half,
-        slenderness=model.lit_slenderness,
-        source=np.array([number[channel] for channel in model.law_channel[model.lit_law]], dtype=np.int64),
+    return Light.zeros(
+        UNALLOCATED,
+        law=law,
+        edge=found.column("lit_edge", np.int64),
+        **{name: found.column(f"lit_{name}") for name in ("side", "height", "half", "slenderness")},
+        source=np.array([number[channel] for channel in law_channel[law]], dtype=np.int64),
         direction=np.array([scene.stimuli[name].light.from_direction for name in lights]),
         casts=casts,
-        edge_node=model.edge_node,
-        half_width=model.half_width,
-        blocker=np.concatenate([s.first_edge + np.arange(s.shown - 1) for s in model.strands]),
-        section=_sections(model),
-        softness=model.rest_length,
+        edge_node=rods.edge_node,
+        half_width=rods.half_width,
+        blocker=np.concatenate([s.first_edge + np.arange(s.shown - 1) for s in found.strands]),
+        section=_sections(found),
+        softness=rods.rest_length,
         kind=np.array([NUMBER[s.shape.kind] for s in shapes], dtype=np.int64),
         size=np.array([s.shape.core for s in shapes]).reshape(-1, 3),
         rounding=np.array([s.shape.rounding for s in shapes], dtype=float),
@@ -91,20 +89,25 @@ def light_of(model: Model) -> Light:
         position=np.array([s.position for s in shapes]).reshape(-1, 3),
         rotation=np.array([s.rotation @ s.shape.rotation for s in shapes]).reshape(-1, 3, 3),
     )
-    light.body_rotation[-1] = np.eye(3)
-    light.seen[:] = 1.0
-    return light
 
 
-def _sections(model: Model) -> Array:
+def _sections(found: Collected) -> Array:
     """Return a number for each place along a rod, the same for the edges of both layers there, shape (n_edge,)."""
     numbers: dict[tuple[str, int], int] = {}
-    section = np.zeros(model.edge_count, dtype=np.int64)
-    for strand in model.strands:
+    section = np.zeros(found.edge_count, dtype=np.int64)
+    for strand in found.strands:
         for k in range(strand.node_count - 1):
             place = strand.rod, strand.first_station + k % (strand.shown - 1)
             section[strand.first_edge + k] = numbers.setdefault(place, len(numbers))
     return section
+
+
+def light_of(model: Model) -> Light:
+    """Return the light of a model with arrays of its own, in which nothing is hidden; absent as in the model."""
+    light = model.light.allocated(sizes_of(model))
+    if light.exists:
+        light.body_rotation[-1], light.seen[:] = np.eye(3), 1.0
+    return light
 
 
 @piece(int, Light, int)

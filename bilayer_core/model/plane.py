@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from bilayer_core.kinematics.frame_strains import cross
-from bilayer_core.model.unknown_order import Layout, ReadOnlyArrays
+from bilayer_core.model.unknown_order import ReadOnlyArrays
 
 Array = np.ndarray
 COORDINATES = "xyz"
@@ -50,29 +50,3 @@ class Plane(ReadOnlyArrays):
             ", ".join(f"{value:.6g}" for value in np.round(vector, 9) + 0.0) for vector in (self.normal, self.point)
         )
         return f"the plane with normal ({normal}) through ({point}) m"
-
-
-@dataclass(frozen=True)
-class InPlane(ReadOnlyArrays):
-    """Additional arrays of a model of dimension 2.
-
-    Unknowns in space, of which a step of Newton's method is one vector, keep the order of `Model.layout`; those that
-    are solved for are in that of `layout`.
-
-    Attributes
-    ----------
-    axes, normal : Array
-        Of the plane, shapes (2, 3), (3,).
-    side : Array
-        σ of every edge and clamp edge: m1 = σ normal × t, m2 = σ normal, shape (n_edge + n_clamp_edge,).
-    joint_after : Array
-        Joint between each edge and the next one, −1 at the end of a strand, shape (n_edge,).
-    layout : Layout
-        Two unknowns a node, none an edge.
-    """
-
-    axes: Array
-    normal: Array
-    side: Array
-    joint_after: Array
-    layout: Layout

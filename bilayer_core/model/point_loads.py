@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from bilayer_core.model.model import Bodies, LoadShares, PointLoads
+from bilayer_core.jit import UNALLOCATED
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.records.parts import Moments, PointForces
 from bilayer_core.model.section import outline
 from bilayer_core.model.strands import Collected, Span
+from bilayer_core.model.unknown_order import columns
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.rod import Rod
 
@@ -27,33 +30,60 @@ def add_point_masses(scene: SceneConfig, found: Collected) -> None:
     found.columns["node_mass"], found.columns["mass_moment"] = [node_mass], [moment]
 
 
-def build_loads(scene: SceneConfig, found: Collected, bodies: Bodies, frame: str) -> PointLoads:
-    """Arrays of the loads whose components are in one of the two frames."""
+def build_loads(
+    scene: SceneConfig, found: Collected, names: Sequence[str], free_index: np.ndarray
+) -> tuple[PointForces, PointForces, Moments]:
+    """Return forces of fixed direction, forces that turn with what they act on, and moments; absent without loads.
+
+    Parameters
+    ----------
+    scene : SceneConfig
+    found : Collected
+    names : sequence of str
+        Of bodies.
+    free_index : ndarray
+        As in `Bodies`.
+    """
     if not scene.loads:
-        return NO_LOADS
-    nodes, forces, moments = [], [], []  # target, load, vector
+        return PointForces.absent(), PointForces.absent(), Moments.absent()
+    parts: dict[str, tuple[list, list, list]] = {"world": ([], [], []), "material": ([], [], [])}
     for index, load in enumerate(scene.loads):
-        if load.frame != frame:
-            continue
+        on_nodes, on_bodies, moments = parts[load.frame]  # target, load, vector
         if load.body is not None:
-            free = bodies.free_index[bodies.names.index(load.body)]
-            forces += [(free, index, load.force)] if any(load.force) else []
+            free = free_index[names.index(load.body)]
+            on_bodies += [(free, index, load.force)] if any(load.force) else []
             moments += [(free, index, load.moment)] if any(load.moment) else []
             continue
         for rod, spans, _ in _copies(scene, found, load.rod):
-            parts = zip(*_shares(rod, spans, load.position), strict=True)
-            nodes += [(node, index, share * np.array(load.force)) for node, share in parts]
-    return PointLoads(*(_load_shares(parts) for parts in (nodes, forces, moments)))
+            shares = zip(*_shares(rod, spans, load.position), strict=True)
+            on_nodes += [(node, index, share * np.array(load.force)) for node, share in shares]
+    (*dead, dead_moments), (*following, following_moments) = parts.values()
+    body, number, vector = _arrays(dead_moments + following_moments)
+    all_moments = Moments.zeros(UNALLOCATED, dead=len(dead_moments), body=body, load=number, vector=vector)
+    return _point_forces("loads", found, *dead), _point_forces("followers", found, *following), all_moments
 
 
-def _load_shares(parts: list[tuple[int, int, np.ndarray]]) -> LoadShares:
+def _arrays(parts: list[tuple[int, int, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return targets, loads and vectors of parts of loads."""
     target, load, vector = zip(*parts, strict=True) if parts else ((), (), ())
-    return LoadShares(
-        np.array(target, dtype=np.int64), np.array(load, dtype=np.int64), np.array(vector, dtype=float).reshape(-1, 3)
+    return np.array(target, dtype=np.int64), np.array(load, dtype=np.int64), np.array(vector, float).reshape(-1, 3)
+
+
+def _point_forces(name: str, found: Collected, on_nodes: list, on_bodies: list) -> PointForces:
+    (node, node_load, node_vector), (body, body_load, body_vector) = _arrays(on_nodes), _arrays(on_bodies)
+    before, after = columns(found.column("node_edges", np.int64, 2)[node])
+    return PointForces.zeros(
+        UNALLOCATED,
+        energy_slot=slot_of(name),
+        node=node,
+        node_load=node_load,
+        node_vector=node_vector,
+        body=body,
+        body_load=body_load,
+        body_vector=body_vector,
+        edge_before=before,
+        edge_after=after,
     )
-
-
-NO_LOADS = PointLoads(*(_load_shares([]) for _ in range(3)))
 
 
 def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[Rod, list[Span], float]]:

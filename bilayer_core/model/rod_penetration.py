@@ -20,20 +20,20 @@ def refuse_meeting_rods(model: Model) -> None:
     PenetrationError
         It names two places, and by how much they overlap.
     """
-    surfaces = model.rod_surfaces
-    if surfaces is None:
+    rods = model.rod_search
+    if not rods.exists:
         return
     position = model.start_position
-    pairs = NearPairs(surfaces, model.edge_node, position)
+    pairs = NearPairs(rods)
     pairs.find(position, model.scene.contact.barrier_distance, 0.0, most=MOST_SHOWN)
     if pairs.count == 0:
         return
     point, edge = pairs.search.point[: pairs.count], pairs.search.edge[: pairs.count]
-    own, i, j = surfaces.point_edge[point], model.edge_node[surfaces.point_edge[point]], model.edge_node[edge]
-    s, along = surfaces.point_fraction[point][:, None], position[j + 1] - position[j]
+    own, i, j = rods.point_edge[point], rods.edge_node[rods.point_edge[point]], rods.edge_node[edge]
+    s, along = rods.point_fraction[point][:, None], position[j + 1] - position[j]
     between = (1.0 - s) * position[i] + s * position[i + 1] - position[j]
     t = np.clip((between * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
-    gap = np.linalg.norm(between - t[:, None] * along, axis=1) - surfaces.edge_radius[own] - surfaces.edge_radius[edge]
+    gap = np.linalg.norm(between - t[:, None] * along, axis=1) - rods.edge_radius[own] - rods.edge_radius[edge]
     worst = int(np.argmin(gap))
     places = [_place(model, own[worst], s[worst, 0]), _place(model, edge[worst], t[worst])]
     raise PenetrationError(

@@ -1,19 +1,29 @@
-"""Rods as surfaces for each other: points on their edges, and which points see which edges."""
+"""Rods as surfaces for each other: points on their edges, and which points see which edges.
+
+The points of an edge divide it evenly, its first node among them (and its last where a strand ends), no farther apart
+than the strand's radius: no other rod fits between them, whatever the mesh. A point stands for the length between the
+middles to its neighbours, at the ends for half of it.
+
+A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of `FEW_EDGES`
+edges and π/2 (H + d̂), with H the thickness of the rod, or twice the radius about its nodes where these are nearer to
+one face. A rod that met itself nearer than that would be bent more sharply than half of it.
+
+Edges that are copies (`model.strand_arrays`) have no points, and belong to one rod more that meets nothing.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
 
-from bilayer_core.contact.broad_phase import RodSearch, near_pairs, scratch
+from bilayer_core.contact.broad_phase import RodSearch, near_pairs, tree_size
 from bilayer_core.errors import SceneError
+from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.rod_pairs import rod_pairs
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import Collected
-from bilayer_core.model.unknown_order import ReadOnlyArrays
 from bilayer_core.model.validity import edge_figures
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.rod import Rod
@@ -28,40 +38,8 @@ MOST_PAIRS = 10_000_000
 FEW_EDGES = 2  # that a point is away from the nearest edge of its own rod that it sees, at least
 
 
-@dataclass(frozen=True)
-class RodSurfaces(ReadOnlyArrays):
-    """Points of rods that can meet, and the segments that they face.
-
-    The points of an edge divide it evenly, its first node among them (and its last where a strand ends), no farther
-    apart than the strand's radius: no other rod fits between them, whatever the mesh. A point stands for the
-    length between the middles to its neighbours, at the ends for half of it.
-
-    A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of
-    `FEW_EDGES` edges and π/2 (H + d̂), with H the thickness of the rod, or twice the radius about its nodes where these
-    are nearer to one face. A rod that met itself nearer than that would be bent more sharply than half of it.
-
-    Edges that are copies (`model.strand_arrays`) have no points, and belong to one rod more that meets nothing.
-    """
-
-    edge_rod: Array  # expanded rod of each edge, shape (n_edge,)
-    edge_first: Array  # whether the edge is the first of its strand in memory, shape (n_edge,)
-    edge_before: Array  # the edge that ends where it begins, −1 without one, shape (n_edge,)
-    edge_after: Array  # the edge that begins where it ends, likewise
-    edge_arc: Array  # from and to along the path of its rod [m], shape (n_edge, 2)
-    edge_radius: Array  # largest radius of its strand's nodes [m], shape (n_edge,)
-    first_point: Array  # of each edge, shape (n_edge + 1,)
-    point_edge: Array  # shape (n_point,)
-    point_fraction: Array  # position on its edge, 0 … 1, shape (n_point,)
-    point_arc: Array  # along the path of its rod [m], shape (n_point,)
-    point_weight: Array  # Δl [m], shape (n_point,)
-    rod_can_collide: Array  # whether two rods, or one and itself, can meet, shape (n_rod, n_rod)
-    rod_joined: Array  # whether one body holds both, or both ends of one, shape (n_rod, n_rod)
-    rod_exclusion: Array  # arc distance from which on a rod sees itself [m], shape (n_rod,)
-    rod_length: Array  # once round a closed rod along its path [m], infinite for others, shape (n_rod,)
-
-
-def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | None:
-    """Return the surfaces of rods, or None if none of them can meet.
+def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch, Array]:
+    """Return the search for rods that meet, absent if none can, and the length of rod that its points stand for [m].
 
     Raises
     ------
@@ -70,7 +48,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     """
     decisions = [rod_pair for rod_pair in rod_pairs(scene) if rod_pair.active]
     if not decisions:
-        return None
+        return RodSearch.absent(), np.zeros(0)
     copies = [(index, copy) for index, rod in enumerate(scene.rods) for copy in rod.copies]
     scene_index = np.array([index for index, _ in copies])  # of each rod with copies
     rods, numbers = [copy.rod for _, copy in copies], {copy.name: number for number, (_, copy) in enumerate(copies)}
@@ -132,7 +110,11 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
     exclusion += [max(exclusion)] * spare
     arrays = {name: np.ascontiguousarray(np.concatenate(values)) for name, values in parts.items()}
     counts = arrays.pop("points_of_edge")
-    return RodSurfaces(
+    weight = arrays.pop("point_weight")
+    search = RodSearch.zeros(
+        UNALLOCATED,
+        start_position=found.column("position", width=3),
+        edge_node=found.column("edge_node", np.int64),
         **arrays,
         first_point=np.concatenate([[0], np.cumsum(counts)]),
         rod_can_collide=can_collide,
@@ -140,6 +122,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> RodSurfaces | No
         rod_exclusion=np.array(exclusion),
         rod_length=np.array([rod.path.length if rod.closed else math.inf for rod in rods] + [math.inf] * spare),
     )
+    return search, weight
 
 
 def _too_thin(scene: SceneConfig, strand: StrandArrays, radius: float, total: float) -> SceneError:
@@ -206,23 +189,10 @@ class NearPairs:
         What `near_pairs` takes and writes; another object after `reserve`.
     """
 
-    def __init__(self, surfaces: RodSurfaces, edge_node: Array, start_position: Array, capacity: int = 0):
-        box, sweep, met = scratch(len(edge_node))
-        base, tip = np.zeros((2, *start_position.shape))
-        names = ("edge_radius", "edge_rod", "edge_first", "edge_before", "edge_after", "edge_arc", "first_point")
-        names += ("point_edge", "point_fraction", "point_arc")
-        names += ("rod_can_collide", "rod_joined", "rod_exclusion", "rod_length")
-        self._geometry = dict(
-            start_position=np.array(start_position),
-            base=base,
-            tip=tip,
-            edge_node=edge_node,
-            **{name: getattr(surfaces, name) for name in names},
-            box=box,
-            sweep=sweep,
-            met=met,
-        )
-        self.reserve(capacity)
+    def __init__(self, search: RodSearch, capacity: int = 0):
+        edges = len(search.edge_node)
+        sizes = {"node": len(search.start_position), "edge": edges, "tree": tree_size(edges), "near pair": capacity}
+        self.search = search.allocated(sizes)
 
     @property
     def count(self) -> int:
@@ -236,15 +206,8 @@ class NearPairs:
 
     def reserve(self, capacity: int) -> None:
         """Have capacity for so many pairs, none of which is listed then."""
-        self.search = RodSearch(
-            **self._geometry,
-            count=np.zeros(1, dtype=np.int64),
-            point=np.empty(capacity, dtype=np.int64),
-            edge=np.empty(capacity, dtype=np.int64),
-            before=np.empty(capacity, dtype=bool),
-            after=np.empty(capacity, dtype=bool),
-            until=np.empty(capacity),
-        )
+        kept = {name: getattr(self.search, name) for name in ("base", "tip", "box", "sweep", "met")}
+        self.search = self.search.allocated({"near pair": capacity}, **kept)
 
     def find(
         self, base: Array, touch: float, search_distance: float, tip: Array | None = None, most: int = MOST_PAIRS

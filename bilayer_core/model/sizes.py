@@ -9,28 +9,25 @@ from bilayer_core.model.model import Model
 
 def sizes_of(model: Model) -> dict[str, int]:
     """How many there are of everything that does not change in number."""
-    layout, bodies, scene = model.solved_layout, len(model.bodies.names), model.scene
-    edges, in_plane, in_fluid = (
-        model.edge_count + model.clamp_edge_count,
-        model.plane is not None,
-        len(model.fluid_mass) > 0,
-    )
-    impacts = len(model.impact_pairs)
-    points, joints, pairs = model.contact_points, len(model.joint_a), len(model.pair_joint)
+    layout, rods, surfaces = model.solved_layout, model.rods, model.surfaces
+    bodies, scene = len(model.bodies.names), model.scene
+    edges = rods.edge_count + len(model.constrained.clamp_edge_body)
+    in_plane, in_fluid = model.plane.exists, model.fluid.exists
+    impacts, joints, pairs = len(model.impact_pairs), len(rods.joint_a), len(model.bonds.joint)
     return {
         "node": model.node_count,
-        "edge": model.edge_count,
+        "edge": rods.edge_count,
         "edge+clamp": edges,
         "joint": joints,
         "pair": pairs,
         "strain": model.strain_count + impacts + len(model.mechanisms),
         "impact": impacts,
         "strand": len(model.strands),
-        "attached": len(model.attached_node),
-        "contact_point": len(points.weight),
-        "point": len(points.position),
-        "rod point": len(points.rod_point_node),
-        "surface": len(model.surfaces.names),
+        "attached": len(model.constrained.node),
+        "contact_point": len(surfaces.weight),
+        "point": len(surfaces.point_position),
+        "rod point": len(surfaces.rod_points.node),
+        "surface": len(surfaces.kind),
         "body": bodies,
         "body+world": bodies + 1,
         "free": model.free_count,
@@ -42,11 +39,11 @@ def sizes_of(model: Model) -> dict[str, int]:
         "band": layout.half_bandwidth + 1,
         "force": len(NAMES),
         "channel": len(scene.stimuli),
-        "law": len(model.law_channel),
-        "lit": len(model.lit_law),
+        "law": len(model.drives.law_channel),
+        "lit": len(model.light.law),
         "load": len(scene.loads),
         "wet": model.node_count if in_fluid else 0,
-        "dragged": len(model.drag_node),
+        "dragged": len(model.flow.node),
         "edge with hessian": edges if in_fluid or not in_plane else 0,  # in a plane that of the fluid alone
         "joint in space": 0 if in_plane else joints,
         "pair in space": 0 if in_plane else pairs,

@@ -152,9 +152,9 @@ OUT_OF_PLANE = 1e-9
 def refuse_out_of_plane(model: Model, state: State) -> None:
     """Raise InputError if a state is none of a model of dimension 2."""
     plane = model.plane
-    if plane is None:
+    if not plane.exists:
         return
-    free, turned = model.bodies.body_of_free, state.body_rotation @ model.bodies.start_rotation.transpose(0, 2, 1)
+    free, turned = model.free_bodies.body_of_free, state.body_rotation @ model.bodies.start_rotation.transpose(0, 2, 1)
     spins = state.body_angular_velocity
     out_of_plane = {
         "position": (state.position - model.start_position) @ plane.normal,
@@ -176,10 +176,10 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
 
 def _settled(model: Model, stimulus: Array) -> Array:
     """Return the value that each law has at the start if channels have had theirs for long, shape (n_law,)."""
-    light, settled = light_of(model), stimulus[model.law_channel]
+    light, settled = light_of(model), stimulus[model.drives.law_channel]
     if not light.exists:
         return settled
-    bodies, frames = model.bodies, model.start_director1[: model.edge_count]
+    bodies, frames = model.bodies, model.start_director1
     return settled * part_seen(light, model.start_position, frames, bodies.start_position, bodies.start_rotation)
 
 
@@ -196,7 +196,7 @@ def initial_state(
     `with_history` makes arrays for what some integrators keep from step to step, `memory` for so many values of forces;
     `fingerprint` says what the state belongs to, `conditions` is a number of all else (`model.fingerprint`).
     """
-    bodies, in_fluid, sizes = model.bodies, model.node_count if len(model.fluid_mass) else 0, sizes_of(model)
+    bodies, in_fluid, sizes = model.bodies, model.node_count if model.fluid.exists else 0, sizes_of(model)
     rates = start_rates(model.scene, bodies.start_velocity, bodies.start_angular_velocity)
     strain_rate = np.concatenate([np.zeros(model.strain_count + len(model.impact_pairs)), rates])
     channels = list(model.scene.stimuli.values())
@@ -209,10 +209,10 @@ def initial_state(
         position=model.start_position.copy(),
         position_low=np.zeros((model.node_count, 3)),
         velocity=np.zeros((model.node_count, 3)),
-        director1=model.start_director1[: model.edge_count].copy(),
-        spin=np.zeros(model.edge_count),
+        director1=model.start_director1.copy(),
+        spin=np.zeros(sizes["edge"]),
         fluid_excess=np.zeros((in_fluid, 3)),
-        twist=np.zeros(len(model.joint_a)),
+        twist=np.zeros(sizes["joint"]),
         body_position=bodies.start_position.copy(),
         body_position_low=np.zeros_like(bodies.start_position),
         body_rotation=bodies.start_rotation.copy(),
@@ -222,15 +222,15 @@ def initial_state(
         has_history=np.zeros(int(with_history)),
         touched=np.full(with_history * (sizes["node"] + sizes["point"]), NOT_KNOWN),
         acceleration=np.zeros((with_history * model.node_count, 3)),
-        spin_acceleration=np.zeros(with_history * model.edge_count),
+        spin_acceleration=np.zeros(with_history * sizes["edge"]),
         body_acceleration=np.zeros((with_history * model.free_count, 3)),
         body_moment=np.zeros((with_history * model.free_count, 3)),
         fluid_force=np.zeros((with_history * in_fluid, 3)),
         strain_rate=strain_rate,
         strain_acceleration=np.zeros(with_history * len(strain_rate)),
         account=np.zeros(14),
-        law_force=np.zeros(len(model.law_channel)),
-        light_rate=np.zeros((len(model.lit_law), 2)),
+        law_force=np.zeros(sizes["law"]),
+        light_rate=np.zeros((sizes["lit"], 2)),
         transduction=_settled(model, before) if len(channels) else np.zeros(0),
         conditions=np.array([conditions]),
         seal=np.zeros(1),

@@ -18,7 +18,7 @@ class RestStrains:
     edge : Array
         η of each edge, shape (n_edge,).
     joint : Array
-        κ̄₁ κ̄₂ ψ̄ of each joint [rad], shape (n_joint, 3), read-only; where `Model.coupled_joint` says so κ̄₁ is that
+        κ̄₁ κ̄₂ ψ̄ of each joint [rad], shape (n_joint, 3), read-only; of joints of `Model.off_axis` κ̄₁ is that
         at ε = 0.
     """
 

@@ -9,9 +9,13 @@ In a plane (`model.plane`) a node has two unknowns and an edge none.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+
+from bilayer_core.jit import Record
+from bilayer_core.jit.record import shown
 
 HALF_BANDWIDTH = {
     3: {1: 10, 2: 18},
@@ -27,24 +31,21 @@ class ReadOnlyArrays:
             cls.__repr__ = ReadOnlyArrays.__repr__  # which dataclasses leave as it is
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({', '.join(f'{name}={_short(value)}' for name, value in vars(self).items())})"
+        return f"{type(self).__name__}({', '.join(f'{name}={shown(value)}' for name, value in vars(self).items())})"
 
     def __post_init__(self):
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-            elif isinstance(value, tuple):
-                for array in value:
-                    if isinstance(array, np.ndarray):
-                        array.setflags(write=False)
+        _lock(vars(self).values())
 
 
-def _short(value: object) -> str:
+def _lock(values: Iterable[object]) -> None:
     """Describe an array by its type and shape, a tuple of parts by their number."""
-    if isinstance(value, np.ndarray):
-        return f"{value.dtype} {value.shape}"
-    parts = isinstance(value, tuple) and value and not isinstance(value[0], (str, int, float))
-    return f"({len(value)} x {type(value[0]).__name__})" if parts else repr(value)
+    for value in values:
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
+        elif isinstance(value, tuple):
+            _lock(value)
+        elif isinstance(value, Record):
+            _lock(getattr(value, name) for name in value.names if name not in value.shapes)
 
 
 def columns(pairs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -35,15 +35,16 @@ def collapsed(model: Model, position: Array) -> str:
     position : ndarray, shape (n_node, 3)
         [m].
     """
-    edges = np.diff(position[np.stack([model.edge_node, model.edge_node + 1], axis=1)], axis=1)[:, 0]
+    rods = model.rods
+    edges = np.diff(position[np.stack([rods.edge_node, rods.edge_node + 1], axis=1)], axis=1)[:, 0]
     length = np.linalg.norm(edges, axis=1)
-    part = length / model.rest_length
+    part = length / rods.rest_length
     if part.size and part.min() < LEAST_LENGTH:
         edge = int(part.argmin())
         return f"edge {edge_of_strand(model, edge)} has {100 * part[edge]:.2g} % of its length left"
-    bends = np.arange(model.bend_count)
-    bends = bends[np.maximum(model.joint_a[bends], model.joint_b[bends]) < model.edge_count]
-    first, second = model.joint_a[bends], model.joint_b[bends]
+    bends = np.arange(rods.bend_count)
+    bends = bends[np.maximum(rods.joint_a[bends], rods.joint_b[bends]) < rods.edge_count]
+    first, second = rods.joint_a[bends], rods.joint_b[bends]
     cosine = np.einsum("ij,ij->i", edges[first], edges[second]) / (length[first] * length[second])
     if cosine.size and cosine.min() < math.cos(SHARPEST):
         bend, turn = int(cosine.argmin()), math.degrees(math.acos(max(cosine.min(), -1.0)))
@@ -58,9 +59,9 @@ def damp_materials(model: Model) -> Remedy:
     scene = model.scene
     names = sorted({layer.material for rod in scene.rods for layer in rod.layers})
     longest = max(rod.path.length for rod in scene.rods)
-    edges, bends = slice(0, model.edge_count), slice(0, model.bend_count)
-    density = model.node_mass.sum() / model.rest_length[edges].sum()
-    stiffness = float(np.median(model.joint_stiffness[bends, 0] * model.voronoi_length))
+    edges, bends = slice(0, model.rods.edge_count), slice(0, model.rods.bend_count)
+    density = model.rods.node_mass.sum() / model.rods.rest_length[edges].sum()
+    stiffness = float(np.median(model.rods.joint_stiffness[bends, 0] * model.voronoi_length))
     time = longest**2 / CANTILEVER * math.sqrt(density / stiffness)
     time = max(time, *(MORE * scene.materials[name].retardation_time for name in names))
     changes = {f"materials.{name}.retardation_time": f"{time:.1g}" for name in names}

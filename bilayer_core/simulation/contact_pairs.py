@@ -30,19 +30,18 @@ class ContactOwners:
     def __init__(self, model: Model):
         rods = list(dict.fromkeys(strand.rod for strand in model.strands))
         bodies = list(model.bodies.names)
-        surfaces = [name for name in model.surfaces.names if name not in bodies]
+        surfaces = [name for name in model.surface_names if name not in bodies]
         self._names = [*rods, *bodies, *surfaces, AN_OBSTACLE]
         slot = {name: index for index, name in reversed(list(enumerate(self._names)))}
         self.count = len(self._names)
         of_node = np.zeros(model.node_count, dtype=np.int64)
         for strand in model.strands:
             of_node[strand.first_node : strand.first_node + strand.node_count] = rods.index(strand.rod)
-        points, world = model.contact_points, self.count - 1
+        points, world = model.surfaces, self.count - 1
         # nodes, points of bodies and of the world, points of rods with an arm from a node
         of_bodies = np.array([*range(len(rods), len(rods) + len(bodies)), world])
-        others = points.body[model.node_count : len(points.body) - len(points.rod_point_node)]
-        self.of_point = np.concatenate([of_node, of_bodies[others], of_node[points.rod_point_node]])
-        self.of_surface = np.array([slot[name] for name in model.surfaces.names], dtype=np.int64)
+        self.of_point = np.concatenate([of_node, of_bodies[points.point_body], of_node[points.rod_points.node]])
+        self.of_surface = np.array([slot[name] for name in model.surface_names], dtype=np.int64)
 
     def names_of(self, touching: Array) -> Pairs:
         """Names of the pairs of what `engine.observables` saw touch: a rod comes before a body, and a body before an

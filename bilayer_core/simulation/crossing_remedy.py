@@ -14,8 +14,8 @@ FINER = 2
 
 def crossed(model: Model, number: int) -> tuple[int, str]:
     """Return the edge, and the name of the surface, of a number from `contact.crossing.crossing`."""
-    surface, edge = divmod(number, model.edge_count)
-    return edge, model.surfaces.names[surface]
+    surface, edge = divmod(number, model.rods.edge_count)
+    return edge, model.surface_names[surface]
 
 
 def edge_of_strand(model: Model, edge: int) -> str:

@@ -33,7 +33,7 @@ class Gradient:
     def copy_of(cls, first: Sums, model: Model) -> Gradient:
         """Return a copy of the present first derivatives."""
         found = cls(*(getattr(first, part).copy() for part in PARTS))
-        found.contact[model.bodies.body_of_free] = 0.0
+        found.contact[model.free_bodies.body_of_free] = 0.0
         return found
 
 
@@ -56,16 +56,16 @@ class Motion:
 
 def compose(model: Model, node: Array, turn: Array, clamp_edge: Array, contact: Array) -> Motion:
     """Return a motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of bodies."""
-    i = model.edge_node
+    i = model.rods.edge_node
     edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), clamp_edge])
-    top0, top1, bottom0, bottom1 = (node[of_pairs] for of_pairs in model.pair_node.T)
-    body = contact[model.bodies.body_of_free]
+    top0, top1, bottom0, bottom1 = (node[of_pairs] for of_pairs in model.bonds.node.reshape(-1, 4).T)
+    body = contact[model.free_bodies.body_of_free]
     return Motion(node, edge, 0.5 * (top0 + top1 - bottom0 - bottom1), body, contact)
 
 
 def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:
     """From one configuration to another; turns, each by less than half a turn, are those beyond parallel transport."""
-    edges = model.edge_count
+    edges = model.rods.edge_count
     turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
     clamp_edge = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
     contact = np.hstack([end.pose_position - start.pose_position, np.zeros_like(end.pose_position)])
@@ -78,23 +78,23 @@ def velocity(model: Model, at: Configuration, state: State) -> Motion:
     """Velocities of a state whose configuration is `at`."""
     world = np.zeros((1, 6))
     contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
-    tangent = at.tangent[model.edge_count :]
-    spin = contact[model.clamp_edge_body, 3:]
+    tangent = at.tangent[model.rods.edge_count :]
+    spin = contact[model.constrained.clamp_edge_body, 3:]
     clamp_edge = np.column_stack([np.cross(spin, tangent), np.einsum("ki,ki->k", spin, tangent)])
     return compose(model, state.velocity, state.spin, clamp_edge, contact)
 
 
 def of_prescribed(model: Model, motion: Motion) -> Motion:
     """Return the part of a motion that prescribed bodies impose on held nodes, clamps' directions, points, surfaces."""
-    prescribed = model.bodies.free_index < 0
+    prescribed = model.free_bodies.free_index < 0
     held = np.zeros(model.node_count, dtype=bool)
-    held[model.attached_node] = model.attached_free < 0
-    clamp_edges = motion.edge[model.edge_count :]
+    held[model.constrained.node] = model.constrained.free < 0
+    clamp_edges = motion.edge[model.rods.edge_count :]
     return compose(
         model,
         np.where(held[:, None], motion.node, 0.0),
-        np.zeros(model.edge_count),
-        np.where(prescribed[model.clamp_edge_body, None], clamp_edges, 0.0),
+        np.zeros(model.rods.edge_count),
+        np.where(prescribed[model.constrained.clamp_edge_body, None], clamp_edges, 0.0),
         np.where(prescribed[:, None], motion.contact, 0.0),
     )
 

@@ -94,8 +94,8 @@ class EnergyLedger:
         self._model = model
         self._evaluator = Evaluator(model)  # with arrays of its own: those of the run stay as they are
         self._imposed_mass = np.zeros(model.node_count)
-        imposed = model.attached_node[model.attached_free < 0]
-        self._imposed_mass[imposed] = model.node_mass[imposed]
+        imposed = model.constrained.node[model.constrained.free < 0]
+        self._imposed_mass[imposed] = model.rods.node_mass[imposed]
         self._kinds = {name: kinds()[name] for name in model.forces}
         self._watched = [name for name, kind in self._kinds.items() if kind is not Kind.INERTIAL]
         self._first: _Instant | None = None
@@ -137,7 +137,7 @@ class EnergyLedger:
                 sums[name] += 0.5 * h * (start + end)
         if after.fluid is not None:
             self._imposed["fluid"] += self._work_of_fluid(before, after, imposed)
-        bends = slice(self._model.bend_count)
+        bends = slice(self._model.rods.bend_count)
         rises = after.rest.edge - before.rest.edge, after.rest.joint[bends, 0] - before.rest.joint[bends, 0]
         for rise, *three in zip(rises, before.resistance, middle.resistance, after.resistance, strict=True):
             self._stimulus += float((three[0] + 4.0 * three[1] + three[2]) @ rise) / 6.0
@@ -199,7 +199,7 @@ class EnergyLedger:
         held = self._imposed_mass > 0.0
         pushed = after.fluid.momentum[held] - before.fluid.momentum[held]
         turned = 0.5 * (before.fluid.shape_gradient + after.fluid.shape_gradient)
-        work = float(np.vdot(turned, imposed.edge[: self._model.edge_count]))
+        work = float(np.vdot(turned, imposed.edge[: self._model.rods.edge_count]))
         return work - 0.5 * float(np.vdot(pushed, before.velocity[held] + after.velocity[held]))
 
     def _force(self, name: str, at: Configuration) -> tuple[float, Gradient]:
@@ -209,7 +209,7 @@ class EnergyLedger:
 
     def _evaluate_fluid(self, at: Configuration, state: State) -> _Fluid | None:
         model = self._model
-        if not len(model.fluid_mass):
+        if not model.fluid.exists:
             return None
         relative, fluid = survey_fluid(model, at, state.velocity, state.spin)
         carried = float(fluid.momentum.sum(axis=0) @ fluid.velocity)
@@ -251,13 +251,14 @@ class EnergyLedger:
 
 def _resistance(model: Model, at: Configuration, rest: RestStrains) -> tuple[Array, Array]:
     """Return the derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
-    strain = at.length[: model.edge_count] / model.rest_length - 1.0
+    rods, joint = model.rods, model.off_axis.joint
+    strain = at.length[: rods.edge_count] / rods.rest_length - 1.0
     bend = at.joint_strain[:, 0] - rest.joint[:, 0]
-    of_edges = np.concatenate([strain, np.zeros(model.clamp_edge_count)])
-    coupled = np.stack([model.joint_a, model.joint_b], axis=1)[model.coupled_joint]
-    bend[model.coupled_joint] -= np.einsum("ki,ki->k", model.strain_coupling, of_edges[coupled])
-    moment = model.joint_stiffness[:, 0] * bend
-    return -model.axial_stiffness * (strain - rest.edge) * model.rest_length, -moment[: model.bend_count]
+    of_edges = np.concatenate([strain, np.zeros(len(model.constrained.clamp_edge_body))])
+    coupled = np.stack([rods.joint_a, rods.joint_b], axis=1)[joint]
+    bend[joint] -= np.einsum("ki,ki->k", model.strain_coupling, of_edges[coupled])
+    moment = rods.joint_stiffness[:, 0] * bend
+    return -rods.axial_stiffness * (strain - rest.edge) * rods.rest_length, -moment[: rods.bend_count]
 
 
 class _Way:
@@ -277,5 +278,5 @@ class _Way:
             state.body_rotation[b] = rotation_matrix(part * turn) @ begin.rotation[b]
         at = evaluator.new()
         evaluator.take_state(state, at)
-        evaluator.transport_frames(begin, part * moved.edge[: self._model.edge_count, 3], at)
+        evaluator.transport_frames(begin, part * moved.edge[: self._model.rods.edge_count, 3], at)
         return at

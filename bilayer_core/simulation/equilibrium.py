@@ -128,7 +128,7 @@ class _Search:
         """Have the rest strains and the loads of now, and the light on the present shape, in a stepper."""
         state, model = self.state, self.stepper.model
         if len(state.transduction):
-            settled = self.stepper.surroundings.stimulus_at(state, self.time)[model.law_channel]
+            settled = self.stepper.surroundings.stimulus_at(state, self.time)[model.drives.law_channel]
             if self.light.exists:
                 place = state.position, state.director1, state.body_position, state.body_rotation
                 settled = settled * part_seen(self.light, *place)

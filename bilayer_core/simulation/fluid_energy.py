@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.engine.build_problem import fluid_of
 from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.parts import Fluid
@@ -16,9 +15,9 @@ Array = np.ndarray
 
 def momentum_of_fluid(model: Model, at: Configuration, velocity: Array) -> Array:
     """Momentum of the fluid at each node [N s], shape (n_node, 3); (0, 3) without added mass."""
-    if not len(model.fluid_mass):
+    if not model.fluid.exists:
         return np.zeros((0, 3))
-    return survey_fluid(model, at, velocity, np.zeros(model.edge_count))[1].momentum
+    return survey_fluid(model, at, velocity, np.zeros(model.rods.edge_count))[1].momentum
 
 
 def energy_of_fluid(model: Model, at: Configuration, velocity: Array, spin: Array) -> float:
@@ -28,6 +27,6 @@ def energy_of_fluid(model: Model, at: Configuration, velocity: Array, spin: Arra
 
 def survey_fluid(model: Model, at: Configuration, velocity: Array, spin: Array) -> tuple[float, Fluid]:
     """T [J], and the fluid with P and ∂T/∂q; see `forces.added_mass.fluid_momentum`."""
-    fluid = fluid_of(model, sizes_of(model))
+    fluid = model.fluid.allocated(sizes_of(model))
     fluid.node_velocity[:], fluid.spin[:] = velocity, spin
     return fluid_momentum(fluid, at), fluid

@@ -25,7 +25,7 @@ def joint_shapes(model: Model) -> tuple[JointInfo, ...]:
 
 
 def _radius(model: Model) -> float:
-    return RADIUS * float(2.0 * model.half_width.max())
+    return RADIUS * float(2.0 * model.rods.half_width.max())
 
 
 def _of_joints(model: Model) -> Iterator[JointInfo]:

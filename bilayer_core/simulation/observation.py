@@ -29,12 +29,12 @@ def describe(model: Model, state: State, settings: dict[str, str], scene_text: s
         title=scene.title,
         scene_text=scene_text,
         node_count=model.node_count + model.point_count,
-        edge_count=model.edge_count,
+        edge_count=model.rods.edge_count,
         strands=tuple(map(strand, model.strands)),
         bodies=tuple(
-            BodyInfo(name, _shape_info(shape) if shape else None, bool(free < 0), index in model.attached_body)
+            BodyInfo(name, _shape_info(shape) if shape else None, bool(free < 0), index in model.constrained.body)
             for index, (name, shape, free) in enumerate(
-                zip(bodies.names, bodies.shapes, bodies.free_index, strict=False)
+                zip(bodies.names, bodies.shapes, model.free_bodies.free_index, strict=False)
             )
         ),
         obstacles=tuple(
@@ -91,15 +91,15 @@ def velocities_with_points(model: Model, state: State) -> Array:
 
 def _points(model: Model, state: State) -> tuple[Array, Array]:
     """Body of each point, shape (n_point,), and its arm from the body's position [m], shape (n_point, 3)."""
-    body = model.contact_points.body[model.node_count : model.node_count + model.point_count]
-    arms = np.einsum("kij,kj->ki", state.body_rotation[body], model.contact_points.position[: model.point_count])
+    body = model.surfaces.point_body[: model.point_count]
+    arms = np.einsum("kij,kj->ki", state.body_rotation[body], model.surfaces.point_position[: model.point_count])
     return body, arms
 
 
 def energies(model: Model, seen: Parts) -> dict[str, float]:
     """Kinetic energies, and that of each conservative term, of a state that was looked at [J]."""
     kinetic, of_fluid = seen.kinetic.tolist()
-    found = {"kinetic": kinetic, "fluid": of_fluid} if len(model.fluid_mass) else {"kinetic": kinetic}
+    found = {"kinetic": kinetic, "fluid": of_fluid} if model.fluid.exists else {"kinetic": kinetic}
     values = seen.energy.tolist()
     return found | {name: values[place] for name, place in _conservative(model.forces)}
 

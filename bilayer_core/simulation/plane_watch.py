@@ -154,15 +154,15 @@ class PlaneWatch:
 def turning_rate(stepper: Stepper, state: State) -> float:
     """Rate at which turning out of its plane seems to grow [1/s] for a robot that no prescribed body holds, else 0."""
     model, engine = stepper.model, stepper.engine
-    if np.any(model.attached_free < 0):
+    if np.any(model.constrained.free < 0):
         return 0.0
     engine.do_once(state, EVALUATE_STATE)
-    sums, axes, free = engine.sums, model.plane.axes, model.bodies.body_of_free
+    sums, axes, free = engine.sums, model.rods.axes, model.free_bodies.body_of_free
     unknowns = model.layout.node[:, None] + np.arange(3)
     force, of_bodies = -sums.gradient[unknowns], -sums.body[: len(free), :3]
-    force[model.attached_node] = -sums.attached
-    np.add.at(of_bodies, model.attached_free, sums.attached)
-    mass = np.concatenate([model.node_mass, model.bodies.mass])
+    force[model.constrained.node] = -sums.attached
+    np.add.at(of_bodies, model.constrained.free, sums.attached)
+    mass = np.concatenate([model.rods.node_mass, model.free_bodies.mass])
     place = np.concatenate([state.position, state.body_position[free]]) @ axes.T
     place -= mass @ place / mass.sum()
     force = np.concatenate([force, of_bodies]) @ axes.T

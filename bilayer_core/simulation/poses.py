@@ -149,7 +149,7 @@ def _numbers(name: str, key: str, values: Sequence[float], count: int) -> Array:
 
 def _refuse_out_of_plane(model: Model, index: int, name: str, position: Array, rotation: Array) -> None:
     """Raise InputError if a pose is none of a model of dimension 2."""
-    if model.plane is None:
+    if not model.plane.exists:
         return
     normal, start = model.plane.normal, model.bodies
     away = abs(float((position - start.start_position[index]) @ normal))

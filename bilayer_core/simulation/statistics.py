@@ -16,10 +16,10 @@ from bilayer_core.simulation.stepper import Stepper
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:
     """Mass centre of the rods [m], shape (3,)."""
-    moment = model.node_mass @ state.position
+    moment = model.rods.node_mass @ state.position
     if len(model.mass_moment):
         moment += model.mass_moment @ state.director1
-    return moment / model.node_mass.sum()
+    return moment / model.rods.node_mass.sum()
 
 
 @dataclass

@@ -298,7 +298,7 @@ class Stepper:
             why = f"{why}: {part}"
         why = f"{why}, which a linear material cannot hold" if folded else why
         moving = np.concatenate([state.velocity, state.body_velocity])
-        mass = self.model.node_mass.sum() + self.model.bodies.mass.sum()
+        mass = self.model.rods.node_mass.sum() + self.model.free_bodies.mass.sum()
         of_energy = math.sqrt(2.0 * state.account[LARGEST] / mass)
         speed = max(float(np.linalg.norm(moving, axis=1).max()), of_energy)
         change = remedy(found, self.steps, self._method, self.model, gap, speed, folded)

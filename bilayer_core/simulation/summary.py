@@ -127,7 +127,7 @@ def _warnings(strain: float, numerical: float, largest: float, plane_watch: Plan
 def _of_contact(model: Model, unresolved: int, energy: float) -> Iterator[str]:
     if not unresolved:
         return
-    contact, square = model.scene.contact, 2.0 * energy / (model.node_mass.sum() + model.bodies.mass.sum())
+    contact, square = model.scene.contact, 2.0 * energy / (model.rods.node_mass.sum() + model.free_bodies.mass.sum())
     needed = stiffness_that_holds(0.5 * heaviest(model) * square, contact.barrier_distance)
     remedy = "a larger `contact.barrier_distance`"
     if needed > model.contact_stiffness:

@@ -56,16 +56,16 @@ class Surroundings:
 
     def rest_strains_of(self, transduction: Array) -> RestStrains:
         """Strains without stress from the filtered stimuli."""
-        model = self.model
-        strain = free_strain(transduction, model.law_gain, model.law_reference, model.law_saturation)
-        eigenstrain = np.bincount(model.driven_edge, model.driven_weight * strain[model.driven_law], model.edge_count)
-        joint = model.joint_rest
-        if len(model.driven_joint):
-            bent = model.driven_joint_weight * strain[model.driven_joint_law]
+        drives, edges = self.model.drives, self.model.rods.edge_count
+        strain = free_strain(transduction, drives.law_gain, drives.law_reference, drives.law_saturation)
+        eigenstrain = np.bincount(drives.driven_edge, drives.driven_weight * strain[drives.driven_law], edges)
+        joint = drives.joint_rest
+        if len(drives.driven_joint):
+            bent = drives.driven_joint_weight * strain[drives.driven_joint_law]
             joint = joint.copy()
-            joint[:, 0] += np.bincount(model.driven_joint, bent, len(joint))
+            joint[:, 0] += np.bincount(drives.driven_joint, bent, len(joint))
             joint.flags.writeable = False
-        return RestStrains(model.rest_strain + eigenstrain, joint)
+        return RestStrains(drives.rest_strain + eigenstrain, joint)
 
     def load_factor(self, state: State, ended: float = 0.0) -> Array:
         """Factor of each load in a state, shape (n_load,): at the end of a step of length `ended` [s] that from before

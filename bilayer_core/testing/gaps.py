@@ -66,13 +66,13 @@ class GapCheck:
 
     def __init__(self, model: Model):
         self._model = model
-        self._edge = model.edge_node
-        self._pairs = None if model.rod_surfaces is None else PairsOfEdges(model)
+        self._edge = model.rods.edge_node
+        self._pairs = PairsOfEdges(model) if model.rod_search.exists else None
         self.every = max(1, math.ceil(self._pairs.count / MOST_PAIRS)) if self._pairs else 1
         self._points = MeetingPoints(model)
         self._surfaces = surfaces_of(model, self._points)
         radius = self._points.node_radius
-        self._edge_radius = np.zeros(0) if model.rod_surfaces is None else model.rod_surfaces.edge_radius
+        self._edge_radius = model.rod_search.edge_radius
         self._fractions = fractions_of_points(model)
         self._smallest_radius = float(radius[model.node_length > 0.0].min())
         if self._pairs:
@@ -81,7 +81,7 @@ class GapCheck:
 
     def _leave_out_joined(self) -> None:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
-        rods, start = self._model.rod_surfaces, self._model.start_position
+        rods, start = self._model.rod_search, self._model.start_position
         first, second = self._pairs.at(start)
         joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
         gap, _ = self._rod_gaps(start)
@@ -227,7 +227,7 @@ class PairsOfEdges:
     """
 
     def __init__(self, model: Model, most: int = MOST_EDGES):
-        self._model, self._edges = model, len(model.rod_surfaces.edge_rod)
+        self._model, self._edges = model, len(model.rod_search.edge_rod)
         self._all: tuple[Array, Array] | None = None
         self._left_out = np.empty(0, dtype=np.int64)
         self.count = self._edges * (self._edges - 1) // 2
@@ -239,9 +239,9 @@ class PairsOfEdges:
         """Two arrays of edges, all pairs that may be nearer than the barrier distance among them; nodes [m]."""
         if self._all is not None:
             return self._all
-        edge = self._model.edge_node
+        edge = self._model.rods.edge_node
         middle, along = 0.5 * (nodes[edge] + nodes[edge + 1]), nodes[edge + 1] - nodes[edge]
-        reach = np.linalg.norm(along, axis=1).max() + 2.0 * self._model.rod_surfaces.edge_radius.max()
+        reach = np.linalg.norm(along, axis=1).max() + 2.0 * self._model.rod_search.edge_radius.max()
         reach += self._model.scene.contact.barrier_distance
         near = KDTree(middle).query_pairs(reach, output_type="ndarray")
         first, second = self._allowed(near[:, 0], near[:, 1])
@@ -258,7 +258,7 @@ class PairsOfEdges:
 
     def length_between(self, first: Array, second: Array) -> Array:
         """Length of rod between two edges [m], infinite between rods."""
-        surfaces = self._model.rod_surfaces
+        surfaces = self._model.rod_search
         same = surfaces.edge_rod[first] == surfaces.edge_rod[second]
         arc = surfaces.edge_arc.mean(axis=1)
         return np.where(same, np.abs(arc[first] - arc[second]), math.inf)
@@ -268,7 +268,7 @@ class PairsOfEdges:
 
     def _allowed(self, first: Array, second: Array) -> tuple[Array, Array]:
         """Those pairs that may not come together."""
-        surfaces = self._model.rod_surfaces
+        surfaces = self._model.rod_search
         rod_a, rod_b = surfaces.edge_rod[first], surfaces.edge_rod[second]
         arc, length = surfaces.edge_arc.mean(axis=1), surfaces.rod_length[rod_a]
         apart = np.abs(arc[first] - arc[second])
@@ -282,8 +282,8 @@ class PairsOfEdges:
 
 def fractions_of_points(model: Model) -> Array:
     """Where the points of each edge are on it, 0 … 1, shape (n_edge, most points of an edge); NaN beyond the last."""
-    rods = model.rod_surfaces
-    if rods is None:
+    rods = model.rod_search
+    if not rods.exists:
         return np.empty((0, 0))
     counts = np.diff(rods.first_point)
     found = np.full((len(counts), int(counts.max())), math.nan)

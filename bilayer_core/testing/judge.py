@@ -165,9 +165,9 @@ class _Momentum:
     def _mean(self, frame: Frame) -> np.ndarray:
         """Velocity of the mass centre [m/s], shape (3,)."""
         model = self._simulator.model
-        nodes, bodies = model.node_mass, model.bodies.mass
+        nodes, bodies = model.rods.node_mass, model.free_bodies.mass
         momentum = nodes @ frame.velocities[: model.node_count]
-        momentum = momentum + bodies @ frame.body_velocities[model.bodies.body_of_free]
+        momentum = momentum + bodies @ frame.body_velocities[model.free_bodies.body_of_free]
         return momentum / (nodes.sum() + bodies.sum())
 
     def off(self, frame: Frame) -> float:
@@ -184,4 +184,4 @@ def _flies(simulator: Simulator) -> bool:
     scene, model = simulator.scene, simulator.model
     alone = scene.contact is None and scene.fluid is None and not scene.loads and scene.damping.mass == 0.0
     guided = any(isinstance(body.motion, Guided) for body in scene.bodies)
-    return bool(alone and not guided and (model.attached_free >= 0).all())
+    return bool(alone and not guided and (model.constrained.free >= 0).all())

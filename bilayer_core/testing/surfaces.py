@@ -42,26 +42,28 @@ class MeetingPoints:
             own = slice(strand.first_node, strand.first_node + strand.node_count)
             self.node_radius[own], half_width[own] = 0.5 * strand.thickness, 0.5 * strand.width
             self._offset[own] = strand.offset
-        beyond = np.maximum(half_width - self.node_radius, 0.0) if model.plane is None else np.zeros(nodes)
+        beyond = np.zeros(nodes) if model.plane.exists else np.maximum(half_width - self.node_radius, 0.0)
         self._sides = [np.zeros(nodes), -beyond, beyond] if beyond.any() else [np.zeros(nodes)]
         self._balls = [
             index for index, shape in enumerate(model.bodies.shapes) if shape is not None and shape.kind == "sphere"
         ]
-        contact = model.contact_points
-        shown = np.arange(nodes, nodes + contact.point_count)
+        contact = model.surfaces
+        shown = np.arange(nodes, nodes + model.point_count)
         copies = len(self._sides)
         radii = [float(model.bodies.shapes[ball].half[0]) for ball in self._balls]
         self.radius = np.concatenate([np.tile(self.node_radius, copies), contact.radius[shown], radii])
         rest = np.full(len(shown) + len(self._balls), -1)
         self.node = np.concatenate([np.tile(np.arange(nodes), copies), rest])
-        self.body = np.concatenate([np.full(copies * nodes, -1), contact.body[shown], self._balls]).astype(np.int64)
+        self.body = np.concatenate(
+            [np.full(copies * nodes, -1), contact.contact_point_body[shown], self._balls]
+        ).astype(np.int64)
         self.slot = np.concatenate([np.tile(np.arange(nodes), copies), shown, np.full(len(self._balls), -1)])
 
     def places(self, frame: Frame) -> Array:
         """Where they are [m], shape (n_point, 3)."""
         model, nodes = self._model, self._model.node_count
-        position, edges = frame.positions[:nodes], model.contact_points.node_edges
-        along = position[model.edge_node + 1] - position[model.edge_node]
+        position, edges = frame.positions[:nodes], model.surfaces.node_edges
+        along = position[model.rods.edge_node + 1] - position[model.rods.edge_node]
         tangent = along / np.linalg.norm(along, axis=1)[:, None]
         across = np.cross(tangent, frame.directors)
         m1, m2 = frame.directors[edges].mean(axis=1), across[edges].mean(axis=1)
@@ -113,7 +115,7 @@ def surfaces_of(model: Model, points: MeetingPoints) -> list[MetSurface]:
         return []
     found = []
     for owned in owned_shapes(model.scene, model.bodies):
-        if owned.collider.name not in model.surfaces.names:
+        if owned.collider.name not in model.surface_names:
             continue
         meeting = np.flatnonzero(_can_meet(model, points, owned))
         found.append(
@@ -136,15 +138,15 @@ def _can_meet(model: Model, points: MeetingPoints, owned: Owned) -> Array:
     """Which points can meet a surface, shape (n_point,): not those of its own body, nor of a rod that grows out of it;
     of what goes by schedules, none meets another.
     """
-    contact = model.contact_points
-    meets = model.surfaces.can_collide[model.surfaces.names.index(owned.collider.name)][contact.group]
+    surfaces, of_rods = model.surfaces, model.surfaces.rod_points.node
+    meets = surfaces.can_collide[model.surface_names.index(owned.collider.name)][surfaces.group]
     section = meets[: model.node_count].copy()
-    np.logical_or.at(section, contact.rod_point_node, meets[len(meets) - len(contact.rod_point_node) :])
+    np.logical_or.at(section, of_rods, meets[len(meets) - len(of_rods) :])
     can = np.zeros(len(points.radius), dtype=bool)
-    of_rods, listed = points.node >= 0, points.slot >= model.node_count
-    can[of_rods] = section[points.node[of_rods]]
+    sections, listed = points.node >= 0, points.slot >= model.node_count
+    can[sections] = section[points.node[sections]]
     can[listed] = meets[points.slot[listed]]
-    free = np.append(model.bodies.free_index[: len(model.bodies.names)] >= 0, False)
+    free = np.append(model.free_bodies.free_index[: len(model.bodies.names)] >= 0, False)
     balls = points.slot < 0
     can[balls] = free[points.body[balls]] | free[owned.body]
     return can & (points.body != owned.body)

@@ -24,12 +24,12 @@ TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS.parent)]
 
 import rclpy  # noqa: E402
-from support import synthetic_run  # noqa: E402
 from mcap.reader import make_reader  # noqa: E402
 from rcl_interfaces.srv import SetParameters  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from rclpy.qos import QoSProfile  # noqa: E402
 from std_srvs.srv import Trigger  # noqa: E402
+from support import synthetic_run  # noqa: E402
 from support.processes import claimed_domain, environment  # noqa: E402
 
 from bilayer_core.log.file.mcap_log import McapRecorder  # noqa: E402

@@ -26,10 +26,10 @@ def frames_of(case, shift):
     trial = Trial(case.scene(), case.most_steps, case.cpu_limit, judged=False)
     simulator, model = trial.simulator, trial.simulator.model
     state = simulator._state
-    held = set(model.attached_node.tolist())
+    held = set(model.constrained.node.tolist())
     loose = [node for node in range(model.node_count) if node not in held]
     state.position[loose, 2] += shift * trial.length
-    state.body_position[model.bodies.body_of_free, 2] += shift * trial.length
+    state.body_position[model.free_bodies.body_of_free, 2] += shift * trial.length
     return trial, trial.looks(trial.ends(LOOKS))
 
 

@@ -33,8 +33,8 @@ model, state = simulator.model, simulator._state
 evaluator = Evaluator(model)
 at, moved = evaluator.new(), evaluator.new()
 evaluator.take_state(state, at)
-nothing = np.zeros((len(model.joint_a), 3))
-evaluator.stand_still(state, at, 1.0, np.zeros(model.edge_count), nothing, np.zeros(0))
+nothing = np.zeros((len(model.rods.joint_a), 3))
+evaluator.stand_still(state, at, 1.0, np.zeros(model.rods.edge_count), nothing, np.zeros(0))
 evaluator.start_stage(at)
 
 
@@ -53,7 +53,7 @@ for unknown in unknowns:
 print(json.dumps({
     "terms": simulator.summary()["terms"],
     "energy": simulator.energy(),
-    "weight": 9.81 * float(model.node_mass.sum()),
+    "weight": 9.81 * float(model.rods.node_mass.sum()),
     "ends": ends.tolist(),
     "stable": simulator.solve_static().stable,
     "gradient": gradient[unknowns].tolist(),

@@ -15,7 +15,7 @@ import traceback
 import warnings
 from collections.abc import Callable
 from concurrent.futures import TimeoutError
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, is_dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -139,13 +139,14 @@ def _built_again(case: Case):
 
 def _require_numbers(simulator) -> None:
     """Raise `Unclear` if an array of the model is not finite."""
+    from bilayer_core.jit import Record
+
     model = simulator.model
-    for part in (model, *(getattr(model, field.name) for field in fields(model))):
-        for field in fields(part) if is_dataclass(part) else ():
-            array = getattr(part, field.name)
-            if isinstance(array, np.ndarray) and array.dtype == float and field.name not in ENDLESS:
+    for part in (model, *vars(model).values()):
+        for name, array in vars(part).items() if is_dataclass(part) or isinstance(part, Record) else ():
+            if isinstance(array, np.ndarray) and array.dtype == float and name not in ENDLESS:
                 if not np.isfinite(array).all():
-                    raise Unclear(f"{type(part).__name__}.{field.name} holds {array[~np.isfinite(array)][0]}")
+                    raise Unclear(f"{type(part).__name__}.{name} holds {array[~np.isfinite(array)][0]}")
 
 
 def _refuse_constant(name: str) -> None:

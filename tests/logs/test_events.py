@@ -115,7 +115,7 @@ def test_what_touches_is_what_forces_act_on():
     for frame in memory.frames:
         nodes = frame.contact_forces[: simulator.model.node_count]
         assert bool(frame.contacts) == bool(nodes.any())
-        low = frame.positions[:, 2].min() < 2e-3 + simulator.model.contact_points.radius.max()
+        low = frame.positions[:, 2].min() < 2e-3 + simulator.model.surfaces.radius.max()
         assert low or ("loop", "ground") not in frame.contacts
     assert {pair for frame in memory.frames for pair in frame.contacts} == {("loop", "ground"), ("loop", "loop")}
 

@@ -49,7 +49,7 @@ def momentum(simulator):
     """Of rods and fluid together [N s]."""
     model, state = simulator.model, simulator._state
     fluid = momentum_of_fluid(model, simulator._stepper.end, state.velocity)
-    return model.node_mass @ state.velocity + (fluid + state.fluid_excess).sum(axis=0)
+    return model.rods.node_mass @ state.velocity + (fluid + state.fluid_excess).sum(axis=0)
 
 
 def random_problem(seed=0):
@@ -62,12 +62,12 @@ def random_problem(seed=0):
     start, bent = evaluator.new(), evaluator.new()
     evaluator.take_state(state, start)
     bent.position[:] = start.position + 4e-4 * rng.standard_normal((model.node_count, 3))
-    evaluator.transport_frames(start, 0.3 * rng.standard_normal(model.edge_count), bent)
-    return evaluator, bent, rng.standard_normal((model.node_count, 3)), rng.standard_normal(model.edge_count)
+    evaluator.transport_frames(start, 0.3 * rng.standard_normal(model.rods.edge_count), bent)
+    return evaluator, bent, rng.standard_normal((model.node_count, 3)), rng.standard_normal(model.rods.edge_count)
 
 
 def shape_gradient_of(model, at, velocity):
-    return survey_fluid(model, at, velocity, np.zeros(model.edge_count))[1].shape_gradient
+    return survey_fluid(model, at, velocity, np.zeros(model.rods.edge_count))[1].shape_gradient
 
 
 def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
@@ -89,16 +89,16 @@ def test_momentum_and_shape_force_are_derivatives_of_the_fluids_energy():
 
     gradient = shape_gradient_of(model, at, velocity)
     on_nodes, h = np.zeros_like(velocity), 1e-9
-    np.add.at(on_nodes, model.edge_node, -gradient[:, :3])
-    np.add.at(on_nodes, model.edge_node + 1, gradient[:, :3])
+    np.add.at(on_nodes, model.rods.edge_node, -gradient[:, :3])
+    np.add.at(on_nodes, model.rods.edge_node + 1, gradient[:, :3])
     for entry in np.ndindex(velocity.shape):
         unit = np.zeros_like(velocity)
         unit[entry] = h
-        still = np.zeros(model.edge_count)
+        still = np.zeros(model.rods.edge_count)
         difference = (displaced(unit, still) - displaced(-unit, still)) / (2 * h)
         assert difference == pytest.approx(on_nodes[entry], abs=1e-6 * np.abs(on_nodes).max())
-    for edge in range(model.edge_count):
-        angle = np.zeros(model.edge_count)
+    for edge in range(model.rods.edge_count):
+        angle = np.zeros(model.rods.edge_count)
         angle[edge] = 1e-6
         difference = (displaced(0.0, angle) - displaced(0.0, -angle)) / 2e-6
         assert difference == pytest.approx(gradient[edge, 3], abs=1e-7 * np.abs(gradient[:, 3]).max())
@@ -126,7 +126,7 @@ def test_a_turn_of_body_motion_and_flow_leaves_the_fluids_energy_unchanged():
 def test_multiples_of_the_flat_plates_mass_are_the_scenes():
     content = scene([rod(WHOLE)], fluid=water(added_mass={"through": 0.5, "sideways": 3.0, "turning": 2.0}))
     model = build_model(load_scene(content))
-    assert model.fluid_mass.sum(axis=0) == pytest.approx([0.05 * ADDED, 0.3 * SIDEWAYS, 0.2 * TURNING])
+    assert model.fluid.mass.sum(axis=0) == pytest.approx([0.05 * ADDED, 0.3 * SIDEWAYS, 0.2 * TURNING])
 
 
 @pytest.mark.parametrize("integrator", ["implicit_euler", "sdirk2", "implicit_midpoint"])
@@ -259,7 +259,7 @@ def test_a_clamped_strip_swings_more_slowly_by_the_root_of_its_whole_mass():
 def test_without_added_mass_there_is_nothing_to_compute():
     for fluid in (None, water(added_mass=False)):
         simulator = Simulator(load_scene(scene([rod(WHOLE)], fluid=fluid)))
-        assert simulator.model.fluid_mass.shape == (0, 3)
+        assert len(simulator.model.fluid.mass) == 0
         simulator.run(0.002)
         assert "added mass" not in simulator.model.forces
         assert "fluid" not in simulator.energy()

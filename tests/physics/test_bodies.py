@@ -46,9 +46,9 @@ def test_a_flying_hub_and_its_arms_keep_their_momentum_while_they_bend():
     simulator = Simulator(load_scene(flyer))
     simulator.run(0.015)  # while the arms are driven
     frame = simulator.frame()
-    rods = simulator.model.node_mass @ simulator.velocities
+    rods = simulator.model.rods.node_mass @ simulator.velocities
     momentum = rods + 1e-3 * frame.body_velocities[0]
-    exchanged = np.abs(simulator.model.node_mass[:, None] * simulator.velocities).sum()
+    exchanged = np.abs(simulator.model.rods.node_mass[:, None] * simulator.velocities).sum()
     assert frame.body_positions[0, 2] > 1e-5  # arms bend down, the hub rises
     assert np.linalg.norm(frame.body_angular_velocities[0]) > 1e-3  # the wing makes it turn
     assert np.abs(momentum).max() < 1e-9 * exchanged
@@ -110,7 +110,7 @@ def test_a_free_body_with_feet_stands_on_the_ground():
         )
     )
     simulator.run(0.5)
-    weight = 9.81 * (0.01 + simulator.model.node_mass.sum())
+    weight = 9.81 * (0.01 + simulator.model.rods.node_mass.sum())
     assert simulator.contact_forces[-4:, 2] == pytest.approx(np.full(4, weight / 4), rel=1e-3)
     assert simulator.frame().contact_wrenches[0] == pytest.approx([0, 0, weight, 0, 0, 0], abs=1e-3 * weight)
 

@@ -76,7 +76,7 @@ def test_what_a_run_computes_does_not_depend_on_the_capacity_that_it_begins_with
 def test_arrays_of_the_thinnest_strips_of_the_stress_matrix_are_small(name):
     found = load_scene(all_cases()[name].scene())
     model = build_model(found, found.solver.model, found.solver.dimension)
-    assert len(model.rod_surfaces.point_edge) > 800_000
+    assert len(model.rod_search.point_edge) > 800_000
     tracemalloc.start()
     arrays = storage.Storage(model)
     _ = arrays.problem
@@ -99,7 +99,7 @@ def test_a_rod_too_thin_for_contact_is_refused_before_memory_is_asked_for(thickn
 
 
 def test_the_limit_of_points_is_on_those_of_all_rods_together(monkeypatch):
-    count = len(build_model(load_scene(falling())).rod_surfaces.point_edge)
+    count = len(build_model(load_scene(falling())).rod_search.point_edge)
     monkeypatch.setattr(rod_surfaces, "MOST_POINTS", count)
     build_model(load_scene(falling()))
     monkeypatch.setattr(rod_surfaces, "MOST_POINTS", count - 3)

@@ -152,7 +152,7 @@ def test_the_step_of_newton_is_that_of_the_whole_matrix_of_a_ring(model, dimensi
     content = scene([ring(TWO, edges=8)], gravity=[0, 0, -5])
     problem = Problem(content, np.random.default_rng(3), model, dimension, noise=1e-7, origin_noise=1e-9, turns=1e-3)
     gradient, hessian = problem.derivatives()
-    twice = problem.model.joined_unknowns(problem.model.solved_layout)
+    twice = np.stack([problem.model.joins.first, problem.model.joins.copy], axis=1)
     size = len(hessian)
     joined = np.eye(size)
     joined[twice[:, 1]] = joined[twice[:, 0]]
@@ -274,7 +274,7 @@ def test_a_free_ring_keeps_its_momentum_and_its_energy_budget_closes(model):
     for dt in (1e-3, 5e-4):
         simulator = Simulator(load_scene(content), model=model, dimension=3, dt=dt, budget=True)
         simulator.run(0.1)
-        momentum = simulator.model.node_mass @ simulator.velocities
+        momentum = simulator.model.rods.node_mass @ simulator.velocities
         assert np.abs(momentum).max() < 1e-12
         budget = simulator.budget()
         lost.append(budget["lost"]["numerical"] / max(budget["stored"].values()))

@@ -48,7 +48,7 @@ def test_with_fixed_steps_the_remedy_is_adaptive_ones_as_well():
 def test_no_step_ends_with_an_edge_that_has_no_length_left(integrator, turns, dt):
     """Such an edge turns by what Newton's method leaves: faces of its rod would then be anywhere."""
     simulator = Simulator(load_scene(coiling(turns, dt=dt, integrator=integrator)))
-    rest, least = simulator.model.rest_length, math.inf
+    rest, least = simulator.model.rods.rest_length, math.inf
     with pytest.raises(SimulationError, match="has less than 1 % of its length left"):
         while simulator.time < 0.05:
             simulator.step()

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.evaluations import Problem, check
+from support.records_by_hand import changed
 from support.sample_scenes import ball, contact, everything, layer, rod, scene
 from support.slips import dissipation
 
@@ -27,16 +28,17 @@ HUBS = {
 
 def without_rotation(model):
     """The model whose bond does not resist that its layers turn against each other."""
-    stiffness = model.joint_stiffness.copy()
-    stiffness[model.bend_count :] = 0.0
-    return replace(model, joint_stiffness=stiffness)
+    stiffness = model.rods.joint_stiffness.copy()
+    stiffness[model.rods.bend_count :] = 0.0
+    return replace(model, rods=changed(model.rods, joint_stiffness=stiffness))
 
 
 def without_translation(model):
     """The model whose bond resists turns alone, about both axes across the strip."""
-    stiffness = model.joint_stiffness.copy()
-    stiffness[model.bend_count :, 1] = stiffness[model.bend_count :, 0]
-    return replace(model, joint_stiffness=stiffness, pair_stiffness=0.0 * model.pair_stiffness)
+    stiffness = model.rods.joint_stiffness.copy()
+    stiffness[model.rods.bend_count :, 1] = stiffness[model.rods.bend_count :, 0]
+    rods = changed(model.rods, joint_stiffness=stiffness)
+    return replace(model, rods=rods, bonds=changed(model.bonds, stiffness=0.0 * model.bonds.stiffness))
 
 
 BONDS = {"translation": without_rotation, "rotation": without_translation}

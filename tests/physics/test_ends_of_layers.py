@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.evaluations import Problem, at_rest, check
 from support.planar_scenes import AHEAD, HUBS, everything_in_plane
+from support.records_by_hand import changed
 from support.sample_scenes import everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
@@ -111,26 +112,27 @@ def test_a_strip_that_bends_by_itself_has_no_shear_between_its_layers_at_the_end
     content = strip(1.0, 1.0, 0.01)
     simulator = settled(content)
     model, x = simulator.model, simulator.positions
-    top0, top1, bottom0, bottom1 = (x[nodes] for nodes in model.pair_node[:40].T)
-    edges = np.array([model.joint_a, model.joint_b])[:, model.pair_joint[:40]]
-    tangent = np.diff(x, axis=0)[model.edge_node[edges]].mean(axis=0)
+    top0, top1, bottom0, bottom1 = (x[nodes] for nodes in model.bonds.node[:40].T)
+    edges = np.array([model.rods.joint_a, model.rods.joint_b])[:, model.bonds.joint[:40]]
+    tangent = np.diff(x, axis=0)[model.rods.edge_node[edges]].mean(axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     slip = np.einsum("ki,ki->k", 0.5 * (top0 + top1 - bottom0 - bottom1), tangent)
-    assert np.abs(slip).max() < 1e-3 * 0.01 * model.rest_length[0]
+    assert np.abs(slip).max() < 1e-3 * 0.01 * model.rods.rest_length[0]
 
 
 def ends_alone(model):
     """The model in which nothing bends or twists but the ends of layers."""
-    assert len(model.pair_joint) > len(model.joint_a) - model.bend_count
-    return replace(model, joint_stiffness=0.0 * model.joint_stiffness)
+    assert len(model.bonds.joint) > len(model.rods.joint_a) - model.rods.bend_count
+    return replace(model, rods=changed(model.rods, joint_stiffness=0.0 * model.rods.joint_stiffness))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_derivatives_of_ends_agree_with_differences_in_space(seed):
     problem = Problem(everything(), np.random.default_rng(seed), change=ends_alone)
     model = problem.model
-    before = model.edge_node[model.joint_a[model.pair_joint[len(model.joint_a) - model.bend_count :]]]
-    assert np.isin(before, model.attached_node).any()  # beside a clamp
+    rods = model.rods
+    before = rods.edge_node[rods.joint_a[model.bonds.joint[len(rods.joint_a) - rods.bend_count :]]]
+    assert np.isin(before, model.constrained.node).any()  # beside a clamp
     for force in ("bending", "twisting"):
         check(problem, (force,))
         assert problem.terms[force] > 0.0
@@ -150,7 +152,7 @@ def test_a_clamp_bends_the_half_edge_beside_it_with_its_own_joint():
     walls = [fixed(), fixed("other", (0.1, 0, 0))]
     clamped = scene([rod(layers, clamp_start="wall", clamp_end="other")], bodies=walls)
     model = build_model(load_scene(clamped))
-    assert len(model.pair_joint) == len(model.joint_a) - model.bend_count
+    assert len(model.bonds.joint) == len(model.rods.joint_a) - model.rods.bend_count
 
 
 def test_tapered_layers_start_without_stress_at_their_ends():

@@ -231,7 +231,7 @@ def test_velocities_that_are_changed_begin_a_new_account():
     simulator.run(1e-3)
     let_go(simulator, np.tile([0.0, 0.0, 1.0], (simulator.model.node_count, 1)))
     account = simulator.energy_account
-    assert account[ENERGY] == pytest.approx(0.5 * simulator.model.node_mass.sum(), rel=1e-9)
+    assert account[ENERGY] == pytest.approx(0.5 * simulator.model.rods.node_mass.sum(), rel=1e-9)
     assert account[FREE] == account[LOWEST] == 0.0 < account[LARGEST]
     simulator.run(1e-3)
     assert simulator.statistics.gaining == 0

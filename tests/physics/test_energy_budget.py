@@ -22,7 +22,7 @@ def test_what_implicit_euler_loses_is_what_its_velocities_say():
     differences = []
     for dt in (1e-3, 5e-4):
         simulator = Simulator(load_scene(clamped((0, 0, -9.81))), dt=dt, integrator="implicit_euler", budget=True)
-        mass = simulator.model.node_mass[1:, None]
+        mass = simulator.model.rods.node_mass[1:, None]
         v, a = np.zeros((8, 3)), np.array([0, 0, -9.81])
         work = 0.0
         for _ in range(round(0.05 / dt)):
@@ -57,7 +57,7 @@ def test_a_strip_that_spins_freely_loses_angular_momentum_at_first_order():
     lost = []
     for dt in (5e-4, 2.5e-4):
         simulator = Simulator(load_scene(strip), dt=dt, integrator="implicit_euler")
-        masses, radius = simulator.model.node_mass, simulator.positions[:, 0]
+        masses, radius = simulator.model.rods.node_mass, simulator.positions[:, 0]
         throw(simulator, np.stack([0 * radius, 10.0 * radius, 0 * radius], axis=1))
         simulator.run(0.1)
         momentum = masses @ np.cross(simulator.positions, simulator.velocities)

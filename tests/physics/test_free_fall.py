@@ -43,7 +43,7 @@ def error_of_fall(simulator, gravity, duration, euler_step=0.0):
     speed, way = gravity * time, 0.5 * gravity * time * (time + euler_step)
     step = simulator.time / simulator.statistics.steps
     last_digits = 64.0 * np.spacing(np.abs(before.position).max())
-    mass = simulator.model.node_mass / simulator.model.node_mass.sum()
+    mass = simulator.model.rods.node_mass / simulator.model.rods.node_mass.sum()
     errors = []
     for name, shares, tremble in (("", mass, last_digits), ("body_", np.ones(1), 0.0)):
         position, low = getattr(state, f"{name}position"), getattr(state, f"{name}position_low")

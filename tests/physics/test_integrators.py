@@ -79,7 +79,7 @@ def thrown(integrator, dt):
     before and after, and the impulses that nodes have exchanged.
     """
     simulator = Simulator(load_scene(free_strip()), dt=dt, integrator=integrator)
-    mass, along = simulator.model.node_mass[:, None], part(simulator, "position")[:, :1] - 0.015
+    mass, along = simulator.model.rods.node_mass[:, None], part(simulator, "position")[:, :1] - 0.015
     with_parts(simulator, velocity=np.hstack([3.0 * along, 0.0 * along + 0.3, 4.0 * along + 100.0 * along**2]))
     places, speeds = [simulator.positions], [simulator.velocities]
     simulator.run(0.1)
@@ -155,7 +155,7 @@ def test_a_ribbon_that_is_dropped_comes_to_rest_on_the_barrier(integrator):
     )
     simulator = Simulator(load_scene(dropped), dt=1e-3, integrator=integrator)  # five periods of the barrier
     simulator.run(0.3)
-    weight = 9.81 * simulator.model.node_mass.sum()
+    weight = 9.81 * simulator.model.rods.node_mass.sum()
     for _ in range(20):
         simulator.step()
         assert np.abs(simulator.velocities[:, 2]).max() < 1e-5

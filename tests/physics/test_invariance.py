@@ -28,7 +28,7 @@ def deformed(evaluator, start, seed=0, amplitude=2e-4):
     shape = evaluator.new()
     step = np.zeros(model.layout.size)
     step[model.layout.node[:, None] + np.arange(3)] = amplitude * rng.standard_normal((model.node_count, 3))
-    step[model.layout.edge] = 0.2 * rng.standard_normal(model.edge_count)
+    step[model.layout.edge] = 0.2 * rng.standard_normal(model.rods.edge_count)
     evaluator.move(start, step, np.zeros((0, 6)), shape)
     return shape
 
@@ -61,7 +61,7 @@ def test_frames_carried_along_a_rigid_turn_turn_with_the_body():
     for _ in range(steps):
         following.position[:] = now.position @ turn.T
         # a rigid turn spins each edge about its tangent by the turn's component along it
-        tangents = now.tangent[: evaluator.model.edge_count]
+        tangents = now.tangent[: evaluator.model.rods.edge_count]
         evaluator.transport_frames(now, tangents @ (axis / steps), following)
         now, following = following, evaluator.new()
     assert elastic_energy(evaluator, now) == pytest.approx(before, rel=1e-6)
@@ -76,7 +76,7 @@ def test_elastic_forces_and_moments_sum_to_zero(torsion, forces):
     gradient = evaluator.sums.gradient
     forces = gradient[model.layout.node[:, None] + np.arange(3)]
     about_tangent = gradient[model.layout.edge]
-    moment = np.cross(shape.position, forces).sum(axis=0) + about_tangent @ shape.tangent[: model.edge_count]
+    moment = np.cross(shape.position, forces).sum(axis=0) + about_tangent @ shape.tangent[: model.rods.edge_count]
     scale = np.abs(forces).sum()
     assert np.abs(forces.sum(axis=0)).max() < 1e-12 * scale
     assert np.abs(moment).max() < 1e-12 * scale * 0.02
@@ -93,7 +93,7 @@ def test_twist_of_a_bonded_strip_costs_its_torsional_stiffness_at_every_mesh(tor
     shape.position[:] = np.stack(
         [x, -start.position[:, 2] * np.sin(angle), start.position[:, 2] * np.cos(angle)], axis=1
     )
-    middle = 0.5 * (angle[model.edge_node] + angle[model.edge_node + 1])
+    middle = 0.5 * (angle[model.rods.edge_node] + angle[model.rods.edge_node + 1])
     evaluator.transport_frames(start, middle, shape)
     sections = [rectangle(model.scene.materials["gel"], *np.array([[0.01], [t], [1.0]])) for t in (1e-3, 1.5e-3)]
     tilt = bond(*sections, model.scene.coupling, torsion).tilt[0]
@@ -110,7 +110,7 @@ def test_friction_and_barrier_between_ball_and_strip_keep_their_total_momentum()
 
     def momentum():
         frame = simulator.frame()
-        return simulator.model.node_mass @ simulator.velocities + 2.7e-3 * frame.body_velocities[0]
+        return simulator.model.rods.node_mass @ simulator.velocities + 2.7e-3 * frame.body_velocities[0]
 
     before = momentum()
     simulator.run(0.05)

@@ -89,11 +89,11 @@ def star(model, **junction):
 def test_a_junction_has_no_mass_and_keeps_momentum_and_directions(model):
     simulator = star(model)
     start = simulator.com
-    assert simulator.model.bodies.mass.tolist() == [0.0]
+    assert simulator.model.free_bodies.mass.tolist() == [0.0]
     simulator.run(0.03)
     assert np.ptp(simulator.curvatures) > 5.0  # the legs bend
     np.testing.assert_allclose(simulator.com, start, atol=1e-12)
-    mass, model_ = simulator.model.node_mass, simulator.model
+    mass, model_ = simulator.model.rods.node_mass, simulator.model
     momentum = mass @ simulator.velocities[: model_.node_count]
     assert np.abs(momentum).max() < 1e-10 * mass.sum()
     # The legs leave the junction at the angles at which they met: it is rigid.
@@ -183,7 +183,7 @@ def test_joints_keep_momentum_and_the_energy_budget(kind):
     ]
     simulator = Simulator(load_scene(content), model="laminate", integrator="sdirk2", tolerance=1e-5, budget=True)
     simulator.run(0.05)
-    momentum = simulator.model.node_mass @ simulator.velocities[: simulator.model.node_count]
+    momentum = simulator.model.rods.node_mass @ simulator.velocities[: simulator.model.node_count]
     assert np.abs(momentum).max() < 1e-10
     assert np.ptp(simulator.positions[:, 2]) > 0.01
     assert abs(simulator.budget()["relative_residual"]) < 1e-3

@@ -42,7 +42,7 @@ def test_curvature_and_faces_do_not_depend_on_where_the_curve_lies(height, monke
     on_axis = settled(content)
     monkeypatch.setattr(laminate, "_axis", lambda _: height)
     beside = settled(content)
-    assert len(on_axis.model.coupled_joint) == 0 < len(beside.model.coupled_joint)
+    assert len(on_axis.model.off_axis.joint) == 0 < len(beside.model.off_axis.joint)
     assert beside.curvatures == pytest.approx(on_axis.curvatures, rel=1e-9)
 
     strands = [simulator.description.strands[0] for simulator in (on_axis, beside)]
@@ -95,7 +95,7 @@ def test_a_layer_on_a_part_bends_that_part_alone_as_two_rods_do():
         return scene(rods, bodies=[fixed()], stimuli=HEAT)
 
     simulator = settled(strip_of(51))
-    assert 0 < len(simulator.model.coupled_joint) < 15  # the curve is that of the long, single part
+    assert 0 < len(simulator.model.off_axis.joint) < 15  # the curve is that of the long, single part
     chi = simulator.curvatures
     assert chi[16:25] == pytest.approx(np.full(9, -1.5 * 0.02 / 2e-3), rel=1e-9)
     assert np.abs(np.delete(chi, range(15, 26))).max() < 1e-7  # where Newton's method ends
@@ -159,7 +159,7 @@ def test_natural_curvature_and_twist_are_means_weighted_with_stiffness():
 def test_mass_and_its_centre_are_those_of_two_rods_point_masses_included():
     content = everything()
     one, two = (Simulator(load_scene(content), model=model) for model in ("laminate", "two_rod"))
-    assert one.model.node_mass.sum() == pytest.approx(two.model.node_mass.sum(), rel=1e-12)
+    assert one.model.rods.node_mass.sum() == pytest.approx(two.model.rods.node_mass.sum(), rel=1e-12)
     assert one.com == pytest.approx(two.com, abs=1e-12)
     assert one.model.unknowns < 0.7 * two.model.unknowns
 
@@ -169,7 +169,7 @@ def test_a_point_mass_is_on_the_path_wherever_the_curve_of_a_laminate_lies(place
     layers = [layer("bottom"), layer("top", thickness=3e-3)]
     mass = {"name": "cargo", "rod": "rod", "position": place, "mass": 2e-3}
     light, heavy = (Simulator(load_scene(scene([rod(layers)], masses=m)), model="laminate") for m in ([], [mass]))
-    own = light.model.node_mass.sum()
+    own = light.model.rods.node_mass.sum()
     expected = (own * light.com + 2e-3 * np.array([place, 0.0, 0.0])) / (own + 2e-3)
     assert light.com[2] == pytest.approx(1e-3, rel=1e-9)  # of layers from −1 to 3 mm
     assert heavy.com == pytest.approx(expected, rel=1e-12, abs=1e-17)
@@ -210,9 +210,9 @@ def test_contact_counts_from_both_faces(dimension):
     model = build_model(load_scene(content), "laminate", dimension)
     (strand,) = model.strands
     low, high = (strand.offset + side * strand.thickness for side in (-0.5, 0.5))
-    points, start = model.contact_points, start_contact_points(model)
+    points, start = model.surfaces, start_contact_points(model)
     touching = points.weight > 0.0
-    node = np.concatenate([np.arange(21), points.rod_point_node])[touching]
+    node = np.concatenate([np.arange(21), points.rod_points.node])[touching]
     height, radius = start[touching, 2] - model.start_position[node, 2], points.radius[touching]
     assert np.bincount(node, minlength=21).tolist() == [1 if dimension == 2 else 3] * 21
     assert height - radius == pytest.approx(low[node]) and height + radius == pytest.approx(high[node])

@@ -17,7 +17,7 @@ from bilayer_core.verification.validate.light import CURVATURE, GAIN, LENGTH, SM
 def seen_at_start(content, model="laminate"):
     """The record of the light of a scene, and the part that each law sees at the start."""
     built = build_model(load_scene(content), model)
-    light, bodies, frames = light_of(built), built.bodies, built.start_director1[: built.edge_count]
+    light, bodies, frames = light_of(built), built.bodies, built.start_director1
     return light, part_seen(light, built.start_position, frames, bodies.start_position, bodies.start_rotation)
 
 
@@ -49,7 +49,7 @@ def test_light_from_the_side_of_the_width_is_weaker_by_its_cosine():
     content = lit_strip(0.0, SMALL, 11)
     content["stimuli"]["sun"]["light"]["from"] = [0, math.sin(1.0), math.cos(1.0)]
     straight, oblique = settled(lit_strip(0.0, SMALL, 11)), settled(content)
-    assert oblique.model.plane is None  # that light leaves the plane
+    assert not oblique.model.plane.exists  # that light leaves the plane
     assert oblique.curvatures == pytest.approx(math.cos(1.0) * straight.curvatures, rel=1e-3)
 
 
@@ -82,7 +82,7 @@ def test_where_the_other_layer_ends_both_faces_of_a_layer_are_lit():
     content["rods"][0]["layers"][0]["interval"] = [0, 0.05]
     simulator = settled(content, model="laminate")
     model = simulator.model
-    assert np.count_nonzero(model.lit_side == 0.0) == 10 and np.count_nonzero(model.lit_side == 1.0) == 10
+    assert np.count_nonzero(model.light.side == 0.0) == 10 and np.count_nonzero(model.light.side == 1.0) == 10
     seen = simulator._state.transduction
     assert seen == pytest.approx([0.0] * 10 + [1.0] * 10, abs=1e-12)
 
@@ -151,8 +151,8 @@ def test_a_scene_without_light_has_nothing_of_it():
     content = lit_strip(0.0, stations=6)
     del content["stimuli"]["sun"]["light"]
     model = build_model(load_scene(content), "laminate")
-    assert not light_of(model).exists and len(model.law_channel) == 1
-    assert len(build_model(load_scene(lit_strip(0.0, stations=6)), "laminate").law_channel) == 5
+    assert not light_of(model).exists and len(model.drives.law_channel) == 1
+    assert len(build_model(load_scene(lit_strip(0.0, stations=6)), "laminate").drives.law_channel) == 5
 
 
 def test_copies_that_are_mirror_images_bend_as_mirror_images():

@@ -29,12 +29,12 @@ def test_a_force_on_the_path_between_two_layers_does_not_turn_them():
     thick = [layer("bottom", thickness=1e-3), layer("top", thickness=3e-3)]
     pulled = scene([rod(thick, stations=41)], loads=[force_on_rod([0.2, 0, 0], 0.05)], materials=SOFT)
     simulator = Simulator(load_scene(pulled))
-    model, shares = simulator.model, simulator.model.dead_loads.nodes
-    moment = np.cross(model.start_position[shares.target] - [0.05, 0, 0], shares.vector).sum(axis=0)
-    assert shares.vector.sum(axis=0) == pytest.approx([0.2, 0, 0])
+    model, loads = simulator.model, simulator.model.loads
+    moment = np.cross(model.start_position[loads.node] - [0.05, 0, 0], loads.node_vector).sum(axis=0)
+    assert loads.node_vector.sum(axis=0) == pytest.approx([0.2, 0, 0])
     assert np.abs(moment).max() < 1e-18
     simulator.run(0.1)
-    momentum = model.node_mass @ simulator.velocities
+    momentum = model.rods.node_mass @ simulator.velocities
     assert momentum == pytest.approx([0.02, 0, 0], abs=1e-12)
 
 
@@ -75,8 +75,8 @@ def test_point_masses_weigh_as_much_as_they_are_heavy():
     layers = [layer("bottom"), layer("top", thickness=2e-3, interval=[0.02, 0.08])]
     plain = Simulator(load_scene(scene([rod(layers)])))
     simulator = Simulator(load_scene(scene([rod(layers)], masses=masses)))
-    own = plain.model.node_mass.sum()
-    assert simulator.model.node_mass.sum() == pytest.approx(own + 6e-3)
+    own = plain.model.rods.node_mass.sum()
+    assert simulator.model.rods.node_mass.sum() == pytest.approx(own + 6e-3)
     expected = (own * plain.com + np.array([1e-3 * 0.0333 + 5e-3 * LENGTH, 0, 0])) / (own + 6e-3)
     expected[2] -= 5e-3 * 0.5e-3 / (own + 6e-3)  # the tip is of the bottom layer alone
     assert simulator.com == pytest.approx(expected, abs=1e-15)
@@ -91,9 +91,9 @@ def test_a_pattern_takes_a_load_on_all_copies_or_on_the_one_that_is_named():
     ]
     masses = [{"name": "one", "rod": "arm_1", "position": 0.01, "mass": 1.0}]
     model = Simulator(load_scene(scene([star], loads=both, masses=masses))).model
-    assert model.dead_loads.nodes.target.tolist() == [4, 9, 14, 10]
-    assert model.dead_loads.nodes.vector[:, 2].tolist() == [1.0, 1.0, 1.0, 2.0]
-    assert np.flatnonzero(model.node_mass > 0.5).tolist() == [7]
+    assert model.loads.node.tolist() == [4, 9, 14, 10]
+    assert model.loads.node_vector[:, 2].tolist() == [1.0, 1.0, 1.0, 2.0]
+    assert np.flatnonzero(model.rods.node_mass > 0.5).tolist() == [7]
 
 
 def flyer(inertia=(3e-5, 3e-5, 3e-5), **motion):

@@ -22,19 +22,19 @@ def test_near_pairs_are_all_that_a_search_of_everything_finds_and_grow_with_the_
         rods = [rod([layer()], length=length, stations=stations, name=name) for name in "ab"]
         rods[1]["path"]["start"] = [0.7e-3, 0, 1.8e-3]
         model = model_of(rods)
-        surfaces = model.rod_surfaces
-        pairs = NearPairs(surfaces, model.edge_node, model.start_position)
+        surfaces = model.rod_search
+        pairs = NearPairs(surfaces)
         pairs.find(model.start_position, D_HAT, D_HAT)
         counts.append(pairs.count)
         if stations > 201:
             continue
         position = model.start_position + 2e-4 * np.sin(np.arange(3 * model.node_count)).reshape(-1, 3)
         pairs.find(position, D_HAT, D_HAT)
-        first = model.edge_node[surfaces.point_edge]
+        first = model.rods.edge_node[surfaces.point_edge]
         s = surfaces.point_fraction[:, None]
         points = (1 - s) * position[first] + s * position[first + 1]
         expected = set()
-        for k, j in enumerate(model.edge_node):
+        for k, j in enumerate(model.rods.edge_node):
             e = position[j + 1] - position[j]
             t = np.clip((points - position[j]) @ e / (e @ e), 0.0, 1.0)[:, None]
             distance = np.linalg.norm(points - position[j] - t * e, axis=1)
@@ -59,8 +59,8 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
     stations, spacing, reach = 91, 1e-3, 1.9e-3
     parts = [layer(name) for name in ("bottom", "top")[:layers]]
     model = model_of([rod(parts, length=spacing * (stations - 1), stations=stations)])
-    surfaces = model.rod_surfaces
-    pairs = NearPairs(surfaces, model.edge_node, model.start_position, 100)
+    surfaces = model.rod_search
+    pairs = NearPairs(surfaces, 100)
     s, edge = surfaces.point_fraction[:, None], surfaces.point_edge
     exclusion, radii = surfaces.rod_exclusion[0], surfaces.edge_radius[edge][:, None] + surfaces.edge_radius
     arc = surfaces.point_arc[:, None]
@@ -75,9 +75,9 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
         assert np.array_equal(np.lexsort((segment, point)), np.arange(pairs.count))
         for part in np.linspace(0.0, 1.0, 11):
             position = base + part * (tip - base)
-            points = (1 - s) * position[model.edge_node[edge]] + s * position[model.edge_node[edge] + 1]
-            e = position[model.edge_node + 1] - position[model.edge_node]
-            way = points[:, None] - position[model.edge_node]
+            points = (1 - s) * position[model.rods.edge_node[edge]] + s * position[model.rods.edge_node[edge] + 1]
+            e = position[model.rods.edge_node + 1] - position[model.rods.edge_node]
+            way = points[:, None] - position[model.rods.edge_node]
             t = np.clip(np.einsum("pkc,kc->pk", way, e) / np.einsum("kc,kc->k", e, e), 0.0, 1.0)
             gap = np.linalg.norm(way - t[:, :, None] * e, axis=2) - radii
             near = {(int(p), int(k)) for p, k in np.argwhere(sees & (gap < reach))}
@@ -91,13 +91,13 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
 
 def gaps_between(model, position):
     """Of all points of the first of two rods from all segments of the second, and the other way round."""
-    surfaces, found = model.rod_surfaces, []
-    i, s = model.edge_node[surfaces.point_edge], surfaces.point_fraction[:, None]
+    surfaces, found = model.rod_search, []
+    i, s = model.rods.edge_node[surfaces.point_edge], surfaces.point_fraction[:, None]
     points = (1.0 - s) * position[i] + s * position[i + 1]
     for own in (0, 1):
         mine = surfaces.edge_rod[surfaces.point_edge] == own
         other = np.flatnonzero(surfaces.edge_rod != own)
-        j = model.edge_node[other]
+        j = model.rods.edge_node[other]
         along, between = position[j + 1] - position[j], points[mine][:, None] - position[j]
         t = np.clip((between * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
         distance = np.linalg.norm(between - t[..., None] * along, axis=2)

@@ -34,11 +34,12 @@ def strain_of(strand, edges):
 
 def test_strains_of_nodes_are_those_of_their_edges(simulator):
     model, at, frame = simulator.model, simulator._stepper.end, simulator.frame()
-    edges = at.length[: model.edge_count] / model.rest_length - 1.0
-    cosine = np.sum(at.tangent[model.joint_a] * at.tangent[model.joint_b], axis=1)
-    bend = np.sum(at.tangent[model.joint_b] * at.director1[model.joint_a], axis=1)
-    bend -= np.sum(at.tangent[model.joint_a] * at.director1[model.joint_b], axis=1)
-    bends = slice(model.bend_count)
+    edges = at.length[: model.rods.edge_count] / model.rods.rest_length - 1.0
+    a, b = model.rods.joint_a, model.rods.joint_b
+    cosine = np.sum(at.tangent[a] * at.tangent[b], axis=1)
+    bend = np.sum(at.tangent[b] * at.director1[a], axis=1)
+    bend -= np.sum(at.tangent[a] * at.director1[b], axis=1)
+    bends = slice(model.rods.bend_count)
     expected = np.zeros(len(frame.curvature))
     expected[model.joint_node[bends]] = bend[bends] / (1.0 + cosine[bends]) / model.voronoi_length
     for strand in model.strands:
@@ -48,7 +49,7 @@ def test_strains_of_nodes_are_those_of_their_edges(simulator):
             strain[0], strain[-1] = strain[-2], strain[1]
             expected[nodes[[0, -1]]] = expected[nodes[[-2, 1]]]
         else:
-            free = [end for end in (0, -1) if nodes[end] not in model.attached_node]
+            free = [end for end in (0, -1) if nodes[end] not in model.constrained.node]
             expected[nodes[free]] = [expected[nodes[1 if end == 0 else -2]] for end in free]
         np.testing.assert_allclose(frame.strain[nodes], strain, rtol=0, atol=1e-14)
         np.testing.assert_allclose(frame.curvature[nodes], expected[nodes], rtol=1e-12, atol=1e-12)
@@ -65,20 +66,20 @@ def test_wrenches_on_bodies_are_sums_over_what_touches_and_what_is_held(simulato
     np.testing.assert_allclose(frame.contact_wrenches, contact[:-1], rtol=1e-12, atol=1e-18)
     points = model.node_count + model.point_count
     np.testing.assert_array_equal(frame.contact_forces, -sums.contact_point[:points])
-    held, tangent, of_edge = -sums.attached, at.tangent[model.edge_count :], -sums.edge[model.edge_count :]
+    held, tangent, of_edge = -sums.attached, at.tangent[model.rods.edge_count :], -sums.edge[model.rods.edge_count :]
     moment = np.cross(at.arm, held) + np.cross(tangent, of_edge[:, :3]) + of_edge[:, 3:] * tangent
     clamps = np.zeros((len(model.bodies.names), 6))
-    np.add.at(clamps, model.attached_body, np.concatenate([held, moment], axis=1))
+    np.add.at(clamps, model.constrained.body, np.concatenate([held, moment], axis=1))
     np.testing.assert_allclose(frame.clamp_wrenches, clamps, rtol=1e-12, atol=1e-12 * np.abs(clamps).max(initial=1e-9))
 
 
 def test_energies_and_rotations_seen_are_those_of_the_state(simulator):
     model, state, frame = simulator.model, simulator._state, simulator.frame()
     assert frame.energy["kinetic"] == pytest.approx(kinetic_energy(model, state), rel=1e-12)
-    if len(model.fluid_mass):
+    if model.fluid.exists:
         of_fluid = energy_of_fluid(model, simulator._stepper.end, state.velocity, state.spin)
         assert frame.energy["fluid"] == pytest.approx(of_fluid, rel=1e-12)
-    assert ("fluid" in frame.energy) == bool(len(model.fluid_mass))
+    assert ("fluid" in frame.energy) == model.fluid.exists
     expected = [quaternion_from_matrix(of) for of in state.body_rotation]
     np.testing.assert_allclose(frame.body_quaternions, np.reshape(expected, (-1, 4)), rtol=0, atol=1e-15)
 

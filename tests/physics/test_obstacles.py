@@ -180,7 +180,7 @@ def test_a_ribbon_drapes_over_a_fixed_cylinder_and_presses_on_it_with_its_weight
     )
     simulator = Simulator(load_scene(draped))
     simulator.run(1.5)
-    weight = 9.81 * simulator.model.node_mass.sum()
+    weight = 9.81 * simulator.model.rods.node_mass.sum()
     assert simulator.contact_forces.sum(axis=0) == pytest.approx([0, 0, weight], abs=0.01 * weight)
     assert simulator.positions[[0, -1], 2].max() < 0.0  # both ends hang
     distance = np.hypot(simulator.positions[:, 0], simulator.positions[:, 2])

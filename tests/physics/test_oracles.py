@@ -34,8 +34,8 @@ def bent_rod(rng, joints):
     evaluator, (rest, load_factor), state = Evaluator(model), undriven(model), initial_state(model)
     straight, bent = evaluator.new(), evaluator.new()
     evaluator.take_state(state, straight)
-    bent.position[1:] = bent.position[0] + np.cumsum(random_frames(rng, model.edge_count)[0], axis=0)
-    evaluator.transport_frames(straight, rng.standard_normal(model.edge_count), bent)
+    bent.position[1:] = bent.position[0] + np.cumsum(random_frames(rng, model.rods.edge_count)[0], axis=0)
+    evaluator.transport_frames(straight, rng.standard_normal(model.rods.edge_count), bent)
     rest_joint = rng.standard_normal(rest.joint.shape)
     evaluator.stand_still(state, straight, 1.0, rest.edge, rest_joint, load_factor)
     return evaluator, bent, rest_joint
@@ -55,7 +55,7 @@ def test_bending_and_twist_strains_are_those_of_the_curvature_binormal():
         ]
     )
     assert at.joint_strain == pytest.approx(expected, abs=1e-13)
-    parts = 0.5 * evaluator.model.joint_stiffness * np.square(expected - rest)
+    parts = 0.5 * evaluator.model.rods.joint_stiffness * np.square(expected - rest)
     assert energies["bending"] == pytest.approx(parts[:, :2].sum())
     assert energies["twisting"] == pytest.approx(parts[:, 2].sum())
 

@@ -133,7 +133,7 @@ def test_turns_of_a_helix_that_touch_push_each_other_apart():
     coil = HELIX | {"pitch": 1.6e-3, "angle": "2.5 turns"}
     content = scene([on_path(coil, (-1, 0, 0), ONE, 101)], bodies=[fixed()], contact=contact(barrier_distance=1e-3))
     simulator = Simulator(load_scene(content))
-    assert simulator.model.rod_surfaces is not None
+    assert simulator.model.rod_search.exists
     start = simulator.positions[-1, 2]
     simulator.run(0.01)
     assert simulator.positions[-1, 2] > start + 1e-6

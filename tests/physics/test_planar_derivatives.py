@@ -23,7 +23,7 @@ def of_everything(ahead, hub, seed, model):
 @pytest.mark.parametrize("model", MODELS)
 def test_derivatives_of_every_force_agree_with_differences(model, ahead, hub):
     problem = of_everything(ahead, hub, 1, model)
-    assert len(problem.model.coupled_joint) == (6 if model == "laminate" else 0)
+    assert len(problem.model.off_axis.joint) == (6 if model == "laminate" else 0)
     forces = [name for name in ALONE if name != "bond" or model == "two_rod"]
     assert set(forces) == set(problem.model.forces) - set(IDLE)
     for force in forces:
@@ -53,7 +53,7 @@ def test_the_newton_matrix_of_rods_that_touch_is_the_derivative_of_the_gradient(
     assert all(terms[term] > 0.0 for term in ("rod barrier", "rod friction"))
     contacts = evaluator.problem.rod_contact.contacts
     touching = contacts.node[: contacts.count[0]]
-    assert np.isin(touching, problem.model.attached_node).any()
+    assert np.isin(touching, problem.model.constrained.node).any()
     loads = []
     for _ in range(3):
         load = np.zeros(len(problem.scale))

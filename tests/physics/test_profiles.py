@@ -1,5 +1,7 @@
 """Sections, natural shapes and moduli that vary along the path."""
 
+from operator import attrgetter
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -34,11 +36,13 @@ def test_the_mass_is_the_integral_of_the_section():
 
     mass = 1000.0 * quad(section, 0, LENGTH, points=width["at"])[0]
     center = 1000.0 * quad(lambda s: s * section(s), 0, LENGTH, points=width["at"])[0] / mass
-    assert model.node_mass.sum() == pytest.approx(mass, rel=1e-3)
-    assert model.node_mass @ model.start_position[:, 0] / model.node_mass.sum() == pytest.approx(center, rel=1e-3)
+    assert model.rods.node_mass.sum() == pytest.approx(mass, rel=1e-3)
+    assert model.rods.node_mass @ model.start_position[:, 0] / model.rods.node_mass.sum() == pytest.approx(
+        center, rel=1e-3
+    )
     flat = build_model(load_scene(scene([rod([layer()], length=LENGTH, width=width)])))
     exact = 1000.0 * 1e-3 * (0.02 * 4e-3 + 0.03 * 7e-3 + 0.03 * 8e-3 + 0.02 * 6e-3)
-    assert flat.node_mass.sum() == pytest.approx(exact, rel=1e-12)
+    assert flat.rods.node_mass.sum() == pytest.approx(exact, rel=1e-12)
 
 
 def test_a_tapered_strip_sinks_as_fast_as_a_uniform_one_and_does_not_turn():
@@ -58,7 +62,7 @@ def test_the_fluid_that_goes_along_is_the_integral_of_the_width_squared():
     layers = [layer("bottom"), layer("top", thickness=linear(1e-3, 2e-3))]
     model = build_model(load_scene(scene([rod(layers, length=LENGTH, width=linear(12e-3, 4e-3))], fluid=fluid)))
     expected = 0.25 * np.pi * 800.0 * quad(lambda s: between(12e-3, 4e-3, s) ** 2, 0, LENGTH)[0]
-    assert model.fluid_mass[:, 0].sum() == pytest.approx(expected, rel=1e-3)
+    assert model.fluid.mass[:, 0].sum() == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_constant_profile_is_the_number_and_stiffness_multiplies_the_moduli():
@@ -74,8 +78,10 @@ def test_a_constant_profile_is_the_number_and_stiffness_multiplies_the_moduli():
     )
     materials = {"gel": GEL, "stiff": {**GEL, "youngs_modulus": 3e8}}
     one, other = (build_model(load_scene(scene([r], materials=materials))) for r in (strip, same))
-    for name in ("axial_stiffness", "joint_stiffness", "joint_rest", "pair_stiffness", "node_mass", "spin_inertia"):
-        assert getattr(one, name) == pytest.approx(getattr(other, name), rel=1e-14, abs=1e-18), name
+    of_rods = [f"rods.{name}" for name in ("axial_stiffness", "joint_stiffness", "node_mass", "spin_inertia")]
+    for name in (*of_rods, "drives.joint_rest", "bonds.stiffness"):
+        own = attrgetter(name)
+        assert own(one) == pytest.approx(own(other), rel=1e-14, abs=1e-18), name
 
 
 def test_the_section_is_drawn_and_touches_as_it_is():
@@ -84,15 +90,15 @@ def test_the_section_is_drawn_and_touches_as_it_is():
     (drawn,) = simulator.description.strands
     assert drawn.width == pytest.approx(np.linspace(10e-3, 2e-3, 21))
     assert drawn.thickness == pytest.approx(np.linspace(1e-3, 3e-3, 21))
-    points, nodes = simulator.model.contact_points, simulator.model.node_count
+    points, nodes = simulator.model.surfaces, simulator.model.node_count
     assert points.radius[:nodes] == pytest.approx(0.5 * drawn.thickness)
     border = 0.5 * (drawn.width - drawn.thickness)
     wide = border > 1e-12
     assert 10 < wide.sum() < 21
-    assert np.unique(points.rod_point_node).tolist() == np.flatnonzero(wide).tolist()
-    assert np.abs(points.rod_point_arm[:, 1]) == pytest.approx(np.repeat(border[wide], 2))
+    assert np.unique(points.rod_points.node).tolist() == np.flatnonzero(wide).tolist()
+    assert np.abs(points.rod_points.arm[:, 1]) == pytest.approx(np.repeat(border[wide], 2))
     assert points.radius[nodes:] == pytest.approx(np.repeat(0.5 * drawn.thickness[wide], 2))
-    weight = points.weight[:nodes] + np.bincount(points.rod_point_node, points.weight[nodes:], nodes)
+    weight = points.weight[:nodes] + np.bincount(points.rod_points.node, points.weight[nodes:], nodes)
     assert weight == pytest.approx(simulator.model.node_length)
 
 

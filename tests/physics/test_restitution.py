@@ -117,7 +117,7 @@ def test_derivatives_agree_with_differences(restitution, speed):
     state.memory[:], state.strain_rate[:] = 1.0, -speed
     at, trial = evaluator.new(), evaluator.new()
     evaluator.take_state(state, at)
-    drive = model.rest_strain, model.joint_rest, np.zeros(0)
+    drive = model.drives.rest_strain, model.drives.joint_rest, np.zeros(0)
     evaluator.stand_still(state, at, 1e-5, *drive)
     evaluator.start_stage(at)
 

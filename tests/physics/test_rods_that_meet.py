@@ -104,7 +104,7 @@ def test_ribbons_that_collide_in_flight_keep_their_momentum_and_slow_down_by_fri
     simulator = Simulator(load_scene(flight))
     nodes = simulator.model.strands[-1].first_node
     simulator._state.velocity[nodes:] = [0.3, 0.1, -0.5]
-    mass = simulator.model.node_mass
+    mass = simulator.model.rods.node_mass
     before = mass @ simulator.velocities
     relative = simulator.velocities[nodes, 0]
     simulator.run(0.05)

@@ -31,7 +31,7 @@ def end_of(content, duration, dt=1e-3):
 
 def edge_strains(simulator):
     lengths = np.linalg.norm(np.diff(simulator.positions, axis=0), axis=1)
-    return lengths / simulator.model.rest_length - 1.0
+    return lengths / simulator.model.rods.rest_length - 1.0
 
 
 def test_halving_the_step_does_not_change_what_a_square_wave_makes_of_a_lagging_layer():
@@ -84,7 +84,7 @@ def test_an_interval_of_a_layer_that_starts_later_counts_along_the_path():
     content["rods"][0]["layers"] = [layer("passive"), active]
     model = Simulator(load_scene(content)).model
     # The passive layer has edges 0 to 9; edge 10 lies 4 to 6 mm along the path.
-    assert model.driven_edge.tolist() == [13, 14]
+    assert model.drives.driven_edge.tolist() == [13, 14]
 
 
 def test_a_saturated_layer_grows_by_its_hyperbolic_law_from_its_reference():

@@ -21,7 +21,7 @@ def test_views_of_rods_show_all_nodes_of_the_simulator_once(gripper):
     nodes = np.concatenate([rod.nodes for rod in gripper.rods.values()])
     edges = np.concatenate([rod.edges for rod in gripper.rods.values()])
     assert nodes.tolist() == list(range(gripper.model.node_count))
-    assert edges.tolist() == list(range(gripper.model.edge_count))
+    assert edges.tolist() == list(range(gripper.model.rods.edge_count))
     frame = gripper.frame()
     for of_rods, of_frame in (
         ("positions", frame.positions),

@@ -60,9 +60,9 @@ def test_momentum_of_a_viscous_strip_in_violent_vibration_stays(integrator):
     simulator = Simulator(load_scene(content))
     rng = np.random.default_rng(3)
     let_go(simulator, 0.2 * rng.standard_normal((simulator.model.node_count, 3)))
-    before, energy = simulator.model.node_mass @ simulator.velocities, simulator.energy()
+    before, energy = simulator.model.rods.node_mass @ simulator.velocities, simulator.energy()
     simulator.run(0.02)
-    after = simulator.model.node_mass @ simulator.velocities
+    after = simulator.model.rods.node_mass @ simulator.velocities
     assert np.abs(after - before).max() < 1e-9 * np.linalg.norm(before)
     assert sum(simulator.energy().values()) < sum(energy.values())
 

@@ -138,7 +138,7 @@ def sliding(coefficient=0.3):
 
 def test_friction_takes_coulombs_work_and_all_of_a_sliding_strips_energy():
     simulator = run(sliding(), 0.12, 2e-4, (0.3, 0, 0))
-    taken, mass = simulator.budget()["lost"]["friction"], simulator.model.node_mass.sum()
+    taken, mass = simulator.budget()["lost"]["friction"], simulator.model.rods.node_mass.sum()
     distance = simulator.positions[0, 0]
     assert np.abs(simulator.velocities).max() < 1e-6
     assert taken == pytest.approx(0.3 * mass * 9.81 * distance, rel=2e-3)
@@ -253,7 +253,7 @@ def test_a_curved_strip_feels_the_same_drag_from_whichever_end_its_path_begins()
         fluid = {"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05]}
         simulator = Simulator(load_scene(scene([strip], fluid=fluid)), dt=1e-4)
         simulator.run(1e-3)
-        return simulator.model.node_mass @ simulator.velocities
+        return simulator.model.rods.node_mass @ simulator.velocities
 
     one = momentum([0, 0, 0], [1, 0, 0], [0, 0, 1])
     other = momentum([0.05, 0, 0.05], [0, 0, -1], [-1, 0, 0])

@@ -22,7 +22,7 @@ def test_an_arch_snaps_through_as_it_warms_and_stays_as_it_cools(model):
     assert 44.0 < temperatures[snap] < 54.0
     assert heights[:snap].max() > heights[0] + 1e-3  # it rises before
     left, right = (simulator.bodies[name].clamp_wrench for name in ("left", "right"))
-    weight = float(simulator.model.node_mass.sum()) * 9.81
+    weight = float(simulator.model.rods.node_mass.sum()) * 9.81
     assert left[2] == pytest.approx(-0.5 * weight, rel=0.02)
     assert right[2] == pytest.approx(-0.5 * weight, rel=0.02)
     assert left[0] == pytest.approx(-right[0], rel=0.02)

@@ -89,7 +89,7 @@ def test_it_takes_off_within_milliseconds_and_rises_by_more_than_its_length(jump
 
 def test_it_rises_no_higher_than_its_elastic_energy_could_lift_it(jump):
     simulator, flight = jump
-    mass = simulator.model.node_mass.sum()
+    mass = simulator.model.rods.node_mass.sum()
     eta, density, modulus = 0.05, 1000.0, 1e8
     assert flight.rise < 0.094 * modulus * eta**2 / (density * GRAVITY)
     in_flight = simulator.energy()

@@ -45,7 +45,7 @@ def test_the_cube_ends_at_rest_on_the_floor_100_mm_aside(method):
     assert aloft == pytest.approx([ASIDE, 0.0, 75.5e-3], abs=1e-3)
     assert cube.position == pytest.approx([ASIDE, 0.0, 15.5e-3], abs=1e-3)
     assert max(map(abs, yaw(simulator))) < 1e-3
-    of_fingers = simulator.contact_forces[: len(simulator.model.node_mass)]
+    of_fingers = simulator.contact_forces[: len(simulator.model.rods.node_mass)]
     assert not of_fingers.any()  # all have let go
     before = cube.position
     simulator.run(0.5)

@@ -18,7 +18,7 @@ STROKES = {"fluid.added_mass=false": 3.978e-3, "fluid.added_mass=true": 4.543e-3
 
 def height(simulator):
     """Of the mass centre of arms and hub [m]."""
-    nodes, hub = simulator.model.node_mass, simulator.model.bodies.mass[0]
+    nodes, hub = simulator.model.rods.node_mass, simulator.model.free_bodies.mass[0]
     total = nodes @ simulator.positions[:, 2] + hub * simulator.bodies["hub"].position[2]
     return total / (nodes.sum() + hub)
 
@@ -46,7 +46,7 @@ def test_the_swimmer_has_the_papers_parameters():
     assert (passive + 1, active) == (321, 288)  # the hub is one
     assert simulator.scene.gravity == (0.0, 0.0, 0.0)
     assert simulator.scene.fluid.added_mass is None
-    drag = simulator.model.drag_coefficient[5]
+    drag = simulator.model.flow.coefficient[5]
     assert drag / drag[1] == pytest.approx([0.01, 1.0, 0.2])  # sideways the thickness counts, not the width
 
 

@@ -104,7 +104,7 @@ def time_of(message):
 
 def test_a_mounted_hub_keeps_its_top_speed_and_bears_the_weight_as_after_a_reset(process, connect, folder):
     arm, simulator = Arm(client := connect(process)), Simulator(load_scene(folder / "hung.yaml"))
-    weight = GRAVITY * float(simulator.model.node_mass.sum())
+    weight = GRAVITY * float(simulator.model.rods.node_mass.sum())
     assert weight == pytest.approx(GRAVITY * 1000 * 0.1 * 0.01 * 0.002, rel=1e-9)
     for _ in range(2):
         times, heights, wrench = arm.run(1.0)

@@ -107,9 +107,9 @@ def test_the_least_rest_length_counts_laws_where_and_when_they_meet(laws, reache
 @pytest.mark.parametrize("model", ["laminate", "two_rod"])
 def test_every_edge_of_a_model_keeps_a_rest_length_at_the_ends_of_what_is_accepted(model):
     built = build_model(load_scene(driven([of("humidity", -0.6), of("heat", 0.39)])), model)
-    least = np.minimum(built.law_gain * [0.0, -1.0], built.law_gain * [1.0, 1.0])
-    strain = built.rest_strain.copy()
-    np.add.at(strain, built.driven_edge, built.driven_weight * least[built.driven_law])
+    least = np.minimum(built.drives.law_gain * [0.0, -1.0], built.drives.law_gain * [1.0, 1.0])
+    strain = built.drives.rest_strain.copy()
+    np.add.at(strain, built.drives.driven_edge, built.drives.driven_weight * least[built.drives.driven_law])
     assert strain.min() > -1.0
     assert strain.min() == pytest.approx({"laminate": -0.495, "two_rod": -0.99}[model])
 

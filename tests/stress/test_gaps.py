@@ -50,10 +50,10 @@ def test_near_pairs_of_very_many_edges_are_those_of_all(kind):
     few, many = PairsOfEdges(model), PairsOfEdges(model, most=0)
     simulator.run()
     nodes = simulator.frame().positions[: model.node_count]
-    middle = 0.5 * (nodes[model.edge_node] + nodes[model.edge_node + 1])
+    middle = 0.5 * (nodes[model.rods.edge_node] + nodes[model.rods.edge_node + 1])
     first, second = few.at(nodes)
-    longest = np.linalg.norm(nodes[model.edge_node + 1] - nodes[model.edge_node], axis=1).max()
-    reach = longest + 2.0 * model.rod_surfaces.edge_radius.max() + simulator.scene.contact.barrier_distance
+    longest = np.linalg.norm(nodes[model.rods.edge_node + 1] - nodes[model.rods.edge_node], axis=1).max()
+    reach = longest + 2.0 * model.rod_search.edge_radius.max() + simulator.scene.contact.barrier_distance
     near = np.linalg.norm(middle[first] - middle[second], axis=1) < reach
     expected = set(zip(first[near].tolist(), second[near].tolist(), strict=True))
     found = {(min(pair), max(pair)) for pair in zip(*(part.tolist() for part in many.at(nodes)), strict=True)}

@@ -20,7 +20,7 @@ STEPS = (3e-8, 1e-7, 3e-7, 1e-6)  # of differences, of which the best counts [m]
 
 def undriven(model):
     """Strains without stress and factors of loads where no stimulus acts and loads are whole."""
-    return RestStrains(model.rest_strain, model.joint_rest), np.ones(len(model.scene.loads))
+    return RestStrains(model.drives.rest_strain, model.drives.joint_rest), np.ones(len(model.scene.loads))
 
 
 def at_rest(model, length):
@@ -76,8 +76,8 @@ class Problem:
     ):
         model = self.model = change(build_model(load_scene(content), model, dimension))
         evaluator = self.evaluator = Evaluator(model)
-        in_space, axes = model.plane is None, model.directions
-        free = np.setdiff1d(np.arange(model.node_count), model.attached_node)
+        in_space, axes = not model.plane.exists, model.rods.axes
+        free = np.setdiff1d(np.arange(model.node_count), model.constrained.node)
 
         def draw(count):
             return rng.standard_normal((count, len(axes))) @ axes
@@ -88,13 +88,15 @@ class Problem:
         evaluator.take_state(state, rest)
         evaluator.take_state(state, bent)
         bent.position[free] += noise * draw(len(free))
-        still = np.zeros(model.edge_count)
-        evaluator.transport_frames(rest, turns * rng.standard_normal(model.edge_count) if in_space else still, bent)
+        still = np.zeros(model.rods.edge_count)
+        evaluator.transport_frames(
+            rest, turns * rng.standard_normal(model.rods.edge_count) if in_space else still, bent
+        )
         state.position[:] = bent.position
-        state.director1[:] = bent.director1[: model.edge_count]
+        state.director1[:] = bent.director1[: model.rods.edge_count]
         state.velocity[free] = 0.05 * draw(len(free))
-        state.spin[:] = rng.standard_normal(model.edge_count) if in_space else still
-        for body in model.bodies.body_of_free:
+        state.spin[:] = rng.standard_normal(model.rods.edge_count) if in_space else still
+        for body in model.free_bodies.body_of_free:
             state.body_velocity[body] = 0.02 * draw(1)[0]
             spin = rng.standard_normal(3) if in_space else rng.standard_normal() * model.plane.normal
             state.body_angular_velocity[body] = spin
@@ -110,9 +112,9 @@ class Problem:
             origin.body_displacement[:] += origin_noise * draw(len(origin.body_displacement))
             for b in range(len(origin.rotation)):
                 origin.rotation[b] = rotation_matrix(1e3 * origin_noise * rng.standard_normal(3)) @ origin.rotation[b]
-            turned = 1e3 * origin_noise * rng.standard_normal(model.edge_count)
+            turned = 1e3 * origin_noise * rng.standard_normal(model.rods.edge_count)
         surroundings = Surroundings(model)
-        strains = surroundings.rest_strains_of(np.full(len(model.law_gain), 0.7))
+        strains = surroundings.rest_strains_of(np.full(len(model.drives.law_gain), 0.7))
         then = state.copy()
         then.time[0] = 0.03
         load_factor = surroundings.load_factor(then)
@@ -129,14 +131,14 @@ class Problem:
     def _number(self):
         """`basis`: unknowns of the model in space, and of bodies, by those of the vector; `free`: those not held."""
         model = self.model
-        size, solved, freedom = model.layout.size, model.solved_layout, model.bodies.freedom
+        size, solved, freedom = model.layout.size, model.solved_layout, model.free_bodies.freedom
         self.size = size
         self.basis = np.zeros((size + 6 * model.free_count, solved.size + freedom.shape[1]))
         self.scale = np.ones(self.basis.shape[1])
-        for c, axis in enumerate(model.directions):
+        for c, axis in enumerate(model.rods.axes):
             for d in range(3):
                 self.basis[model.layout.node + d, solved.node + c] = axis[d]
-        if model.plane is None:
+        if not model.plane.exists:
             self.basis[model.layout.edge, solved.edge] = 1.0
             self.scale[solved.edge] = 1.0 / HALF_WIDTH
         self.basis[size:, solved.size :] = freedom
@@ -167,7 +169,7 @@ class Problem:
 
     def derivatives(self, forces=None):
         """Gradient and Hessian of the free unknowns at `at`, as steps take them."""
-        evaluator, size, freedom = self.evaluator, self.model.solved_layout.size, self.model.bodies.freedom
+        evaluator, size, freedom = self.evaluator, self.model.solved_layout.size, self.model.free_bodies.freedom
         self.terms = evaluator.evaluate(self.at, forces, second=True)
         gradient = self.gradient()
         band, border, corner = evaluator.assemble(self.at)
@@ -204,7 +206,7 @@ def check(problem, forces=None):
     gradient_errors, hessian_errors = [], []
     for h in STEPS:
         by_energy, by_gradient = problem.differences(h, forces)
-        if problem.model.plane is None:
+        if not problem.model.plane.exists:
             # frames are transported: differences of the gradient are symmetric only up to holonomy
             by_gradient = 0.5 * (by_gradient + by_gradient.T)
         gradient_errors.append(np.abs(gradient - by_energy).max() / largest)

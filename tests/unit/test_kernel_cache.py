@@ -24,7 +24,7 @@ from bilayer_core.model.state import initial_state
 
 model = build_model(load_scene("gripping"), "laminate", 3)
 before, after = initial_state(model), initial_state(model)
-ball = model.bodies.body_of_free[0]
+ball = model.free_bodies.body_of_free[0]
 turn = [[math.cos(0.1), -math.sin(0.1), 0], [math.sin(0.1), math.cos(0.1), 0], [0, 0, 1]]
 after.body_rotation[ball] = turn @ after.body_rotation[ball]
 ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.names}) for state in (before, after))

@@ -11,38 +11,44 @@ class RodPoints:
     """Contact points with arms from nodes, the last of all contact points; see `model.rod_points`."""
 
     first: int  # of them among contact points
-    node: Indices
-    arm: Matrix  # along m1 and m2 [m]
+    node: Indices  # ascending, shape (n_rod_point,)
+    arm: Matrix  # along m1 and m2, means of the node's edges [m], shape (n_rod_point, 2)
     longest: float  # of the arms [m]
 
 
 @record
 class Surfaces:
-    """Contact points, surfaces, and the list of near pairs with what it was made for; see `contact.near`."""
+    """Contact points, surfaces, and the list of near pairs with what it was made for; see `contact.near`.
 
-    d_hat: float
-    stiffness: float
-    radius: Vector
-    weight: Vector
-    contact_point_body: Indices
+    Contact points have a radius: all nodes, then *points* of bodies (contact points of the scene; corners and rims of
+    surfaces), then *centres* of balls and points of obstacles, and *rod points*, which have an arm from a node
+    (`model.rod_points`). Surfaces that they can meet are those of obstacles, then bodies'; see `contact.shapes` for
+    their numbers.
+    """
+
+    d_hat: float  # barrier distance [m]
+    stiffness: float  # of the barrier [Pa]
+    radius: Vector  # half the thickness, offset, or radius [m], shape (n_contact_point,)
+    weight: Vector  # Δl of the barrier [m], 0 of a node that its rod points stand for, shape (n_contact_point,)
+    contact_point_body: Indices  # body that takes the force, −1 for those of rods, shape (n_contact_point,)
     free_index: Indices  # indices of all bodies among the free ones; none if none is free
-    moved_by: Indices
-    node_free: Flags
-    group: Indices
-    point_position: Matrix  # of points and centres in their bodies' frames
-    point_body: Indices
+    moved_by: Indices  # body that moves it, −1 for those of rods that none holds, shape (n_contact_point,)
+    node_free: Flags  # whether no body holds a node, shape (n_node,)
+    group: Indices  # contact points of a group meet the same surfaces, shape (n_contact_point,)
+    point_position: Matrix  # of points and centres in their bodies' frames [m], shape (n_point, 3)
+    point_body: Indices  # their bodies, shape (n_point,)
     node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
     rod_points: RodPoints
     arm_factor: float  # how many times farther than nodes and borders of edges a contact point of a rod moves at most
-    kind: Indices
-    size: Matrix
-    rounding: Vector
-    bound: Vector
-    body: Indices
-    position: Matrix
-    rotation: Stack
-    can_collide: FlagTable
-    edge_can_cross: FlagTable  # see `contact.crossing`
+    kind: Indices  # shape (n_surface,)
+    size: Matrix  # half sizes of what is rounded [m], shape (n_surface, 3)
+    rounding: Vector  # [m], shape (n_surface,)
+    bound: Vector  # radius of a ball about the position that holds it [m], shape (n_surface,)
+    body: Indices  # body that it belongs to, or the world, shape (n_surface,)
+    position: Matrix  # in the body's frame [m], shape (n_surface, 3)
+    rotation: Stack  # its own axes in the body's frame, shape (n_surface, 3, 3)
+    can_collide: FlagTable  # whether contact points of a group can meet it, shape (n_surface, n_group)
+    edge_can_cross: FlagTable  # whether it could come between the nodes of an edge, shape (n_surface, n_edge)
     near_contact_point: Indices = ("near",)
     near_surface: Indices = ("near",)
     near_gap: Vector = ("near",)
@@ -78,12 +84,12 @@ class Sliding:
     acts: bool
     threshold: float
     coefficient: Matrix
-    node_axis: Indices
+    node_axis: Indices  # which direction of each node counts as forward: 0 t, 1 m1, ±2 ± m2, shape (n_node,)
     grained: bool  # whether a surface has a grain, or the world an axis; its coefficients, and the same every way:
     along_grain: Vector  # shape (3,)
     across_all: float
     world_axis: Vector  # 0 without one, shape (3,)
-    surface_grain: Matrix  # in their bodies' frames, 0 without one, shape (n_surface, 3)
+    surface_grain: Matrix  # forward direction on each in its body's frame, 0 without one, shape (n_surface, 3)
     point_grain: Matrix  # likewise of contact points, shape (n_contact_point, 3)
     mu: Matrix = ("near", 3)  # coefficients of contacts: forward, backward, sideways
     count: Indices = (1,)

@@ -11,7 +11,7 @@ from bilayer_core.jit.record import Flags, IndexTable, Indices, Matrix, Stack, V
 
 @record
 class Strands:
-    """Numbering, sections and joints of rods; see `model.Model` and `model.unknown_order`."""
+    """Numbering, sections and joints of rods; see `model.model.Model` and `model.unknown_order`."""
 
     size: int  # unknowns of the matrix
     dimension: int  # of them at each node
@@ -20,46 +20,46 @@ class Strands:
     bandwidth: int  # half of it, without the diagonal
     axes: Matrix  # directions of a node's unknowns in the matrix, shape (dimension, 3)
     row: Indices  # first of them in the matrix, shape (n_node,)
-    node_unknown: Indices  # slot of a node in gradients and steps, which are vectors in space
-    edge_unknown: Indices  # likewise of an edge
-    edge_node: Indices
-    node_mass: Vector
-    spin_inertia: Vector
-    half_width: Vector
-    rest_length: Vector
-    axial_stiffness: Vector
-    joint_a: Indices
-    joint_b: Indices
-    joint_stiffness: Matrix
+    node_unknown: Indices  # slot of a node in gradients and steps, which are vectors in space, shape (n_node,)
+    edge_unknown: Indices  # likewise of an edge, shape (n_edge,)
+    edge_node: Indices  # first node of each edge, shape (n_edge,)
+    node_mass: Vector  # with point masses [kg], shape (n_node,)
+    spin_inertia: Vector  # of edges about their tangent [kg m²], shape (n_edge,)
+    half_width: Vector  # of each edge [m], shape (n_edge,)
+    rest_length: Vector  # [m], shape (n_edge,)
+    axial_stiffness: Vector  # EA [N], shape (n_edge,)
+    joint_a: Indices  # first edge of each joint, shape (n_joint,)
+    joint_b: Indices  # second edge
+    joint_stiffness: Matrix  # k₁ k₂ k₃ [N m], shape (n_joint, 3)
 
 
 @record
 class Viscosity:
     """Retardation times of elements [s]; absent if no material has one. See `forces.viscosity`."""
 
-    edge_time: Vector
-    joint_time: Matrix
-    pair_time: Matrix
+    edge_time: Vector  # of edges, shape (n_edge,)
+    joint_time: Matrix  # of κ₁ κ₂ ψ of joints, shape (n_joint, 3)
+    pair_time: Matrix  # of vectors between layers, shape (n_pair, 3)
 
 
 @record
 class Drives:
     """Rest strains of edges and joints, which stimuli change."""
 
-    rest_strain: Vector
-    driven_edge: Indices
-    driven_law: Indices
-    driven_weight: Vector
-    joint_rest: Matrix
-    driven_joint: Indices
-    driven_joint_law: Indices
-    driven_joint_weight: Vector
-    law_channel: Indices
-    law_rising: Vector
-    law_falling: Vector
-    law_gain: Vector
-    law_reference: Vector
-    law_saturation: Vector
+    rest_strain: Vector  # of edges without stimuli, shape (n_edge,)
+    driven_edge: Indices  # edges that follow a law, once for each law, shape (n_driven,)
+    driven_law: Indices  # the law that each of them follows, shape (n_driven,)
+    driven_weight: Vector  # its part of the law's eigenstrain, shape (n_driven,)
+    joint_rest: Matrix  # κ̄₁ κ̄₂ ψ̄ without stimuli [rad], shape (n_joint, 3)
+    driven_joint: Indices  # joints whose κ̄₁ follows a law, once for each law, shape (n_driven_joint,)
+    driven_joint_law: Indices  # likewise
+    driven_joint_weight: Vector  # κ̄₁ per eigenstrain of the law [rad], likewise
+    law_channel: Indices  # stimulus channel of each law, shape (n_law,)
+    law_rising: Vector  # time constant for a rising stimulus [s], shape (n_law,)
+    law_falling: Vector  # and for a falling one
+    law_gain: Vector  # eigenstrain per unit of stimulus near the reference, shape (n_law,)
+    law_reference: Vector  # stimulus without eigenstrain, in its unit, shape (n_law,)
+    law_saturation: Vector  # largest magnitude of the eigenstrain, or infinite, shape (n_law,)
 
 
 @record
@@ -74,8 +74,8 @@ class Space:
 class Plane:
     """Arrays of dimension 2, instead of frames and twist; see `forces.planar`."""
 
-    normal: Vector
-    side: Vector
+    normal: Vector  # of the plane, p × q of its directions `Strands.axes`, shape (3,)
+    side: Vector  # σ of edges and clamp edges: m1 = σ normal × t, m2 = σ normal, shape (n_edge + n_clamp_edge,)
     joint_after: Indices  # between each edge and the next, −1 at the end of a strand, shape (n_edge,)
     frame: Matrix = ("edge+clamp", 4)
     polar_gradient: Matrix = ("edge+clamp", 2)
@@ -89,8 +89,8 @@ class Plane:
 class OffAxis:
     """Joints whose natural curvature depends on the strains of their edges; see `forces.bend_twist`."""
 
-    joint: Indices
-    slope: Matrix
+    joint: Indices  # whose κ̄₁ depends on the strains of its edges, shape (n_coupled,)
+    slope: Matrix  # b/|ē| of either edge, ∂κ̄₁ by its length, 0 for a clamp edge [rad/m], shape (n_coupled, 2)
     rest: Matrix = ("joint", 3)  # of all joints at the present strains [rad]
 
 
@@ -99,42 +99,44 @@ class Bonds:
     """Vectors between two layers, each in the frames of the two edges of a joint; see `forces.bond`."""
 
     joint: Indices  # that of `Strands` with number bend_count + k for paired edges k, then those of ends of layers
-    node: IndexTable
-    weight: Matrix
-    stiffness: Matrix
-    rest: Matrix
+    node: IndexTable  # it leads from the middle of the last two nodes to that of the first two, shape (n_pair, 4)
+    weight: Matrix  # of the frames of the joint's two edges, shape (n_pair, 2)
+    stiffness: Matrix  # along m1, m2, m3 [N/m], shape (n_pair, 3)
+    rest: Matrix  # likewise [m]
 
 
 @record
 class Bodies:
-    """Rigid bodies; the last one is the world."""
+    """Rigid bodies; the last one is the world, which never moves. *Free* bodies, guided ones among them, have unknowns,
+    in the order in which they occur.
+    """
 
-    free_index: Indices
-    body_of_free: Indices
+    free_index: Indices  # index among the free bodies, −1 for a prescribed one and the world, shape (n_body + 1,)
+    body_of_free: Indices  # the reverse, shape (n_free,)
     prescribed: Indices  # bodies without unknowns, shape (n_prescribed,)
-    mass: Vector
-    second_moment: Stack
+    mass: Vector  # of free bodies [kg], shape (n_free,)
+    second_moment: Stack  # ∫ r rᵀ dm of free bodies, body frame [kg m²], shape (n_free, 3, 3)
     inertia: Vector  # factor of the shift for each unknown of free bodies: m and tr(J), shape (6 n_free,)
-    freedom: Matrix
+    freedom: Matrix  # motions (X, φ) that they are allowed, a column each, orthonormal, shape (6 n_free, n_freedom)
     freedom_first: Indices  # the first unknown of the body that each of its columns moves, shape (n_freedom,)
-    bounding_radius: Vector
-    rotates: Flags  # whether a body can turn, bool
+    bounding_radius: Vector  # largest distance of what a body carries, or of gyration [m], shape (n_body + 1,)
+    rotates: Flags  # whether a body can turn, shape (n_body,)
 
 
 @record
 class Constrained:
     """Nodes and directions that bodies hold."""
 
-    node: Indices
-    unknown: Indices
-    row: Indices
-    body: Indices
-    free: Indices
-    position: Matrix  # in the body's frame
-    clamp_edge_body: Indices
-    clamp_edge_free: Indices
-    clamp_edge_tangent: Matrix  # in the body's frame
-    clamp_edge_director1: Matrix  # likewise, after the edges' own: shape (n_edge + n_clamp_edge, 3)
+    node: Indices  # held by bodies, shape (n_attached,)
+    unknown: Indices  # the first of each in gradients and steps, shape (n_attached,)
+    row: Indices  # and in the matrix
+    body: Indices  # that holds it, shape (n_attached,)
+    free: Indices  # likewise among the free ones, −1 for others
+    position: Matrix  # in the body's frame [m], shape (n_attached, 3)
+    clamp_edge_body: Indices  # body of each clamp edge, shape (n_clamp_edge,)
+    clamp_edge_free: Indices  # likewise among the free ones, −1 for others
+    clamp_edge_tangent: Matrix  # in the body's frame, unit, shape (n_clamp_edge, 3)
+    clamp_edge_director1: Matrix  # likewise, after those of edges at the start, shape (n_edge + n_clamp_edge, 3)
 
 
 @record
@@ -143,10 +145,10 @@ class Attachments:
 
     holding: int  # how many nodes
     unknown: Indices  # rows of the matrix
-    free: Indices
-    of_unknown: Indices
-    clamp_edge_free: Indices
-    clamp_edge_joint: Indices
+    free: Indices  # as in `Constrained`
+    of_unknown: Indices  # attached node of each unknown of the matrix, −1 for the others, shape (n_unknown,)
+    clamp_edge_free: Indices  # as in `Constrained`
+    clamp_edge_joint: Indices  # joint of each clamp edge, shape (n_clamp_edge,)
 
 
 @record
@@ -187,14 +189,14 @@ class Mechanisms:
 
 @record
 class Flow:
-    """Drag."""
+    """Drag; see `forces.drag`."""
 
-    velocity: Vector
-    node: Indices
-    edge_before: Indices
+    velocity: Vector  # of the fluid [m/s], shape (3,)
+    node: Indices  # that carries a share of its station's drag, shape (n_drag,)
+    edge_before: Indices  # likewise, the same as the one after at an end
     edge_after: Indices
-    coefficient: Matrix
-    direction: Stack = ("dragged", 3, 3)
+    coefficient: Matrix  # ρ_f A C along t, m1, m2 [kg/m], shape (n_drag, 3)
+    direction: Stack = ("dragged", 3, 3)  # t, m1, m2
 
 
 @record
@@ -219,15 +221,15 @@ class PointForces:
     """Forces of fixed direction, or that turn with what they act on (then with the edges of their nodes)."""
 
     energy_slot: int  # of their energy in `Sums`
-    node: Indices
-    node_load: Indices
-    node_vector: Matrix
-    body: Indices
+    node: Indices  # on which a part of a load acts, shape (n_on_node,)
+    node_load: Indices  # which load, likewise
+    node_vector: Matrix  # at factor 1 [N], shape (n_on_node, 3)
+    body: Indices  # likewise among free bodies, shape (n_on_body,)
     body_load: Indices
     body_vector: Matrix
     on_nodes: Matrix = ("loaded node", 3)  # the present ones
     on_bodies: Matrix = ("loaded body", 3)
-    edge_before: Indices
+    edge_before: Indices  # of each loaded node, the same as the one after at an end
     edge_after: Indices
 
 
@@ -236,7 +238,7 @@ class Moments:
     """Moments on free bodies; the first `dead` keep their direction."""
 
     dead: int
-    body: Indices
-    load: Indices
-    vector: Matrix
+    body: Indices  # among free bodies, shape (n_moment,)
+    load: Indices  # which load, likewise
+    vector: Matrix  # at factor 1 [N m], shape (n_moment, 3)
     present: Matrix = ("moment", 3)

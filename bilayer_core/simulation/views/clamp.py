@@ -31,13 +31,13 @@ class ClampView:
     @property
     def position(self) -> Array:
         present = self._present
-        return present.state.position[present.model.attached_node[self._held]].mean(axis=0)
+        return present.state.position[present.model.constrained.node[self._held]].mean(axis=0)
 
     @property
     def wrench(self) -> Array:
         present = self._present
         wrench = present.seen().clamp[self._held].sum(axis=0)
-        body = present.model.attached_body[self._held[0]]
+        body = present.model.constrained.body[self._held[0]]
         wrench[3:] -= np.cross(self.position - present.state.body_position[body], wrench[:3])
         return wrench
 
@@ -49,8 +49,8 @@ def clamp_views(present: Present) -> ByName[ClampView]:
         ends[strand.first_node] = f"{strand.rod}.start"
         ends[strand.first_node + strand.node_count - 1] = f"{strand.rod}.end"
     held: dict[str, list[int]] = {}
-    for index, node in enumerate(model.attached_node.tolist()):
+    for index, node in enumerate(model.constrained.node.tolist()):
         held.setdefault(ends[node], []).append(index)
     names = model.bodies.names
-    clamps = {end: ClampView(present, names[model.attached_body[own[0]]], own) for end, own in held.items()}
+    clamps = {end: ClampView(present, names[model.constrained.body[own[0]]], own) for end, own in held.items()}
     return ByName("clamps", clamps)

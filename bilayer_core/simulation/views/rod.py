@@ -57,7 +57,7 @@ class RodView:
 
     @property
     def arc_length(self) -> Array:
-        rest = self._present.model.rest_length
+        rest = self._present.model.rods.rest_length
         lengths = [rest[s.first_edge : s.first_edge + s.shown - 1] for s in self._strands]
         return np.concatenate([np.concatenate([[0.0], np.cumsum(of_strand)]) for of_strand in lengths])
 

@@ -67,7 +67,7 @@ def _linking(positions: Array, strands: list[slice]) -> Array:
 
 def comes_to_rest(trial: Trial) -> Decision:
     """Mean speed of a heap at the end, over that of its fall."""
-    simulator, fastest, mass = trial.simulator, 0.0, trial.simulator.model.node_mass
+    simulator, fastest, mass = trial.simulator, 0.0, trial.simulator.model.rods.node_mass
 
     def speed() -> float:
         return math.sqrt(float(mass @ (simulator.velocities**2).sum(axis=1)) / mass.sum())

@@ -106,7 +106,7 @@ def keeps_momenta(trial: Trial) -> Decision:
         energy.append(sum(simulator.energy().values()) + _kinetic(trial))
 
     trial.run(each_step=look)
-    mass = simulator.model.node_mass
+    mass = simulator.model.rods.node_mass
     off = float(np.linalg.norm(mass @ simulator.velocities - impulse) / np.linalg.norm(impulse))
     lost = float(np.linalg.norm(_moment(trial) - moment) / np.linalg.norm(moment))
     grown = max(energy) / energy[0] - 1.0
@@ -127,12 +127,12 @@ ANGULAR = {
 
 
 def _kinetic(trial: Trial) -> float:
-    return 0.5 * float(trial.simulator.model.node_mass @ (trial.simulator.velocities**2).sum(axis=1))
+    return 0.5 * float(trial.simulator.model.rods.node_mass @ (trial.simulator.velocities**2).sum(axis=1))
 
 
 def _moment(trial: Trial) -> Array:
     simulator = trial.simulator
-    return simulator.model.node_mass @ np.cross(simulator.positions, simulator.velocities)
+    return simulator.model.rods.node_mass @ np.cross(simulator.positions, simulator.velocities)
 
 
 def grows(trial: Trial) -> Decision:

@@ -144,7 +144,7 @@ def vibration(edges: int = 40, periods: int = 4, steps: int = 300, dimension: in
     simulator = Simulator(load_scene(beam(edges + 1, loads=[load], solver=solver)), dimension=dimension)
     simulator.solve_static()
     s = np.linspace(0.0, 1.0, edges + 1)
-    shape = simulator.model.node_mass * cantilever_mode(s)
+    shape = simulator.model.rods.node_mass * cantilever_mode(s)
     times, amplitudes = [], []
     for _ in range(periods * steps):
         simulator.step()

@@ -50,7 +50,7 @@ def munk(across: float) -> tuple[float, float]:
     let_go(simulator, np.tile([0.3, 0.0, across], (EDGES + 1, 1)))
     simulator.run(0.1)
     chord = simulator.positions[-1] - simulator.positions[0]
-    weights = simulator.model.node_mass / simulator.model.node_mass.sum()
+    weights = simulator.model.rods.node_mass / simulator.model.rods.node_mass.sum()
     arms = np.linspace(-0.5, 0.5, EDGES + 1) * LENGTH
     own, whole = OWN * LENGTH, (OWN + ADDED["through"]) * LENGTH
     expected = kirchhoff_plate((0.3, across), own, whole, whole * float(weights @ arms**2), 0.1)

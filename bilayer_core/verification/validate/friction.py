@@ -60,7 +60,7 @@ def resting_gap(law: dict, corner_length: float) -> float:
 def at_rest(content: dict, height: str = "block") -> Simulator:
     """Return a simulator of the scene with its block at its resting height above what is below z = 0."""
     model = Simulator(load_scene(content)).model
-    gap = resting_gap(content["contact"], float(model.contact_points.weight[model.node_count]))
+    gap = resting_gap(content["contact"], float(model.surfaces.weight[model.node_count]))
     for body in content["bodies"]:
         if body["name"] == height:
             body["position"][2] = 0.5 * SIZE[2] + gap

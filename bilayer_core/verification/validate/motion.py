@@ -38,9 +38,9 @@ def momentum_lost(integrator: str) -> tuple[float, float]:
     simulator = free_bilayer(dt=1e-4, integrator=integrator)
     rng = np.random.default_rng(3)
     let_go(simulator, 0.2 * rng.standard_normal((simulator.model.node_count, 3)))
-    before = simulator.model.node_mass @ simulator.velocities
+    before = simulator.model.rods.node_mass @ simulator.velocities
     simulator.run(0.02)
-    after = simulator.model.node_mass @ simulator.velocities
+    after = simulator.model.rods.node_mass @ simulator.velocities
     return float(np.abs(after - before).max() / np.linalg.norm(before)), 0.0
 
 
@@ -54,7 +54,7 @@ def _spin_lost(integrator: str, dt: float) -> float:
     let_go(simulator, np.cross([0, 0, 20.0], simulator.positions))
 
     def momentum() -> float:
-        return float(simulator.model.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
+        return float(simulator.model.rods.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
 
     before = momentum()
     simulator.run(0.05)

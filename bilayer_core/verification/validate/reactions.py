@@ -30,7 +30,7 @@ def cantilever(model: str, dimension: int, retardation_time: float = 0.0, **step
 
 def load_of_nodes(simulator: Simulator, acceleration: np.ndarray) -> np.ndarray:
     """Weight [N] of all nodes less their inertia, and its moment about the clamp [N m], shape (6,)."""
-    force = simulator.model.node_mass[:, None] * (GRAVITY - acceleration)
+    force = simulator.model.rods.node_mass[:, None] * (GRAVITY - acceleration)
     arms = simulator.positions - simulator.clamps["arm.start"].position
     return np.concatenate([force.sum(axis=0), np.cross(arms, force).sum(axis=0)])
 

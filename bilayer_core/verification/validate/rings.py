@@ -78,7 +78,7 @@ def frequency(kind: str, waves: int, edges: int = EDGES, steps: int = 400) -> tu
     angle, outward, along = _circle(simulator)
     shape = np.cos(waves * angle)[:, None] * outward - np.sin(waves * angle)[:, None] * along / waves
     let_go(simulator, 1e-4 * RADIUS * rate * shape)
-    start, mass = simulator.positions, simulator.model.node_mass
+    start, mass = simulator.positions, simulator.model.rods.node_mass
 
     def amplitude() -> float:
         return float(mass @ ((simulator.positions - start) * shape).sum(axis=1))
@@ -225,7 +225,7 @@ def rolling(coefficient: float) -> tuple[float, float]:
     along = simulator.positions - [0, 0, height]
     let_go(simulator, np.cross([0, spin, 0], along))
     simulator.run(1.2 * 0.5 * spin * RADIUS / (coefficient * 9.81))
-    mass = simulator.model.node_mass
+    mass = simulator.model.rods.node_mass
     return float(mass @ simulator.velocities[:, 0] / mass.sum()), 0.5 * spin * RADIUS
 
 

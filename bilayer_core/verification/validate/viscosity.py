@@ -86,7 +86,7 @@ def spun(integrator: str) -> float:
     let_go(simulator, np.cross([0, 0, 20.0], simulator.positions))
 
     def momentum() -> float:
-        return float(simulator.model.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
+        return float(simulator.model.rods.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
 
     simulator.run(0.5)
     before = momentum()
