@@ -88,7 +88,7 @@ class Stepper:
     ----------
     surroundings : Surroundings
     ledger : EnergyLedger or None
-        What keeps the energy budget, if anything does.
+        Keeps the energy budget, if anything does; `begin_budget` comes before the first step.
 
     Raises
     ------
@@ -136,6 +136,14 @@ class Stepper:
         control = self._control_of(model, steps)
         self.engine.take_scene(model, control, steps.newton_tolerance, max_iterations)
         self.engine.actuation = self.surroundings.actuation
+        if self.ledger is not None:
+            self.ledger = EnergyLedger(model)
+
+    def begin_budget(self, state: State) -> None:
+        """Start the energy budget from zero at a state, if it is kept."""
+        if self.ledger is not None:
+            rest = self.surroundings.rest_strains_of(state.transduction)
+            self.ledger.begin(state, rest, self.surroundings.load_factor(state))
 
     @property
     def same_time(self) -> float:
