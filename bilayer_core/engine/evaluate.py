@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.engine.configuration import measure_departure
+from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.engine.newton import bound, correction_speed, predicted_decrease
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
 from bilayer_core.forces.friction_limit import limit_by_friction
@@ -14,7 +15,7 @@ from bilayer_core.jit import piece
 from bilayer_core.model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, STATUS
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY, ROD_CAPACITY_EXCEEDED
-from bilayer_core.model.records.step import Configuration, Stage
+from bilayer_core.model.records.step import Configuration, Stage, StateArrays
 
 
 @piece(int, Problem, Configuration, Stage, bool, bool)
@@ -50,6 +51,12 @@ def evaluate_at(p, at, stage, with_hessian, expands):
             expand_to_unknowns(p, at)
     p.outcome.figures[ENERGY], p.outcome.figures[GAP] = energy, gap
     return status
+
+
+@piece(float, Problem, StateArrays)
+def measure_kinetic_energy(p, state):
+    """Return the kinetic energy of nodes, edges and free bodies [J]."""
+    return kinetic_energy(p, state)
 
 
 @piece(float, Problem, Stage)

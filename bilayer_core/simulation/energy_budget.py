@@ -47,7 +47,6 @@ from bilayer_core.model.state import State
 from bilayer_core.model.stimulated_strains import RestStrains
 from bilayer_core.simulation.edge_space import Gradient, Motion, displacement, of_prescribed, velocity
 from bilayer_core.simulation.fluid_energy import survey_fluid
-from bilayer_core.simulation.kinetic_energy import kinetic_energy
 from bilayer_core.simulation.quadrature import simpson
 
 Array = np.ndarray
@@ -235,7 +234,7 @@ class EnergyLedger:
                 energy[name], gradient[name] = value, found
         return _Instant(
             at=at,
-            kinetic=kinetic_energy(model, state),
+            kinetic=evaluator.kinetic_energy(state),
             fluid=self._evaluate_fluid(at, state),
             velocity=state.velocity.copy(),
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),

@@ -7,7 +7,6 @@ from support.sample_scenes import everything
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import quaternion_from_matrix
 from bilayer_core.simulation.fluid_energy import energy_of_fluid
-from bilayer_core.simulation.kinetic_energy import kinetic_energy
 
 SCENES = {
     "every force, two rods": (everything, "two_rod"),
@@ -70,6 +69,19 @@ def test_wrenches_on_bodies_are_sums_over_what_touches_and_what_is_held(simulato
     clamps = np.zeros((len(model.bodies.names), 6))
     np.add.at(clamps, model.attached_body, np.concatenate([held, moment], axis=1))
     np.testing.assert_allclose(frame.clamp_wrenches, clamps, rtol=1e-12, atol=1e-12 * np.abs(clamps).max(initial=1e-9))
+
+
+def kinetic_energy(model, state):
+    """Of nodes, of edges about their tangents, and of free bodies [J]."""
+    kinetic = 0.5 * model.node_mass @ np.square(state.velocity).sum(axis=1) + 0.5 * model.spin_inertia @ state.spin**2
+    for slot, body in enumerate(model.bodies.body_of_free):
+        velocity, spin, rotation = (
+            of[body] for of in (state.body_velocity, state.body_angular_velocity, state.body_rotation)
+        )
+        second = model.bodies.second_moment[slot]
+        inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
+        kinetic += 0.5 * (model.bodies.mass[slot] * velocity @ velocity + spin @ inertia @ spin)
+    return kinetic
 
 
 def test_energies_and_rotations_seen_are_those_of_the_state(simulator):
