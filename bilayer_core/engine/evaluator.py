@@ -14,6 +14,7 @@ from bilayer_core.engine.evaluate import bound_step, evaluate_at, measure_kineti
 from bilayer_core.engine.linear.newton_matrix import EXACT, assemble, factorise, solve
 from bilayer_core.engine.potential import start_stage, update_lagged
 from bilayer_core.engine.stages import predict_stage, stand_still_stage, start_step_point
+from bilayer_core.engine.step import write_rest_strains
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
 from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.force_register import memory_size
@@ -24,6 +25,7 @@ from bilayer_core.model.records.problem import Problem, Sums
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Point, Stage, StateArrays
 from bilayer_core.model.state import State, initial_state
+from bilayer_core.model.stimulated_strains import RestStrains
 
 Array = np.ndarray
 
@@ -123,6 +125,13 @@ class Evaluator:
         transport_frames(self.problem, base, at)
 
     # stages
+
+    def rest_strains_of(self, transduction: Array) -> RestStrains:
+        """Strains without stress from the stimuli that materials have reached, shape (n_law,)."""
+        self._state.transduction[:] = transduction
+        write_rest_strains(self.problem, self._arrays, self._work)
+        stage = self.stage
+        return RestStrains(stage.rest_edge.copy(), stage.rest_joint.copy(), self._work.strain.copy())
 
     def start_point(self, state: State, at: Configuration) -> Point:
         """Positions and momenta at the start of a step from a state, whose configuration is `at`."""

@@ -99,28 +99,28 @@ class EnergyLedger:
         self._watched = [name for name, kind in self._kinds.items() if kind is not Kind.INERTIAL]
         self._first: _Instant | None = None
 
-    def begin(self, state: State, rest: RestStrains, load_factor: Array) -> None:
-        """Start from zero at a state, with the rest strains and the factors of loads there."""
-        self._first = self._last = self._evaluate_state(state, rest, load_factor)
+    def begin(self, state: State, load_factor: Array) -> None:
+        """Start from zero at a state, with the factors of loads there."""
+        self._first = self._last = self._evaluate_state(state, load_factor)
         self._work: dict[str, float] = defaultdict(float)  # of each force [J]
         self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
         self._stimulus = 0.0
 
-    def begin_step(self, state: State, rest: RestStrains, load_factor: Array) -> None:
+    def begin_step(self, state: State, load_factor: Array) -> None:
         """Take the factors of loads, and the coefficients of friction, with which a step begins, where they have jumped
         since the last one ended.
         """
         same = np.array_equal(state.friction, self._last.friction, equal_nan=True)
         if not (same and np.array_equal(load_factor, self._last.load_factor)):
-            self._last = self._evaluate_state(state, rest, load_factor)
+            self._last = self._evaluate_state(state, load_factor)
 
-    def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
+    def record(self, state: State, load_factor: Array, h: float) -> None:
         """Add the works of a step of length `h` [s] that has just been accepted."""
-        before, after = self._last, self._evaluate_state(state, rest, load_factor)
+        before, after = self._last, self._evaluate_state(state, load_factor)
         moved = displacement(self._model, before.at, after.at)
         imposed = of_prescribed(self._model, moved)
         way = _Way(self._model, self._evaluator, before, state, moved)
-        halfway = before.rest.halfway_to(rest)
+        halfway = before.rest.halfway_to(after.rest)
         middle = self._evaluate_at(way.at(0.5), way.state, halfway, 0.5 * (before.load_factor + load_factor))
         for name, gradient in after.gradient.items():
             three = before.gradient[name], middle.gradient[name], gradient
@@ -214,10 +214,10 @@ class EnergyLedger:
         carried = float(fluid.momentum.sum(axis=0) @ fluid.velocity)
         return _Fluid(relative + carried, fluid.momentum, fluid.shape_gradient)
 
-    def _evaluate_state(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
+    def _evaluate_state(self, state: State, load_factor: Array) -> _Instant:
         at = self._evaluator.new()
         self._evaluator.take_state(state, at)
-        return self._evaluate_at(at, state, rest, load_factor)
+        return self._evaluate_at(at, state, self._evaluator.rest_strains_of(state.transduction), load_factor)
 
     def _evaluate_at(self, at: Configuration, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
         model, evaluator = self._model, self._evaluator

@@ -180,9 +180,7 @@ class RunLoop:
         if self._plane_watch is None or not self._plane_watch.is_due(steps, last):
             return
         with self.timed():
-            surroundings = self._stepper.surroundings
-            rest = surroundings.rest_strains_of(self._state.transduction)
-            self._plane_watch.look(self._state, rest, surroundings.load_factor(self._state))
+            self._plane_watch.look(self._state, self._stepper.surroundings.load_factor(self._state))
 
     def run(
         self,

@@ -142,8 +142,7 @@ class Stepper:
     def begin_budget(self, state: State) -> None:
         """Start the energy budget from zero at a state, if it is kept."""
         if self.ledger is not None:
-            rest = self.surroundings.rest_strains_of(state.transduction)
-            self.ledger.begin(state, rest, self.surroundings.load_factor(state))
+            self.ledger.begin(state, self.surroundings.load_factor(state))
 
     @property
     def same_time(self) -> float:
@@ -189,8 +188,7 @@ class Stepper:
         it does not know what touches, it takes that from there.
         """
         time = float(state.time[0])
-        rest = self.surroundings.rest_strains_of(state.transduction)
-        self.engine.set_drive(rest, self.surroundings.load_factor(state))
+        self.engine.set_drive(state, self.surroundings.load_factor(state))
         self.engine.do_once(state, EVALUATE_STATE)
         unknown = state.touched == NOT_KNOWN
         state.touched[unknown] = self.engine.touching[: len(unknown)][unknown]
@@ -230,8 +228,7 @@ class Stepper:
         if until <= begin + self._same:
             raise InputError(f"until: {until} is not allowed; it must be later than the present time, {begin} s")
         if self.ledger is not None:
-            rest = self.surroundings.rest_strains_of(state.transduction)
-            self.ledger.begin_step(state, rest, self.surroundings.load_factor(state))
+            self.ledger.begin_step(state, self.surroundings.load_factor(state))
         found = self._integrate(state, until, due, 1 if self.ledger is not None else most)
         if found.failed:
             gap = self.engine.gap
@@ -239,9 +236,7 @@ class Stepper:
             if not found.done:
                 raise self._failure(found, begin, state, gap)
         if self.ledger is not None:
-            rest = self.surroundings.rest_strains_of(state.transduction)
-            load_factor = self.surroundings.load_factor(state, found.length)
-            self.ledger.record(state, rest, load_factor, found.length)
+            self.ledger.record(state, self.surroundings.load_factor(state, found.length), found.length)
         return found
 
     def _integrate(self, state: State, until: float, due: float, most: int) -> IntegrationReport:
