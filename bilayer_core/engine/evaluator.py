@@ -10,7 +10,13 @@ import numpy as np
 
 from bilayer_core.engine.configuration import move, take_state, transport_frames
 from bilayer_core.engine.engine import new_inputs
-from bilayer_core.engine.evaluate import bound_step, evaluate_at, measure_kinetic_energy, speed_of_step
+from bilayer_core.engine.evaluate import (
+    bound_step,
+    evaluate_at,
+    evaluate_laws,
+    measure_kinetic_energy,
+    speed_of_step,
+)
 from bilayer_core.engine.linear.newton_matrix import EXACT, assemble, factorise, solve
 from bilayer_core.engine.potential import start_stage, update_lagged
 from bilayer_core.engine.stages import predict_stage, stand_still_stage, start_step_point
@@ -237,6 +243,11 @@ class Evaluator:
         figures, sums = self._storage.outcome.figures, self.sums
         self.total, self.gap = float(figures[ENERGY]), float(figures[GAP])
         return {name: float(sums.energy[k]) for k, name in enumerate(NAMES) if sums.selected[k]}
+
+    def forces_of_laws(self, at: Configuration) -> Array:
+        """Return −∂V/∂η of each law [J] at a configuration, with the rest strains of the stage, shape (n_law,)."""
+        evaluate_laws(self.problem, self._work, at)
+        return self._work.end_force.copy()
 
     def kinetic_energy(self, state: State) -> float:
         """Return the kinetic energy of nodes, edges and free bodies [J]."""

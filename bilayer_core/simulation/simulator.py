@@ -68,7 +68,7 @@ class Simulator:
         Overrides the scene's: the largest error per step, relative to the longest rod. With one, steps are adaptive.
         It is no bound on the error of a whole run, which is larger; `bilayer_core.estimate_error` tells that.
     budget : bool
-        Keep the energy budget of the run (`budget`), in two to three times the time.
+        Keep the energy budget of the run (`budget`): steps cost four to thirteen times as much.
 
     Attributes
     ----------

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.fluid_energy import energy_of_fluid
 from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import quaternion_from_matrix
-from bilayer_core.simulation.fluid_energy import energy_of_fluid
 
 SCENES = {
     "every force, two rods": (everything, "two_rod"),
