@@ -58,7 +58,7 @@ RATE_ROUNDING = 1e-9
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
 @click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
 @click.option("--at", type=Duration(from_zero=True), metavar="T", help="Of the log of --from-state, its state at T.")
-@click.option("--budget", is_flag=True, help="Show where the energy went (runs two to three times as long).")
+@click.option("--budget", is_flag=True, help="Show where the energy went (steps cost four to thirteen times as much).")
 @click.option("--error-estimate", is_flag=True, help=ERROR_HELP)
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")

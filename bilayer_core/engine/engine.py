@@ -14,7 +14,7 @@ from bilayer_core.engine.integrate import Clock, Integration, StepControl, clear
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
 from bilayer_core.engine.run_extrema import count_shape
-from bilayer_core.engine.step import treat_state
+from bilayer_core.engine.step import treat_state, write_rest_strains
 from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
 from bilayer_core.errors import SimulationError
@@ -38,7 +38,6 @@ from bilayer_core.model.records.parts import Mechanisms
 from bilayer_core.model.records.problem import Sums
 from bilayer_core.model.records.step import RunExtrema, StageInputs, StateArrays
 from bilayer_core.model.state import State
-from bilayer_core.model.stimulated_strains import RestStrains
 
 Array = np.ndarray
 
@@ -242,10 +241,11 @@ class Engine:
         """How many directions were found unstable when they were last counted."""
         return int(self._storage.problem.system.negative[0])
 
-    def set_drive(self, rest: RestStrains, load_factor: Array) -> None:
-        """Set the rest strains and load factors that act on the state in modes other than steps."""
-        stage = self._work.stage
-        stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest.edge, rest.joint, load_factor
+    def set_drive(self, state: State, load_factor: Array) -> None:
+        """Set the rest strains of a state, and load factors, that act on it in modes other than steps."""
+        run = self._parts_for(state)
+        write_rest_strains(run.problem, run.state, run.work)
+        run.work.stage.load_factor[:] = load_factor
 
     def evaluate_end(self) -> None:
         """Find the gradients at the end of the last step, after Newton's last correction, with all that its last stage

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 from bilayer_core.engine.configuration import measure_departure
+from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.engine.newton import bound, correction_speed, predicted_decrease
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
+from bilayer_core.engine.powers import write_forces_of_laws
 from bilayer_core.forces.friction_limit import limit_by_friction
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.forces.surface_pairs import list_surface_pairs
@@ -14,7 +16,7 @@ from bilayer_core.jit import piece
 from bilayer_core.model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, STATUS
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY, ROD_CAPACITY_EXCEEDED
-from bilayer_core.model.records.step import Configuration, Stage
+from bilayer_core.model.records.step import Configuration, Stage, StateArrays, Work
 
 
 @piece(int, Problem, Configuration, Stage, bool, bool)
@@ -50,6 +52,18 @@ def evaluate_at(p, at, stage, with_hessian, expands):
             expand_to_unknowns(p, at)
     p.outcome.figures[ENERGY], p.outcome.figures[GAP] = energy, gap
     return status
+
+
+@piece(float, Problem, StateArrays)
+def measure_kinetic_energy(p, state):
+    """Return the kinetic energy of nodes, edges and free bodies [J]."""
+    return kinetic_energy(p, state)
+
+
+@piece(int, Problem, Work, Configuration)
+def evaluate_laws(p, work, at):
+    """Write −∂V/∂η of each law [J] at a configuration, with the rest strains of the stage, to `Work.end_force`."""
+    return write_forces_of_laws(p, at, work.stage, work.end_force)
 
 
 @piece(float, Problem, Stage)

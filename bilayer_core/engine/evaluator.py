@@ -10,10 +10,17 @@ import numpy as np
 
 from bilayer_core.engine.configuration import move, take_state, transport_frames
 from bilayer_core.engine.engine import new_inputs
-from bilayer_core.engine.evaluate import bound_step, evaluate_at, speed_of_step
+from bilayer_core.engine.evaluate import (
+    bound_step,
+    evaluate_at,
+    evaluate_laws,
+    measure_kinetic_energy,
+    speed_of_step,
+)
 from bilayer_core.engine.linear.newton_matrix import EXACT, assemble, factorise, solve
 from bilayer_core.engine.potential import start_stage, update_lagged
 from bilayer_core.engine.stages import predict_stage, stand_still_stage, start_step_point
+from bilayer_core.engine.step import write_rest_strains
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
 from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.force_register import memory_size
@@ -24,6 +31,7 @@ from bilayer_core.model.records.problem import Problem, Sums
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Point, Stage, StateArrays
 from bilayer_core.model.state import State, initial_state
+from bilayer_core.model.stimulated_strains import RestStrains
 
 Array = np.ndarray
 
@@ -123,6 +131,13 @@ class Evaluator:
         transport_frames(self.problem, base, at)
 
     # stages
+
+    def rest_strains_of(self, transduction: Array) -> RestStrains:
+        """Strains without stress from the stimuli that materials have reached, shape (n_law,)."""
+        self._state.transduction[:] = transduction
+        write_rest_strains(self.problem, self._arrays, self._work)
+        stage = self.stage
+        return RestStrains(stage.rest_edge.copy(), stage.rest_joint.copy(), self._work.strain.copy())
 
     def start_point(self, state: State, at: Configuration) -> Point:
         """Positions and momenta at the start of a step from a state, whose configuration is `at`."""
@@ -228,6 +243,16 @@ class Evaluator:
         figures, sums = self._storage.outcome.figures, self.sums
         self.total, self.gap = float(figures[ENERGY]), float(figures[GAP])
         return {name: float(sums.energy[k]) for k, name in enumerate(NAMES) if sums.selected[k]}
+
+    def forces_of_laws(self, at: Configuration) -> Array:
+        """Return −∂V/∂η of each law [J] at a configuration, with the rest strains of the stage, shape (n_law,)."""
+        evaluate_laws(self.problem, self._work, at)
+        return self._work.end_force.copy()
+
+    def kinetic_energy(self, state: State) -> float:
+        """Return the kinetic energy of nodes, edges and free bodies [J]."""
+        self._take(state)
+        return measure_kinetic_energy(self.problem, self._arrays)
 
     # the matrix
 

@@ -110,6 +110,17 @@ def drive_stage(p, state, inputs, n, work):
     return READY
 
 
+@piece(int, Problem, StateArrays, Work)
+def write_rest_strains(p, state, work):
+    """Write the eigenstrain of laws and the rest strains of a state to `work`, from what its materials have reached."""
+    drives, strain = p.drives, work.strain
+    for i in range(drives.law_channel.shape[0]):
+        law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
+        strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
+    _grow(drives, strain, work.stage.rest_edge, work.stage.rest_joint)
+    return READY
+
+
 @kernel
 def _clear(outcome):
     """Begin to count what Newton's method needs."""

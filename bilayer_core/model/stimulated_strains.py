@@ -18,17 +18,16 @@ class RestStrains:
     edge : Array
         η of each edge, shape (n_edge,).
     joint : Array
-        κ̄₁ κ̄₂ ψ̄ of each joint [rad], shape (n_joint, 3), read-only; of joints of `Model.off_axis` κ̄₁ is that
-        at ε = 0.
+        κ̄₁ κ̄₂ ψ̄ of each joint [rad], shape (n_joint, 3); of joints of `Model.off_axis` κ̄₁ is that at ε = 0.
+    law : Array
+        η of each law, shape (n_law,).
     """
 
     edge: Array
     joint: Array
+    law: Array
 
     def halfway_to(self, other: RestStrains) -> RestStrains:
         """Return the mean of both."""
-        joint = self.joint
-        if other.joint is not joint:
-            joint = 0.5 * (joint + other.joint)
-            joint.flags.writeable = False
-        return RestStrains(0.5 * (self.edge + other.edge), joint)
+        pairs = (self.edge, other.edge), (self.joint, other.joint), (self.law, other.law)
+        return RestStrains(*(0.5 * (own + others) for own, others in pairs))

@@ -6,8 +6,7 @@ edge space (`motion`), and η the eigenstrain:
     work of a conservative force   W = −∫ g·dq, straight from qₙ to qₙ₊₁      by Simpson's rule: −ΔE to fourth order
     work of a barrier              the same, on halves where it must be
     work of a dissipative force    W = ½ h (Pₙ + Pₙ₊₁),  P = −g·v             second order, and never above zero
-    work of the stimulus           W = ∫ s·dη, along the same way,  s = ∂E/∂η = −EA (ε − η) |ē|, and likewise of
-                                   natural curvatures κ̄₁ that follow it, ∂E/∂κ̄₁ = −k₁ (κ₁ − κ̄₁)
+    work of the stimulus           W = ∫ s·dη, along the same way,  s = ∂E/∂η of each law (`engine.powers`)
     work of prescribed bodies      what moves held nodes and surfaces against all these forces, and their kinetic energy
 
 Energies E and the kinetic energy T come from states alone, works from gradients alone, so that two sums measure
@@ -28,6 +27,10 @@ powers of friction and drag are taken rather than force times displacement becau
 the force depends on the velocity. Friction has the normal forces of either end there, where a step of the integrator
 has those of its start. What jumps between two steps (a load, a stimulus) is taken as a change over the second: an error
 of first order in the step in which it happens.
+
+Energies, momenta of the fluid, rest strains and forces of laws are those of the engine. Its own account of each step
+(`engine.energy_account`) takes works by the integrator's weights, which costs nothing and leaves no residual by which
+to find a wrong gradient; `docs/energy.md` compares the two.
 """
 
 from __future__ import annotations
@@ -39,6 +42,7 @@ import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.request_modes import EVALUATION_TIME
+from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.force_list import Kind, kinds
 from bilayer_core.model.model import Model
@@ -46,8 +50,6 @@ from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.state import State
 from bilayer_core.model.stimulated_strains import RestStrains
 from bilayer_core.simulation.edge_space import Gradient, Motion, displacement, of_prescribed, velocity
-from bilayer_core.simulation.fluid_energy import survey_fluid
-from bilayer_core.simulation.kinetic_energy import kinetic_energy
 from bilayer_core.simulation.quadrature import simpson
 
 Array = np.ndarray
@@ -81,7 +83,7 @@ class _Instant:
     rest: RestStrains
     load_factor: Array
     friction: Array
-    resistance: tuple[Array, Array]  # ∂E/∂η of edges [J], ∂E/∂κ̄₁ of joints [N m], shapes (n_edge,), (bend_count,)
+    law_force: Array  # −∂E/∂η of laws [J], shape (n_law,)
     energy: dict[str, float]
     gradient: dict[str, Gradient]
     power: dict[str, tuple[float, float]]
@@ -100,28 +102,28 @@ class EnergyLedger:
         self._watched = [name for name, kind in self._kinds.items() if kind is not Kind.INERTIAL]
         self._first: _Instant | None = None
 
-    def begin(self, state: State, rest: RestStrains, load_factor: Array) -> None:
-        """Start from zero at a state, with the rest strains and the factors of loads there."""
-        self._first = self._last = self._evaluate_state(state, rest, load_factor)
+    def begin(self, state: State, load_factor: Array) -> None:
+        """Start from zero at a state, with the factors of loads there."""
+        self._first = self._last = self._evaluate_state(state, load_factor)
         self._work: dict[str, float] = defaultdict(float)  # of each force [J]
         self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
         self._stimulus = 0.0
 
-    def begin_step(self, state: State, rest: RestStrains, load_factor: Array) -> None:
+    def begin_step(self, state: State, load_factor: Array) -> None:
         """Take the factors of loads, and the coefficients of friction, with which a step begins, where they have jumped
         since the last one ended.
         """
         same = np.array_equal(state.friction, self._last.friction, equal_nan=True)
         if not (same and np.array_equal(load_factor, self._last.load_factor)):
-            self._last = self._evaluate_state(state, rest, load_factor)
+            self._last = self._evaluate_state(state, load_factor)
 
-    def record(self, state: State, rest: RestStrains, load_factor: Array, h: float) -> None:
+    def record(self, state: State, load_factor: Array, h: float) -> None:
         """Add the works of a step of length `h` [s] that has just been accepted."""
-        before, after = self._last, self._evaluate_state(state, rest, load_factor)
+        before, after = self._last, self._evaluate_state(state, load_factor)
         moved = displacement(self._model, before.at, after.at)
         imposed = of_prescribed(self._model, moved)
         way = _Way(self._model, self._evaluator, before, state, moved)
-        halfway = before.rest.halfway_to(rest)
+        halfway = before.rest.halfway_to(after.rest)
         middle = self._evaluate_at(way.at(0.5), way.state, halfway, 0.5 * (before.load_factor + load_factor))
         for name, gradient in after.gradient.items():
             three = before.gradient[name], middle.gradient[name], gradient
@@ -137,10 +139,8 @@ class EnergyLedger:
                 sums[name] += 0.5 * h * (start + end)
         if after.fluid is not None:
             self._imposed["fluid"] += self._work_of_fluid(before, after, imposed)
-        bends = slice(self._model.rods.bend_count)
-        rises = after.rest.edge - before.rest.edge, after.rest.joint[bends, 0] - before.rest.joint[bends, 0]
-        for rise, *three in zip(rises, before.resistance, middle.resistance, after.resistance, strict=True):
-            self._stimulus += float((three[0] + 4.0 * three[1] + three[2]) @ rise) / 6.0
+        resistance = before.law_force + 4.0 * middle.law_force + after.law_force
+        self._stimulus -= float(resistance @ (after.rest.law - before.rest.law)) / 6.0
         self._last = after
 
     def budget(self) -> dict:
@@ -208,17 +208,18 @@ class EnergyLedger:
         return energy, Gradient.copy_of(self._evaluator.sums, self._model)
 
     def _evaluate_fluid(self, at: Configuration, state: State) -> _Fluid | None:
-        model = self._model
-        if not model.fluid.exists:
+        fluid = self._evaluator.problem.fluid
+        if not fluid.exists:
             return None
-        relative, fluid = survey_fluid(model, at, state.velocity, state.spin)
+        fluid.node_velocity[:], fluid.spin[:] = state.velocity, state.spin
+        relative = fluid_momentum(fluid, at)
         carried = float(fluid.momentum.sum(axis=0) @ fluid.velocity)
-        return _Fluid(relative + carried, fluid.momentum, fluid.shape_gradient)
+        return _Fluid(relative + carried, fluid.momentum.copy(), fluid.shape_gradient.copy())
 
-    def _evaluate_state(self, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
+    def _evaluate_state(self, state: State, load_factor: Array) -> _Instant:
         at = self._evaluator.new()
         self._evaluator.take_state(state, at)
-        return self._evaluate_at(at, state, rest, load_factor)
+        return self._evaluate_at(at, state, self._evaluator.rest_strains_of(state.transduction), load_factor)
 
     def _evaluate_at(self, at: Configuration, state: State, rest: RestStrains, load_factor: Array) -> _Instant:
         model, evaluator = self._model, self._evaluator
@@ -235,30 +236,18 @@ class EnergyLedger:
                 energy[name], gradient[name] = value, found
         return _Instant(
             at=at,
-            kinetic=kinetic_energy(model, state),
+            kinetic=evaluator.kinetic_energy(state),
             fluid=self._evaluate_fluid(at, state),
             velocity=state.velocity.copy(),
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
             rest=rest,
             load_factor=load_factor.copy(),
             friction=state.friction.copy(),
-            resistance=_resistance(model, at, rest),
+            law_force=evaluator.forces_of_laws(at),
             energy=energy,
             gradient=gradient,
             power=power,
         )
-
-
-def _resistance(model: Model, at: Configuration, rest: RestStrains) -> tuple[Array, Array]:
-    """Return the derivatives of the energy by rest strains of edges [J] and by κ̄₁ of joints [N m]."""
-    rods, joint = model.rods, model.off_axis.joint
-    strain = at.length[: rods.edge_count] / rods.rest_length - 1.0
-    bend = at.joint_strain[:, 0] - rest.joint[:, 0]
-    of_edges = np.concatenate([strain, np.zeros(len(model.constrained.clamp_edge_body))])
-    coupled = np.stack([rods.joint_a, rods.joint_b], axis=1)[joint]
-    bend[joint] -= np.einsum("ki,ki->k", model.strain_coupling, of_edges[coupled])
-    moment = rods.joint_stiffness[:, 0] * bend
-    return -rods.axial_stiffness * (strain - rest.edge) * rods.rest_length, -moment[: rods.bend_count]
 
 
 class _Way:

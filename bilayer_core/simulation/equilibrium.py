@@ -133,8 +133,7 @@ class _Search:
                 place = state.position, state.director1, state.body_position, state.body_rotation
                 settled = settled * part_seen(self.light, *place)
             state.transduction[:] = settled
-        rest = self.stepper.surroundings.rest_strains_of(self.state.transduction)
-        stepper.engine.set_drive(rest, self.stepper.surroundings.load_factor(self.state))
+        stepper.engine.set_drive(state, self.stepper.surroundings.load_factor(self.state))
 
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine

@@ -10,24 +10,37 @@ from bilayer_core.kinematics.rotation import quaternion_from_matrix
 from bilayer_core.model.force_list import Kind, kinds
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.model import Model
+from bilayer_core.model.plan import Plan
 from bilayer_core.model.shape_numbers import Shape, obstacle_pose, shape_of
 from bilayer_core.model.state import State
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.observed.frame import BodyInfo, Description, ObstacleInfo, ShapeInfo, Strand
+from bilayer_core.observed.system import versions
+from bilayer_core.scene.loader import scene_text
 from bilayer_core.simulation.joint_shapes import joint_shapes
 from bilayer_core.simulation.parts import Parts
+from bilayer_core.simulation.step_choice import Steps
 
 Array = np.ndarray
 
 
-def describe(model: Model, state: State, settings: dict[str, str], scene_text: str) -> Description:
-    """Return the unchanging part of what observers see."""
+def describe(model: Model, state: State, plan: Plan, steps: Steps) -> Description:
+    """Return the description of a run for observers: everything that does not change while it lasts."""
     scene = model.scene
     bodies = model.bodies
+    settings = {
+        "model": plan.model,
+        "dimension": str(plan.dimension),
+        "integrator": plan.integrator,
+        "dt": repr(steps.dt),
+        "tolerance": "none" if steps.tolerance is None else repr(steps.tolerance),
+        "newton_tolerance": repr(steps.newton_tolerance),
+        **versions(),
+    }
     return Description(
         scene_name=scene.name,
         title=scene.title,
-        scene_text=scene_text,
+        scene_text=scene_text(scene),
         node_count=model.node_count + model.point_count,
         edge_count=model.rods.edge_count,
         strands=tuple(map(strand, model.strands)),

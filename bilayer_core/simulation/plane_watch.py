@@ -27,7 +27,6 @@ from bilayer_core.forces.force_register import memory_size
 from bilayer_core.forces.mechanisms import REMEMBERED
 from bilayer_core.model.planarity import require_plane
 from bilayer_core.model.state import PARTS, State, initial_state
-from bilayer_core.model.stimulated_strains import RestStrains
 from bilayer_core.simulation.stepper import Stepper
 
 Array = np.ndarray
@@ -97,8 +96,8 @@ class PlaneWatch:
         enough = self._since_look >= (FIRST_LOOK if last else self._next)
         return enough and self.since is None
 
-    def look(self, state: State, rest: RestStrains, load_factor: Array) -> None:
-        """Look at a state under the rest strains and factors of loads that act there."""
+    def look(self, state: State, load_factor: Array) -> None:
+        """Look at a state under the factors of loads that act there."""
         if self._space is None:
             self._space, self._plane = self._make(3), self._make(2)
             model = self._space.model
@@ -109,8 +108,8 @@ class PlaneWatch:
                 mine[...] = part
         turned = REMEMBERED * len(self._space.model.mechanisms)  # first of the memory of both
         self._copy.memory[:turned] = state.memory[:turned]
-        for stepper in (self._space, self._plane):
-            stepper.engine.set_drive(rest, load_factor)
+        for stepper, of in ((self._space, self._copy), (self._plane, state)):
+            stepper.engine.set_drive(of, load_factor)
         time, rate = float(state.time[0]), self._largest_rate(state)
         self._growth += 0.5 * (rate + self._rate) * (time - self._time)
         self._unstable += rate > 0.0

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 import math
+import time as clock
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
 
-from bilayer_core.errors import InputError
-from bilayer_core.observed.inputs import Acted, Input
-from bilayer_core.simulation.observers import Schedule
-from bilayer_core.simulation.run_result import Termination
+from bilayer_core.engine.step_outcome import IntegrationReport
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.jit.compile_all import ensure_compiled
+from bilayer_core.jit.piece import loading
+from bilayer_core.model.state import State
+from bilayer_core.observed.inputs import Input
+from bilayer_core.observed.observer import Observed, Observer
+from bilayer_core.simulation.controls import Controls
+from bilayer_core.simulation.observers import Schedule, first_failure
+from bilayer_core.simulation.plane_watch import PlaneWatch
+from bilayer_core.simulation.run_result import RunResult, Termination
+from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
+from bilayer_core.simulation.stepper import Stepper, StepReport
 
 STEPS_AT_ONCE = 64
 """That the engine makes before anyone is asked whether to go on."""
-
-
-class Advanced(Acted, Protocol):
-    """Object that the loop advances: a `Simulator`."""
-
-    @property
-    def time(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -63,48 +66,213 @@ def time_left(now: float, end_of_scene: float, duration: float | None, until: fl
     return left
 
 
-def advance_to(
-    simulator: Advanced,
-    end: float,
-    last: float,
-    integrate: Callable[[int, float, float], object],
-    schedule: Schedule,
-    inputs: Sequence[Input],
-    callbacks: Callbacks,
-) -> Termination:
-    """Make steps until the end of a run, or until someone ends it.
+def wall_time() -> float:
+    """Return elapsed seconds without those for the loading of kernels; differences count."""
+    return clock.perf_counter() - loading.wall
+
+
+class RunLoop:
+    """Makes the steps of a run, counts them, and shows them to those who look.
 
     Parameters
     ----------
-    simulator : Advanced
-    end : float
-        Where the last adaptive step ends [s].
-    last : float
-        A step that ends here or later is the last [s].
-    integrate : callable
-        Makes at most so many steps, to this time at the latest, and none after one that has reached that time.
-    schedule : Schedule
-        Of the observers.
-    inputs : sequence of Input
-    callbacks : Callbacks
+    stepper : Stepper
+    state : State
+        Advanced in place.
+    controls : Controls
+        Inputs that act during a run, and who is told of them.
+    plane_watch : PlaneWatch, optional
+        Looks out of the plane of a model of dimension 2 now and then.
 
-    Returns
-    -------
-    Termination
+    Attributes
+    ----------
+    statistics : RunStatistics
+    termination : str
+        How the last run ended (`Termination`).
+    cpu_time, wall_time : float
+        Of the steps [s].
+    attached : list of Schedule
+        Of observers that look whoever makes steps.
     """
-    waiting = deque(sorted(inputs, key=lambda of: of.time))
-    while simulator.time < last:
-        while waiting and waiting[0].time <= simulator.time:
-            waiting.popleft().apply(simulator)
-        until = min(end, waiting[0].time) if waiting else end
-        integrate(callbacks.steps_at_once, until, schedule.next_due())
-        schedule.observe_due()
-        if callbacks.each_step is not None:
-            callbacks.each_step(simulator.time)
-        if callbacks.progress is not None:
-            callbacks.progress(simulator.time)
-        if callbacks.stop is not None and callbacks.stop():
-            return Termination.STOPPED
-        if callbacks.interrupted is not None and simulator.time < last and callbacks.interrupted():
-            return Termination.INTERRUPTED
-    return Termination.COMPLETED
+
+    def __init__(self, stepper: Stepper, state: State, controls: Controls, plane_watch: PlaneWatch | None) -> None:
+        self._stepper, self._state, self._controls, self._plane_watch = stepper, state, controls, plane_watch
+        self._compile_time: float | None = None
+        self.attached: list[Schedule] = []
+        self.start_over()
+
+    @property
+    def _time(self) -> float:
+        return float(self._state.time[0])
+
+    def start_over(self) -> None:
+        """Count from the present state on."""
+        height = float(center_of_mass(self._stepper.model, self._state)[2])
+        self.statistics = RunStatistics(com_max_height=height)
+        self._stepper.engine.start_over(height)
+        self.termination = Termination.COMPLETED.value
+        self.cpu_time = self.wall_time = 0.0
+        if self._plane_watch is not None:
+            self._plane_watch.restart(self._time)
+
+    def take_state(self) -> None:
+        """Evaluate a state to which no step has led, and begin extrema and budget with it."""
+        self._stepper.evaluate(self._state)
+        self.statistics.take_shape(self._stepper, self._state)
+        self._stepper.begin_budget(self._state)
+
+    def compile(self) -> float:
+        """Have kernels and the forces of the first state ready; see `Simulator.compile`."""
+        if self._compile_time is None:
+            ensure_compiled()
+            begin = clock.thread_time()
+            self._compile_time = 0.0
+            self.take_state()
+            self._compile_time = clock.thread_time() - begin
+        return self._compile_time
+
+    @contextmanager
+    def timed(self) -> Iterator[None]:
+        """Count what is done meanwhile as time of the simulation, and the loading of kernels as that of compilation."""
+        cpu, wall, loaded = clock.thread_time(), wall_time(), loading.cpu
+        try:
+            yield
+        finally:
+            loaded = loading.cpu - loaded
+            self._compile_time = (self._compile_time or 0.0) + loaded
+            self.cpu_time += clock.thread_time() - cpu - loaded
+            self.wall_time += wall_time() - wall
+
+    def step(self, until: float, whole: bool) -> StepReport:
+        """Advance by one step, or by one part of it unless it is to be a `whole` one; see `Simulator.step`."""
+        self.compile()
+        begin, before = self._time, self._state.step[0]
+        until = until if self._stepper.steps.adaptive else math.inf
+        found = self.integrate(1, until, math.inf)
+        while whole and self._state.step[0] == before:
+            found = found.followed_by(self.integrate(1, until, math.inf))
+        return StepReport.of(found, self._time, self._time - begin)
+
+    def integrate(self, most: int, until: float, due: float) -> IntegrationReport:
+        """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that
+        has reached `due` [s].
+        """
+        state, before = self._state, float(self._state.step[0])
+        if self._stepper.steps.adaptive:
+            self._controls.note_end(until)
+        if self._plane_watch is not None:
+            most = min(most, self._plane_watch.steps_left)
+        due = min([due, *(attached.next_due() for attached in self.attached)])
+        with self.timed():
+            try:
+                found = self._stepper.integrate(state, most, until, due)
+            except SimulationError:
+                self.termination = Termination.FAILED.value
+                raise
+            self.statistics.update(found, int(state.step[0] - before), self._stepper)
+        self._look_out(found.done)
+        for attached in self.attached:
+            attached.observe_due()
+        return found
+
+    def _look_out(self, steps: int, last: bool = False) -> None:
+        """Look out of the plane now and then, after so many more steps; the first look needs more of the program."""
+        if self._plane_watch is None or not self._plane_watch.is_due(steps, last):
+            return
+        with self.timed():
+            self._plane_watch.look(self._state, self._stepper.surroundings.load_factor(self._state))
+
+    def run(
+        self,
+        observed: Observed,
+        duration: float | None,
+        until: float | None,
+        observers: Sequence[Observer],
+        inputs: Sequence[Input],
+        callbacks: Callbacks,
+    ) -> RunResult:
+        """Advance by a duration or to a time, and show what is `observed` to observers; see `Simulator.run`."""
+        steps = self._stepper.steps
+        left = time_left(self._time, self._stepper.model.scene.duration, duration, until)
+        count, fixed = int(round(left / steps.dt)), not steps.adaptive
+        if fixed and left > 0.0 and count == 0:
+            raise InputError(f"duration: {left:g} s is less than half a step of {steps.dt:g} s; nothing would happen")
+        self.compile()
+        begin, cpu, wall, before = self._time, self.cpu_time, wall_time(), self._state.step[0]
+        end = begin + count * steps.dt if fixed else self._stepper.end_near(begin + left if until is None else until)
+        last = end - 0.5 * steps.dt if fixed else end
+        schedule = Schedule(observers, observed)
+        ends_of_listening = [self._controls.listen(of.note) for of in observers if hasattr(of, "note")]
+        try:
+            schedule.start()
+            termination = self._advance(end, last, schedule, inputs, callbacks)
+            if termination is Termination.COMPLETED:
+                self._look_out(0, last=True)
+            for attached in self.attached:
+                attached.observe_last()
+        except BaseException as failure:
+            of_program = isinstance(failure, Exception)
+            self.termination = (Termination.FAILED if of_program else Termination.INTERRUPTED).value
+            first_failure([attached.observe_last for attached in self.attached], failure)
+            schedule.finish(False, self.termination, failure)
+            raise
+        finally:
+            for stop_listening in ends_of_listening:
+                stop_listening()
+        self.termination = termination.value
+        schedule.finish(termination is not Termination.INTERRUPTED, termination.value)
+        done = int(self._state.step[0] - before)
+        return RunResult(termination, self._time, self._time - begin, done, self.cpu_time - cpu, wall_time() - wall)
+
+    def _advance(
+        self, end: float, last: float, schedule: Schedule, inputs: Sequence[Input], callbacks: Callbacks
+    ) -> Termination:
+        """Make steps until the end of a run, or until someone ends it.
+
+        Parameters
+        ----------
+        end : float
+            Where the last adaptive step ends [s].
+        last : float
+            A step that ends here or later is the last [s].
+        schedule : Schedule
+            Of the observers.
+        inputs : sequence of Input
+        callbacks : Callbacks
+
+        Returns
+        -------
+        Termination
+        """
+        waiting = deque(sorted(inputs, key=lambda of: of.time))
+        while self._time < last:
+            while waiting and waiting[0].time <= self._time:
+                waiting.popleft().apply(self._controls)
+            until = min(end, waiting[0].time) if waiting else end
+            self.integrate(callbacks.steps_at_once, until, schedule.next_due())
+            schedule.observe_due()
+            if callbacks.each_step is not None:
+                callbacks.each_step(self._time)
+            if callbacks.progress is not None:
+                callbacks.progress(self._time)
+            if callbacks.stop is not None and callbacks.stop():
+                return Termination.STOPPED
+            if callbacks.interrupted is not None and self._time < last and callbacks.interrupted():
+                return Termination.INTERRUPTED
+        return Termination.COMPLETED
+
+    def attach(self, observer: Observer, observed: Observed) -> Callable[[], None]:
+        """Show what is `observed` to an observer from now on; see `Simulator.attach`."""
+        schedule = Schedule([observer], observed)
+        schedule.start()
+        self.attached.append(schedule)
+        stop_listening = self._controls.listen(observer.note) if hasattr(observer, "note") else None
+
+        def detach() -> None:
+            if schedule in self.attached:
+                self.attached.remove(schedule)
+                if stop_listening is not None:
+                    stop_listening()
+                schedule.finish(True, self.termination)
+
+        return detach

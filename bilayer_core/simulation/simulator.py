@@ -3,52 +3,57 @@
 from __future__ import annotations
 
 import math
-import time as clock
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from bilayer_core.engine.energy_account import OPEN, QUESTIONED
-from bilayer_core.engine.step_outcome import IntegrationReport
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError
 from bilayer_core.forces.force_register import memory_size
 from bilayer_core.integrators.integrator_register import INTEGRATORS
-from bilayer_core.jit.compile_all import ensure_compiled
-from bilayer_core.jit.piece import loading
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.fingerprint import conditions_of, fingerprint_of
+from bilayer_core.model.impacts import reason_of_stiffness
 from bilayer_core.model.model import Model
 from bilayer_core.model.plan import make_plan
 from bilayer_core.model.state import State, initial_state, refuse_out_of_plane
-from bilayer_core.observed.inputs import RESET, UNTIL, Input
+from bilayer_core.observed.frame import Description, Frame
+from bilayer_core.observed.inputs import RESET, Input
 from bilayer_core.observed.observer import Observer
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.capture import make_frame
 from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
-from bilayer_core.simulation.observers import Schedule, first_failure
+from bilayer_core.simulation.friction_changes import coefficients
+from bilayer_core.simulation.observation import (
+    describe,
+    energies,
+    positions_with_points,
+    velocities_with_points,
+)
 from bilayer_core.simulation.plane_watch import PlaneWatch
-from bilayer_core.simulation.run_loop import Callbacks, advance_to, time_left
-from bilayer_core.simulation.run_result import RunResult, Termination
+from bilayer_core.simulation.poses import LEAST_TIME
+from bilayer_core.simulation.run_loop import Callbacks, RunLoop
+from bilayer_core.simulation.run_result import RunResult
 from bilayer_core.simulation.same_model import differing
-from bilayer_core.simulation.statistics import RunStatistics
+from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
 from bilayer_core.simulation.step_choice import choose_steps
 from bilayer_core.simulation.stepper import Stepper, StepReport
 from bilayer_core.simulation.summary import summarise
+from bilayer_core.simulation.views.body import BodyView, body_views
+from bilayer_core.simulation.views.clamp import ClampView, clamp_views
+from bilayer_core.simulation.views.joint import JointView, joint_views
+from bilayer_core.simulation.views.present import ByName, Present
+from bilayer_core.simulation.views.rod import RodView, rod_views
 
 Array = np.ndarray
 
 
-def wall_time() -> float:
-    """Return elapsed seconds without those for the loading of kernels; differences count."""
-    return clock.perf_counter() - loading.wall
-
-
-class Simulator(Controls):
+class Simulator:
     """A scene in motion.
 
     Parameters
@@ -63,7 +68,20 @@ class Simulator(Controls):
         Overrides the scene's: the largest error per step, relative to the longest rod. With one, steps are adaptive.
         It is no bound on the error of a whole run, which is larger; `bilayer_core.estimate_error` tells that.
     budget : bool
-        Keep the energy budget of the run (`budget`), in two to three times the time.
+        Keep the energy budget of the run (`budget`): steps cost four to thirteen times as much.
+
+    Attributes
+    ----------
+    scene : SceneConfig
+    plan : Plan
+        Model, dimension and integrator, and the terms that are computed.
+    model : Model
+    steps : Steps
+    dt : float
+        Length of fixed steps, or of the first adaptive one [s].
+    tolerance : float or None
+        Of adaptive steps.
+    keeps_budget : bool
 
     Raises
     ------
@@ -98,14 +116,13 @@ class Simulator(Controls):
         self._method = method
         self._stepper = self._stepper_of(self.model)
         self.keeps_budget = budget
-        self._ledger = EnergyLedger(self.model) if budget else None
-        self._listeners: list[Callable[[Input], None]] = []
-        self._attached: list[Schedule] = []
-        self._until = math.nan
+        self._stepper.ledger = EnergyLedger(self.model) if budget else None
         self._state = self._initial_state()
-        self._compile_time: float | None = None
         self.plane_watch = PlaneWatch(self._in_dimension, scene.duration) if self.plan.dimension == 2 else None
-        self._start_over()
+        self._controls = Controls(self._stepper, self._state)
+        self._loop = RunLoop(self._stepper, self._state, self._controls, self.plane_watch)
+        self._present = Present(self._stepper, self._state, self._loop.compile)
+        self._note_start()
 
     def __repr__(self) -> str:
         dof = self.model.node_count
@@ -126,21 +143,232 @@ class Simulator(Controls):
         marks = self._fingerprint, memory_size(self.model), self._conditions
         return initial_state(self.model, self._keeps_history, *marks)
 
-    def _start_over(self) -> None:
-        self.statistics = RunStatistics(com_max_height=float(self.com[2]))
-        self._stepper.engine.start_over(self.statistics.com_max_height)
+    def _note_start(self) -> None:
         self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
-        self.termination = Termination.COMPLETED.value
-        self.cpu_time = self.wall_time = 0.0
-        if self.plane_watch is not None:
-            self.plane_watch.restart(self.time)
 
-    def _begin_budget(self) -> None:
-        if self._ledger is not None:
-            surroundings = self._stepper.surroundings
-            rest = surroundings.rest_strains_of(self._state.transduction)
-            self._ledger.begin(self._state, rest, surroundings.load_factor(self._state))
-            self._stepper.ledger = self._ledger
+    @property
+    def reasons(self) -> dict[str, str]:
+        """Why `model`, `dimension`, `integrator` and `stepping` are what they are, and `contact_stiffness` if that is
+        not the scene's.
+        """
+        return {**self.plan.reasons, "stepping": self.steps.reason, **reason_of_stiffness(self.model)}
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return float(self._state.time[0])
+
+    @property
+    def positions(self) -> Array:
+        """Positions of nodes, layer by layer, then of contact points of bodies [m], shape (nodes, 3)."""
+        return positions_with_points(self.model, self._state)
+
+    @property
+    def velocities(self) -> Array:
+        """Their velocities [m/s], shape (nodes, 3)."""
+        return velocities_with_points(self.model, self._state)
+
+    @property
+    def contact_forces(self) -> Array:
+        """Barrier and friction force on each of them [N], shape (nodes, 3)."""
+        return self._present.seen().contact_force
+
+    @property
+    def com(self) -> Array:
+        """Mass centre of the rods [m], shape (3,)."""
+        return center_of_mass(self.model, self._state)
+
+    @property
+    def stimulus(self) -> dict[str, float]:
+        """Value of each channel over the last step, in its unit."""
+        self.compile()
+        return dict(zip(self.scene.stimuli, self._stepper.stimulus.tolist(), strict=True))
+
+    @property
+    def friction(self) -> dict[str, float]:
+        """Coefficients of friction that act, by their keys in `contact.friction`; empty where there is none."""
+        return coefficients(self.model, self._state)
+
+    @property
+    def rods(self) -> ByName[RodView]:
+        """Every rod by name: positions, strain, curvature, directors and contact forces of its nodes, and its layers.
+
+        Copies of a pattern have names of their own, such as ``arm_0``.
+        """
+        return rod_views(self._present)
+
+    @property
+    def bodies(self) -> ByName[BodyView]:
+        """Every body by name: its pose, and the force and moment of contact and of the rods that it holds."""
+        return body_views(self._present)
+
+    @property
+    def clamps(self) -> ByName[ClampView]:
+        """Every end of a rod that a body holds, by ``ROD.start`` or ``ROD.end``: the force and moment that it bears."""
+        return clamp_views(self._present)
+
+    @property
+    def joints(self) -> ByName[JointView]:
+        """Every joint between bodies by name: the force and moment that it bears, and how far it gives way."""
+        return joint_views(self._present)
+
+    @property
+    def curvatures(self) -> Array:
+        """Curvature χ through the thickness at every node [1/m], shape (nodes,)."""
+        return self._present.seen().curvature
+
+    def energy(self) -> dict[str, float]:
+        """Energy of each term [J]."""
+        return energies(self.model, self._present.seen())
+
+    @property
+    def energy_account(self) -> Array:
+        """Account of the energy that steps supplied, lost and made; slots in `engine.energy_account`."""
+        return self._state.account.copy()
+
+    @property
+    def statistics(self) -> RunStatistics:
+        """Figures of the run since its start."""
+        return self._loop.statistics
+
+    @property
+    def termination(self) -> str:
+        """How the last run ended; ``"completed"`` before any."""
+        return self._loop.termination
+
+    @property
+    def cpu_time(self) -> float:
+        """CPU time of the steps [s]."""
+        return self._loop.cpu_time
+
+    @property
+    def wall_time(self) -> float:
+        """Elapsed time of the steps [s]."""
+        return self._loop.wall_time
+
+    def budget(self) -> dict[str, Any]:
+        """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
+
+        Raises
+        ------
+        InputError
+            If it is not kept.
+        """
+        if self._stepper.ledger is None:
+            raise InputError("budget: is not kept; make the simulator with budget=True")
+        self.compile()
+        return self._stepper.ledger.budget()
+
+    @property
+    def description(self) -> Description:
+        """Description of the run: everything that does not change while it lasts."""
+        return describe(self.model, self._state, self.plan, self.steps)
+
+    def frame(self) -> Frame:
+        """Take a snapshot."""
+        self.compile()
+        return make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
+
+    def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0) -> None:
+        """Set a channel from the next step on, in its unit.
+
+        Parameters
+        ----------
+        channel : str
+        value : float or None
+            None gives it back to the scene's schedule. A value that passes the range by rounding only, such as
+            1.0000000000000002, is the end of the range.
+        over : float
+            Simulated time in which it gets there, linearly, from what it is now [s]; 0 is a jump. Steps follow a ramp
+            without beginning again, also one that is replaced by another on its way: what comes often is cheaper so.
+
+        Raises
+        ------
+        InputError
+            If there is no such channel, the value is not finite or out of the channel's range, or `over` is no time, or
+            given without a value; nothing is changed then.
+        """
+        self._controls.set_stimulus(channel, value, over=over)
+
+    def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
+        """Multiply force and moment of a load by a factor from the next step on.
+
+        Parameters
+        ----------
+        name : str
+        factor : float or None
+            None gives it back to its schedule.
+        over : float
+            As in `set_stimulus`.
+
+        Raises
+        ------
+        InputError
+            If there is no such load, the factor is not finite, or `over` is no time, or given without a factor; nothing
+            is changed then.
+        """
+        self._controls.set_load(name, factor, over=over)
+
+    def set_friction(self, value: float | None, key: str = "coefficient") -> None:
+        """Have a coefficient of friction jump to a value, from the next step on.
+
+        Parameters
+        ----------
+        value : float or None
+            None gives it back to the scene.
+        key : str
+            Of `contact.friction`: ``coefficient``, ``forward``, ``backward`` or ``sideways``. Those that the scene does
+            not give, and that are not set, go with ``coefficient``.
+
+        Raises
+        ------
+        InputError
+            If nothing slides against friction in the scene, there is no such coefficient, or the value is not finite or
+            below 0; nothing is changed then.
+        """
+        self._controls.set_friction(value, key)
+
+    def set_pose(
+        self,
+        name: str,
+        position: Sequence[float] | None = None,
+        quaternion: Sequence[float] | None = None,
+        *,
+        over: float = LEAST_TIME,
+    ) -> None:
+        """Have a prescribed body go to a pose from the next step on, and rest there; see `simulation.poses`.
+
+        It gets there in the time `over`, or in the time that its `top_speed` and `top_angular_speed` demand if that is
+        longer, with a continuous velocity from where and however fast it moves now. Its schedule acts no more, until
+        `reset`.
+
+        Parameters
+        ----------
+        name : str
+            A prescribed body with a `top_speed` or a `top_angular_speed`.
+        position : sequence of float, optional
+            Of its mass centre, in the world [m]; without one that of its present goal, or the present one.
+        quaternion : sequence of float, optional
+            Orientation x y z w, of any length above 0, likewise; reached by at most half a turn.
+        over : float
+            The least time until it is there [s].
+
+        Raises
+        ------
+        InputError
+            If there is no such body, or it may not move or turn, or not in this way; nothing is changed then.
+        """
+        self._controls.set_pose(name, position, quaternion, over=over)
+
+    def listen(self, note: Callable[[Input], None]) -> Callable[[], None]:
+        """Have all that acts from outside told from now on; returns what ends that.
+
+        Parameters
+        ----------
+        note : callable
+            Called with each `observed.inputs.Input`, before the step from which on it acts.
+        """
+        return self._controls.listen(note)
 
     def compile(self) -> float:
         """Compile all kernels that are not in the cache, and prepare the start.
@@ -153,15 +381,7 @@ class Simulator(Controls):
         float
             CPU time of this for the scene [s].
         """
-        if self._compile_time is None:
-            ensure_compiled()
-            begin = clock.thread_time()
-            self._compile_time = 0.0
-            self._stepper.evaluate(self._state)
-            self.statistics.take_shape(self._stepper, self._state)
-            self._begin_budget()
-            self._compile_time = clock.thread_time() - begin
-        return self._compile_time
+        return self._loop.compile()
 
     def step(self, until: float = math.inf) -> StepReport:
         """Advance by one step.
@@ -181,12 +401,7 @@ class Simulator(Controls):
         SimulationError
             If it cannot be made; the state is that of the last step, or of the last part of it.
         """
-        self.compile()
-        begin, before = self.time, self._state.step[0]
-        found = self._integrate_once(until)
-        while self._state.step[0] == before:
-            found = found.followed_by(self._integrate_once(until))
-        return StepReport.of(found, self.time, self.time - begin)
+        return self._loop.step(until, whole=True)
 
     def advance(self, until: float = math.inf) -> StepReport:
         """Advance by one step, or by one part of a fixed one; otherwise like `step`.
@@ -200,56 +415,7 @@ class Simulator(Controls):
         -------
         StepReport
         """
-        self.compile()
-        begin = self.time
-        return StepReport.of(self._integrate_once(until), self.time, self.time - begin)
-
-    def _integrate_once(self, until: float) -> IntegrationReport:
-        return self._integrate(1, until if self.steps.adaptive else math.inf, math.inf)
-
-    def _integrate(self, most: int, until: float, due: float) -> IntegrationReport:
-        """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that
-        has reached `due` [s].
-        """
-        state, before = self._state, float(self._state.step[0])
-        if self._listeners and self.steps.adaptive and until != self._until:
-            self._until = until
-            self._note(UNTIL, "", until)
-        if self.plane_watch is not None:
-            most = min(most, self.plane_watch.steps_left)
-        due = min([due, *(attached.next_due() for attached in self._attached)])
-        with self._timed():
-            try:
-                found = self._stepper.integrate(state, most, until, due)
-            except SimulationError:
-                self.termination = Termination.FAILED.value
-                raise
-            self.statistics.update(found, int(state.step[0] - before), self._stepper)
-        self._look_out(found.done)
-        for attached in self._attached:
-            attached.observe_due()
-        return found
-
-    def _look_out(self, steps: int, last: bool = False) -> None:
-        """Look out of the plane now and then, after so many more steps; the first look needs more of the program."""
-        if self.plane_watch is None or not self.plane_watch.is_due(steps, last):
-            return
-        with self._timed():
-            surroundings = self._stepper.surroundings
-            rest = surroundings.rest_strains_of(self._state.transduction)
-            self.plane_watch.look(self._state, rest, surroundings.load_factor(self._state))
-
-    @contextmanager
-    def _timed(self) -> Iterator[None]:
-        """Count what is done meanwhile as time of the simulation, and the loading of kernels as that of compilation."""
-        cpu, wall, loaded = clock.thread_time(), wall_time(), loading.cpu
-        try:
-            yield
-        finally:
-            loaded = loading.cpu - loaded
-            self._compile_time = (self._compile_time or 0.0) + loaded
-            self.cpu_time += clock.thread_time() - cpu - loaded
-            self.wall_time += wall_time() - wall
+        return self._loop.step(until, whole=False)
 
     def run(
         self,
@@ -311,42 +477,13 @@ class Simulator(Controls):
             If a log cannot be written. Observers have then seen the last accepted frame and are closed; what goes wrong
             with that is a note to the error.
         """
-        left = time_left(self.time, self.scene.duration, duration, until)
-        steps, fixed = int(round(left / self.dt)), not self.steps.adaptive
-        if fixed and left > 0.0 and steps == 0:
-            raise InputError(f"duration: {left:g} s is less than half a step of {self.dt:g} s; nothing would happen")
         if log is not None:
             from bilayer_core.log.file.mcap_log import McapRecorder
 
             output = self.scene.output
             observers = [McapRecorder(log, output.rate, output.marker_rate), *observers]
-        self.compile()
-        begin, cpu, wall, before = self.time, self.cpu_time, wall_time(), self._state.step[0]
-        end = begin + steps * self.dt if fixed else self._stepper.end_near(begin + left if until is None else until)
-        last = end - 0.5 * self.dt if fixed else end
         callbacks = Callbacks(stop, interrupted, progress, each_step)
-        schedule = Schedule(observers, self)
-        ends_of_listening = [self.listen(of.note) for of in observers if hasattr(of, "note")]
-        try:
-            schedule.start()
-            termination = advance_to(self, end, last, self._integrate, schedule, inputs, callbacks)
-            if termination is Termination.COMPLETED:
-                self._look_out(0, last=True)
-            for attached in self._attached:
-                attached.observe_last()
-        except BaseException as failure:
-            of_program = isinstance(failure, Exception)
-            self.termination = (Termination.FAILED if of_program else Termination.INTERRUPTED).value
-            first_failure([attached.observe_last for attached in self._attached], failure)
-            schedule.finish(False, self.termination, failure)
-            raise
-        finally:
-            for stop_listening in ends_of_listening:
-                stop_listening()
-        self.termination = termination.value
-        schedule.finish(termination is not Termination.INTERRUPTED, termination.value)
-        done = int(self._state.step[0] - before)
-        return RunResult(termination, self.time, self.time - begin, done, self.cpu_time - cpu, wall_time() - wall)
+        return self._loop.run(self, duration, until, observers, inputs, callbacks)
 
     def attach(self, observer: Observer) -> Callable[[], None]:
         """Show frames to an observer from now on, at its rate, whoever makes steps.
@@ -363,19 +500,7 @@ class Simulator(Controls):
         callable
             Detaches the observer.
         """
-        schedule = Schedule([observer], self)
-        schedule.start()
-        self._attached.append(schedule)
-        stop_listening = self.listen(observer.note) if hasattr(observer, "note") else None
-
-        def detach() -> None:
-            if schedule in self._attached:
-                self._attached.remove(schedule)
-                if stop_listening is not None:
-                    stop_listening()
-                schedule.finish(True, self.termination)
-
-        return detach
+        return self._loop.attach(observer, self)
 
     def solve_static(self, tolerance: float | None = None) -> StaticReport:
         """Go to an equilibrium under the present stimuli and loads, not in time; see `simulation.equilibrium`.
@@ -396,14 +521,12 @@ class Simulator(Controls):
             If none is found; nothing is changed then.
         """
         self.compile()
-        with self._timed():
+        in_space = (lambda: self._in_dimension(3)) if self.plan.dimension == 2 else None
+        with self._loop.timed():
             try:
-                in_space = (lambda: self._in_dimension(3)) if self.plan.dimension == 2 else None
                 return solve_static(self._stepper, self._state, tolerance, in_space)
             finally:
-                self._stepper.evaluate(self._state)
-                self.statistics.take_shape(self._stepper, self._state)
-                self._begin_budget()
+                self._loop.take_state()
 
     def save_state(self) -> Array:
         """Return a flat copy of the state; `load_state` continues from it bit for bit.
@@ -440,11 +563,10 @@ class Simulator(Controls):
         if not self._state.set_flat(snapshot) and self._state.account[OPEN] == 1.0:
             self._state.account[OPEN] = QUESTIONED
         self.compile()
-        self._stepper.evaluate(self._state)
-        self._start_over()
-        self.statistics.take_shape(self._stepper, self._state)
-        self._begin_budget()
-        for attached in self._attached:
+        self._loop.start_over()
+        self._note_start()
+        self._loop.take_state()
+        for attached in self._loop.attached:
             attached.start_over()
 
     def reset(self, scene: SceneConfig | str | Path | Mapping[str, Any] | None = None) -> None:
@@ -464,7 +586,7 @@ class Simulator(Controls):
         """
         if scene is not None:
             self._take_scene(scene if isinstance(scene, SceneConfig) else load_scene(scene))
-        self._note(RESET, "")
+        self._controls.note(RESET, "")
         self.load_state(self._initial_state().flat())
 
     def same_model(self, scene: SceneConfig) -> bool:
@@ -491,15 +613,14 @@ class Simulator(Controls):
                 "to differ are texts, duration, output, schedules of stimuli and loads, steps and tolerances, and "
                 "coefficients of friction above 0; make a new Simulator"
             )
-        if self._listeners or self._attached:
+        if self._controls.listeners or self._loop.attached:
             raise InputError("reset: takes no other scene while a log or an observer is attached; detach it first")
         steps, iterations = choose_steps(scene, self._method, *self._asked_steps), scene.solver.max_newton_iterations
         self._stepper.take_scene(scene, steps, iterations)
         self.scene, self.model, self.steps = scene, self._stepper.model, steps
         self.dt, self.tolerance = steps.dt, steps.tolerance
         self._conditions = float(conditions_of(scene))
-        self._ledger = EnergyLedger(self.model) if self.keeps_budget else None
-        self._state = self._initial_state()
+        self._state.take(self._initial_state())
         if self.plane_watch is not None:
             self.plane_watch.take_scene(scene.duration, lambda stepper: stepper.take_scene(scene, steps, iterations))
 

@@ -101,7 +101,7 @@ class Stepper:
     ----------
     surroundings : Surroundings
     ledger : EnergyLedger or None
-        What keeps the energy budget, if anything does.
+        Keeps the energy budget, if anything does; `begin_budget` comes before the first step.
 
     Raises
     ------
@@ -149,6 +149,13 @@ class Stepper:
         control = self._control_of(model, steps)
         self.engine.take_scene(model, control, steps.newton_tolerance, max_iterations)
         self.engine.actuation = self.surroundings.actuation
+        if self.ledger is not None:
+            self.ledger = EnergyLedger(model)
+
+    def begin_budget(self, state: State) -> None:
+        """Start the energy budget from zero at a state, if it is kept."""
+        if self.ledger is not None:
+            self.ledger.begin(state, self.surroundings.load_factor(state))
 
     @property
     def same_time(self) -> float:
@@ -194,8 +201,7 @@ class Stepper:
         it does not know what touches, it takes that from there.
         """
         time = float(state.time[0])
-        rest = self.surroundings.rest_strains_of(state.transduction)
-        self.engine.set_drive(rest, self.surroundings.load_factor(state))
+        self.engine.set_drive(state, self.surroundings.load_factor(state))
         self.engine.do_once(state, EVALUATE_STATE)
         unknown = state.touched == NOT_KNOWN
         state.touched[unknown] = self.engine.touching[: len(unknown)][unknown]
@@ -238,8 +244,7 @@ class Stepper:
         if until <= begin + self._same:
             raise InputError(f"until: {until} is not allowed; it must be later than the present time, {begin} s")
         if self.ledger is not None:
-            rest = self.surroundings.rest_strains_of(state.transduction)
-            self.ledger.begin_step(state, rest, self.surroundings.load_factor(state))
+            self.ledger.begin_step(state, self.surroundings.load_factor(state))
         found = self._integrate(state, until, due, 1 if self.ledger is not None else most)
         if found.failed:
             gap = self.engine.gap
@@ -247,9 +252,7 @@ class Stepper:
             if not found.done:
                 raise self._failure(found, begin, state, gap)
         if self.ledger is not None:
-            rest = self.surroundings.rest_strains_of(state.transduction)
-            load_factor = self.surroundings.load_factor(state, found.length)
-            self.ledger.record(state, rest, load_factor, found.length)
+            self.ledger.record(state, self.surroundings.load_factor(state, found.length), found.length)
         return found
 
     def _integrate(self, state: State, until: float, due: float, most: int) -> IntegrationReport:

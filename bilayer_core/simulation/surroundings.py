@@ -1,4 +1,4 @@
-"""Actions on a robot from outside: stimuli, the response of its layers, loads, and bodies on prescribed paths."""
+"""Actions on a robot from outside: stimuli, loads, and bodies on prescribed paths."""
 
 from __future__ import annotations
 
@@ -10,10 +10,8 @@ from bilayer_core.engine.actuation import Actuation, Paths
 from bilayer_core.model.model import Model
 from bilayer_core.model.override import acts, no_overrides, spans_of, value_at
 from bilayer_core.model.state import POSE_GOAL, State
-from bilayer_core.model.stimulated_strains import RestStrains
 from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.spans import Span, Spans
-from bilayer_core.scene.transduction import free_strain
 from bilayer_core.simulation.poses import BEGIN, DURATION, MOVE, POSITION, ROTATION, ROTATION_VECTOR, SPIN, VELOCITY
 
 Array = np.ndarray
@@ -53,19 +51,6 @@ class Surroundings:
         """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's."""
         scheduled = [schedule.value(time) for schedule in self._channels]
         return _overridden(scheduled, state.override[: len(scheduled)], time)
-
-    def rest_strains_of(self, transduction: Array) -> RestStrains:
-        """Strains without stress from the filtered stimuli."""
-        drives, edges = self.model.drives, self.model.rods.edge_count
-        strain = free_strain(transduction, drives.law_gain, drives.law_reference, drives.law_saturation)
-        eigenstrain = np.bincount(drives.driven_edge, drives.driven_weight * strain[drives.driven_law], edges)
-        joint = drives.joint_rest
-        if len(drives.driven_joint):
-            bent = drives.driven_joint_weight * strain[drives.driven_joint_law]
-            joint = joint.copy()
-            joint[:, 0] += np.bincount(drives.driven_joint, bent, len(joint))
-            joint.flags.writeable = False
-        return RestStrains(drives.rest_strain + eigenstrain, joint)
 
     def load_factor(self, state: State, ended: float = 0.0) -> Array:
         """Factor of each load in a state, shape (n_load,): at the end of a step of length `ended` [s] that from before

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from support.evaluations import end_of_step, left_of_step, undriven
+from support.fluid_energy import energy_of_fluid, momentum_of_fluid, survey_fluid
 from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
@@ -13,7 +14,6 @@ from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.section import rectangle
 from bilayer_core.model.state import initial_state
-from bilayer_core.simulation.fluid_energy import energy_of_fluid, momentum_of_fluid, survey_fluid
 
 WIDTH, THICKNESS = 0.01, 2e-3
 OWN = 1000.0 * WIDTH * THICKNESS  # [kg/m]

@@ -185,7 +185,7 @@ def test_after_a_jump_of_a_load_a_method_that_starts_itself_makes_one_step():
     used = []
     while simulator.time < 0.05:
         begin = simulator.time
-        found = simulator._integrate(1, 0.05, math.inf)
+        found = simulator._loop.integrate(1, 0.05, math.inf)
         assert found.done == 1
         used.append((begin, found.restarts))
     assert [begin for begin, restarts in used if restarts] == pytest.approx([0.0, 0.02, 0.03])

@@ -175,14 +175,14 @@ def test_accepted_parts_of_a_step_that_fails_stay_in_state_and_budget():
 
     state.next_step[0] = 0.5e-3  # as after a step that failed
     engine.integrate = fails_after_the_first_part
-    record, budgets = simulator._ledger.record, []
-    simulator._ledger.record = lambda *arguments: (record(*arguments), budgets.append(simulator.budget()))
+    record, budgets = simulator._stepper.ledger.record, []
+    simulator._stepper.ledger.record = lambda *arguments: (record(*arguments), budgets.append(simulator.budget()))
     with pytest.raises(SimulationError, match=r"stopped at t = 0\.0505 s"):
         simulator.step()
     assert [found.done for _, _, found in parts] == [1, 0] and len(budgets) == 1
     np.testing.assert_array_equal(simulator.save_state(), parts[0][1])
     assert simulator.budget() == budgets[0]
-    del engine.integrate, simulator._ledger.record
+    del engine.integrate, simulator._stepper.ledger.record
     engine._newton = newton
     simulator.step()
     assert simulator.time == pytest.approx(0.051, abs=1e-15)

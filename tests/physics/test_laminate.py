@@ -11,7 +11,6 @@ from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.contact_points import start_contact_points
 from bilayer_core.model.plan import make_plan, simplest_model
-from bilayer_core.simulation.surroundings import Surroundings
 from bilayer_core.verification.beam2d.scene import beam_of, set_stimuli
 from bilayer_core.verification.validate.bending import PAIRS, THICKNESS, strip
 from bilayer_core.verification.validate.closed_forms import timoshenko
@@ -113,7 +112,7 @@ def test_the_elastic_energy_has_no_direction_that_costs_nothing_but_rigid_motion
     model, evaluator = simulator.model, Evaluator(simulator.model)
     at = evaluator.new()
     evaluator.take_state(simulator._state, at)
-    strains = Surroundings(model).rest_strains_of(simulator._state.transduction)
+    strains = evaluator.rest_strains_of(simulator._state.transduction)
     evaluator.stand_still(simulator._state, at, 1.0, strains.edge, strains.joint, np.zeros(0))
     evaluator.start_stage(at)
     evaluator.evaluate(at, ELASTIC, second=True)

@@ -33,8 +33,7 @@ def test_no_correction_of_newtons_method_raises_the_potential(model, dimension, 
     stepper, state = simulator._stepper, simulator._state
     energies = [sum(simulator.energy().values())]
     for _ in range(12):
-        rest = stepper.surroundings.rest_strains_of(state.transduction)
-        stepper.engine.set_drive(rest, stepper.surroundings.load_factor(state))
+        stepper.engine.set_drive(state, stepper.surroundings.load_factor(state))
         found = stepper.engine.do_once(state, SETTLE, INERTIA_OVER, 1e-12)
         assert found.status in (CONVERGED, MAX_ITERATIONS)
         stepper.evaluate(state)

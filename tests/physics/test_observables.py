@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
+from support.fluid_energy import energy_of_fluid
 from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import quaternion_from_matrix
-from bilayer_core.simulation.fluid_energy import energy_of_fluid
-from bilayer_core.simulation.kinetic_energy import kinetic_energy
 
 SCENES = {
     "every force, two rods": (everything, "two_rod"),
@@ -66,11 +65,28 @@ def test_wrenches_on_bodies_are_sums_over_what_touches_and_what_is_held(simulato
     np.testing.assert_allclose(frame.contact_wrenches, contact[:-1], rtol=1e-12, atol=1e-18)
     points = model.node_count + model.point_count
     np.testing.assert_array_equal(frame.contact_forces, -sums.contact_point[:points])
-    held, tangent, of_edge = -sums.attached, at.tangent[model.rods.edge_count :], -sums.edge[model.rods.edge_count :]
+    clamp_edges = slice(model.rods.edge_count, None)
+    held, tangent, of_edge = -sums.attached, at.tangent[clamp_edges], -sums.edge[clamp_edges]
     moment = np.cross(at.arm, held) + np.cross(tangent, of_edge[:, :3]) + of_edge[:, 3:] * tangent
     clamps = np.zeros((len(model.bodies.names), 6))
     np.add.at(clamps, model.constrained.body, np.concatenate([held, moment], axis=1))
     np.testing.assert_allclose(frame.clamp_wrenches, clamps, rtol=1e-12, atol=1e-12 * np.abs(clamps).max(initial=1e-9))
+
+
+def kinetic_energy(model, state):
+    """Of nodes, of edges about their tangents, and of free bodies [J]."""
+    kinetic = (
+        0.5 * model.rods.node_mass @ np.square(state.velocity).sum(axis=1)
+        + 0.5 * model.rods.spin_inertia @ state.spin**2
+    )
+    for slot, body in enumerate(model.free_bodies.body_of_free):
+        velocity, spin, rotation = (
+            of[body] for of in (state.body_velocity, state.body_angular_velocity, state.body_rotation)
+        )
+        second = model.free_bodies.second_moment[slot]
+        inertia = rotation @ (np.trace(second) * np.eye(3) - second) @ rotation.T
+        kinetic += 0.5 * (model.free_bodies.mass[slot] * velocity @ velocity + spin @ inertia @ spin)
+    return kinetic
 
 
 def test_energies_and_rotations_seen_are_those_of_the_state(simulator):

@@ -5,6 +5,7 @@ import pytest
 from support.sample_scenes import ball, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.engine.evaluator import Evaluator
 
 PULSE = {"type": "table", "times": [0, 0.02, 0.04], "values": [0, 1, 0]}
 ROUNDING = 1e-12
@@ -30,6 +31,7 @@ class Watched:
 
     def __init__(self, simulator):
         self.simulator, self.curvature, self.strain, self.top = simulator, 0.0, 0.0, -np.inf
+        self.evaluator = Evaluator(simulator.model)
         simulator.compile()
         self.look()
 
@@ -37,7 +39,7 @@ class Watched:
         simulator, model = self.simulator, self.simulator.model
         curvature = np.abs(simulator.curvatures[: model.node_count]).max()
         stepper, state = simulator._stepper, simulator._state
-        rest = stepper.surroundings.rest_strains_of(state.transduction).edge
+        rest = self.evaluator.rest_strains_of(state.transduction).edge
         strain = np.abs(stepper.end.length[: model.rods.edge_count] / model.rods.rest_length - 1.0 - rest).max()
         self.curvature, self.strain = max(self.curvature, curvature), max(self.strain, strain)
         self.top = max(self.top, simulator.bodies["ball"].position[2])

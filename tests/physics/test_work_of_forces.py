@@ -81,7 +81,7 @@ def test_the_work_of_a_barrier_is_the_loss_of_its_energy_however_long_the_steps(
 def test_a_gradient_wrong_by_a_percent_leaves_a_percent_of_the_energy(force, monkeypatch):
     description, duration, dt = CONSERVATIVE[force]
     simulator = Simulator(load_scene(description), dt=dt / 2, budget=True)
-    evaluator = simulator._ledger._evaluator
+    evaluator = simulator._stepper.ledger._evaluator
     monkeypatch.setattr(evaluator, "forces", one_percent_more(evaluator, force))
     simulator.run(duration)
     right, wrong = budget_of(force, 2), simulator.budget()

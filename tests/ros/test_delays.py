@@ -57,8 +57,8 @@ class Physics(Simulator):
         begin = time.thread_time()
         while time.thread_time() - begin < self.nap:
             pass
-        self.cpu_time += self.nap
-        self.wall_time += self.nap
+        self._loop.cpu_time += self.nap
+        self._loop.wall_time += self.nap
         return report
 
 

@@ -20,7 +20,8 @@ STEPS = (3e-8, 1e-7, 3e-7, 1e-6)  # of differences, of which the best counts [m]
 
 def undriven(model):
     """Strains without stress and factors of loads where no stimulus acts and loads are whole."""
-    return RestStrains(model.drives.rest_strain, model.drives.joint_rest), np.ones(len(model.scene.loads))
+    rest = RestStrains(model.drives.rest_strain, model.drives.joint_rest, np.zeros(len(model.drives.law_gain)))
+    return rest, np.ones(len(model.scene.loads))
 
 
 def at_rest(model, length):
@@ -113,11 +114,10 @@ class Problem:
             for b in range(len(origin.rotation)):
                 origin.rotation[b] = rotation_matrix(1e3 * origin_noise * rng.standard_normal(3)) @ origin.rotation[b]
             turned = 1e3 * origin_noise * rng.standard_normal(model.rods.edge_count)
-        surroundings = Surroundings(model)
-        strains = surroundings.rest_strains_of(np.full(len(model.drives.law_gain), 0.7))
+        strains = evaluator.rest_strains_of(np.full(len(model.drives.law_gain), 0.7))
         then = state.copy()
         then.time[0] = 0.03
-        load_factor = surroundings.load_factor(then)
+        load_factor = Surroundings(model).load_factor(then)
         evaluator.predict(start, (h, 1.3 * h), strains.edge, strains.joint, load_factor, turned)
         evaluator.start_stage(start)
         self._number()
@@ -229,11 +229,11 @@ def end_of_step(simulator, before):
     start, end : Configuration
     """
     model, state, h = simulator.model, simulator._state, simulator.dt
-    evaluator, surroundings = Evaluator(model), Surroundings(model)
+    evaluator = Evaluator(model)
     start, end = evaluator.new(), evaluator.new()
     evaluator.take_state(before, start)
     evaluator.start_point(before, start)
-    strains, load_factor = surroundings.rest_strains_of(state.transduction), surroundings.load_factor(state, h)
+    strains, load_factor = evaluator.rest_strains_of(state.transduction), Surroundings(model).load_factor(state, h)
     evaluator.predict(start, (h, h), strains.edge, strains.joint, load_factor)
     evaluator.start_stage(start)
     evaluator.take_state(state, end)

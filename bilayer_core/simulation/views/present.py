@@ -1,9 +1,8 @@
-"""Objects that views look at, and a mapping that finds views by name."""
+"""The present state as views see it, and a mapping that finds views by name."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import TypeVar
 
@@ -18,14 +17,35 @@ MOST_TOLD = 12
 """Names that a mapping tells of itself."""
 
 
-@dataclass(frozen=True)
 class Present:
-    """Objects that views look at: a model, its state, the evaluator of the forces there, and the observables."""
+    """The present state of a run, and what only an evaluation of it tells.
 
-    model: Model
-    state: State
-    evaluated: Callable[[], Stepper]
-    seen: Callable[[], Parts]
+    Parameters
+    ----------
+    stepper : Stepper
+    state : State
+    ready : callable
+        Has kernels and the forces of the first state ready.
+    """
+
+    def __init__(self, stepper: Stepper, state: State, ready: Callable[[], object]) -> None:
+        self.state, self._stepper, self._ready = state, stepper, ready
+
+    @property
+    def model(self) -> Model:
+        """The model, with the scene that it has now."""
+        return self._stepper.model
+
+    def evaluated(self) -> Stepper:
+        """Return the stepper, with forces of the present state."""
+        self._ready()
+        self._stepper.engine.evaluate_end()
+        return self._stepper
+
+    def seen(self) -> Parts:
+        """Return all observables of the present state."""
+        self._ready()
+        return self._stepper.observe(self.state)[0]
 
 
 class ByName(Mapping[str, View]):

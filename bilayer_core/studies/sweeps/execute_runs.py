@@ -20,8 +20,9 @@ from bilayer_core.observed.observer import Observer
 from bilayer_core.observed.system import versions
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content
+from bilayer_core.simulation.run_loop import wall_time
 from bilayer_core.simulation.run_result import Termination
-from bilayer_core.simulation.simulator import Simulator, wall_time
+from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.sweeps.job import Job, Outcome, Point, Row
 from bilayer_core.studies.sweeps.metrics import FinishedRun, MetricError, measure, name_and_component, quantities_of
 from bilayer_core.studies.sweeps.sweep_functions import load
