@@ -218,7 +218,13 @@ class Simulator:
         return self._present.seen().curvature
 
     def energy(self) -> dict[str, float]:
-        """Energy of each term [J]."""
+        """Return the energy of each term.
+
+        Returns
+        -------
+        dict of str to float
+            By the name of the term [J].
+        """
         return energies(self.model, self._present.seen())
 
     @property
@@ -247,12 +253,17 @@ class Simulator:
         return self._loop.wall_time
 
     def budget(self) -> dict[str, Any]:
-        """Where the energy went [J] since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
+        """Return where the energy went since the start, `reset`, `load_state` or `solve_static`; see `EnergyLedger`.
+
+        Returns
+        -------
+        dict
+            Energies by name [J].
 
         Raises
         ------
         InputError
-            If it is not kept.
+            If the simulator keeps no budget.
         """
         if self._stepper.ledger is None:
             raise InputError("budget: is not kept; make the simulator with budget=True")
@@ -265,7 +276,13 @@ class Simulator:
         return describe(self.model, self._state, self.plan, self.steps)
 
     def frame(self) -> Frame:
-        """Take a snapshot."""
+        """Return a snapshot.
+
+        Returns
+        -------
+        Frame
+            The present values.
+        """
         self.compile()
         return make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
 
@@ -361,12 +378,17 @@ class Simulator:
         self._controls.set_pose(name, position, quaternion, over=over)
 
     def listen(self, note: Callable[[Input], None]) -> Callable[[], None]:
-        """Have all that acts from outside told from now on; returns what ends that.
+        """Report all inputs from outside to a listener from now on.
 
         Parameters
         ----------
         note : callable
             Called with each `observed.inputs.Input`, before the step from which on it acts.
+
+        Returns
+        -------
+        callable
+            Ends the reports.
         """
         return self._controls.listen(note)
 
