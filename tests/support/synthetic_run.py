@@ -132,7 +132,7 @@ def random_frame(generator: np.random.Generator) -> Frame:
     """A frame with random numbers in every array, for tests of encoders."""
     model = description()
     nodes, bodies = model.node_count, len(model.bodies)
-    directors = generator.normal(size=(model.rods.edge_count, 3))
+    directors = generator.normal(size=(model.edge_count, 3))
     quaternions = generator.normal(size=(bodies, 4))
     forces = generator.normal(size=(nodes, 3))
     forces[generator.random(nodes) < 0.7] = 0.0
