@@ -65,14 +65,30 @@ class RunStatistics:
     bodies: dict[str, BodyContact] = field(default_factory=dict)
 
     def take_shape(self, stepper: Stepper, state: State) -> None:
-        """Take in the shape of a state to which no step has led, evaluated in `stepper`."""
+        """Take in the shape of a state to which no step has led.
+
+        Parameters
+        ----------
+        stepper : Stepper
+            In which it was evaluated.
+        state : State
+        """
         stepper.engine.count_shape(state)
         stepper.engine.open_account(state)
         self.numerical_before = float(state.account[NUMERICAL])
         self._take_extrema(stepper)
 
     def update(self, report: IntegrationReport, whole: int, stepper: Stepper) -> None:
-        """Take in some steps, of which so many are no parts of one."""
+        """Take in some steps.
+
+        Parameters
+        ----------
+        report : IntegrationReport
+        whole : int
+            How many of the steps are no parts of one.
+        stepper : Stepper
+            Which made them.
+        """
         self.steps += whole
         self.substeps += report.done
         self.rejected += report.rejected
