@@ -103,6 +103,9 @@ def _follow(options: argparse.Namespace, stop: Stop) -> None:
                 shown = now
             if listener.connected != there:
                 there = listener.connected
+                if not there:  # what it sent may still wait to be taken
+                    listener.take_the_rest(executor)
+                    view.show()
                 what = f"following {options.node}: {server.address}" if there else f"{options.node} has ended"
                 _say(what if there else f"{what}; what it showed is served until Ctrl-C")
             if not there and not told and now - begun > PATIENCE:
@@ -148,7 +151,7 @@ class Listener:
         name = name if name.startswith("/") else f"/{name}"
         self.topic = LIVE.full_name(name)
         self._view, self._last, self._begun = view, -1, False
-        self._description = None
+        self._description, self._taken = None, 0
         self.node = Node(f"bilayer_view_{os.getpid()}")
         try:
             self.node.create_subscription(String, DESCRIPTION.full_name(name), self._take_description, KEPT)
@@ -162,6 +165,15 @@ class Listener:
         """True if the node publishes frames and the description of its run is known."""
         return self._description is not None and self._frames.get_publisher_count() > 0
 
+    def take_the_rest(self, executor) -> None:
+        """Take what has arrived, until nothing comes any more."""
+        quiet_since = time.monotonic()
+        while time.monotonic() - quiet_since < PERIOD:
+            before = self._taken
+            executor.spin_once(timeout_sec=PERIOD / 2)
+            if self._taken > before:
+                quiet_since = time.monotonic()
+
     def _take_description(self, message) -> None:
         from bilayer_core.log.messages.description_text import from_json
 
@@ -171,6 +183,7 @@ class Listener:
     def _take_frame(self, message) -> None:
         from bilayer_core.log.messages.packing import unpack
 
+        self._taken += 1
         if self._description is None:
             return  # it is on its way
         parts = unpack(message.layout.dim[0].label if message.layout.dim else "", bytes(message.data))

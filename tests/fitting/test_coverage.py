@@ -1,18 +1,18 @@
-"""Forty fits of the study of docs/fitting.md: its 500 are made by `python tests/benchmarks/fit_coverage.py`."""
+"""Twelve fits of the study of docs/fitting.md: its 500 are made by `python tests/benchmarks/fit_coverage.py`."""
 
 import numpy as np
 import pytest
 from benchmarks.fit_coverage import SEED, TRUTH, study
 from scipy import stats
 
-FITS = 40
+FITS = 12
 BY_CHANCE = 1e-3
 """Probability of a result outside of the limits if intervals are right; the noise is the same each time."""
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
-def test_intervals_of_forty_fits_cover_the_truth_and_are_as_wide_as_fits_scatter():
+def test_intervals_of_twelve_fits_cover_the_truth_and_are_as_wide_as_fits_scatter():
     found = study(FITS, SEED + 1)
     assert np.isfinite(found.values).all()
     fewest = stats.binom.ppf(BY_CHANCE, FITS, 0.95)

@@ -1,6 +1,7 @@
 """Real nodes in processes of their own, and a client node in the test's process; every test has its own ROS domain."""
 
 import itertools
+import math
 import os
 import subprocess
 import sys
@@ -8,9 +9,11 @@ import time
 
 import pytest
 import rclpy
+from rcl_interfaces.srv import GetParameters, GetParameterTypes, SetParameters
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 from support.processes import claimed_domain
 
@@ -82,20 +85,24 @@ class Client:
     """A node of the test's own that listens to a process, sends to it and calls its services."""
 
     def __init__(self, process):
-        self._process = process
+        self._process, self.domain = process, process.domain
         self._context = Context()
         rclpy.init(context=self._context, domain_id=process.domain)
         self.node = Node("client", context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
+        self._callers = {}
 
     def spin_until(self, condition, what, limit=LIMIT):
         """Serve callbacks until `condition()` is true; its value."""
         deadline = time.monotonic() + limit
         while not (value := condition()):
-            assert self._process.running, f"the node ended while the test waited for {what}:\n{self._process.output}"
             assert time.monotonic() < deadline, f"waited {limit} s for {what}"
-            self._executor.spin_once(timeout_sec=0.05)
+            if self._process.running:
+                self._executor.spin_once(timeout_sec=0.05)
+            else:  # its last message may arrive after its end
+                self.drain()
+                assert condition(), f"the node ended while the test waited for {what}:\n{self._process.output}"
         return value
 
     def drain(self, quiet=0.1):
@@ -127,60 +134,98 @@ class Client:
             self._executor.spin_once(timeout_sec=0.05)
         self.drain()
 
-    def request(self, name, node=NODE):
-        """Call the node's service `name`; the future of its answer."""
-        client = self.node.create_client(Trigger, f"{node}/{name}")
-        self.spin_until(client.service_is_ready, f"the service {name}")
-        return client.call_async(Trigger.Request())
+    def caller(self, name, node=NODE, kind=Trigger):
+        """A client of the node's service `name`, which knows where answers go: those to a reader not yet discovered are
+        lost.
+        """
+        service = f"{node}/{name}"
+        if service in self._callers:
+            return self._callers[service]
+        client = self._callers[service] = self.node.create_client(kind, service)
+        # A node learns readers in the order of their creation: it knows this one when it answers a later one.
+        probe = self.node.create_client(GetParameterTypes, f"{node}/get_parameter_types")
+        self.spin_until(lambda: client.service_is_ready() and probe.service_is_ready(), f"the service {service}")
+        answers, asked = [], -math.inf
 
-    def call(self, name, node=NODE) -> Trigger.Response:
+        def answered():
+            nonlocal asked
+            if time.monotonic() > asked + 1.0:
+                asked = time.monotonic()
+                answers.append(probe.call_async(GetParameterTypes.Request()))
+            return any(answer.done() for answer in answers)
+
+        self.spin_until(answered, f"the discovery of the client of {service}")
+        self.node.destroy_client(probe)
+        return client
+
+    def request(self, name, node=NODE, kind=Trigger, request=None):
+        """Call the node's service `name`; the future of its answer."""
+        return self.caller(name, node, kind).call_async(request or kind.Request())
+
+    def call(self, name, node=NODE, kind=Trigger, request=None):
         """Call the node's service `name`; its answer."""
-        future = self.request(name, node)
+        future = self.request(name, node, kind, request)
         self.spin_until(future.done, f"an answer of {name}")
         return future.result()
 
-    def close(self):
+    def set_parameter(self, name, value, node=NODE):
+        """Set a parameter of the node; the result."""
+        wished = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        return self.call("set_parameters", node, SetParameters, wished).results[0]
+
+    def get_parameter(self, name, node=NODE):
+        """The value of a parameter that is a number."""
+        asked = GetParameters.Request(names=[name])
+        return self.call("get_parameters", node, GetParameters, asked).values[0].double_value
+
+    def end(self):
         self._executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self._context)
 
 
 @pytest.fixture(scope="module")
-def start(tmp_path_factory):
-    """Starts executables of the package in a domain; they end with the module."""
-    started = []
-
-    def begin(module, domain, parameters=None, arguments=()):
-        process = NodeProcess(module, tmp_path_factory.mktemp("node"), domain, parameters, arguments)
-        started.append(process)
-        return process
-
-    yield begin
-    for process in started:
-        process.end()
+def residents():
+    """Processes and clients in a domain, which end before another test may have it."""
+    return []
 
 
 @pytest.fixture(scope="module")
-def connect():
-    """Makes clients of processes; they close with the module."""
-    clients = []
+def start(tmp_path_factory, residents):
+    """Starts executables of the package in a domain; they end with the fixture that gave the domain."""
+
+    def begin(module, domain, parameters=None, arguments=()):
+        residents.append(NodeProcess(module, tmp_path_factory.mktemp("node"), domain, parameters, arguments))
+        return residents[-1]
+
+    return begin
+
+
+@pytest.fixture(scope="module")
+def connect(residents):
+    """Makes clients of processes; they close with the fixture that gave the domain."""
 
     def begin(process):
-        clients.append(Client(process))
-        return clients[-1]
+        residents.append(Client(process))
+        return residents[-1]
 
-    yield begin
-    for client in clients:
-        client.close()
+    return begin
+
+
+def inhabited(residents):
+    """A claimed domain, in which everybody ends before it is given back."""
+    with claimed_domain() as domain:
+        yield domain
+        for resident in [of for of in residents if of.domain == domain]:
+            residents.remove(resident)
+            resident.end()
 
 
 @pytest.fixture
-def domain():
-    with claimed_domain() as domain:
-        yield domain
+def domain(residents):
+    yield from inhabited(residents)
 
 
 @pytest.fixture(scope="module")
-def domain_of_module():
-    with claimed_domain() as domain:
-        yield domain
+def domain_of_module(residents):
+    yield from inhabited(residents)

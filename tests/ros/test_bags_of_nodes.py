@@ -25,7 +25,7 @@ class Recorder:
         self.messages = []
         node = client.node
         for name in nodes:
-            client.spin_until(lambda name=name: node.count_publishers(f"{name}/events"), f"the topics of {name}")
+            client.caller("resume", name)  # services are made after topics, so these are known
         for topic, (ros_type, *_) in node.get_topic_names_and_types():
             if topic.startswith(tuple(f"{name}/" for name in nodes)) and (
                 offered := node.get_publishers_info_by_topic(topic)

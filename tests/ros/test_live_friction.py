@@ -5,8 +5,6 @@ import math
 import pytest
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import Log
-from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.parameter import Parameter
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
@@ -53,24 +51,6 @@ def client(process, connect):
     return connect(process)
 
 
-def ask(client, kind, service, request):
-    caller = client.node.create_client(kind, f"/bilayer_sim/{service}")
-    client.spin_until(caller.service_is_ready, service)
-    future = caller.call_async(request)
-    client.spin_until(future.done, f"an answer of {service}")
-    return future.result()
-
-
-def set_friction(client, **values):
-    parameters = [Parameter(f"friction.{key}", value=value).to_parameter_msg() for key, value in values.items()]
-    return ask(client, SetParameters, "set_parameters", SetParameters.Request(parameters=parameters)).results[0]
-
-
-def shown(client):
-    answer = ask(client, GetParameters, "get_parameters", GetParameters.Request(names=["friction.coefficient"]))
-    return answer.values[0].double_value
-
-
 def way(client, poses, frames=10):
     """How far the block goes in some more frames [m]."""
     client.drain()
@@ -98,23 +78,25 @@ def test_without_friction_in_the_scene_no_coefficient_can_be_given():
 def test_a_block_slides_once_friction_is_below_the_slope_until_a_reset(client, process, folder):
     poses, events = client.listen(PoseStamped, "/bilayer_sim/body_pose/block"), []
     client.node.create_subscription(Log, "/bilayer_sim/events", events.append, 100)
-    assert shown(client) == 0.4  # by the name that the coefficient had before
+    assert client.get_parameter("friction.coefficient") == 0.4  # by the name that the coefficient had before
     assert process.output.count("parameter 'friction' is now called 'friction.coefficient'") == 1
     assert abs(way(client, poses)) < 1e-5
-    assert set_friction(client, coefficient=0.2).successful
+    assert client.set_parameter("friction.coefficient", 0.2).successful
     slid = way(client, poses)
     cosine = math.cos(math.atan(SLOPE))
     assert slid == pytest.approx(0.5 * GRAVITY * (SLOPE - 0.2) * cosine * 0.2**2, rel=0.05)
     assert [event.msg for event in events if event.name == "setting"] == ["contact.friction.coefficient is 0.2"]
-    assert set_friction(client, coefficient=-1.0).successful
+    assert client.set_parameter("friction.coefficient", -1.0).successful
     way(client, poses)
     assert abs(way(client, poses)) < 1e-5  # by the 0.4 with which the node was started
     for bad in (-0.1, math.nan, math.inf):
-        refused = set_friction(client, sideways=bad)
+        refused = client.set_parameter("friction.sideways", bad)
         assert not refused.successful and "allowed is a finite number >= 0, or -1" in refused.reason
-    assert set_friction(client, coefficient=0.0).successful
+    assert client.set_parameter("friction.coefficient", 0.0).successful
     assert client.call("reset").success
-    client.spin_until(lambda: shown(client) == 0.4, "the value of the start after a reset")
+    client.spin_until(
+        lambda: client.get_parameter("friction.coefficient") == 0.4, "the value of the start after a reset"
+    )
     assert abs(way(client, poses)) < 1e-5
     process.send(15)
     assert process.wait() == 0

@@ -4,8 +4,6 @@ import signal
 
 import numpy as np
 import pytest
-from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
@@ -29,20 +27,6 @@ def run_log(tmp_path_factory):
     return path
 
 
-def call(client, service_type, name, request):
-    service = client.node.create_client(service_type, f"{NODE}/{name}")
-    client.spin_until(service.service_is_ready, name)
-    future = service.call_async(request)
-    client.spin_until(future.done, "an answer")
-    return future.result()
-
-
-def seek(client, position):
-    """The result of setting the position."""
-    wished = Parameter("play.position", value=position).to_parameter_msg()
-    return call(client, SetParameters, "set_parameters", SetParameters.Request(parameters=[wished])).results[0]
-
-
 def test_markers_of_another_time_are_deleted_at_the_start_after_a_seek_and_in_each_loop(
     start, connect, domain, run_log
 ):
@@ -53,7 +37,7 @@ def test_markers_of_another_time_are_deleted_at_the_start_after_a_seek_and_in_ea
     client.spin_until(lambda: markers.get_publisher_count() > 0, "a publisher of markers")
     assert client.call("resume", NODE).success
     client.spin_until(lambda: len(heard) > 12, "two passes")
-    assert seek(client, 0.3).successful
+    assert client.set_parameter("play.position", 0.3, NODE).successful
     count = len(heard)
     client.spin_until(lambda: len(heard) > count + 2, "markers after a seek")
     arrays = [(array.markers[0].action == Marker.DELETEALL, array.markers[-1].header.stamp.nanosec) for array in heard]
@@ -91,11 +75,10 @@ def test_positions_of_a_log_with_epoch_stamps_count_from_its_first_message(start
     client = connect(node)
     assert client.call("is_paused", NODE).message == "paused at t = 1764000000.5 s"
     assert client.call("play_next", NODE).message == "sent /a of t = 1764000000.5 s"
-    assert seek(client, 1.5).successful
+    assert client.set_parameter("play.position", 1.5, NODE).successful
     assert client.call("play_next", NODE).message == "sent /a of t = 1764000001.5 s"
-    found = call(client, GetParameters, "get_parameters", GetParameters.Request(names=["play.position"]))
-    assert found.values[0].double_value == 1.5
-    refused = seek(client, 3.0)
+    assert client.get_parameter("play.position", NODE) == 1.5
+    refused = client.set_parameter("play.position", 3.0, NODE)
     assert not refused.successful and "is not in what is played, which is 1764000000 to 1764000002 s" in refused.reason
 
 

@@ -10,8 +10,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
@@ -60,24 +58,6 @@ def listen(client, topic, ros_type=Float64, qos=DEEP):
 
 def numbers(found):
     return [value_of(data) for data in found]
-
-
-def set_parameter(client, name, value, node=NODE):
-    """The result."""
-    service = client.node.create_client(SetParameters, f"{node}/set_parameters")
-    client.spin_until(service.service_is_ready, "set_parameters")
-    wished = Parameter(name, value=value).to_parameter_msg()
-    future = service.call_async(SetParameters.Request(parameters=[wished]))
-    client.spin_until(future.done, "an answer")
-    return future.result().results[0]
-
-
-def get_parameter(client, name, node=NODE):
-    service = client.node.create_client(GetParameters, f"{node}/get_parameters")
-    client.spin_until(service.service_is_ready, "get_parameters")
-    future = service.call_async(GetParameters.Request(names=[name]))
-    client.spin_until(future.done, "an answer")
-    return future.result().values[0].double_value
 
 
 def message_class(ros_type):
@@ -135,22 +115,22 @@ def test_services_and_live_parameters_move_a_paused_player(start, connect, domai
 
     assert said("is_paused") == (True, "paused at t = 0.4 s")
     assert said("play_next") == (True, "sent /bilayer_sim/number of t = 0.4 s")
-    assert set_parameter(client, "play.position", 7.25).successful
-    assert get_parameter(client, "play.position") == 7.25
+    assert client.set_parameter("play.position", 7.25, NODE).successful
+    assert client.get_parameter("play.position", NODE) == 7.25
     assert said("is_paused") == (True, "paused at t = 7.25 s")
     assert said("play_next") == (True, "sent /bilayer_sim/number of t = 7.3 s")
-    assert get_parameter(client, "play.position") == 7.3
-    refused = set_parameter(client, "play.position", 12.0)
+    assert client.get_parameter("play.position", NODE) == 7.3
+    refused = client.set_parameter("play.position", 12.0, NODE)
     assert not refused.successful and refused.reason == "t = 12 s is not in what is played, which is 0 to 9.9 s"
     for value in (0.0, -1.0, float("nan"), "fast"):
-        refused = set_parameter(client, "play.rate", value)
+        refused = client.set_parameter("play.rate", value, NODE)
         assert not refused.successful and "allowed is a finite number > 0" in refused.reason
-    assert not set_parameter(client, "play.loop", True).successful
-    assert set_parameter(client, "play.rate", 1e-3).successful
+    assert not client.set_parameter("play.loop", True, NODE).successful
+    assert client.set_parameter("play.rate", 1e-3, NODE).successful
     assert said("toggle_paused")[1].startswith("playing at t = 7.3")
     assert said("is_paused")[0] is False
     assert said("play_next") == (False, "the log is being played: call pause first")
-    assert set_parameter(client, "play.rate", 50).successful  # an integer will do
+    assert client.set_parameter("play.rate", 50, NODE).successful  # an integer will do
     client.spin_to_the_end()
     assert node.wait() == 0
     assert numbers(heard) == [4, *range(73, 100)]
@@ -236,7 +216,7 @@ def test_topics_are_offered_as_they_were_and_late_listeners_get_what_is_latched(
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     heard = listen(client, "/map", qos=latched)
     client.spin_until(lambda: heard, "what is latched")
-    assert set_parameter(client, "play.position", 1.0).successful
+    assert client.set_parameter("play.position", 1.0, NODE).successful
     client.spin_until(lambda: len(heard) > 1, "what was latched before")
     late = listen(client, "/map", qos=latched)
     client.spin_until(lambda: late, "what is latched now")

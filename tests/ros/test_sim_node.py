@@ -7,8 +7,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PointStamped, PoseArray
 from rcl_interfaces.msg import Log, ParameterDescriptor
-from rcl_interfaces.srv import DescribeParameters, SetParameters
-from rclpy.parameter import Parameter
+from rcl_interfaces.srv import DescribeParameters
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, Float64MultiArray
@@ -244,29 +243,15 @@ def test_diagnostics_come_about_once_a_second(client, heard):
     assert "real-time factor" in {value.key for value in status.values}
 
 
-def ask(client, kind, service, request):
-    """The answer of one of the services that every node has."""
-    caller = client.node.create_client(kind, f"/bilayer_sim/{service}")
-    client.spin_until(caller.service_is_ready, service)
-    future = caller.call_async(request)
-    client.spin_until(future.done, f"an answer of {service}")
-    return future.result()
-
-
-def set_parameter(client, name, value):
-    request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-    return ask(client, SetParameters, "set_parameters", request).results[0]
-
-
 def test_rates_may_be_set_at_any_time_and_are_told_as_events(client, heard):
     clock, nodes = heard(Clock, "/clock"), heard(PoseArray, "nodes")
     before, events = len(nodes), []
     client.node.create_subscription(Log, "/bilayer_sim/events", events.append, 100)
     try:
-        client.spin_until(lambda: set_parameter(client, "rate", 25.0).successful and events, "an event")
+        client.spin_until(lambda: client.set_parameter("rate", 25.0).successful and events, "an event")
         assert [to_seconds(step(client, clock).clock) for _ in range(2)] == pytest.approx([0.04, 0.08], abs=1e-9)
-        assert set_parameter(client, "marker_rate", 12.5).successful
-        assert set_parameter(client, "real_time_factor", 0.4).successful
+        assert client.set_parameter("marker_rate", 12.5).successful
+        assert client.set_parameter("real_time_factor", 0.4).successful
         assert client.call("resume").success
         client.spin_until(lambda: to_seconds(clock[-1].clock) > 0.25, "some time")
         assert client.call("pause").success
@@ -277,18 +262,18 @@ def test_rates_may_be_set_at_any_time_and_are_told_as_events(client, heard):
         assert said[0] == "rate is 25 Hz, marker_rate is 20 Hz" and "real_time_factor is 0.4" in said
     finally:
         for name, value in (("rate", 50.0), ("marker_rate", 0.0), ("real_time_factor", 0.0)):
-            assert set_parameter(client, name, value).successful
+            assert client.set_parameter(name, value).successful
 
 
 def test_a_rate_above_that_of_the_scene_may_be_set_at_any_time(client, heard):
     clock = heard(Clock, "/clock")
     try:
-        assert set_parameter(client, "rate", 400.0).successful
+        assert client.set_parameter("rate", 400.0).successful
         assert [to_seconds(step(client, clock).clock) for _ in range(4)] == pytest.approx(
             [0.0025, 0.005, 0.0075, 0.01], abs=1e-9
         )
     finally:
-        assert set_parameter(client, "rate", 50.0).successful
+        assert client.set_parameter("rate", 50.0).successful
 
 
 @pytest.mark.parametrize(
@@ -306,14 +291,14 @@ def test_a_rate_above_that_of_the_scene_may_be_set_at_any_time(client, heard):
     ],
 )
 def test_a_setting_that_cannot_be_is_refused_with_the_reason(client, name, value, reason):
-    answer = set_parameter(client, name, value)
+    answer = client.set_parameter(name, value)
     assert not answer.successful
     assert reason in answer.reason
 
 
 def test_parameters_say_what_they_mean_and_what_is_allowed(client):
     request = DescribeParameters.Request(names=["rate", "lockstep_timeout", "scene", "control_period"])
-    rate, timeout, scene, _ = ask(client, DescribeParameters, "describe_parameters", request).descriptors
+    rate, timeout, scene, _ = client.call("describe_parameters", kind=DescribeParameters, request=request).descriptors
     assert (rate.read_only, timeout.read_only) == (False, True)
     assert "frames published and logged" in rate.description and scene.additional_constraints == "a text"
     assert isinstance(rate, ParameterDescriptor) and rate.floating_point_range[0].from_value == 0.0

@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tarfile
 from xml.etree import ElementTree
 
 import pytest
@@ -37,8 +36,7 @@ def distribution(root, tracked, tmp_path_factory):
     command = [sys.executable, "setup.py", "--quiet", "sdist", "--formats=tar", "--dist-dir", directory]
     subprocess.run(command, cwd=directory / "sources", check=True)
     (archive,) = directory.glob("*.tar")
-    with tarfile.open(archive) as packed:
-        packed.extractall(directory, filter="data")
+    shutil.unpack_archive(archive, directory)
     return directory / archive.stem
 
 
