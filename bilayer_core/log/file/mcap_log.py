@@ -9,18 +9,18 @@ and the end of the chain; written at the end, so a log without it was cut off).
 from __future__ import annotations
 
 import os
+import sys
 import threading
 import time as clock
+from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 
 from bilayer_core.errors import InputError, OutputError, SimulationError
 from bilayer_core.log.file.backlog import Backlog
 from bilayer_core.log.file.chain import CHAIN, END, Chain, place_of_seal
-from bilayer_core.log.file.frame_block import FrameBlock
 from bilayer_core.log.file.lock import open_alone, refuse_file_in_use
 from bilayer_core.log.file.log_head import SCENE_ATTACHMENT
-from bilayer_core.log.file.mcap_file import McapFile
 from bilayer_core.log.file.output_paths import check_output_path, unwritable
 from bilayer_core.log.messages.cdr import nanoseconds
 from bilayer_core.log.messages.clouds import CloudEncoder
@@ -30,7 +30,7 @@ from bilayer_core.log.messages.event_messages import encode_event
 from bilayer_core.log.messages.events import Event, EventDetector
 from bilayer_core.log.messages.markers import deleting_all_first
 from bilayer_core.log.messages.schemas import schema_text
-from bilayer_core.log.messages.topics import EVENTS, INPUTS, MARKERS, QOS, TF, DisplayGate, Rate, input_topics
+from bilayer_core.log.messages.topics import EVENTS, INPUTS, MARKERS, QOS, DisplayGate, Rate, TopicSpec, input_topics
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import STIMULUS, Input
 
@@ -38,6 +38,7 @@ CHUNK_SIZE = 256 * 1024  # [bytes]: 0.9 ms to compress; larger chunks stall the 
 GATHERING_PERIOD = 0.1  # for which the writer lets frames gather, so that it wakes ten times a second [s of wall time]
 FLUSH_PERIOD = 0.4  # longest time that a message then waits for its chunk to be written [s of wall time]
 SYNC_PERIOD = 1.0  # longest time before it is on the disk [s of wall time]
+MESSAGE_SIZE = 31  # of a message beside its data [bytes]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
@@ -313,6 +314,7 @@ class _LogFile:
 
     def __init__(self, path: Path, force: bool, description: Description, gate: DisplayGate, tf: str):
         import mcap
+        from mcap.writer import CompressionType, Writer
 
         from bilayer_core.observed.system import machine, versions
 
@@ -321,11 +323,12 @@ class _LogFile:
         self._clouds = CloudEncoder(description)
         self._events = EventDetector(description)
         self._file = open_alone(path, force)
-        self._each = [TF.name] if tf else []
-        self._large = [spec.name for spec in self._encoder.topics if spec.rate is Rate.DISPLAY]
+        self._names = {
+            shown: [spec.name for spec in self._encoder.topics if shown or spec.rate is not Rate.DISPLAY]
+            for shown in (False, True)
+        }
         self._has_markers = False
-        self._block: FrameBlock | None = None
-        self._sequence = 0
+        self._in_chunk = self._sequence = 0
         self._unflushed_since: float | None = None
         self._synced = clock.monotonic()
         with ExitStack() as undo:
@@ -333,8 +336,9 @@ class _LogFile:
             undo.callback(_delete, path)
             used = {**versions(), "mcap": mcap.__version__}
             library = f"bilayer_sim_ros {used['bilayer_sim_ros']}"
-            self._log = McapFile(self._file, CHUNK_SIZE, "ros2", library, self._add_link)
-            self._log.add_attachment(SCENE_ATTACHMENT, "application/yaml", description.scene_text.encode())
+            self._log = Writer(self._file, sys.maxsize, CompressionType.LZ4)  # chunks end here, see `_end_chunk`
+            self._log.start("ros2", library)
+            self._log.add_attachment(0, 0, SCENE_ATTACHMENT, "application/yaml", description.scene_text.encode())
             head = {
                 "versions": used,
                 "machine": machine(),
@@ -345,17 +349,38 @@ class _LogFile:
                 self._log.add_metadata(name, metadata)
             self._chain, self._seal = Chain(description.scene_text, head), place_of_seal(description)
             self._add_link()
-            schemas: dict[str, int] = {}
-            self._topics: dict[str, int] = {}
-            for spec in (*self._encoder.topics, *self._clouds.topics, *input_topics(description)):
-                if spec.type not in schemas:
-                    schemas[spec.type] = self._log.add_schema(spec.type, schema_text(spec.type))
-                channel = self._log.add_channel(spec.full_name(), schemas[spec.type], {QOS: spec.offered_profile})
-                self._topics[spec.name] = channel
-            self._log.describe_outside()
+            topics = (*self._encoder.topics, *self._clouds.topics, *input_topics(description))
+            self._topics = self._announce(topics)
             self._log.flush()
             self._sync()
             undo.pop_all()
+
+    def _announce(self, topics: Iterable[TopicSpec]) -> dict[str, int]:
+        """Announce topics and their types, outside of chunks, too: if the first one is lost, what follows can be read.
+
+        Returns their numbers by name.
+        """
+        from mcap.data_stream import RecordBuilder
+        from mcap.records import Channel, Schema
+
+        records = RecordBuilder()
+        schemas: dict[str, int] = {}
+        channels: dict[str, int] = {}
+        for spec in topics:
+            if spec.type not in schemas:
+                said = {"name": spec.type, "encoding": "ros2msg", "data": schema_text(spec.type).encode()}
+                schemas[spec.type] = self._log.register_schema(**said)
+                Schema(id=schemas[spec.type], **said).write(records)
+            told = {
+                "topic": spec.full_name(),
+                "message_encoding": "cdr",
+                "schema_id": schemas[spec.type],
+                "metadata": {QOS: spec.offered_profile},
+            }
+            channels[spec.name] = self._log.register_channel(**told)
+            Channel(id=channels[spec.name], **told).write(records)
+        self._file.write(records.end())
+        return channels
 
     def write(self, item: Frame | Input | Event) -> None:
         """Write the messages of a frame, of what acts from outside, or of an event."""
@@ -375,13 +400,9 @@ class _LogFile:
             self._unflushed_since = clock.monotonic()
 
     def _write_frame(self, frame: Frame) -> None:
-        if self._block is None:
-            self._block = FrameBlock(self._encoder.small_messages(frame), self._topics)
         stamp, display = nanoseconds(frame.time), self._gate.is_due(frame.time)
-        self._block.fill(frame, self._sequence)
         self._chain.add_state(stamp, 0.0 if self._seal is None else frame.state[self._seal])
-        self._log.add_records(self._block.records, self._block.places, stamp)
-        for name in (*self._each, *(self._large if display else ())):
+        for name in self._names[display]:
             data = self._encoder.encode(name, frame)
             if name == MARKERS and not self._has_markers:
                 self._has_markers, data = True, deleting_all_first(data)
@@ -394,7 +415,17 @@ class _LogFile:
             self._add(EVENTS.name, nanoseconds(event.time), encode_event(event))
 
     def _add(self, name: str, stamp: int, data: bytes) -> None:
-        self._log.add_message(self._topics[name], stamp, self._sequence, data)
+        self._log.add_message(self._topics[name], stamp, data, stamp, self._sequence)
+        self._in_chunk += MESSAGE_SIZE + len(data)
+        if self._in_chunk > CHUNK_SIZE:
+            self._end_chunk()
+
+    def _end_chunk(self) -> None:
+        """Write the chunk in hand, and the hash of what it holds."""
+        self._log.flush()
+        if self._in_chunk:
+            self._add_link()
+        self._in_chunk = 0
 
     def _add_link(self) -> None:
         """Write the hash of the states and inputs in the chunks so far."""
@@ -408,7 +439,8 @@ class _LogFile:
 
     def flush(self) -> None:
         """Write the chunk in hand; every second also to the disk."""
-        self._log.flush()
+        self._end_chunk()
+        self._file.flush()
         self._unflushed_since = None
         if clock.monotonic() - self._synced >= SYNC_PERIOD - FLUSH_PERIOD - GATHERING_PERIOD:
             self._sync()
@@ -422,7 +454,7 @@ class _LogFile:
     def finish(self, ending: dict[str, str]) -> None:
         """Write the metadata ``run`` and the file's index."""
         self._add_events(self._events.end(float(ending["last_time"])))
-        self._log.flush()
+        self._end_chunk()
         self._log.add_metadata(END, ending | self._chain.link.as_metadata())
         self._log.finish()
         self._file.flush()

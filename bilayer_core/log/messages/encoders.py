@@ -14,7 +14,7 @@ from bilayer_core.log.messages.cdr import SEPARATOR, Template, read_float64_mult
 from bilayer_core.log.messages.markers import MarkerEncoder
 from bilayer_core.log.messages.node_frames import NodeFrames
 from bilayer_core.log.messages.tf_frames import TfEncoder
-from bilayer_core.log.messages.topics import FRAME_ID, MARKERS, TF, Rate, output_topics
+from bilayer_core.log.messages.topics import FRAME_ID, MARKERS, TF, output_topics
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import LOAD, SIZES, STIMULUS, Input
 from bilayer_core.printable import shortened
@@ -187,11 +187,6 @@ class FrameEncoder:
         """
         templates = {"energy": self._energy[1].template, MARKERS: self._markers.template}
         return len(templates.get(name) or self._encoders[name].template)
-
-    def small_messages(self, frame: Frame) -> dict[str, SmallMessage]:
-        """Return the encoders by name, in order, of all topics of `Rate.OUTPUT` but `TF`, for the run of `frame`."""
-        names = [spec.name for spec in self.topics if spec.rate is Rate.OUTPUT and spec is not TF]
-        return {name: self._encoders[name] for name in names} | {"energy": self._energy_message(frame)}
 
     def _encode_energy(self, frame: Frame) -> bytes:
         return self._energy_message(frame)(frame)
