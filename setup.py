@@ -111,6 +111,7 @@ setup(
         "numba>=0.67,<0.69",  # all tests pass with 0.68 and with 0.67
         "platformdirs>=4",
         "numpy>=1.26",
+        "pebble>=5.0",
         "pint>=0.24",
         "pydantic>=2.9,<3",
         "pyyaml>=6.0",
@@ -131,7 +132,7 @@ setup(
             "optuna>=4",
             "pyarrow>=15",
         ],
-        "stress": ["matplotlib>=3.8", "pebble>=5.0"],
+        "stress": ["matplotlib>=3.8"],
         "bench": ["matplotlib>=3.8", "mujoco>=4.0", "pyelastica>=1.0"],
         "test": [
             "cryptography>=42",
@@ -145,7 +146,6 @@ setup(
             "numpydoc>=1.8",
             "optuna>=4",
             "pandas>=2.2",
-            "pebble>=5.0",
             "pillow>=10.1",
             "playwright>=1.50",
             "pyarrow>=15",

@@ -6,10 +6,10 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import get_context, parent_process
 from typing import Any
 
 
@@ -22,25 +22,43 @@ def usable_cores() -> int:
     return os.cpu_count() or 1
 
 
-class _Pool(ProcessPoolExecutor):
-    """Its processes are started where work is handed over, and do not hear Ctrl-C, which is for who started them."""
-
-    def submit(self, *arguments: Any, **named: Any) -> Future:
-        with keyboard_unheard():
-            return super().submit(*arguments, **named)
-
-
 @contextmanager
-def side_by_side(count: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of as many processes; those that still work when the block ends, or raises, are ended."""
-    before = set(active_children())
-    with _Pool(count, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
-        try:
-            yield pool
-        finally:
-            for process in set(active_children()) - before:
-                process.terminate()
-            pool.shutdown(wait=True, cancel_futures=True)  # without its thread, Python's end would race with that one's
+def side_by_side(
+    count: int, tasks_each: int = 0, prepare: Callable[[], None] | None = None
+) -> Iterator[Callable[..., Future]]:
+    """Yield a function that has others called in as many processes: ``schedule(function, *arguments, timeout=None)``.
+
+    It returns a future; a process that takes longer than the timeout [s] is killed. When the block ends, or raises,
+    what still works is ended, and what waits is cancelled. The processes do not hear Ctrl-C, which is for who started
+    them.
+
+    Parameters
+    ----------
+    count : int
+    tasks_each : int
+        After which another process takes the place of one; 0 for never.
+    prepare : callable, optional
+        Called in each process first.
+    """
+    from pebble import ProcessPool
+
+    pool = ProcessPool(count, tasks_each, _begin, [prepare], get_context("spawn"))
+    futures: list[Future] = []
+
+    def schedule(function: Callable, *arguments: Any, timeout: float | None = None) -> Future:
+        futures[:] = [future for future in futures if not future.done()]
+        futures.append(pool.schedule(function, arguments, timeout=timeout))
+        return futures[-1]
+
+    try:
+        with keyboard_unheard():  # by the processes, and by the threads that start more of them
+            schedule(_nothing)
+        yield schedule
+    finally:
+        for future in futures:
+            future.cancel()
+        pool.stop()
+        pool.join()
 
 
 @contextmanager
@@ -60,7 +78,11 @@ def keyboard_unheard() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _end_with_parent() -> None:
+def _nothing() -> None:
+    """Do nothing: the first task starts the processes."""
+
+
+def _begin(prepare: Callable[[], None] | None) -> None:
     """In each of the processes: end when the one that started it has ended, though it could not say so."""
 
     def watch() -> None:
@@ -68,3 +90,5 @@ def _end_with_parent() -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+    if prepare is not None:
+        prepare()

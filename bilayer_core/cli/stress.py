@@ -55,7 +55,7 @@ def stress(
     if listed:
         _list(cases)
         return 0
-    require("stress", "pebble", "matplotlib")
+    require("stress", "matplotlib")
     directory = output_directory(out)
     journal = Journal(directory, head_of(cases), resume)
     with json_to(json_file) as write_json:

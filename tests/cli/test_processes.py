@@ -24,9 +24,9 @@ class Stop(Exception):
 
 def test_a_block_that_ends_leaves_neither_process_nor_thread():
     before = set(threading.enumerate()), set(active_children())
-    with pytest.raises(Stop), side_by_side(1) as pool:
-        pool.submit(time.sleep, 100.0)
-        waiting = pool.submit(time.sleep, 100.0)
+    with pytest.raises(Stop), side_by_side(1) as schedule:
+        schedule(time.sleep, 100.0)
+        waiting = schedule(time.sleep, 100.0)
         raise Stop
     assert (set(threading.enumerate()), set(active_children())) == before  # Python's own end would race with a thread
     assert waiting.done()

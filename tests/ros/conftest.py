@@ -116,7 +116,7 @@ class Client:
     def listen(self, message_type, topic) -> list:
         """A list that grows with every message; it has one already."""
         messages = []
-        self.node.create_subscription(message_type, topic, messages.append, 10)
+        self.node.create_subscription(message_type, topic, messages.append, 1000)
         self.spin_until(lambda: messages, f"a message on {topic}")
         return messages
 

@@ -12,7 +12,7 @@ OPTIONAL = {"rosbag2_interfaces", "simulation_interfaces"}
 OWN = {"bilayer_core", "bilayer_sim_ros"}
 COMMANDS = {"ros2launch"}
 """ROS packages that are not imported, but run."""
-OF_PIP = {"lz4", "mcap", "numba", "pint"}
+OF_PIP = {"lz4", "mcap", "numba", "pebble", "pint"}
 """Python packages without a key of rosdep, or with too old a version."""
 KEYS = {"python3-yaml": "pyyaml"}
 """Keys of rosdep whose package has another name."""

@@ -228,8 +228,8 @@ def _make(
 ) -> dict[str, str]:
     """Add what runs find to `found`, by their names; why one that is not needed is missing is returned."""
     text, missing = scene_text(scene), {}
-    with side_by_side(workers) as pool:
-        jobs = {pool.submit(_run, text, run.overrides, duration, start): run for run in runs}
+    with side_by_side(workers) as schedule:
+        jobs = {schedule(_run, text, run.overrides, duration, start): run for run in runs}
         for job in as_completed(jobs):
             name = jobs[job].name
             try:

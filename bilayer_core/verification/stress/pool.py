@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import FIRST_COMPLETED, wait
-from multiprocessing import get_context
 from pathlib import Path
 
-from bilayer_core.extras import require
+from bilayer_core.processes import side_by_side
 from bilayer_core.verification.stress.stress_case import Outcome, Record, StressCase
 
 MEMORY = 3 * 2**30
@@ -33,38 +32,28 @@ def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record]
         Processes.
     done : callable
         Called with each record.
-
-    Raises
-    ------
-    InputError
-        If the library for it is not installed.
     """
-    require("stress", "pebble")
-    from pebble import ProcessExpired, ProcessPool
+    from pebble import ProcessExpired
 
     left = list(reversed(list(cases)))
-    with ProcessPool(workers, CASES_A_WORKER, context=get_context("spawn"), initializer=_begin) as pool:
+    with side_by_side(workers, CASES_A_WORKER, _limit_memory) as schedule:
         waiting = {}
-        try:
-            while left or waiting:
-                while left and len(waiting) < 2 * workers:
-                    case = left.pop()
-                    waiting[pool.schedule(_run, (case,), timeout=_time_of(case))] = case
-                finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
-                for job in finished:
-                    case = waiting.pop(job)
-                    try:
-                        record = Record.from_line(job.result())
-                    except TimeoutError:
-                        record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
-                    except ProcessExpired as death:
-                        record = _lost(case, f"its process died with exit code {death.exitcode}")
-                    except Exception as fault:  # of the worker, such as no memory while it tells what came
-                        record = _lost(case, f"{type(fault).__name__}: {fault}")
-                    done(record)
-        except BaseException:  # such as that of Ctrl-C: cases that run are not waited for
-            pool.stop()
-            raise
+        while left or waiting:
+            while left and len(waiting) < 2 * workers:
+                case = left.pop()
+                waiting[schedule(_run, case, timeout=_time_of(case))] = case
+            finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for job in finished:
+                case = waiting.pop(job)
+                try:
+                    record = Record.from_line(job.result())
+                except TimeoutError:
+                    record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
+                except ProcessExpired as death:
+                    record = _lost(case, f"its process died with exit code {death.exitcode}")
+                except Exception as fault:  # of the worker, such as no memory while it tells what came
+                    record = _lost(case, f"{type(fault).__name__}: {fault}")
+                done(record)
 
 
 def _time_of(case: StressCase) -> float:
@@ -75,7 +64,7 @@ def _lost(case: StressCase, why: str) -> Record:
     return Record(case.name, case.axis, not case.outside, list(case.outside), Outcome.FAILED, why)
 
 
-def _begin() -> None:
+def _limit_memory() -> None:
     """Prepare a worker: load numpy and scipy, and then limit its address space."""
     from bilayer_core.verification.stress import execute_case  # noqa: F401 (loads all that cases need)
 
