@@ -132,7 +132,6 @@ setup(
             "optuna>=4",
             "pyarrow>=15",
         ],
-        "stress": ["matplotlib>=3.8"],
         "bench": ["matplotlib>=3.8", "mujoco>=4.0", "pyelastica>=1.0"],
         "test": [
             "cryptography>=42",

@@ -332,8 +332,7 @@ class SimulationWorker:
 
     def _show_again_when_due(self) -> None:
         """Repeat the frame, and the tick, of a time that stands still, for subscribers that come late."""
-        stands_still = self._paused or self._control.waiting
-        if stands_still and time.monotonic() - self._shown_at >= SHOWING_PERIOD:
+        if not self._may_advance and time.monotonic() - self._shown_at >= SHOWING_PERIOD:
             self._publish(everything=True)
             self._control.repeat(self._simulator.time)
 

@@ -36,7 +36,7 @@ WORKS = {
 """What needs no extra."""
 NEEDS = [
     (["bench"], "matplotlib", "plot"),
-    (["stress", "--quick"], "matplotlib", "stress"),
+    (["stress", "--quick"], "matplotlib", "plot"),
     (["sweep", "sweep.yaml"], "dask", "sweep"),
     (["optimise", "sweep.yaml", "--maximise", "x"], "dask", "sweep"),
     (

@@ -147,11 +147,12 @@ def test_beside_a_free_run_it_stands_still_in_a_pause_and_begins_anew_after_a_re
         assert client.call("resume").success
         client.spin_until(lambda: answers[-1].position[0] > 0.4, "a part of the way")
         assert client.call("pause").success
-        paused = client.listen(Clock, "/clock")[0].clock
-        client.spin_until(lambda at=paused: answers[-1].header.stamp == at, "an answer to the time of the pause")
-        count = len(answers)
-        still = applied[-1].data[0]
-        client.listen(Clock, "/clock")  # which is repeated once a second
+        clocks = client.listen(Clock, "/clock")
+        client.spin_until(lambda of=clocks: of[-1:] == of[-2:-1], "the time of the pause, which is repeated")
+        client.spin_until(lambda of=clocks: answers[-1].header.stamp == of[-1].clock, "an answer to it")
+        count, still = len(answers), applied[-1].data[0]
+        del clocks[:]
+        client.spin_until(lambda of=clocks: of, "another repetition")
         client.drain()
         assert len(answers) == count and applied[-1].data[0] == still
         # Each time has one right answer, however late it was heard.

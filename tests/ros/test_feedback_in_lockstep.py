@@ -156,6 +156,7 @@ def test_while_a_tick_waits_its_frame_is_repeated_with_it(monkeypatch):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 def test_ten_runs_whose_controllers_start_late_and_are_slow_are_equal(start, domain, tmp_path):
     cases = [(lateness, nap) for lateness in (None, 0.0, 0.5, 2.0) for nap in (0.0, 0.05)] + [(None, 0.1), (1.0, 0.1)]
     logs = [tmp_path / f"{seed}.mcap" for seed in range(len(cases))]

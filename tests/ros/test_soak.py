@@ -57,12 +57,13 @@ def test_nonsense_at_1_khz_and_fifty_restless_subscribers_leave_the_memory_flat(
     node = start("sim_node", domain, {"scene": scene, "log": log})
     node.wait_for("is ready")
     process, beside = psutil.Process(node.pid), [Beside(name, domain) for name in ("sender", "visitors")]
-    memory, begin = [], time.monotonic()
+    memory, begin, started = [], time.monotonic(), sum(process.cpu_times()[:2])
     while (now := time.monotonic() - begin) < SECONDS:
         assert node.running, node.output
         memory.append((now, process.memory_info().rss / 1e6))
         time.sleep(SAMPLE_PERIOD)
     done = {key: value for of in beside for key, value in of.end().items()}
+    cpu_time = sum(process.cpu_times()[:2])
     node.send(signal.SIGINT)
     assert node.wait() == 0, node.output
     at, megabytes = np.array(memory).T
@@ -76,7 +77,8 @@ def test_nonsense_at_1_khz_and_fifty_restless_subscribers_leave_the_memory_flat(
     )
     assert last - first < MOST_GROWTH
     assert done["rate"] > 500 and done["subscriptions"] > 50 + SECONDS and done["received"] > 10 * SECONDS
-    assert info.last_time > 0.8 * SECONDS and info.termination == "ended by SIGINT"
+    # It keeps pace on a core of its own; how much of one it gets is the machine's affair.
+    assert info.last_time > 0.8 * min(SECONDS, cpu_time - started) and info.termination == "ended by SIGINT"
     assert node.output.count("refused: ") > 0.3 * SECONDS
     assert warnings < WARNINGS_A_SECOND * (SECONDS + 10)
     assert "[ERROR]" not in node.output and "Traceback" not in node.output
