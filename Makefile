@@ -20,7 +20,7 @@ endif
 STAMP := $(VENV)/installed-with-ros-$(ROS)
 # Tests that together run all pieces of the engine; `make bounds` says which are missing.
 BOUNDS := $(addprefix tests/physics/,test_simulator.py test_bodies.py test_loads.py test_rods_that_meet.py test_solve_static.py test_planar.py test_slip.py test_rod_contact.py test_near_rods.py test_crossing.py test_closed_rods.py test_light.py test_observables.py) \
-	tests/unit/test_widths.py
+	tests/logs/test_joint_markers.py tests/unit/test_widths.py
 
 help:  ## Show what can be made.
 	@sed -n 's/^\([a-z]*\):.*## /make \1	/p' $(MAKEFILE_LIST)

@@ -1,8 +1,7 @@
-"""Surroundings of all tests: a kernel cache that fits the sources, and ROS 2 on this machine alone."""
+"""Surroundings of all tests: a kernel cache of their own, and ROS 2 on this machine alone."""
 
 import ctypes
 import os
-import shutil
 from pathlib import Path
 
 import pytest
@@ -13,14 +12,8 @@ CACHES = ROOT / ".pytest_cache" / "kernels"
 
 
 def _use_own_kernel_cache() -> None:
-    """Kernels of the tests, in a folder of their own: those of other states of the sources are deleted."""
+    """Kernels of the tests, in a folder of their own."""
     os.environ["NUMBA_CACHE_DIR"] = str(CACHES)
-    if "PYTEST_XDIST_WORKER" not in os.environ:
-        from bilayer_core.jit.cache import cache_folder
-
-        for other in CACHES.glob("*"):
-            if other != cache_folder():
-                shutil.rmtree(other, ignore_errors=True)
 
 
 # How long an example takes is no property of the code: the machine may be busy.

@@ -1,20 +1,18 @@
 """Compilation: options, records that kernels read, pieces compiled by themselves, and their cache on disk.
 
-Three kinds of functions are compiled:
+Two kinds of functions are compiled:
 
 `kernel`
     Called by other kernels, and by tests: compiled within each piece that calls it, and kept nowhere.
 `piece`
     Compiled by itself for declared types when it is first called, by other pieces or by the interpreter; kept on disk.
-`entry`
-    Called by the interpreter with arrays, where a model is built: kept on disk.
 """
 
 from __future__ import annotations
 
-from bilayer_core.jit.kernel import entry, kernel
+from bilayer_core.jit.kernel import kernel
 from bilayer_core.jit.piece import caller, piece
 from bilayer_core.jit.record import UNALLOCATED, Record, record, record_at, shapes_of, zeros_in_one
 
 __all__ = ["UNALLOCATED", "Record", "record", "record_at", "shapes_of", "zeros_in_one"]
-__all__ += ["caller", "entry", "kernel", "piece"]
+__all__ += ["caller", "kernel", "piece"]

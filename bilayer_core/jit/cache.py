@@ -1,10 +1,8 @@
-"""Where compiled code is kept: a folder named by the content of everything that can be compiled into it.
+"""Where machine code is kept: a folder of object files, each named by its piece and by the digest of the piece.
 
-numba looks at the file of the function that it compiled, not at those of the functions that this calls. So the folder's
-name is a fingerprint of every source that holds kernels, of numba, llvmlite, numpy and Python, of numba's settings, and
-of the processor: after an edit or an update the folder is another, and nothing of yesterday's code runs.
+So an edit compiles the pieces that it changes, an update of numba all, and nothing of yesterday's code runs.
 
-The folders are in ``NUMBA_CACHE_DIR`` or else in the user's cache directory; those that no process has used for
+The folder is in ``NUMBA_CACHE_DIR`` or else in the user's cache directory; files that no process has used for
 `DAYS_KEPT` days are deleted. A folder that other users could put files into is neither read nor written.
 ``BILAYER_JIT_CACHE=0`` keeps nothing.
 """
@@ -14,49 +12,43 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
-import shutil
-import sys
-import threading
+import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-import llvmlite
-import llvmlite.binding
-import numba
-import numpy as np
 from platformdirs import user_cache_path
 
 from bilayer_core.errors import OutputError
+from bilayer_core.jit.digest import CACHE_DIR, settings
 from bilayer_core.jit.private_folder import exposure, make_private
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDERS = ("jit", "kinematics", "contact", "scene", "model", "forces", "engine")
 """Of the package: all that hold kernels (a test looks for others)."""
-CACHE_DIR = "NUMBA_CACHE_DIR"
+KERNELS = "kernels"
+"""Name of the folder."""
 DAYS_KEPT = 30
 DAY = 86400.0
-USED = "used"
-"""Name of an empty file in each folder, touched by who uses it."""
-_lock = threading.RLock()
 _log = logging.getLogger(__name__)
 
 
 @cache
+def sources() -> dict[str, str]:
+    """Return a hash of every source that can be compiled in, by its path in the package."""
+    paths = sorted(path for folder in FOLDERS for path in (PACKAGE / folder).rglob("*.py"))
+    return {path.relative_to(PACKAGE).as_posix(): hash_of(path.read_bytes()) for path in paths}
+
+
+def hash_of(content: bytes) -> str:
+    """Return a hash of some bytes."""
+    return hashlib.blake2b(content, digest_size=12).hexdigest()
+
+
+@cache
 def fingerprint() -> str:
-    """Return a hash of everything that compiled code depends on."""
-    digest = hashlib.blake2b(digest_size=12)
-    settings = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] != CACHE_DIR)
-    settings.append(("BILAYER_JIT_PUBLIC", os.environ.get("BILAYER_JIT_PUBLIC", "0")))
-    target = llvmlite.binding.get_host_cpu_name(), llvmlite.binding.get_host_cpu_features().flatten()
-    versions = sys.version, numba.__version__, llvmlite.__version__, np.__version__
-    digest.update(repr((versions, target, settings)).encode())
-    for folder in FOLDERS:
-        for path in sorted((PACKAGE / folder).rglob("*.py")):
-            digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()
+    """Return a hash of everything that machine code depends on: sources, versions, settings and the target."""
+    return hash_of(settings() + repr(sources()).encode())
 
 
 @cache
@@ -66,7 +58,7 @@ def cache_folder() -> Path | None:
         return None
     root = Path(os.environ.get(CACHE_DIR) or user_cache_path("bilayer_core", appauthor=False))
     try:
-        folder = make_private(root / f"kernels-{fingerprint()}")
+        folder = make_private(root / KERNELS)
         if reason := exposure(folder, PACKAGE):
             _log.warning(
                 "every process compiles its kernels again, since their cache is not safe to read: %s, and who writes "
@@ -75,7 +67,7 @@ def cache_folder() -> Path | None:
                 CACHE_DIR,
             )
             return None
-        (folder / USED).touch()
+        _probe(folder)
     except OSError as error:
         _log.warning(
             "compiled kernels cannot be kept (%s), so every start compiles them again: "
@@ -83,44 +75,71 @@ def cache_folder() -> Path | None:
             error,
         )
         return None
-    _delete_unused(folder.parent)
+    _delete_unused(folder)
     return folder
 
 
-def _delete_unused(root: Path) -> None:
-    """Delete folders of other fingerprints that nobody has used for long."""
+def _probe(folder: Path) -> None:
+    """Raise OSError if files cannot be made there."""
+    with tempfile.TemporaryFile(dir=folder):
+        pass
+
+
+def _delete_unused(folder: Path) -> None:
+    """Delete files that nobody has used for long."""
     oldest = time.time() - DAYS_KEPT * DAY
-    for other in root.glob("kernels-*"):
+    for path in folder.iterdir():
         try:
-            unused = (other / USED).stat().st_mtime < oldest
-        except OSError:  # in use by another version, or of another user
+            if path.stat().st_mtime < oldest:
+                path.unlink()
+        except OSError:  # another process was faster
             continue
-        if unused:
-            shutil.rmtree(other, ignore_errors=True)
 
 
-@contextmanager
-def cached() -> Iterator[None]:
-    """Let numba keep in the folder what is decorated meanwhile; its own setting is restored.
+def kept(name: str) -> bytes | None:
+    """Return the content of a file in the folder, and note that it is in use; None if it is not there."""
+    folder = cache_folder()
+    if folder is None:
+        return None
+    path = folder / name
+    try:
+        content = path.read_bytes()
+        if time.time() - path.stat().st_mtime > DAY:
+            path.touch()
+    except OSError:
+        return None
+    return content
+
+
+def keep(name: str, content: bytes) -> None:
+    """Put a file into the folder, whole or not at all.
 
     Raises
     ------
     OutputError
-        If what is compiled meanwhile cannot be kept.
+        If it cannot be kept.
     """
     folder = cache_folder()
     if folder is None:
-        yield
         return
-    with _lock:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(folder)
+    try:
+        handle, draft = tempfile.mkstemp(dir=folder, suffix=".draft")
         try:
-            yield
-        except OSError as error:
-            raise OutputError(
-                f"{folder}: compiled kernels cannot be kept: {error.strerror or error}; set {CACHE_DIR} to a directory "
-                "with room for them, or BILAYER_JIT_CACHE=0 to keep none"
-            ) from error
-        finally:
-            numba.config.CACHE_DIR = before
+            with os.fdopen(handle, "wb") as file:
+                file.write(content)
+            os.replace(draft, folder / name)
+        except BaseException:
+            os.unlink(draft)
+            raise
+    except OSError as error:
+        raise OutputError(
+            f"{folder}: compiled kernels cannot be kept: {error.strerror or error}; set {CACHE_DIR} to a directory "
+            "with room for them, or BILAYER_JIT_CACHE=0 to keep none"
+        ) from error
+
+
+def forget(name: str) -> None:
+    """Delete a file that is damaged."""
+    folder = cache_folder()
+    if folder is not None:
+        (folder / name).unlink(missing_ok=True)

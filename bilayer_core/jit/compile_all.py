@@ -17,11 +17,12 @@ from importlib import import_module
 from pathlib import Path
 
 from bilayer_core.errors import OutputError
-from bilayer_core.jit.cache import cache_folder
-from bilayer_core.jit.piece import PIECES
+from bilayer_core.jit import library
+from bilayer_core.jit.cache import cache_folder, fingerprint, keep, kept
+from bilayer_core.jit.piece import PIECES, Piece
 
-COMPLETE = "complete"
-"""Name of an empty file in the folder in which all pieces are."""
+COMPLETE = "complete-{}"
+"""Name of the file in the folder that says that all pieces are there for the present sources."""
 MOST_PROCESSES = 2
 _log = logging.getLogger(__name__)
 PACKAGES = Path(__file__).resolve().parents[2]
@@ -42,9 +43,8 @@ LONGEST = {
 
 
 def is_complete() -> bool:
-    """Return whether the cache holds all pieces, or nothing is kept at all."""
-    folder = cache_folder()
-    return folder is None or (folder / COMPLETE).exists()
+    """Return whether the library or the cache holds all pieces, or nothing is kept at all."""
+    return library.is_in_use() or cache_folder() is None or kept(COMPLETE.format(fingerprint())) is not None
 
 
 def ensure_compiled(report: Callable[[int, int], None] | None = None) -> None:
@@ -80,12 +80,10 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     """
     from bilayer_core.processes import usable_cores
 
-    folder = cache_folder()
-    if folder is None:
+    if cache_folder() is None:
         return
     import_module(ENGINE)
-    own = [name for name, piece in PIECES.items() if piece.function.__module__.startswith(f"{PACKAGE}.")]
-    names = sorted(own, key=lambda name: name not in LONGEST)
+    names = sorted((piece.name for piece in own_pieces()), key=lambda name: name not in LONGEST)
     left: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in names:
         left.put(name)
@@ -106,7 +104,12 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
             worker.end()
     if report is not None:
         report(len(names), len(names))
-    (folder / COMPLETE).touch()
+    keep(COMPLETE.format(fingerprint()), b"")
+
+
+def own_pieces() -> list[Piece]:
+    """Return the pieces of this package that are declared."""
+    return [piece for piece in PIECES.values() if piece.function.__module__.startswith(f"{PACKAGE}.")]
 
 
 class _Worker(threading.Thread):
@@ -168,6 +171,8 @@ class _Worker(threading.Thread):
 def main() -> None:
     """Compile all pieces, and say so: what `make install` runs."""
     begin = time.perf_counter()
+    if library.is_in_use():
+        raise SystemExit(f"{library.LIBRARY} holds all kernels: there is nothing to compile")
     if cache_folder() is None:
         raise SystemExit("kernels are not kept on this machine: there is nothing to compile ahead of time")
     if not is_complete():

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numba
 
 from bilayer_core.jit import undocumented
-from bilayer_core.jit.cache import cache_folder, cached
 
 FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 EXACT = {"contract", "nsz"}
@@ -30,9 +29,3 @@ def kernel(function):
 def exact_kernel(function):
     """`kernel` without reordered arithmetic."""
     return numba.njit(**OPTIONS, fastmath=EXACT, forceinline=True)(function)
-
-
-def entry(function):
-    """Compile `function` for the interpreter, and keep it on disk."""
-    with cached():
-        return numba.njit(**OPTIONS, fastmath=FASTMATH, cache=cache_folder() is not None)(function)

@@ -24,9 +24,9 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
-import numba
 from llvmlite import binding, ir
 from numba import errors
 from numba.core import cgutils
@@ -34,8 +34,10 @@ from numba.extending import intrinsic, lower_builtin, type_callable
 from numba.types import Any as AnyType
 from numba.types import VarArg
 
-from bilayer_core.jit.cache import cache_folder, cached
-from bilayer_core.jit.kernel import FASTMATH, OPTIONS
+from bilayer_core.jit import cache, library
+from bilayer_core.jit.digest import CalledByName, digest_of
+from bilayer_core.jit.load_piece import load
+from bilayer_core.jit.machine_code import compile_piece, slot_of
 from bilayer_core.jit.record import NUMBERS, Record, type_in_kernels
 
 IN_C = {int: ctypes.c_int64, float: ctypes.c_double, bool: ctypes.c_bool}
@@ -44,9 +46,10 @@ FIND = "bilayer_find_piece"
 MOST_CALLS = 1000
 """Of a piece that cannot be compiled; who goes on calling it would never end."""
 _word = ir.IntType(64)
+_lock = threading.RLock()
 
 
-class Piece:
+class Piece(CalledByName):
     """A function that is compiled by itself.
 
     Attributes
@@ -55,7 +58,7 @@ class Piece:
     function : callable
         As it is written.
     slot : ctypes.c_int64
-        Its address, as kernels find it; 0 as long as none has called it.
+        Its address, as kernels find it; 0 as long as none has called it, unless it is in the library.
     seconds : float
         CPU time that its compilation, or its reading from the cache, took [s]; 0 before.
     """
@@ -63,8 +66,8 @@ class Piece:
     def __init__(self, function: Callable, result: type, arguments: tuple):
         self.name, self.function = function.__name__, function
         self._result, self._arguments = result, arguments
-        self._compiled = self._callable = None
-        self.slot, self.seconds = ctypes.c_int64(0), 0.0
+        self._address, self._callable = 0, None
+        self.slot, self.seconds = library.slot_of_piece(self) or ctypes.c_int64(0), 0.0
         declare_calls_of(self)
 
     @property
@@ -75,16 +78,45 @@ class Piece:
     @property
     def address(self) -> int:
         """Where it is in memory; compiled, or read from the cache, when first asked for."""
-        if self._compiled is None:
+        if not self._address:
             begin, wall = time.thread_time(), time.perf_counter()
-            with cached():
-                compiler = numba.cfunc(
-                    self.signature, nopython=True, **OPTIONS, fastmath=FASTMATH, cache=cache_folder() is not None
-                )
-                self._compiled = compiler(self.function)
+            with _lock:
+                self._address = self._address or self._load()
             self.seconds = time.thread_time() - begin
             loading.cpu, loading.wall = loading.cpu + self.seconds, loading.wall + time.perf_counter() - wall
-        return self._compiled.address
+        return self._address
+
+    @property
+    def file(self) -> str:
+        """Name of its object file in the cache."""
+        return f"{self.name}-{self._digest[0]}.o"
+
+    @property
+    def calls(self) -> frozenset[CalledByName]:
+        """Pieces that it calls by name."""
+        return self._digest[1]
+
+    @cached_property
+    def _digest(self) -> tuple[str, frozenset[CalledByName]]:
+        return digest_of(self)
+
+    def make_object(self) -> bytes:
+        """Return its object file, from the cache or else compiled and kept there."""
+        if (code := cache.kept(self.file)) is None:
+            code = compile_piece(self)
+            cache.keep(self.file, code)
+        return code
+
+    def _load(self) -> int:
+        if self.slot.value:  # it is in the library
+            return self.slot.value
+        symbols = {FIND: binding.address_of_symbol(FIND)}
+        symbols |= {slot_of(of.name): ctypes.addressof(of.slot) for of in self.calls}
+        try:
+            return load(self.name, self.make_object(), symbols)
+        except RuntimeError:  # the file is damaged
+            cache.forget(self.file)
+            return load(self.name, self.make_object(), symbols)
 
     def __call__(self, *arguments: Any):
         """Run it; records go by their addresses."""
@@ -172,7 +204,7 @@ def piece(result: type, *arguments) -> Callable[[Callable], Piece]:
 
 def declare_calls_of(of: Piece) -> None:
     """Tell numba what a call of a piece is: of the address in its slot, with the declared types."""
-    parameters, symbol = inspect.signature(of.function), f"bilayer_slot_of_{of.name}"
+    parameters, symbol = inspect.signature(of.function), slot_of(of.name)
     _by_slot[ctypes.addressof(of.slot)] = of
     binding.add_symbol(symbol, ctypes.addressof(of.slot))
 

@@ -1,7 +1,6 @@
 """Exposure of a folder: whether other users can put files into it.
 
-numba's index of compiled code is a pickle, and reading a pickle runs the code that it names. Whoever can write to the
-folder of the cache can therefore run programs as the user who reads it.
+The cache holds machine code. Whoever can write to its folder can therefore run programs as the user who reads it.
 """
 
 from __future__ import annotations

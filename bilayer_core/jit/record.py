@@ -50,6 +50,8 @@ if typing.TYPE_CHECKING:  # what programs that are not compiled get
     IndexTable = np.ndarray
     Flags = np.ndarray
     FlagTable = np.ndarray
+    Singles = np.ndarray
+    SingleTable = np.ndarray
 else:
     Vector, Matrix, Stack, Tensor, DeepTensor = (types.Array(types.float64, n, "C") for n in range(1, 6))
     """Arrays of floats with one to five indices."""
@@ -57,10 +59,17 @@ else:
     """Arrays of integers."""
     Flags, FlagTable = (types.Array(types.boolean, n, "C") for n in (1, 2))
     """Arrays of booleans."""
+    Singles, SingleTable = (types.Array(types.float32, n, "C") for n in (1, 2))
+    """Arrays of floats of single precision, as messages have them."""
 UNALLOCATED: Mapping[str, int] = defaultdict(int)
 """Sizes of a record whose arrays with a declared shape come later; see `Record.allocated`."""
 NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean}
-DTYPES = {types.float64: np.dtype(np.float64), types.int64: np.dtype(np.int64), types.boolean: np.dtype(np.bool_)}
+DTYPES = {
+    types.float64: np.dtype(np.float64),
+    types.float32: np.dtype(np.float32),
+    types.int64: np.dtype(np.int64),
+    types.boolean: np.dtype(np.bool_),
+}
 _ADDRESS_WORD = 4
 """Of the words of an array, which one its address is."""
 _WORD_TYPE, _BYTES = ir.IntType(8 * WORD), ir.IntType(8).as_pointer()
@@ -96,6 +105,11 @@ class RecordType(types.Type):
             (name, kind, DTYPES[kind.dtype] if isinstance(kind, types.Array) else None) for name, kind in fields.items()
         ]
         super().__init__(f"{declared.__module__}.{declared.__qualname__}")
+
+    @property
+    def key(self):
+        """The class of its records: numba takes types with equal keys for one, and two classes may share a name."""
+        return self.declared
 
 
 class Record:

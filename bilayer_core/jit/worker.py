@@ -24,7 +24,7 @@ def main() -> None:
     while True:
         name = names.get()
         try:
-            _ = PIECES[name].address
+            PIECES[name].make_object()
         except OutputError as error:
             print(error, file=sys.stderr)
             sys.exit(error.exit_code)

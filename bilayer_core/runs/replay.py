@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError, SimulationError, naming
+from bilayer_core.jit.library import origin
 from bilayer_core.log.file.chain import STATE, Wholeness, check_chain
 from bilayer_core.log.file.log_chunks import LogFile
 from bilayer_core.log.file.log_head import Head
@@ -355,7 +356,7 @@ def _apply(simulator: Simulator, waiting: list[Input], until: float) -> float:
 
 def _changed(head: Head) -> dict[str, tuple[str, str]]:
     """Return versions and parts of the machine that are not those of the log."""
-    then, now = head.versions | head.machine, versions() | machine()
+    then, now = head.versions | head.machine, versions() | machine() | origin()
     return {key: (then[key], now[key]) for key in now if key in then and then[key] != now[key]}
 
 

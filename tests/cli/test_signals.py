@@ -117,15 +117,15 @@ def test_every_verb_that_computes_or_imports_ends_with_one_line(tmp_path, argume
 def test_processes_that_compile_end_with_the_program_and_leave_a_cache_that_works(tmp_path, number):
     variables = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "BILAYER_JIT_AHEAD": "1"}
     with started(*LONG_RUN, cwd=tmp_path, **variables) as process:
-        wait_for(lambda: list(tmp_path.glob("cache/*/*/*.nbc")), process)
+        wait_for(lambda: list(tmp_path.glob("cache/kernels/*.o")), process)
         workers = below(process.pid)
         assert workers
         process.send_signal(number)
         if number in LINES:
             assert_ended_by(number, process)
         wait_for(lambda: not any(map(lives, workers)))
-    assert not list(tmp_path.glob("cache/*/complete"))
-    kept = {path.name.split(".")[1].split("-")[0] for path in tmp_path.glob("cache/*/*/*.nbc")}
+    assert not list(tmp_path.glob("cache/kernels/complete*"))
+    kept = {path.name.rpartition("-")[0] for path in tmp_path.glob("cache/kernels/*.o")}
     again = subprocess.run(
         [sys.executable, "-c", READ_AGAIN, *kept],
         env=environment() | variables,
@@ -140,7 +140,7 @@ def test_processes_that_compile_end_with_the_program_and_leave_a_cache_that_work
 def test_a_signal_while_a_run_itself_compiles_is_one_line(tmp_path):
     variables = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "BILAYER_JIT_AHEAD": "0"}
     with started(*LONG_RUN, cwd=tmp_path, **variables) as process:
-        wait_for(lambda: list(tmp_path.glob("cache/*/*/*.nbc")), process)
+        wait_for(lambda: list(tmp_path.glob("cache/kernels/*.o")), process)
         process.send_signal(signal.SIGINT)
         assert_ended_by(signal.SIGINT, process)
 

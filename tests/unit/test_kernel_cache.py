@@ -6,11 +6,12 @@ import shutil
 import subprocess
 import sys
 import time
+from collections import Counter
 
-import numba
 import pytest
 
-from bilayer_core.jit import cache, compile_all
+from bilayer_core.errors import OutputError
+from bilayer_core.jit import cache, compile_all, digest, piece
 
 PROGRAM = """
 import math
@@ -53,50 +54,77 @@ def test_an_edit_of_a_function_that_kernels_call_changes_the_result_at_once(root
     assert _defect(tree, folder) == first > 0.0
     path.write_text(source.replace(TURN, TRIPLED), encoding="utf-8")
     assert _defect(tree, folder) == pytest.approx(3.0 * first, rel=1e-12)
-    assert len(list(folder.iterdir())) == 2
+    compiled = Counter(path.name.rpartition("-")[0] for path in (folder / "kernels").iterdir())
+    assert compiled == {"step_defect": 2, "near_pairs": 1}  # the edit changes one of the pieces that were needed
 
 
-def test_folders_that_nobody_has_used_for_long_are_deleted(tmp_path, monkeypatch):
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """The folder of this process, in an empty place."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    old, young, foreign = tmp_path / "kernels-old", tmp_path / "kernels-young", tmp_path / "other"
-    for folder in (old, young, foreign):
-        folder.mkdir()
-        (folder / cache.USED).touch()
-    long_ago = time.time() - (cache.DAYS_KEPT + 1) * cache.DAY
-    for folder in (old, foreign):
-        os.utime(folder / cache.USED, (long_ago, long_ago))
     cache.cache_folder.cache_clear()
-    try:
-        own = cache.cache_folder()
-    finally:
-        cache.cache_folder.cache_clear()
-    assert own.is_dir() and young.is_dir() and foreign.is_dir() and not old.exists()
+    yield cache.cache_folder
+    cache.cache_folder.cache_clear()
+
+
+def test_files_that_nobody_has_used_for_long_are_deleted(tmp_path, folder):
+    (tmp_path / cache.KERNELS).mkdir(mode=0o700)
+    old, young, foreign = tmp_path / "kernels" / "old.o", tmp_path / "kernels" / "young.o", tmp_path / "other"
+    long_ago = time.time() - (cache.DAYS_KEPT + 1) * cache.DAY
+    for file in (old, young, foreign):
+        file.touch()
+        if file != young:
+            os.utime(file, (long_ago, long_ago))
+    assert folder().is_dir() and young.exists() and foreign.exists() and not old.exists()
+
+
+def test_a_file_that_is_used_stays(folder):
+    cache.keep("used.o", b"code")
+    long_ago = time.time() - (cache.DAYS_KEPT - 1) * cache.DAY
+    os.utime(folder() / "used.o", (long_ago, long_ago))
+    assert cache.kept("used.o") == b"code" and cache.kept("unknown.o") is None
+    assert time.time() - (folder() / "used.o").stat().st_mtime < cache.DAY
+
+
+def test_a_file_is_there_as_a_whole_or_not_at_all(folder, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(OutputError, match="cannot be kept: No space left on device; set NUMBA_CACHE_DIR to"):
+        cache.keep("new.o", b"code")
+    assert list(folder().iterdir()) == []
+
+
+@piece(int, int)
+def add_one_for_the_cache(n):
+    return n + 1
+
+
+def test_a_damaged_file_is_compiled_again(folder):
+    cache.keep(add_one_for_the_cache.file, b"no code")
+    assert add_one_for_the_cache(1) == 2
+    assert cache.kept(add_one_for_the_cache.file).startswith(b"\x7fELF")
 
 
 def test_the_fingerprint_is_another_for_other_settings_of_numba(monkeypatch):
-    before = cache.fingerprint.__wrapped__()
-    assert cache.fingerprint.__wrapped__() == before
+    before = digest.settings.__wrapped__()
+    assert digest.settings.__wrapped__() == before
     monkeypatch.setenv("NUMBA_BOUNDSCHECK", "1")
-    assert cache.fingerprint.__wrapped__() != before
+    assert digest.settings.__wrapped__() != before
 
 
-def test_a_folder_that_cannot_be_made_is_said_and_nothing_is_kept(tmp_path, monkeypatch, caplog):
+def test_a_folder_that_cannot_be_made_is_said_and_nothing_is_kept(tmp_path, folder, monkeypatch, caplog):
     blocked = tmp_path / "file"
     blocked.touch()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(blocked))
-    cache.cache_folder.cache_clear()
-    try:
-        assert cache.cache_folder() is None
-    finally:
-        cache.cache_folder.cache_clear()
+    assert folder() is None
     assert "cannot be kept" in caplog.text and "NUMBA_CACHE_DIR" in caplog.text
 
 
-def test_numbas_own_setting_is_restored():
-    before = numba.config.CACHE_DIR
-    with cache.cached():
-        assert str(cache.cache_folder()) == numba.config.CACHE_DIR
-    assert before == numba.config.CACHE_DIR
+def test_numba_itself_keeps_nothing(folder):
+    _ = add_one_for_the_cache.make_object()
+    assert [path.name for path in folder().iterdir()] == [add_one_for_the_cache.file]
 
 
 def test_workers_compile_this_package_and_not_one_of_its_name_where_they_start(tmp_path, monkeypatch):

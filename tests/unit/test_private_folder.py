@@ -1,7 +1,6 @@
-"""The cache of kernels is a pickle: only a folder that other users cannot write to is read."""
+"""The cache of kernels holds machine code: only a folder that other users cannot write to is read."""
 
 import os
-import pickle
 import subprocess
 import sys
 
@@ -14,15 +13,15 @@ NOBODY = 65534
 IS_ROOT = os.geteuid() == 0
 """Only root can give files to somebody else."""
 PROGRAM = """
-from bilayer_core.jit.kernel import entry
+from bilayer_core.jit import piece
 
 
-@entry
-def double(x):
+@piece(float, float)
+def change(x):
     return 2.0 * x
 
 
-print(double(3.0))
+print(change(3.0))
 """
 
 
@@ -31,7 +30,7 @@ def folder(tmp_path):
     """A folder of a cache as it is made, with a file of kernels in it."""
     made = make_private(tmp_path / "above" / "root" / "kernels-1")
     (made / "engine").mkdir()
-    (made / "engine" / "kernels.nbi").touch()
+    (made / "engine" / "kernel.o").touch()
     return made
 
 
@@ -44,7 +43,7 @@ def test_folders_of_the_cache_are_made_for_the_user_alone_whatever_the_umask(tmp
     before = os.umask(umask)
     try:
         made = make_private(tmp_path / "above" / "root" / "kernels-1")
-        (made / "kernels.nbi").touch()
+        (made / "kernel.o").touch()
     finally:
         os.umask(before)
     assert [path.stat().st_mode & 0o7777 for path in (made, made.parent, made.parents[1])] == [0o700] * 3
@@ -63,14 +62,14 @@ def test_a_folder_that_others_can_write_to_is_named(folder, place, mode):
 
 @pytest.mark.parametrize("mode", [0o620, 0o602])
 def test_files_that_others_can_reach_and_write_to_are_named(folder, mode):
-    file = folder / "engine" / "kernels.nbi"
+    file = folder / "engine" / "kernel.o"
     file.chmod(mode)
     assert found(folder) == ""  # nobody else comes as far
     folder.chmod(0o755)
     assert found(folder) == f"other users can write to {file}"
 
 
-@pytest.mark.parametrize("place", [".", "engine", "engine/kernels.nbi", "..", "../.."] if IS_ROOT else [])
+@pytest.mark.parametrize("place", [".", "engine", "engine/kernel.o", "..", "../.."] if IS_ROOT else [])
 def test_what_belongs_to_another_user_is_named_with_that_user(folder, place):
     path = (folder / place).resolve()
     os.chown(path, NOBODY, NOBODY)
@@ -107,35 +106,25 @@ def _open(path):
 
 
 @pytest.mark.parametrize("expose", [_open, _give_away] if IS_ROOT else [_open])
-def test_an_index_that_another_user_planted_is_not_unpickled(tmp_path, expose):
-    (tmp_path / "program.py").write_text(PROGRAM)
-    root, mark = tmp_path / "cache", tmp_path / "ran"
+def test_code_that_another_user_planted_is_not_run(tmp_path, expose):
+    program, root = tmp_path / "program.py", tmp_path / "cache"
 
-    def run():
-        environment = os.environ | {"NUMBA_CACHE_DIR": str(root), "PYTHONPATH": str(cache.PACKAGE.parent)}
+    def run(cache_folder, factor):
+        program.write_text(PROGRAM.replace("2.0", factor))
+        environment = os.environ | {"NUMBA_CACHE_DIR": str(cache_folder), "PYTHONPATH": str(cache.PACKAGE.parent)}
         command = [sys.executable, "program.py"]
         return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
 
-    assert run().stdout == "6.0\n"
-    (index,) = root.rglob("*.nbi")
-    index.write_bytes(pickle.dumps(_Planted(str(mark))))
-    expose(index.parents[1])
-    again = run()
-    assert again.stdout == "6.0\n" and not mark.exists()
+    assert run(root, "2.0").stdout == "6.0\n"
+    assert run(tmp_path / "other", "5.0").stdout == "15.0\n"
+    (own,), (planted,) = root.rglob("*.o"), (tmp_path / "other").rglob("*.o")
+    own.write_bytes(planted.read_bytes())
+    expose(own.parent)
+    again = run(root, "2.0")
+    assert again.stdout == "6.0\n"
     (line,) = again.stderr.splitlines()
-    assert str(index.parents[1]) in line
+    assert str(own.parent) in line
     assert "can run programs as you; set NUMBA_CACHE_DIR to a folder that only you can write to" in line
-    index.parents[1].chmod(0o700)
-    os.chown(index.parents[1], os.geteuid(), os.getegid())
-    run()
-    assert mark.exists()  # numba does run what such an index says
-
-
-class _Planted:
-    """An object that, when it is unpickled, makes a file."""
-
-    def __init__(self, path):
-        self.path = path
-
-    def __reduce__(self):
-        return os.mkdir, (self.path,)
+    own.parent.chmod(0o700)
+    os.chown(own.parent, os.geteuid(), os.getegid())
+    assert run(root, "2.0").stdout == "15.0\n"  # such a file is run as it is

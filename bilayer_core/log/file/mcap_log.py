@@ -316,6 +316,7 @@ class _LogFile:
         import mcap
         from mcap.writer import CompressionType, Writer
 
+        from bilayer_core.jit.library import origin
         from bilayer_core.observed.system import machine, versions
 
         self._gate = gate
@@ -341,7 +342,7 @@ class _LogFile:
             self._log.add_attachment(0, 0, SCENE_ATTACHMENT, "application/yaml", description.scene_text.encode())
             head = {
                 "versions": used,
-                "machine": machine(),
+                "machine": machine() | origin(),
                 "settings": {key: text for key, text in description.settings.items() if key not in used},
                 "description": to_text(description),
             }

@@ -53,7 +53,7 @@ class Template:
     """
 
     def __init__(self) -> None:
-        self._buffer = bytearray(HEADER)
+        self._buffer: bytearray | memoryview = bytearray(HEADER)
         self.stamps: list[int] = []
         self._of_stamps: tuple[np.ndarray, np.ndarray] | None = None
         self.fields: dict[str, tuple[int, np.dtype, tuple[int, ...]]] = {}
@@ -96,10 +96,12 @@ class Template:
 
     def views(self) -> dict[str, np.ndarray]:
         """Writable arrays into the message, one for each field. Nothing can be appended afterwards."""
+        self._end()
         return {name: decode(self._buffer, field) for name, field in self.fields.items()}
 
     def numbers(self, dtype: str) -> np.ndarray:
         """View of all that it has as numbers of one type, which is to be complete; see `place`."""
+        self._end()
         size = np.dtype(dtype).itemsize
         count = (len(self._buffer) - len(HEADER)) // size
         return np.frombuffer(self._buffer, dtype, count, len(HEADER))
@@ -112,10 +114,20 @@ class Template:
     def set_time(self, time: float) -> None:
         """Write simulation time [s] into every stamp."""
         if self._of_stamps is None:
+            self._end()
             places = np.array(self.stamps, dtype=np.intp)[:, None] + np.arange(_STAMP.size)
             self._of_stamps = np.frombuffer(self._buffer, np.uint8), places
         buffer, places = self._of_stamps
         buffer[places] = np.frombuffer(stamp_of(nanoseconds(time)), np.uint8)
+
+    def _end(self) -> None:
+        """Move the complete message to where numbers after its header are aligned, as kernels want arrays."""
+        if isinstance(self._buffer, bytearray):
+            words = np.zeros(len(self._buffer) // 8 + 2)
+            begin = 8 - len(HEADER)
+            aligned = words.view(np.uint8)[begin : begin + len(self._buffer)]
+            aligned[:] = self._buffer
+            self._buffer = aligned.data
 
     def __len__(self) -> int:
         return len(self._buffer)

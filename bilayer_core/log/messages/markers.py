@@ -27,7 +27,7 @@ import struct
 
 import numpy as np
 
-from bilayer_core.kinematics.marker_lines import place_arrows
+from bilayer_core.kinematics.marker_lines import ArrowArrays, place_arrows
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_product
 from bilayer_core.log.messages.cdr import HEADER, Template
 from bilayer_core.log.messages.node_frames import NodeFrames, layer_rows
@@ -82,9 +82,17 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarr
     ndarray
         Pairs of points [m], shape (6 arrows, 3).
     """
-    points, units = np.empty((len(forces), 6, 3)), np.empty(len(forces))
-    units[:] = unit
-    place_arrows(origins, forces, units, ARROW_DECADE, HEAD_SHARE, HEAD_HALF_WIDTH, points)
+    points = np.empty((len(forces), 6, 3))
+    arrows = ArrowArrays(
+        origin=np.ascontiguousarray(origins),
+        force=np.ascontiguousarray(forces),
+        unit=np.full(len(forces), unit),
+        decade=ARROW_DECADE,
+        head=HEAD_SHARE,
+        half_width=HEAD_HALF_WIDTH,
+        points=points,
+    )
+    place_arrows(arrows)
     return points.reshape(-1, 3)
 
 
@@ -195,7 +203,7 @@ class MarkerEncoder:
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
         self._ribbons = Ribbons(description, node_frames, STRAIN_LIMIT, template)
-        force_arrows(np.empty((0, 3)), np.empty((0, 3)))  # compiled now, and not where a log's first frame waits for it
+        _ = place_arrows.address  # loaded now, and not where a log's first frame waits for it
         self._clamp_arrows = [(views[name], part, unit) for name, _, part, unit in arrows]
         self._carried = [(body, _Carried(own), views[field]) for body, own, field in carried]
 

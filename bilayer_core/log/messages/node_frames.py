@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.kinematics.node_frames import frames_at_nodes
+from bilayer_core.kinematics.node_frames import NodeFrameArrays, frames_at_nodes
 from bilayer_core.observed.frame import Description, Frame
 
 
@@ -51,14 +51,24 @@ class NodeFrames:
             start += list(node_count + np.arange(size - 1))
             node_count += size
             edge_count += size - 1
-        self._edge_before, self._edge_after, self._start_node = (np.array(part) for part in (before, after, start))
+        edge_before, edge_after, start_node = (np.array(part) for part in (before, after, start))
         self._directors = np.empty((edge_count, 3))
         self.positions = np.empty((node_count, 3))
         self.quaternions = np.empty((node_count, 4))
         self.normals = np.empty((node_count, 3))
         self.widths = np.empty((node_count, 3))
+        self._arrays = NodeFrameArrays(
+            position=self.positions,
+            director=self._directors,
+            edge_before=edge_before,
+            edge_after=edge_after,
+            start_node=start_node,
+            quaternion=self.quaternions,
+            normal=self.normals,
+            width=self.widths,
+        )
         self._frame: Frame | None = None
-        self._compute(self.positions[:0])  # compiled now, and not where a log's first frame waits for it
+        _ = frames_at_nodes.address  # loaded now, and not where a log's first frame waits for it
 
     def update(self, frame: Frame) -> None:
         """Compute all of these for `frame`, once for several calls with the same one."""
@@ -66,18 +76,5 @@ class NodeFrames:
             return
         np.take(frame.positions, self.order, axis=0, out=self.positions)
         np.take(frame.directors, self._edge_order, axis=0, out=self._directors)
-        self._compute(self.positions)
+        frames_at_nodes(self._arrays)
         self._frame = frame
-
-    def _compute(self, positions: np.ndarray) -> None:
-        """Frames at as many nodes as there are positions."""
-        frames_at_nodes(
-            positions,
-            self._directors,
-            self._edge_before,
-            self._edge_after,
-            self._start_node,
-            self.quaternions,
-            self.normals,
-            self.widths,
-        )
