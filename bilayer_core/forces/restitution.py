@@ -24,8 +24,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
-
 from bilayer_core.contact.barrier import barrier
 from bilayer_core.contact.near import gap_normal
 from bilayer_core.jit import kernel, piece
@@ -50,6 +48,7 @@ def damping_of(restitution: float) -> float:
         return LARGEST_DAMPING
     if restitution >= 1.0:
         return 0.0
+    from scipy.optimize import brentq  # which takes longer to import than numba
 
     def difference(z: float) -> float:
         return z - math.log1p(z) + restitution * z + math.log1p(-restitution * z)

@@ -20,7 +20,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.linalg import eigh
 
 from bilayer_core.engine.request_modes import COUNT, EVALUATE_STATE
 from bilayer_core.forces.force_register import memory_size
@@ -155,6 +154,8 @@ def turning_rate(stepper: Stepper, state: State) -> float:
     model, engine = stepper.model, stepper.engine
     if np.any(model.constrained.free < 0):
         return 0.0
+    from scipy.linalg import eigh  # when it is needed: runs in space, and short ones, never do
+
     engine.do_once(state, EVALUATE_STATE)
     sums, axes, free = engine.sums, model.rods.axes, model.free_bodies.body_of_free
     unknowns = model.layout.node[:, None] + np.arange(3)
