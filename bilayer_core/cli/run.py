@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from contextlib import nullcontext, redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -179,6 +180,7 @@ def _make_simulator(
     config: SceneConfig, from_state: str | None, at: float | None, budget: bool, quiet: bool
 ) -> Simulator:
     """Return a simulator that is ready to step."""
+    from bilayer_core.engine.needed_pieces import needed_pieces
     from bilayer_core.simulation.simulator import Simulator
 
     if at is not None and from_state is None:
@@ -190,7 +192,7 @@ def _make_simulator(
         state = read_saved_state(from_state, simulator.description, at)
         with naming(from_state):
             simulator.load_state(state)
-    compile_kernels(quiet)
+    compile_kernels(quiet, partial(needed_pieces, simulator.model))
     simulator.compile()
     return simulator
 

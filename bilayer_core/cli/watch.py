@@ -5,14 +5,14 @@ from __future__ import annotations
 import signal
 import sys
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from types import FrameType
 
 from bilayer_core.cli.signals import WORDS
 from bilayer_core.cli.terminal import say
 
-COMPILING_NOTICE = "compiling kernels, once for this version on this machine (about a minute) ..."
+COMPILING_NOTICE = "compiling kernels, once for this version on this machine (up to a minute) ..."
 TELL_EVERY = 10.0
 """Wall time between two lines about many runs, without a screen [s]."""
 REFRESH = 0.1
@@ -55,12 +55,12 @@ class Interrupt:
         self._before[number](number, frame)
 
 
-def compile_kernels(quiet: bool) -> None:
-    """Compile all kernels if that was not done yet, and tell the user why nothing else happens."""
+def compile_kernels(quiet: bool, needed: Callable[[], Collection[str]] | None = None) -> None:
+    """Compile all kernels or the `needed` ones if they are missing, and tell the user why nothing else happens."""
     from bilayer_core.jit.compile_all import ensure_compiled
 
     if quiet:
-        ensure_compiled(lambda done, total: None)
+        ensure_compiled(lambda done, total: None, needed)
         return
     shown: list[Callable[[int, int], None]] = []
 
@@ -71,7 +71,7 @@ def compile_kernels(quiet: bool) -> None:
         shown[0](done, total)
 
     with ExitStack() as stack:
-        ensure_compiled(report)
+        ensure_compiled(report, needed)
 
 
 @contextmanager

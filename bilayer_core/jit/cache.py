@@ -111,6 +111,12 @@ def kept(name: str) -> bytes | None:
     return content
 
 
+def holds(name: str) -> bool:
+    """Return whether a file is in the folder."""
+    folder = cache_folder()
+    return folder is not None and (folder / name).exists()
+
+
 def keep(name: str, content: bytes) -> None:
     """Put a file into the folder, whole or not at all.
 

@@ -1,6 +1,6 @@
-"""Compile all pieces ahead of time, in two processes where there are two cores.
+"""Compile pieces ahead of time, in two processes where there are two cores.
 
-`make install` does so, and so does the first simulation after an update.
+`make install` compiles all, and the first run of a scene those that it can reach.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from importlib import import_module
 from pathlib import Path
 
 from bilayer_core.errors import OutputError
 from bilayer_core.jit import library
-from bilayer_core.jit.cache import cache_folder, fingerprint, keep, kept
+from bilayer_core.jit.cache import cache_folder, fingerprint, holds, keep, kept
 from bilayer_core.jit.piece import PIECES, Piece
 
 COMPLETE = "complete-{}"
@@ -36,7 +36,6 @@ LONGEST = {
     "make_step",
     "add_bending",
     "assemble_bodies",
-    "adapt",
     "take_rod_contacts",
 }
 """Pieces that take longest to compile, and so come first."""
@@ -47,24 +46,38 @@ def is_complete() -> bool:
     return library.is_in_use() or cache_folder() is None or kept(COMPLETE.format(fingerprint())) is not None
 
 
-def ensure_compiled(report: Callable[[int, int], None] | None = None) -> None:
-    """Compile all pieces if that was not done since the sources changed; ``BILAYER_JIT_AHEAD=0``: those needed, when
-    they are.
+def ensure_compiled(
+    report: Callable[[int, int], None] | None = None, needed: Callable[[], Collection[str]] | None = None
+) -> None:
+    """Compile pieces that the cache lacks; ``BILAYER_JIT_AHEAD=0``: those that are called, when they are.
 
     Parameters
     ----------
     report : callable, optional
         As for `compile_all`; without one, the log says what happens.
+    needed : callable, optional
+        Returns the names of pieces that a scene can reach (`engine.needed_pieces`); all others wait until something
+        calls them. Default: all.
+
+    Raises
+    ------
+    OutputError
+        If what is compiled cannot be kept.
+    RuntimeError
+        If one cannot be compiled; the message has what the process printed.
     """
     if os.environ.get("BILAYER_JIT_AHEAD", "1") == "0" or is_complete():
         return
-    if report is None:
-        _log.warning("compiling all kernels, once for this version on this machine: about a minute")
-    compile_all(report)
+    names = _missing(None if needed is None else needed())
+    if names and report is None:
+        _log.warning("compiling kernels, once for this version on this machine: up to a minute")
+    _compile(names, report)
+    if needed is None:
+        keep(COMPLETE.format(fingerprint()), b"")
 
 
-def compile_all(report: Callable[[int, int], None] | None = None) -> None:
-    """Compile all pieces and keep them.
+def compile_all(report: Callable[[int, int], None] | None = None) -> int:
+    """Compile all pieces that the cache lacks and keep them; return how many these are.
 
     Parameters
     ----------
@@ -78,17 +91,30 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     RuntimeError
         If one cannot be compiled; the message has what the process printed.
     """
+    if cache_folder() is None:
+        return 0
+    names = _missing(None)
+    _compile(names, report)
+    keep(COMPLETE.format(fingerprint()), b"")
+    return len(names)
+
+
+def _missing(needed: Collection[str] | None) -> list[str]:
+    """Return the names of pieces that the cache lacks, those first that take longest to compile."""
+    import_module(ENGINE)
+    asked = [piece for piece in own_pieces() if needed is None or piece.name in needed]
+    return sorted((piece.name for piece in asked if not holds(piece.file)), key=lambda name: name not in LONGEST)
+
+
+def _compile(names: list[str], report: Callable[[int, int], None] | None) -> None:
+    """Compile pieces in as many processes as there are cores for."""
     from bilayer_core.processes import usable_cores
 
-    if cache_folder() is None:
-        return
-    import_module(ENGINE)
-    names = sorted((piece.name for piece in own_pieces()), key=lambda name: name not in LONGEST)
     left: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in names:
         left.put(name)
     done: queue.SimpleQueue[str | Exception] = queue.SimpleQueue()
-    workers = [_Worker(left, done) for _ in range(min(MOST_PROCESSES, usable_cores()))]
+    workers = [_Worker(left, done) for _ in range(min(MOST_PROCESSES, usable_cores(), len(names)))]
     try:
         for worker in workers:
             worker.start()
@@ -102,9 +128,8 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> None:
     finally:
         for worker in workers:
             worker.end()
-    if report is not None:
+    if names and report is not None:
         report(len(names), len(names))
-    keep(COMPLETE.format(fingerprint()), b"")
 
 
 def own_pieces() -> list[Piece]:
@@ -178,8 +203,10 @@ def main() -> None:
     if not is_complete():
         bar = sys.stderr.isatty()
         print("compiling kernels, once for this version on this machine ...", flush=True)
-        compile_all((lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr)) if bar else None)
-        print(f"{len(PIECES)} pieces compiled in {time.perf_counter() - begin:.0f} s: {cache_folder()}")
+        count = compile_all(
+            (lambda done, total: print(f"\r{done} of {total}", end="", file=sys.stderr)) if bar else None
+        )
+        print(f"{count} pieces compiled in {time.perf_counter() - begin:.0f} s: {cache_folder()}")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,9 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 
+from bilayer_core.engine.needed_pieces import needed_pieces
 from bilayer_core.engine.step_outcome import IntegrationReport
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.jit.compile_all import ensure_compiled
@@ -124,7 +126,7 @@ class RunLoop:
     def compile(self) -> float:
         """Have kernels and the forces of the first state ready; see `Simulator.compile`."""
         if self._compile_time is None:
-            ensure_compiled()
+            ensure_compiled(needed=partial(needed_pieces, self._stepper.model))
             begin = clock.thread_time()
             self._compile_time = 0.0
             self.take_state()

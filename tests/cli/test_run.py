@@ -342,7 +342,7 @@ def test_on_a_terminal_progress_shows_simulated_time_and_real_time_factor(here):
 def _compiles(pieces):
     """In place of `ensure_compiled`: reports as if it compiled so many pieces."""
 
-    def ensure_compiled(report):
+    def ensure_compiled(report, needed):
         for done in range(pieces and pieces + 1):
             report(done, pieces)
 

@@ -122,6 +122,22 @@ def test_a_folder_that_cannot_be_made_is_said_and_nothing_is_kept(tmp_path, fold
     assert "cannot be kept" in caplog.text and "NUMBA_CACHE_DIR" in caplog.text
 
 
+def test_only_pieces_that_the_cache_lacks_are_compiled_ahead(folder, monkeypatch):
+    import bilayer_core.engine  # noqa: F401 (declares pieces)
+
+    compiled = []
+    monkeypatch.setenv("BILAYER_JIT_AHEAD", "1")
+    monkeypatch.setattr(compile_all, "_compile", lambda names, report: compiled.append(sorted(names)))
+    for own in compile_all.own_pieces():
+        if own.name not in ("add_drag", "integrate", "observe"):
+            cache.keep(own.file, b"")
+    compile_all.ensure_compiled(needed=lambda: {"add_drag", "add_bending"})
+    assert compiled == [["add_drag"]] and not compile_all.is_complete()
+    assert compile_all.compile_all() == 3 and compile_all.is_complete()
+    compile_all.ensure_compiled()
+    assert compiled[1:] == [["add_drag", "integrate", "observe"]]
+
+
 def test_numba_itself_keeps_nothing(folder):
     _ = add_one_for_the_cache.make_object()
     assert [path.name for path in folder().iterdir()] == [add_one_for_the_cache.file]

@@ -25,6 +25,19 @@ print(json.dumps([sorted(compiled), sorted(name for name, of in PIECES.items() i
 """
 
 
+NEEDED = """
+import json
+from bilayer_core import Simulator, load_scene
+from bilayer_core.engine.needed_pieces import needed_pieces
+from bilayer_core.jit.piece import PIECES
+
+simulator = Simulator(load_scene("gripping"))
+needed = needed_pieces(simulator.model)
+simulator.run(0.1)
+print(json.dumps([sorted(needed), sorted(name for name, of in PIECES.items() if of.seconds)]))
+"""
+
+
 def _printed_by(program):
     tests = Path(__file__).parents[1]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tests.parent), str(tests)])}
@@ -38,3 +51,9 @@ def test_a_warm_run_compiles_nothing_and_loads_only_the_pieces_it_needs():
     assert not compiled
     assert "assemble_in_space" in loaded and "make_step" in loaded
     assert not {"assemble_in_plane", "add_elasticity_in_plane", "adapt", "factor_5"} & set(loaded)
+
+
+def test_the_pieces_that_a_run_needs_are_known_before_it_starts():
+    needed, loaded = map(set, _printed_by(NEEDED))
+    assert loaded <= needed and len(needed) < 90
+    assert not {"factor_5", "begin_light", "add_drag"} & needed

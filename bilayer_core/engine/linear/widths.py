@@ -56,10 +56,12 @@ def _set(factorises, goes_forward, goes_backward, eliminates, suffix: str) -> tu
     )
 
 
-factor_5, forward_5, backward_5, eliminate_5 = _of_width(5)
-factor_9, forward_9, backward_9, eliminate_9 = _of_width(9)
-factor_10, forward_10, backward_10, eliminate_10 = _of_width(10)
-factor_18, forward_18, backward_18, eliminate_18 = _of_width(18)
+SETS: dict[int, tuple[Piece, ...]] = {}
+"""The pieces of each half-bandwidth."""
+factor_5, forward_5, backward_5, eliminate_5 = SETS[5] = _of_width(5)
+factor_9, forward_9, backward_9, eliminate_9 = SETS[9] = _of_width(9)
+factor_10, forward_10, backward_10, eliminate_10 = SETS[10] = _of_width(10)
+factor_18, forward_18, backward_18, eliminate_18 = SETS[18] = _of_width(18)
 
 
 @kernel
