@@ -56,6 +56,14 @@ def test_the_run_of_every_bundled_scene_comes_out_bit_for_bit(tmp_path, name):
     assert found.passed and found.states >= 2 and not found.changed
 
 
+def test_another_target_compiler_and_mathematical_library_are_named(tmp_path, monkeypatch):
+    recorded(tmp_path / "run.mcap", "bending", duration=0.02)
+    now = replay.origin()
+    other = {"target": "znver9", "compiler": "numba 0.1", "libm": "musl 1.2"}
+    monkeypatch.setattr(replay, "origin", lambda: other)
+    assert verify(tmp_path / "run.mcap").changed == {name: (now[name], other[name]) for name in other}
+
+
 @pytest.mark.parametrize("steps", [ADAPTIVE, FIXED], ids=["adaptive", "fixed"])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("dimension", [2, 3])
