@@ -36,6 +36,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
         bodies=model.free_bodies,
         **{name: getattr(model, name) for name in AS_BUILT},
         **{name: getattr(model, name).allocated(sizes) for name in ("off_axis", "flow", "fluid")},
+        raised=model.raised.allocated(sizes, first=sizes["strain"] - 3 * model.kept_directors),
         light=light_of(model),
         loads=_allocated(model.loads),
         followers=_allocated(model.followers),

@@ -53,8 +53,9 @@ from bilayer_core.engine.powers import (
     in_barriers,
     write_forces_of_laws,
 )
-from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
 from bilayer_core.forces.inertia import second_moment_beyond
+from bilayer_core.forces.raised import inertia_off_curve
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.stack import stack_matrix
 from bilayer_core.kinematics.copying import copy
@@ -101,10 +102,10 @@ def _kinetic(p, state, at):
     """Kinetic energy of nodes, edges, free bodies and the fluid [J]."""
     fluid, energy = p.fluid, kinetic_energy(p, state)
     if fluid.exists:
-        copy(state.velocity, fluid.node_velocity)
+        move_fluid(fluid, p.raised, state.velocity, state.strain_rate)
         copy(state.spin, fluid.spin)
         energy += fluid_momentum(fluid, at)
-        for i in range(fluid.momentum.shape[0]):
+        for i in range(state.velocity.shape[0]):
             for c in range(3):
                 energy += fluid.momentum[i, c] * fluid.velocity[c]
     return energy
@@ -208,6 +209,7 @@ def _inertial(p, stage, at):
         energy += strands.node_mass[i] * (x * x + y * y + z * z)
     for e in range(strands.spin_inertia.shape[0]):
         energy += strands.spin_inertia[e] * (at.total_angle[e] - stage.predicted_angle[e]) ** 2
+    energy += 2.0 * inertia_off_curve(p.raised, strands, at, stage)
     s, n, a = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
     for f in range(bodies.mass.shape[0]):
         turned = at.body_departure_quaternion

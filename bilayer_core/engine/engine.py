@@ -92,7 +92,6 @@ class Engine:
         self._evaluated = True  # whether forces are those of `end`
         self.extrema = RunExtrema.zeros(
             sizes,
-            mass_moment=model.mass_moment,
             mass=float(model.rods.node_mass.sum()),
             voronoi_length=model.voronoi_length,
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bilayer_core.forces.raised import kinetic_energy_off_curve
 from bilayer_core.jit import kernel
 from bilayer_core.jit.stack import stack_matrix
 from bilayer_core.kinematics.rotating import inertia_tensor
@@ -17,6 +18,7 @@ def kinetic_energy(p, state):
         energy += 0.5 * strands.node_mass[i] * (v0 * v0 + v1 * v1 + v2 * v2)
     for e in range(strands.spin_inertia.shape[0]):
         energy += 0.5 * strands.spin_inertia[e] * state.spin[e] ** 2
+    energy += kinetic_energy_off_curve(p.raised, strands, state.velocity, state.strain_rate)
     tensor = stack_matrix(3, 3)
     for f in range(bodies.mass.shape[0]):
         b = bodies.body_of_free[f]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.engine.kinetic import kinetic_energy
-from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
 from bilayer_core.forces.bend_twist import bending_strain
 from bilayer_core.forces.joints import Joints
 from bilayer_core.jit import kernel, piece, record, shapes_of, zeros_in_one
@@ -77,7 +77,7 @@ def observe(p, joints, state, at, out):
     copy(p.sums.energy, out.energy)
     out.kinetic[0] = kinetic_energy(p, state)
     if out.fluid.exists:
-        copy(state.velocity, out.fluid.node_velocity)
+        move_fluid(out.fluid, p.raised, state.velocity, state.strain_rate)
         copy(state.spin, out.fluid.spin)
         out.kinetic[1] = fluid_momentum(out.fluid, at)
     return READY

@@ -9,6 +9,7 @@ from numba import types
 from bilayer_core.engine.linear.assembly import expand_gradient
 from bilayer_core.engine.linear.attachments import condense_gradient
 from bilayer_core.forces.contact_on_bodies import condense_contact
+from bilayer_core.forces.raised import pull_edges
 from bilayer_core.jit import caller, kernel, piece
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.model.records.problem import Problem
@@ -110,6 +111,7 @@ def add_forces(p, at, stage, with_hessian, again):
             copy(sums.gradients, sums.lasting)
         gap = min(gap, call_add(forces.add[k], (forces.own[k], p, at, stage, with_hessian)))
     condense_contact(p.has_contact, p.bodies, sums)
+    pull_edges(p.raised, at, sums)
     return gap
 
 

@@ -38,8 +38,10 @@ def count_end(p, state, at, stage, gap, time, extrema):
         height += strands.node_mass[i] * state.position[i, 2]
         force = p.sums.contact_point[i, 0] ** 2 + p.sums.contact_point[i, 1] ** 2 + p.sums.contact_point[i, 2] ** 2
         largest = max(largest, force)
-    for k in range(extrema.mass_moment.shape[0]):
-        height += extrema.mass_moment[k] * state.director1[k, 2]
+    raised = p.raised
+    for r in range(raised.edge.shape[0]):
+        moment = raised.first_moment[r, 0] + raised.first_moment[r, 1]
+        height += moment * state.director1[raised.edge[r], 2]
     figures[0], figures[1] = max(figures[0], height / extrema.mass), min(figures[1], gap)
     figures[2] = max(figures[2], math.sqrt(largest))
     _count_contacts(p.surfaces, time, extrema)

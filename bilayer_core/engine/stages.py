@@ -9,6 +9,7 @@ Positions and momenta advance as `integrators.method` says. What is no vector ne
 - What a body holds has the body's velocity, v + ω × r, not that of a chord of its arc, which differs at first order. So
   its origin is where R̄ := R̃ − γ h ω × R̃ has it: (R − R̄)/(γ h) is dR/dt to second order. A prescribed body has its
   own velocity, not that of a chord either: the same with its pose at the end of the stage and its rates.
+- Material directors of raised edges are vectors with velocities of their own among the strains (`forces.raised`).
 - The angle of an edge counts from the start of the stage, where its frame was last re-based; its origin lies
   before or behind that.
 """
@@ -19,6 +20,7 @@ from bilayer_core.engine.configuration import clear_departure
 from bilayer_core.forces.added_mass import momentum_at
 from bilayer_core.forces.elements import measure_strains
 from bilayer_core.forces.mechanisms import measure_mechanisms
+from bilayer_core.forces.raised import copy_directors, measure_directors, predict_directors
 from bilayer_core.forces.restitution import measure_gaps
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.stack import stack_matrix
@@ -65,8 +67,9 @@ def start_step_point(p, state, start, first):
     measure_strains(p, start, first.strain)
     measure_gaps(p, start, first.strain)
     measure_mechanisms(p, start, first.strain)
+    measure_directors(p.raised, start, first.strain)
     copy(state.strain_rate, first.strain_rate)
-    momentum_at(p.fluid, start, state.velocity, first.fluid_momentum)
+    momentum_at(p, start, state.velocity, state.strain_rate, first.fluid_momentum)
     add_scaled(first.fluid_momentum, 1.0, state.fluid_excess)
     return READY
 
@@ -214,6 +217,7 @@ def predict_stage(p, state, work, inputs, n, previous, start):
         for c in range(3):
             stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
     copy(origin.strain, stage.origin_strain)
+    predict_directors(p.raised, origin, length, stage.predicted_director)
     _take_twist(start, stage)
     return READY
 
@@ -285,10 +289,12 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     measure_strains(p, start, stage.origin_strain)
     measure_gaps(p, start, stage.origin_strain)
     measure_mechanisms(p, start, stage.origin_strain)
+    measure_directors(p.raised, start, stage.origin_strain)
+    copy_directors(p.raised, start, stage.predicted_director)
     add_scaled(stage.origin_strain, -length, state.strain_rate)
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:
-        momentum_at(p.fluid, start, state.velocity, stage.origin_fluid_momentum)
+        momentum_at(p, start, state.velocity, state.strain_rate, stage.origin_fluid_momentum)
     _take_twist(start, stage)
     return READY
 

@@ -235,7 +235,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         if with_history:  # for the step after, which can take them if nothing touches anew
             keep_stage_derivatives(state, work.origin, work.end, stage.lengths[1], method.carry)
             if not method.history:  # a first step may begin with velocities, but with no rates of strains
-                state.strain_acceleration[:] = 0.0
+                _forget_rates(p.raised, state.strain_acceleration)
             state.has_history[0] = _compare_touched(p.sums, state.touched)
     copy(work.transduction, state.transduction)
     edge = _collapsed(p.strands, configuration_at(work.configurations[e]))
@@ -260,6 +260,13 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     last = configuration_at(work.configurations[e])
     p.outcome.counts[GAINS] = close_step_account(p, state, work, h, ends > stages, last)
     return _leave(p, CONVERGED, -1, e)
+
+
+@kernel
+def _forget_rates(raised, acceleration):
+    """Clear those of strains, without kept directors, which are positions."""
+    for k in range(raised.first if raised.exists else acceleration.shape[0]):
+        acceleration[k] = 0.0
 
 
 @kernel

@@ -2,7 +2,8 @@
 
 The momentum of the fluid is no fixed multiple of a velocity. Where the end of a step lies beyond its last stage, both
 are extrapolated, and differ there (second order in h). The momentum counts, and velocities are those that it asks for;
-of nodes that a body holds, which move as it does, the difference is kept in the state.
+of nodes that a body holds, which move as it does, and of those beside raised edges, whose momenta hang together
+(`forces.raised`), the difference is kept in the state.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from bilayer_core.forces.added_mass import momentum_at, write_inertia
 from bilayer_core.forces.elements import measure_strains
 from bilayer_core.forces.inertia import moment_of_rotation
 from bilayer_core.forces.mechanisms import measure_mechanisms, remember_mechanisms
+from bilayer_core.forces.raised import measure_directors
 from bilayer_core.forces.restitution import measure_gaps
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.flat import flat
@@ -26,7 +28,7 @@ from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Point, StageInputs, StateArrays, Work
 
 HELD = 0.0
-"""In place of the inertia of a node that a body holds."""
+"""In place of the inertia of a node whose velocity stays."""
 
 
 @piece(int, Problem, StateArrays, Work, StageInputs, int, Configuration)
@@ -66,9 +68,10 @@ def end_stage(p, state, work, inputs, n, end):
     measure_strains(p, end, point.strain)
     measure_gaps(p, end, point.strain)
     measure_mechanisms(p, end, point.strain)
+    measure_directors(p.raised, end, point.strain)
     for k in range(point.strain.shape[0]):
         point.strain_rate[k] = (point.strain[k] - stage.origin_strain[k]) / length
-    momentum_at(p.fluid, end, point.velocity, point.fluid_momentum)
+    momentum_at(p, end, point.velocity, point.strain_rate, point.fluid_momentum)
     return READY
 
 
@@ -140,7 +143,10 @@ def _write_frames(bodies, strands, at, state):
 
 @kernel
 def _share(inertia, excess, first, copy):
-    """Give a node that is there twice, and its copy, what both have."""
+    """Give a node that is there twice, and its copy, what both have; if one is held, hold both."""
+    if inertia[first, 0, 0] == HELD or inertia[copy, 0, 0] == HELD:
+        inertia[first, 0, 0] = inertia[copy, 0, 0] = HELD
+        return
     for m in range(3):
         excess[first, m] += excess[copy, m]
         excess[copy, m] = excess[first, m]
@@ -153,7 +159,7 @@ def _share(inertia, excess, first, copy):
 def _take_momentum(p, end, last, state):
     """Change velocities v of nodes by w so that m (v + w) + P(v + w) is their momentum: (m + ∂P/∂v) w = P − P(v)."""
     fluid, excess, velocity = p.fluid, state.fluid_excess, state.velocity
-    momentum_at(fluid, end, last.velocity, excess)
+    momentum_at(p, end, last.velocity, last.strain_rate, excess)
     apart = False
     for i in range(excess.shape[0]):
         for c in range(3):
@@ -162,11 +168,14 @@ def _take_momentum(p, end, last, state):
     if not apart:
         return
     write_inertia(fluid, p.strands.node_mass, end)
-    for k in range(fluid.joined.shape[0]):
-        _share(fluid.inertia, excess, fluid.joined[k, 0], fluid.joined[k, 1])
     for k in range(p.constrained.node.shape[0]):
         fluid.inertia[p.constrained.node[k], 0, 0] = HELD
-    for i in range(excess.shape[0]):
+    for k in range(p.raised.edge.shape[0]):
+        i = p.strands.edge_node[p.raised.edge[k]]
+        fluid.inertia[i, 0, 0] = fluid.inertia[i + 1, 0, 0] = HELD
+    for k in range(fluid.joined.shape[0]):
+        _share(fluid.inertia, excess, fluid.joined[k, 0], fluid.joined[k, 1])
+    for i in range(velocity.shape[0]):
         if fluid.inertia[i, 0, 0] == HELD:
             continue
         gained = solve_three(fluid.inertia[i], excess[i, 0], excess[i, 1], excess[i, 2])

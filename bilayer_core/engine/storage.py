@@ -36,9 +36,9 @@ from bilayer_core.model.set_friction import friction_law, friction_values, none_
 from bilayer_core.model.sizes import sizes_of
 
 Array = np.ndarray
-FIRST = ("node", "edge", "pair", "body", "contact_point", "contact")
+FIRST = ("node", "edge", "pair", "body", "contact_point", "contact", "pull")
 """Parts of `Sums.gradients`."""
-SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian")
+SECOND = ("edge_hessian", "cross_hessian", "pair_hessian", "node_hessian", "body_hessian", "raised_hessian")
 """Parts of `Sums.hessians`, with those of the dimension."""
 IN_SPACE = ("first_hessian", "second_hessian")
 IN_PLANE = ("polar_hessian", "cross_hessian", "pair_hessian", "mixed_hessian")

@@ -23,7 +23,9 @@ differences of positions alone, so the momentum of rods and fluid together is co
 solution in each step.
 
 In space: T is summed over edges, half of an edge's mass at either end, T = Σ ½·½ m l̄ (u_i·m_edge)², l̄ the rest length;
-the layers of a section share it in proportion to their thickness. Error: second order in the edge length.
+the layers of a section share it in proportion to their thickness. Where the middle of the section lies z over the curve
+of a laminate, u is that of x + z m1, and m1 as a vector has the momentum z P (`forces.raised`). Error: second order in
+the edge length.
 
 In time: over a stage of length h from an origin where the fluid had the momentum P̄,
 
@@ -48,6 +50,7 @@ from __future__ import annotations
 
 import math
 
+from bilayer_core.forces.raised import director_moved
 from bilayer_core.jit import kernel, piece
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.model.force_slots import slot_of
@@ -64,15 +67,19 @@ def fluid_momentum(fluid, at):
     mass, edge_node, flow, velocity, spin = fluid.mass, fluid.edge_node, fluid.velocity, fluid.node_velocity, fluid.spin
     length, tangent, director1, director2 = at.length, at.tangent, at.director1, at.director2
     momentum_out, shape_gradient_out = fluid.momentum, fluid.shape_gradient
+    nodes, middle, rate = velocity.shape[0], fluid.middle, fluid.director_rate
     energy = 0.0
     momentum_out[:] = 0.0
     shape_gradient_out[:] = 0.0
     for k in range(mass.shape[0]):
         energy += 0.5 * mass[k, 2] * spin[k] ** 2
+        r = fluid.raised[k]
         for i in range(edge_node[k], edge_node[k] + 2):
             along = through = across = 0.0
             for c in range(3):
                 relative = velocity[i, c] - flow[c]
+                if r >= 0:
+                    relative += middle[r] * rate[r, c]
                 along += relative * tangent[k, c]
                 through += relative * director1[k, c]
                 across += relative * director2[k, c]
@@ -81,17 +88,31 @@ def fluid_momentum(fluid, at):
             for c in range(3):
                 momentum = momentum1 * director1[k, c] + momentum2 * director2[k, c]
                 momentum_out[i, c] += momentum
+                if r >= 0:
+                    momentum_out[nodes + fluid.slot[r], c] += middle[r] * momentum
                 shape_gradient_out[k, c] -= momentum * along / length[k]
             shape_gradient_out[k, 3] += momentum1 * across - momentum2 * through
     return energy
 
 
 @kernel
-def momentum_at(fluid, at, velocity, momentum_out):
-    """Write P with given velocities of nodes [m/s], shapes (n_node, 3), if the fluid has inertia."""
+def move_fluid(fluid, raised, velocity, strain_rate):
+    """Have the velocities of nodes [m/s], shape (n_node, 3), and of raised directors, among the rates of strains, in
+    the record of a fluid.
+    """
+    copy(velocity, fluid.node_velocity)
+    for r in range(raised.edge.shape[0]):
+        for c in range(3):
+            fluid.director_rate[r, c] = strain_rate[raised.first + 3 * raised.slot[r] + c]
+
+
+@kernel
+def momentum_at(p, at, velocity, strain_rate, momentum_out):
+    """Write P with given velocities, as for `move_fluid`, if the fluid has inertia."""
+    fluid = p.fluid
     if not fluid.exists:
         return
-    copy(velocity, fluid.node_velocity)
+    move_fluid(fluid, p.raised, velocity, strain_rate)
     fluid_momentum(fluid, at)
     copy(fluid.momentum, momentum_out)
 
@@ -129,18 +150,26 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
     )
     node_gradient, node_hessian = sums.node, sums.node_hessian
     edge_gradient, edge_hessian = sums.edge, sums.edge_hessian
+    raised, middle, pull, nodes = p.raised, fluid.middle, sums.pull, position.shape[0]
     energy = 0.0
-    for i in range(origin_momentum.shape[0]):
+    for r in range(raised.edge.shape[0]):
+        for c in range(3):
+            force = origin_momentum[nodes + raised.slot[r], c] / momentum_length
+            pull[r, c] -= force
+            energy -= force * director_moved(raised, at, stage, r, c)
+    for i in range(nodes):
         for c in range(3):
             force = origin_momentum[i, c] / momentum_length
             node_gradient[i, c] -= force
             energy -= force * (position[i, c] - origin[i, c])
     for k in range(mass.shape[0]):
-        first = edge_node[k]
+        first, r = edge_node[k], fluid.raised[k]
         for i in range(first, first + 2):
             through = across = 0.0
             for c in range(3):
                 relative = (position[i, c] - origin[i, c]) / h - flow[c]
+                if r >= 0:
+                    relative += middle[r] * director_moved(raised, at, stage, r, c) / h
                 through += relative * direction1[k, c]
                 across += relative * direction2[k, c]
             mass1, mass2 = 0.5 * mass[k, 0], 0.5 * mass[k, 1]
@@ -148,11 +177,16 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
             for m in range(3):
                 momentum = mass1 * through * direction1[k, m] + mass2 * across * direction2[k, m]
                 node_gradient[i, m] += momentum / momentum_length
+                if r >= 0:
+                    pull[r, m] += middle[r] * momentum / momentum_length
                 if with_hessian:
                     for n in range(m, 3):
-                        node_hessian[i, m, n] += (
+                        second = (
                             mass1 * direction1[k, m] * direction1[k, n] + mass2 * direction2[k, m] * direction2[k, n]
                         ) / (h * momentum_length)
+                        node_hessian[i, m, n] += second
+                        if r >= 0:
+                            sums.raised_hessian[2 * r + i - first, m, n] += second
         for c in range(3):
             lengthening = position[first + 1, c] - origin[first + 1, c] - position[first, c] + origin[first, c]
             energy -= shape_gradient[k, c] * lengthening
@@ -173,6 +207,9 @@ def update_fluid(fluid, p, at, stage):
     for i in range(velocity.shape[0]):
         for c in range(3):
             velocity[i, c] = (position[i, c] - origin[i, c]) / h
+    for r in range(p.raised.edge.shape[0]):
+        for c in range(3):
+            fluid.director_rate[r, c] = director_moved(p.raised, at, stage, r, c) / h
     fluid_momentum(fluid, at)
     for k in range(fluid.direction1.shape[0]):
         for c in range(3):

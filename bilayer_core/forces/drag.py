@@ -11,6 +11,9 @@ length h_t, v = u/h_t − U (U the flow):
 
     D = h_t ρ_f A C |v·n|³/6,    ∂D/∂u = ½ ρ_f A C |v·n| (v·n) n,    ∂²D/∂u² = ρ_f A C |v·n|/h_t n nᵀ
 
+It acts at the middle of the section. Where that is off the curve of a laminate, the halves of edges at a node each
+carry half of it at y = x + z m1, and v is ẏ (`forces.raised`).
+
 The drag is implicit: it cannot overshoot, however long the step. The directions move along with Newton's corrections
 and end as those at the end of the stage, so that the drag has the integrator's order: held at the start of the step,
 they made the stroke of a swimmer 6 % wrong at 1 ms with any integrator.
@@ -20,6 +23,7 @@ from __future__ import annotations
 
 import math
 
+from bilayer_core.forces.raised import director_motion
 from bilayer_core.jit import kernel, piece
 from bilayer_core.kinematics.vector import add_row, add_upper_outer_sum, combine, combine3, cross, dot, row, scaled
 from bilayer_core.model.force_slots import slot_of
@@ -33,9 +37,15 @@ DRAG = slot_of("drag")
 @kernel
 def node_directions(before, after, at):
     """Mean of the directions t, m1, m2 of the edges before and after a node (the same at an end), orthonormal."""
-    t = combine(1.0, row(at.tangent, before), 1.0, row(at.tangent, after))
+    return mixed_directions(before, 0.5, after, 0.5, at)
+
+
+@kernel
+def mixed_directions(before, part_before, after, part_after, at):
+    """Directions t, m1, m2 that are mixed of those of two edges, orthonormal."""
+    t = combine(part_before, row(at.tangent, before), part_after, row(at.tangent, after))
     t = scaled(1.0 / math.sqrt(dot(t, t)), t)
-    m = combine(1.0, row(at.director1, before), 1.0, row(at.director1, after))
+    m = combine(part_before, row(at.director1, before), part_after, row(at.director1, after))
     m = combine(1.0, m, -dot(m, t), t)
     m = scaled(1.0 / math.sqrt(dot(m, m)), m)
     return t, m, cross(t, m)
@@ -58,6 +68,9 @@ def add_drag(flow, p, at, stage, with_hessian):
             (position[i, 1] - origin[i, 1]) / h - flow_velocity[1],
             (position[i, 2] - origin[i, 2]) / h - flow_velocity[2],
         )
+        r = flow.raised[k]
+        if r >= 0:
+            v = combine(1.0, v, p.raised.middle[r] / h, director_motion(p.raised, at, stage, r))
         t, m, n = row(direction[k], 0), row(direction[k], 1), row(direction[k], 2)
         vt, vm, vn = dot(v, t), dot(v, m), dot(v, n)
         ct, cm, cn = coefficient[k, 0] * abs(vt), coefficient[k, 1] * abs(vm), coefficient[k, 2] * abs(vn)
@@ -66,9 +79,13 @@ def add_drag(flow, p, at, stage, with_hessian):
         lost += 0.5 * dot(resistance, v)
         supplied -= 0.5 * dot(resistance, u)
         add_row(gradient, i, 0.5, resistance)
+        if r >= 0:
+            add_row(sums.pull, r, 0.5 * p.raised.middle[r], resistance)
         if with_hessian:
             t_, m_, n_ = scaled(ct, t), scaled(cm, m), scaled(cn, n)
             add_upper_outer_sum(hessian, i, 1.0 / h, t_, t, m_, m, n_, n)
+            if r >= 0:
+                add_upper_outer_sum(sums.raised_hessian, 2 * r + flow.half[k], 1.0 / h, t_, t, m_, m, n_, n)
     sums.energy[DRAG], sums.lost[DRAG], sums.supplied[DRAG] = energy, lost, supplied
     return math.inf
 

@@ -22,6 +22,7 @@ from bilayer_core.forces.joints import add_joints, joints_of
 from bilayer_core.forces.loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
 from bilayer_core.forces.mechanisms import REMEMBERED, add_mechanisms, end_mechanisms, memory_at
 from bilayer_core.forces.planar import add_elasticity_in_plane
+from bilayer_core.forces.raised import add_raised_masses
 from bilayer_core.forces.restitution import add_restitution, end_restitution, start_restitution, with_memory
 from bilayer_core.forces.rod_contact import (
     add_rod_barrier,
@@ -101,6 +102,7 @@ TERMS: tuple[Term, ...] = (
     ),
     Term(("stretching", "viscosity"), lambda model, of: None, add_viscosity, start_elements),
     Term(("inertia", "damping", "gravity"), lambda model, of: None, add_inertial_forces),
+    Term(("inertia", "damping", "gravity"), lambda model, of: of["raised"], add_raised_masses),
     Term(("loads",), lambda model, of: of["loads"], add_point_forces, start_dead_loads),
     Term(("barrier", "restitution"), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),
     Term(

@@ -4,6 +4,9 @@ A force F that keeps its direction is conservative:
 
     V = −F·x,    ∂V/∂x = −F,    no Hessian
 
+On a path that lies z over the curve of a laminate the force acts at x + z m̄1 (`forces.raised`), m̄1 the mean of the
+edges before and after the node, or that of the last edge.
+
 A moment M that keeps its direction is not: no potential of a rotation has the gradient −M everywhere. Over a step it
 has one up to second order. With R̃ the rotation that inertia predicts, Q = R R̃ᵀ the small turn beyond it, and
 ax(A) = (A₃₂ − A₂₃, A₁₃ − A₃₁, A₂₁ − A₁₂):
@@ -15,14 +18,16 @@ ax(A) = (A₃₂ − A₂₃, A₁₃ − A₃₁, A₂₁ − A₁₂):
 the angular acceleration times the square of the step: the error is of second order. V is work, not energy.
 
 A load that turns with what it acts on ("follower") takes its direction from the configuration to which Newton moved
-last, as drag does, and is then one of these: the step ends with the direction that it has there.
+last, as drag does, and is then one of these: the step ends with the direction that it has there. At an end of a rod,
+half an edge beyond its last one, that is 1.5 times the direction of this less half of that beside it.
 """
 
 from __future__ import annotations
 
 import math
 
-from bilayer_core.forces.drag import node_directions
+from bilayer_core.forces.drag import mixed_directions
+from bilayer_core.forces.raised import director_moved
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.stack import stack_matrix
 from bilayer_core.kinematics.vector import combine3
@@ -51,6 +56,20 @@ def point_force(index, force, position, origin, length, gradient_out):
 
 
 @kernel
+def _pull_of_levers(loads, raised, at, stage, pull_out):
+    """Add −Σ F·(z m1) of forces on half edges at the height z; return it [J] and the power of them [W]."""
+    energy = power = 0.0
+    for j in range(loads.lever.shape[0]):
+        k, r, height = loads.lever[j], loads.lever_raised[j], loads.lever_height[j]
+        for c in range(3):
+            force = height * loads.on_nodes[k, c]
+            pull_out[r, c] -= force
+            energy -= force * at.director1[raised.edge[r], c]
+            power += force * director_moved(raised, at, stage, r, c) / stage.lengths[0]
+    return energy, power
+
+
+@kernel
 def in_axes_of_body(vector, k, factor, rotation, f, vector_out):
     """Row k in the axes of free body f, times a factor."""
     for c in range(3):
@@ -68,6 +87,10 @@ def add_point_forces(loads, p, at, stage, with_hessian):
         origin = stage.origin_body_position
         more = point_force(loads.body, loads.on_bodies, at.body_position, origin, h, sums.body)
         sums.energy[slot], sums.supplied[slot] = found[0] + more[0], found[1] + more[1]
+        if loads.lever.shape[0] > 0:
+            off_curve = _pull_of_levers(loads, p.raised, at, stage, sums.pull)
+            sums.energy[slot] += off_curve[0]
+            sums.supplied[slot] += off_curve[1]
     return math.inf
 
 
@@ -89,7 +112,8 @@ def update_followers(loads, p, at, stage):
     node, body = loads.node, loads.body
     for k in range(node.shape[0]):
         factor, v = stage.load_factor[loads.node_load[k]], loads.node_vector
-        t, m, n = node_directions(loads.edge_before[k], loads.edge_after[k], at)
+        parts = loads.part
+        t, m, n = mixed_directions(loads.edge_before[k], parts[k, 0], loads.edge_after[k], parts[k, 1], at)
         force = combine3(factor * v[k, 0], t, factor * v[k, 1], m, factor * v[k, 2], n)
         for c in range(3):
             loads.on_nodes[k, c] = force[c]

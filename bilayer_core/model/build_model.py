@@ -18,7 +18,8 @@ from bilayer_core.model.lit_elements import build_light
 from bilayer_core.model.model import Model, PlacedBodies
 from bilayer_core.model.planarity import require_plane
 from bilayer_core.model.plane import Plane as ScenePlane
-from bilayer_core.model.point_loads import add_point_masses, build_loads
+from bilayer_core.model.point_loads import add_point_masses, build_loads, edges_of_loads
+from bilayer_core.model.raised_edges import build_raised
 from bilayer_core.model.records.parts import (
     Attachments,
     Bonds,
@@ -66,10 +67,11 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     constrained = _constrained(found, bodies.free_index, layout, solved)
     drives, bonds = _drives(found), _bonds(found, rods.bend_count)
     joined_node, joined_edge = found.column("joined_node", np.int64, 2), found.column("joined_edge", np.int64, 2)
-    flow, fluid = build_fluid(scene.fluid, found, rods.edge_node)
-    loads, followers, moments = build_loads(scene, found, placed.names, bodies.free_index)
+    raised, number, kept_directors = build_raised(found, edges_of_loads(scene, found), scene.fluid is not None)
+    flow, fluid = build_fluid(scene.fluid, found, rods.edge_node, raised, number)
+    loads, followers, moments = build_loads(scene, found, placed.names, bodies.free_index, number)
     rod_search, rod_point_weight = build_rod_surfaces(scene, found)
-    strain_coupling, mass_moment = found.column("strain_coupling", width=2), found.column("mass_moment")
+    strain_coupling = found.column("strain_coupling", width=2)
     built = Model(
         scene=scene,
         forces=forces,
@@ -83,6 +85,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         plane=Plane.absent() if plane is None else _plane(plane, found, placed, rods),
         off_axis=OffAxis.absent() if bonds.exists else _off_axis(found, rods, strain_coupling),
         bonds=bonds,
+        raised=raised,
+        kept_directors=kept_directors,
         free_bodies=bodies,
         constrained=constrained,
         attachments=_attachments(constrained, solved, rods) if len(bodies.mass) else Attachments.absent(),
@@ -102,7 +106,6 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         joined_node=joined_node,
         joined_edge=joined_edge,
         node_length=found.column("node_length"),
-        mass_moment=mass_moment if mass_moment.any() else mass_moment[:0],
         joint_node=_of_joints(found, "joint_node", np.int64),
         voronoi_length=found.column("voronoi_length"),
         strain_coupling=strain_coupling,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.jit import UNALLOCATED
-from bilayer_core.model.records.parts import Flow, Fluid
+from bilayer_core.model.raised_edges import halves_at
+from bilayer_core.model.records.parts import Flow, Fluid, Raised
 from bilayer_core.model.section import outline
 from bilayer_core.model.strands import Collected, Span, stations_of
 from bilayer_core.model.unknown_order import columns
@@ -24,23 +25,63 @@ def add_fluid(found: Collected, fluid: config.Fluid | None, rod: Rod, copies: li
         _add_added_mass(found, fluid, rod, copies)
 
 
-def build_fluid(fluid: config.Fluid | None, found: Collected, edge_node: Array) -> tuple[Flow, Fluid]:
-    """Return the records of drag and of added mass, absent without them; `edge_node` as in `Strands`."""
+def build_fluid(
+    fluid: config.Fluid | None, found: Collected, edge_node: Array, raised: Raised, number: Array
+) -> tuple[Flow, Fluid]:
+    """Return the records of drag and of added mass, absent without them.
+
+    Parameters
+    ----------
+    fluid : scene.config.Fluid or None
+    found : Collected
+    edge_node : ndarray
+        As in `Strands`.
+    raised : Raised
+    number : ndarray
+        Of each edge in `raised`, −1 of the others.
+    """
     if fluid is None:
         return Flow.absent(), Fluid.absent()
-    velocity, (before, after) = np.array(fluid.velocity), columns(found.column("drag_edge", np.int64, 2))
-    flow = Flow.zeros(
-        UNALLOCATED,
-        velocity=velocity,
-        node=found.column("drag_node", np.int64),
-        edge_before=before,
-        edge_after=after,
-        coefficient=found.column("drag_coefficient", width=3),
-    )
+    velocity = np.array(fluid.velocity)
+    flow = Flow.zeros(UNALLOCATED, velocity=velocity, **_places_of_drag(found, raised, number))
     mass, joined = found.column("fluid_mass", width=3), found.column("joined_node", np.int64, 2)
     if not len(mass):
         return flow, Fluid.absent()
-    return flow, Fluid.zeros(UNALLOCATED, velocity=velocity, edge_node=edge_node, mass=mass, joined=joined)
+    return flow, Fluid.zeros(
+        UNALLOCATED,
+        velocity=velocity,
+        edge_node=edge_node,
+        mass=mass,
+        raised=number,
+        middle=raised.middle,
+        slot=raised.slot,
+        joined=joined,
+    )
+
+
+def _places_of_drag(found: Collected, raised: Raised, number: Array) -> dict[str, Array]:
+    """Arrays of `Flow`: where the middle of a section is off the curve, the two halves of edges at a node each carry
+    their part of its drag, with the node's directions.
+    """
+    node, edges = found.column("drag_node", np.int64), found.column("drag_edge", np.int64, 2)
+    coefficient = found.column("drag_coefficient", width=3)
+    height = np.append(raised.middle, 0.0)[number[edges]]  # −1 is the last
+    split = np.flatnonzero(height.any(axis=1))
+    whole = np.delete(np.arange(len(node)), split)
+    of_edges, halves, parts = halves_at(found, node[split])
+    share, side = columns(np.argwhere(parts > 0.0))
+    index = np.concatenate([whole, split[share]])
+    half_edge, none = number[of_edges[share, side]], np.full(len(whole), -1)
+    before, after = columns(edges[index])
+    part = np.concatenate([np.ones(len(whole)), parts[share, side]])
+    return {
+        "node": node[index],
+        "raised": np.concatenate([none, half_edge]),
+        "half": np.concatenate([0 * none, halves[share, side]]),
+        "edge_before": before,
+        "edge_after": after,
+        "coefficient": part[:, None] * coefficient[index],
+    }
 
 
 def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:

@@ -32,6 +32,8 @@ from bilayer_core.scene.rod import Rod, RodCopy
 
 Array = np.ndarray
 NAME = "laminate"
+ON_CURVE = 1e-9
+"""Part of the thickness by which a mass centre may be off the curve and count as on it."""
 UNEVEN = 0.1
 """Part by which the distances of the two faces from the curve may differ without a warning."""
 
@@ -50,9 +52,9 @@ class _Placed:
         """[kg]"""
         return self.present * self.section.mass * self.length
 
-    def spin_inertia(self, axis: float) -> Array:
-        """About the curve [kg m²]."""
-        return self.present * self.length * self.section.spin_inertia + self.mass * (self.height - axis) ** 2
+    def spin_inertia(self, centre: Array) -> Array:
+        """About a line at a height over the path [kg m²]."""
+        return self.present * self.length * self.section.spin_inertia + self.mass * (self.height - centre) ** 2
 
 
 def add_laminate(found: Collected, scene: SceneConfig, rod: Rod, body_index: dict[str, int]) -> None:
@@ -77,9 +79,10 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     whole = WholeSection(scene, rod, halves, shape)
     low, high = _faces(rod, axis)
     strands = _strands(found, copies, axis, shape, (low, high))
+    mass, centre = sum(layer.mass for layer in layers), _mass_centre(rod, layers, axis)
     elements = StrandElements(
-        edge_mass=sum(layer.mass for layer in layers),
-        spin_inertia=sum(layer.spin_inertia(axis) for layer in layers),
+        edge_mass=mass,
+        spin_inertia=sum(layer.spin_inertia(axis + centre) for layer in layers),
         half_width=0.5 * layers[0].section.width,
         axial_stiffness=whole.axial_stiffness,
         rest_strain=whole.rest_strain,
@@ -88,11 +91,19 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
         node_radius=np.maximum(high, -low),
         retardation_time=scene.materials[rod.layers[0].material].retardation_time,
     )
-    moment = sum(layer.mass * (layer.height - axis) for layer in layers)
-    moment[-1] *= not shape.closed
-    found.add(mass_moment=np.tile(moment, len(copies)))
+    middle = _middle(rod, axis)
+    path = -axis if abs(axis) > ON_CURVE * _thickness(rod).sum(axis=0).max() else 0.0
+    halves_mass = np.stack([0.5 * mass, 0.5 * mass], axis=1)
+    if shape.closed:  # the first and the last node have none, see `model.strands.add_strands`
+        halves_mass[0, 0] = halves_mass[-1, 1] = 0.0
+    found.add(
+        first_moment=np.tile(halves_mass * centre[:, None], (len(copies), 1)),
+        second_moment=np.tile(halves_mass.sum(axis=1) * centre**2, len(copies)),
+        middle=np.tile(middle, len(copies)),
+        off_curve=np.tile((centre != 0.0) | (middle != 0.0) | (path != 0.0), len(copies)),
+    )
     found.rods += [[(0, int(nodes[-1]), strand.first_node, strand.first_edge)] for strand in strands]
-    found.path_height += [-axis] * len(copies)
+    found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
@@ -175,6 +186,25 @@ def _prevailing(present: Array) -> Array:
     kind = (1 << np.arange(len(present))[::-1]) @ present  # a bit for each layer
     count = np.bincount(kind).tolist()
     return kind == max(range(len(count)), key=lambda k: (count[k], k.bit_count()))
+
+
+def _thickness(rod: Rod) -> Array:
+    """Thicknesses of the layers at the middle of edges [m], shape (n_layer, n_edge)."""
+    return outline(rod, np.arange(stations_of(rod)[1]) + 0.5)[1]
+
+
+def _mass_centre(rod: Rod, layers: list[_Placed], axis: float) -> Array:
+    """Height of the mass centre over the curve at each edge [m]; 0 where it is rounding, shape (n_edge,)."""
+    mass = sum(layer.mass for layer in layers)
+    centre = sum(layer.mass * (layer.height - axis) for layer in layers) / mass
+    return np.where(np.abs(centre) > ON_CURVE * _thickness(rod).sum(axis=0), centre, 0.0)
+
+
+def _middle(rod: Rod, axis: float) -> Array:
+    """Height of the middle of the section over the curve at each edge [m]; 0 where it is rounding, shape (n_edge,)."""
+    layers = _thickness(rod)
+    middle = (0.0 if len(layers) == 1 else 0.5 * (layers[1] - layers[0])) - axis
+    return np.where(np.abs(middle) > ON_CURVE * layers.sum(axis=0), middle, 0.0)
 
 
 def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:

@@ -24,9 +24,8 @@ of a joint bend as in series. A* > 0 and K > 0: both sums are of squares. An edg
 own stimuli a uniform strip is exact at every node, wherever the curve lies.
 
 On the neutral axis B = 0, and the curve is an ordinary rod. It lies on that of the section which covers most of the
-rod; where a layer begins or ends the axis is elsewhere, and `forces.bend_twist` has the part with b. Inertia and
-loads act on the curve: where the mass centre is off it, the moment of the weight about the curve is left out, and only
-the mass centre that is reported has its offset.
+rod; where a layer begins or ends the axis is elsewhere, and `forces.bend_twist` has the part with b. Mass, loads and
+fluid act where they are, off the curve (`forces.raised`).
 
 Across the width and in twist 1/K = Σ ℓ/EI₂ and Σ ℓ/GJ likewise.
 """

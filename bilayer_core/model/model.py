@@ -23,6 +23,7 @@ from bilayer_core.model.records.parts import (
     OffAxis,
     Plane,
     PointForces,
+    Raised,
     Strands,
     Viscosity,
 )
@@ -78,6 +79,8 @@ class Model(ReadOnlyArrays):
     plane: Plane  # absent in three dimensions
     off_axis: OffAxis
     bonds: Bonds
+    raised: Raised  # absent where everything acts on the curve
+    kept_directors: int  # of edges where something may act off the curve under other loads, too
     free_bodies: Bodies
     constrained: Constrained
     attachments: Attachments
@@ -103,7 +106,6 @@ class Model(ReadOnlyArrays):
     joined_node: Array  # nodes of closed strands, each with its copy, shape (n_joined, 2); see `model.strand_arrays`
     joined_edge: Array  # likewise of edges, shape (n_joined_edge, 2)
     node_length: Array  # half the lengths of its edges at the start [m], shape (n_node,)
-    mass_moment: Array  # mass × its height along m1 of each edge [kg m], shape (n_edge,); (0,) if all of it is at nodes
     joint_node: Array  # node at which a bend acts, −1 for bonds, shape (n_joint,)
     voronoi_length: Array  # of bends and clamps [m], shape (bend_count,)
     strain_coupling: Array  # b of either edge of joints of `off_axis`, 0 for a clamp edge [rad], shape (n_coupled, 2)
@@ -123,7 +125,9 @@ class Model(ReadOnlyArrays):
 
     @property
     def strain_count(self) -> int:
-        """How many strains viscosity acts on; gaps of `impact_pairs`, then values of `mechanisms`, come after them."""
+        """How many strains viscosity acts on; gaps of `impact_pairs`, values of `mechanisms`, then kept directors come
+        after them.
+        """
         if "viscosity" not in self.forces:
             return 0
         return self.rods.edge_count + 3 * (len(self.rods.joint_a) + len(self.bonds.joint))

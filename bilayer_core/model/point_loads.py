@@ -8,6 +8,7 @@ import numpy as np
 
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.raised_edges import directions_at, halves_at
 from bilayer_core.model.records.parts import Moments, PointForces
 from bilayer_core.model.section import outline
 from bilayer_core.model.strands import Collected, Span
@@ -15,23 +16,38 @@ from bilayer_core.model.unknown_order import columns
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.rod import Rod
 
+MOMENTS = ("first_moment", float, 2), ("second_moment",)
+
 
 def add_point_masses(scene: SceneConfig, found: Collected) -> None:
-    """Add point masses to the masses of nodes [kg], and their heights over these to the moments of mass [kg m]."""
-    node_mass, moment = found.column("node_mass"), found.column("mass_moment")
-    node_edges = found.column("node_edges", np.int64, 2)
+    """Add point masses to the masses of nodes [kg], and where they are off the curve to the moments of half edges."""
+    node_mass, first, second = (found.column(*of) for of in (("node_mass",), MOMENTS[0], MOMENTS[1]))
     for point in scene.masses:
         for rod, spans, height in _copies(scene, found, point.rod):
             nodes, shares = _shares(rod, spans, point.position)
             np.add.at(node_mass, nodes, point.mass * shares)
             if height:
-                for edges in node_edges[nodes].T:  # numpy 2.4 reads past the values if it is given both at once
-                    np.add.at(moment, edges, 0.5 * height * point.mass * shares)
-    found.columns["node_mass"], found.columns["mass_moment"] = [node_mass], [moment]
+                edges, halves, parts = (of.ravel() for of in halves_at(found, nodes))
+                masses = parts * np.repeat(point.mass * shares, 2)
+                np.add.at(first, (edges, halves), height * masses)
+                np.add.at(second, edges, height**2 * masses)
+    found.columns |= {"node_mass": [node_mass], "first_moment": [first], "second_moment": [second]}
+
+
+def edges_of_loads(scene: SceneConfig, found: Collected) -> np.ndarray:
+    """Return edges whose halves carry loads off the curve."""
+    nodes = [
+        _shares(rod, spans, load.position)[0]
+        for load in scene.loads
+        if load.body is None
+        for rod, spans, height in _copies(scene, found, load.rod)
+        if height
+    ]
+    return np.unique(halves_at(found, np.concatenate(nodes))[0]) if nodes else np.zeros(0, dtype=np.int64)
 
 
 def build_loads(
-    scene: SceneConfig, found: Collected, names: Sequence[str], free_index: np.ndarray
+    scene: SceneConfig, found: Collected, names: Sequence[str], free_index: np.ndarray, raised: np.ndarray
 ) -> tuple[PointForces, PointForces, Moments]:
     """Return forces of fixed direction, forces that turn with what they act on, and moments; absent without loads.
 
@@ -43,6 +59,8 @@ def build_loads(
         Of bodies.
     free_index : ndarray
         As in `Bodies`.
+    raised : ndarray
+        Number of each edge in `Raised`, −1 of the others.
     """
     if not scene.loads:
         return PointForces.absent(), PointForces.absent(), Moments.absent()
@@ -54,13 +72,17 @@ def build_loads(
             on_bodies += [(free, index, load.force)] if any(load.force) else []
             moments += [(free, index, load.moment)] if any(load.moment) else []
             continue
-        for rod, spans, _ in _copies(scene, found, load.rod):
+        for rod, spans, height in _copies(scene, found, load.rod):
             shares = zip(*_shares(rod, spans, load.position), strict=True)
-            on_nodes += [(node, index, share * np.array(load.force)) for node, share in shares]
+            on_nodes += [(node, index, share * np.array(load.force), height) for node, share in shares]
     (*dead, dead_moments), (*following, following_moments) = parts.values()
     body, number, vector = _arrays(dead_moments + following_moments)
     all_moments = Moments.zeros(UNALLOCATED, dead=len(dead_moments), body=body, load=number, vector=vector)
-    return _point_forces("loads", found, *dead), _point_forces("followers", found, *following), all_moments
+    return (
+        _point_forces("loads", found, raised, *dead),
+        _point_forces("followers", found, raised, *following),
+        all_moments,
+    )
 
 
 def _arrays(parts: list[tuple[int, int, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -69,9 +91,15 @@ def _arrays(parts: list[tuple[int, int, np.ndarray]]) -> tuple[np.ndarray, np.nd
     return np.array(target, dtype=np.int64), np.array(load, dtype=np.int64), np.array(vector, float).reshape(-1, 3)
 
 
-def _point_forces(name: str, found: Collected, on_nodes: list, on_bodies: list) -> PointForces:
-    (node, node_load, node_vector), (body, body_load, body_vector) = _arrays(on_nodes), _arrays(on_bodies)
-    before, after = columns(found.column("node_edges", np.int64, 2)[node])
+def _point_forces(name: str, found: Collected, raised: np.ndarray, on_nodes: list, on_bodies: list) -> PointForces:
+    heights = np.array([height for *_, height in on_nodes])
+    node, node_load, node_vector = _arrays([part[:3] for part in on_nodes])
+    body, body_load, body_vector = _arrays(on_bodies)
+    mixed, mixed_parts = directions_at(found, node)
+    before, after = columns(mixed)
+    edges, _, parts = halves_at(found, node)
+    arms = parts * heights[:, None]
+    lever, side = columns(np.argwhere(arms != 0.0))
     return PointForces.zeros(
         UNALLOCATED,
         energy_slot=slot_of(name),
@@ -83,6 +111,10 @@ def _point_forces(name: str, found: Collected, on_nodes: list, on_bodies: list) 
         body_vector=body_vector,
         edge_before=before,
         edge_after=after,
+        part=mixed_parts,
+        lever=lever,
+        lever_raised=raised[edges[lever, side]],
+        lever_height=arms[lever, side],
     )
 
 
@@ -101,7 +133,7 @@ def _shares(rod: Rod, spans: list[Span], position: float) -> tuple[np.ndarray, n
 
     Between stations the parts are linear in the position; where two layers cover a station, the path is their
     interface, and each strand takes a part in proportion to the other's thickness. Force, moment and mass centre are
-    thus those of a point on the path; a single strand for both layers takes all, at its own height.
+    thus those of a point on the path; a single strand for both layers takes all, and half edges the lever to the path.
     """
     along = min(position / rod.edge_length, rod.stations - 1.0)
     before = min(int(along), rod.stations - 2)

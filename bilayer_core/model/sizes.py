@@ -14,13 +14,15 @@ def sizes_of(model: Model) -> dict[str, int]:
     edges = rods.edge_count + len(model.constrained.clamp_edge_body)
     in_plane, in_fluid = model.plane.exists, model.fluid.exists
     impacts, joints, pairs = len(model.impact_pairs), len(rods.joint_a), len(model.bonds.joint)
+    raised = len(model.raised.edge)
     return {
         "node": model.node_count,
         "edge": rods.edge_count,
         "edge+clamp": edges,
         "joint": joints,
         "pair": pairs,
-        "strain": model.strain_count + impacts + len(model.mechanisms),
+        "strain": model.strain_count + impacts + len(model.mechanisms) + 3 * model.kept_directors,
+        "raised": raised,
         "impact": impacts,
         "strand": len(model.strands),
         "attached": len(model.constrained.node),
@@ -42,7 +44,8 @@ def sizes_of(model: Model) -> dict[str, int]:
         "law": len(model.drives.law_channel),
         "lit": len(model.light.law),
         "load": len(scene.loads),
-        "wet": model.node_count if in_fluid else 0,
+        "wet": model.node_count + model.kept_directors if in_fluid else 0,
+        "wet half": 2 * raised if model.flow.exists else 0,
         "dragged": len(model.flow.node),
         "edge with hessian": edges if in_fluid or not in_plane else 0,  # in a plane that of the fluid alone
         "joint in space": 0 if in_plane else joints,

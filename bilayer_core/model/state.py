@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from bilayer_core.errors import InputError
+from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.fingerprint import FREE, difference
 from bilayer_core.model.free_motions import start_rates
 from bilayer_core.model.lit_elements import light_of, part_seen
@@ -46,7 +47,7 @@ class State:
     velocity: Array  # [m/s], shape (n_node, 3)
     director1: Array  # material director m1 of edges, unit, shape (n_edge, 3)
     spin: Array  # rate of edges about their tangent [rad/s], shape (n_edge,)
-    fluid_excess: Array  # fluid momentum less that of `velocity`, of held nodes [N s], shape (n_node, 3) or (0, 3)
+    fluid_excess: Array  # fluid momentum less that of `velocity`, of held nodes and as in `Fluid.momentum` [N s]
     twist: Array  # of joints when forces were last evaluated [rad]: tells whole turns apart, shape (n_joint,)
     body_position: Array  # [m], shape (n_body, 3)
     body_position_low: Array  # what rounding cut off `body_position` [m], shape (n_body, 3)
@@ -62,8 +63,8 @@ class State:
     spin_acceleration: Array  # of edges [rad/s²], shape (n_edge,)
     body_acceleration: Array  # of free bodies [m/s²], shape (n_free, 3)
     body_moment: Array  # on free bodies [N m], shape (n_free, 3)
-    fluid_force: Array  # rate of the momentum of the fluid at nodes [N], shape (n_node, 3) with added mass
-    strain_rate: Array  # of elements with viscosity [1/s], gaps with damped impacts, and mechanisms [m/s, rad/s]
+    fluid_force: Array  # rate of the momentum of the fluid, as in `Fluid.momentum` [N], with added mass
+    strain_rate: Array  # of viscous elements [1/s], gaps of impacts, mechanisms [m/s, rad/s], kept directors [1/s]
     strain_acceleration: Array  # likewise [1/s²]; empty if the integrator has no history
     account: Array  # of energy; see `engine.energy_account`, shape (14,)
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
@@ -143,6 +144,31 @@ def sealed(values: Array, place: int) -> Array:
     return flat
 
 
+def director_rates(model: Model, state: State) -> Array:
+    """Return ṁ1 of raised edges [1/s], shape (n_raised, 3)."""
+    return _kept_rates(model, state)[model.raised.slot]
+
+
+def turn_directors(model: Model, state: State) -> None:
+    """Let directors of raised edges turn as the velocities of nodes and the spins of a state say.
+
+    They have velocities of their own (`forces.raised`), which a state whose velocities someone sets has to be given.
+    """
+    edge = model.raised.edge
+    first, second = (state.position[model.rods.edge_node[edge] + end] for end in (0, 1))
+    vector, director = second - first, state.director1[edge]
+    length = np.linalg.norm(vector, axis=1, keepdims=True)
+    lengthened = state.velocity[model.rods.edge_node[edge] + 1] - state.velocity[model.rods.edge_node[edge]]
+    tangent, leaning = vector / length, np.einsum("ki,ki->k", director, lengthened)[:, None] / length
+    turned = state.spin[edge, None] * cross(tangent, director)
+    _kept_rates(model, state)[model.raised.slot] = turned - leaning * tangent
+
+
+def _kept_rates(model: Model, state: State) -> Array:
+    """Return the rates of kept directors [1/s], a view of shape (n_kept, 3)."""
+    return state.strain_rate[state.strain_rate.size - 3 * model.kept_directors :].reshape(-1, 3)
+
+
 PARTS = tuple(part.name for part in fields(State))
 """Names of the parts of a state, in order."""
 OUT_OF_PLANE = 1e-9
@@ -196,12 +222,15 @@ def initial_state(
     `with_history` makes arrays for what some integrators keep from step to step, `memory` for so many values of forces;
     `fingerprint` says what the state belongs to, `conditions` is a number of all else (`model.fingerprint`).
     """
-    bodies, in_fluid, sizes = model.bodies, model.node_count if model.fluid.exists else 0, sizes_of(model)
+    bodies, sizes = model.bodies, sizes_of(model)
+    in_fluid = sizes["wet"] if model.fluid.exists else 0
     rates = start_rates(model.scene, bodies.start_velocity, bodies.start_angular_velocity)
-    strain_rate = np.concatenate([np.zeros(model.strain_count + len(model.impact_pairs)), rates])
+    strain_rate = np.zeros(sizes["strain"])
+    before_rates = model.strain_count + len(model.impact_pairs)
+    strain_rate[before_rates : before_rates + len(rates)] = rates
     channels = list(model.scene.stimuli.values())
     before = np.array([channel.schedule.value_before(0.0, LAST_STEP) for channel in channels])
-    return State(
+    state = State(
         time=np.zeros(1),
         step=np.zeros(1),
         next_step=np.zeros(1),
@@ -239,3 +268,5 @@ def initial_state(
         pose_goal=np.zeros((len(bodies.controlled), POSE_GOAL)),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),
     )
+    turn_directors(model, state)
+    return state

@@ -47,9 +47,10 @@ from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.force_list import Kind, kinds
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
-from bilayer_core.model.state import State
+from bilayer_core.model.state import State, director_rates
 from bilayer_core.model.stimulated_strains import RestStrains
 from bilayer_core.simulation.edge_space import Gradient, Motion, displacement, of_prescribed, velocity
+from bilayer_core.simulation.momentum import momentum_off_curve
 from bilayer_core.simulation.quadrature import simpson
 
 Array = np.ndarray
@@ -80,6 +81,7 @@ class _Instant:
     imposed_kinetic: float
     fluid: _Fluid | None
     velocity: Array  # of nodes [m/s], shape (n_node, 3)
+    carried: Array  # momentum of nodes that masses off the curve add [N s], shape (n_node, 3)
     rest: RestStrains
     load_factor: Array
     friction: Array
@@ -139,6 +141,8 @@ class EnergyLedger:
                 sums[name] += 0.5 * h * (start + end)
         if after.fluid is not None:
             self._imposed["fluid"] += self._work_of_fluid(before, after, imposed)
+        pushed = (after.carried - before.carried) * (before.velocity + after.velocity)
+        self._imposed["masses off the curve"] -= 0.5 * float(pushed[self._imposed_mass > 0.0].sum())
         resistance = before.law_force + 4.0 * middle.law_force + after.law_force
         self._stimulus -= float(resistance @ (after.rest.law - before.rest.law)) / 6.0
         self._last = after
@@ -212,9 +216,11 @@ class EnergyLedger:
         if not fluid.exists:
             return None
         fluid.node_velocity[:], fluid.spin[:] = state.velocity, state.spin
+        fluid.director_rate[:] = director_rates(self._model, state)
         relative = fluid_momentum(fluid, at)
-        carried = float(fluid.momentum.sum(axis=0) @ fluid.velocity)
-        return _Fluid(relative + carried, fluid.momentum.copy(), fluid.shape_gradient.copy())
+        momentum = fluid.momentum[: self._model.node_count].copy()
+        carried = float(momentum.sum(axis=0) @ fluid.velocity)
+        return _Fluid(relative + carried, momentum, fluid.shape_gradient.copy())
 
     def _evaluate_state(self, state: State, load_factor: Array) -> _Instant:
         at = self._evaluator.new()
@@ -239,6 +245,7 @@ class EnergyLedger:
             kinetic=evaluator.kinetic_energy(state),
             fluid=self._evaluate_fluid(at, state),
             velocity=state.velocity.copy(),
+            carried=momentum_off_curve(model, state),
             imposed_kinetic=0.5 * float(self._imposed_mass @ np.square(state.velocity).sum(axis=1)),
             rest=rest,
             load_factor=load_factor.copy(),

@@ -18,7 +18,7 @@ from bilayer_core.model.fingerprint import conditions_of, fingerprint_of
 from bilayer_core.model.impacts import reason_of_stiffness
 from bilayer_core.model.model import Model
 from bilayer_core.model.plan import make_plan
-from bilayer_core.model.state import State, initial_state, refuse_out_of_plane
+from bilayer_core.model.state import State, initial_state, refuse_out_of_plane, turn_directors
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import RESET, Input
 from bilayer_core.observed.observer import Observer
@@ -29,6 +29,7 @@ from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
+from bilayer_core.simulation.momentum import angular_momentum_of, momentum_of
 from bilayer_core.simulation.observation import (
     describe,
     energies,
@@ -177,6 +178,16 @@ class Simulator:
     def com(self) -> Array:
         """Mass centre of the rods [m], shape (3,)."""
         return center_of_mass(self.model, self._state)
+
+    @property
+    def momentum(self) -> Array:
+        """Momentum of rods and free bodies, without that of a fluid [N s], shape (3,)."""
+        return momentum_of(self.model, self._state)
+
+    @property
+    def angular_momentum(self) -> Array:
+        """Their angular momentum about the origin [N m s], shape (3,)."""
+        return angular_momentum_of(self.model, self._state)
 
     @property
     def stimulus(self) -> dict[str, float]:
@@ -582,8 +593,10 @@ class Simulator:
         loaded = self._initial_state()
         loaded.set_flat(snapshot)
         refuse_out_of_plane(self.model, loaded)
-        if not self._state.set_flat(snapshot) and self._state.account[OPEN] == 1.0:
-            self._state.account[OPEN] = QUESTIONED
+        if not self._state.set_flat(snapshot):
+            turn_directors(self.model, self._state)
+            if self._state.account[OPEN] == 1.0:
+                self._state.account[OPEN] = QUESTIONED
         self.compile()
         self._loop.start_over()
         self._note_start()

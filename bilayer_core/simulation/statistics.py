@@ -17,8 +17,7 @@ from bilayer_core.simulation.stepper import Stepper
 def center_of_mass(model: Model, state: State) -> np.ndarray:
     """Mass centre of the rods [m], shape (3,)."""
     moment = model.rods.node_mass @ state.position
-    if len(model.mass_moment):
-        moment += model.mass_moment @ state.director1
+    moment += model.raised.first_moment.sum(axis=1) @ state.director1[model.raised.edge]
     return moment / model.rods.node_mass.sum()
 
 

@@ -154,26 +154,21 @@ class Judge:
 
 
 class _Momentum:
-    """The momentum of a robot on which nothing but gravity acts: that of its nodes and bodies, where the model has all
-    mass.
-    """
+    """The momentum of a robot on which nothing but gravity acts."""
 
     def __init__(self, simulator: Simulator):
         self._simulator, frame = simulator, simulator.frame()
-        self._time, self._velocity = frame.time, self._mean(frame)
+        self._time, self._velocity = frame.time, self._mean()
 
-    def _mean(self, frame: Frame) -> np.ndarray:
+    def _mean(self) -> np.ndarray:
         """Velocity of the mass centre [m/s], shape (3,)."""
         model = self._simulator.model
-        nodes, bodies = model.rods.node_mass, model.free_bodies.mass
-        momentum = nodes @ frame.velocities[: model.node_count]
-        momentum = momentum + bodies @ frame.body_velocities[model.free_bodies.body_of_free]
-        return momentum / (nodes.sum() + bodies.sum())
+        return self._simulator.momentum / (model.rods.node_mass.sum() + model.free_bodies.mass.sum())
 
     def off(self, frame: Frame) -> float:
         """By how much the velocity of the mass centre is not what it must be, over what is allowed."""
         gained = np.array(self._simulator.scene.gravity) * (frame.time - self._time)
-        off = float(np.linalg.norm(self._mean(frame) - self._velocity - gained))
+        off = float(np.linalg.norm(self._mean() - self._velocity - gained))
         fastest = float(np.linalg.norm(frame.velocities, axis=1).max())
         steps = max(self._simulator.statistics.substeps, 1)
         return off / (math.sqrt(steps) * self._simulator.steps.newton_tolerance + ROUNDING * fastest)

@@ -7,6 +7,7 @@ from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import quaternion_from_matrix
+from bilayer_core.model.state import director_rates
 
 SCENES = {
     "every force, two rods": (everything, "two_rod"),
@@ -74,11 +75,16 @@ def test_wrenches_on_bodies_are_sums_over_what_touches_and_what_is_held(simulato
 
 
 def kinetic_energy(model, state):
-    """Of nodes, of edges about their tangents, and of free bodies [J]."""
+    """Of nodes, of edges about their tangents, of masses off the curve, and of free bodies [J]."""
     kinetic = (
         0.5 * model.rods.node_mass @ np.square(state.velocity).sum(axis=1)
         + 0.5 * model.rods.spin_inertia @ state.spin**2
     )
+    raised, rates = model.raised, director_rates(model, state)
+    for half in range(raised.first_moment.shape[1]):
+        velocity = state.velocity[model.rods.edge_node[raised.edge] + half]
+        kinetic += raised.first_moment[:, half] @ (velocity * rates).sum(axis=1)
+    kinetic += 0.5 * raised.second_moment @ np.square(rates).sum(axis=1)
     for slot, body in enumerate(model.free_bodies.body_of_free):
         velocity, spin, rotation = (
             of[body] for of in (state.body_velocity, state.body_angular_velocity, state.body_rotation)
@@ -93,7 +99,8 @@ def test_energies_and_rotations_seen_are_those_of_the_state(simulator):
     model, state, frame = simulator.model, simulator._state, simulator.frame()
     assert frame.energy["kinetic"] == pytest.approx(kinetic_energy(model, state), rel=1e-12)
     if model.fluid.exists:
-        of_fluid = energy_of_fluid(model, simulator._stepper.end, state.velocity, state.spin)
+        moving = state.velocity, state.spin, director_rates(model, state)
+        of_fluid = energy_of_fluid(model, simulator._stepper.end, *moving)
         assert frame.energy["fluid"] == pytest.approx(of_fluid, rel=1e-12)
     assert ("fluid" in frame.energy) == model.fluid.exists
     expected = [quaternion_from_matrix(of) for of in state.body_rotation]

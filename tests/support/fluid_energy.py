@@ -20,13 +20,17 @@ def momentum_of_fluid(model: Model, at: Configuration, velocity: Array) -> Array
     return survey_fluid(model, at, velocity, np.zeros(model.rods.edge_count))[1].momentum
 
 
-def energy_of_fluid(model: Model, at: Configuration, velocity: Array, spin: Array) -> float:
+def energy_of_fluid(
+    model: Model, at: Configuration, velocity: Array, spin: Array, director_rate: Array | float = 0.0
+) -> float:
     """Kinetic energy of the fluid relative to its flow [J]."""
-    return survey_fluid(model, at, velocity, spin)[0]
+    return survey_fluid(model, at, velocity, spin, director_rate)[0]
 
 
-def survey_fluid(model: Model, at: Configuration, velocity: Array, spin: Array) -> tuple[float, Fluid]:
+def survey_fluid(
+    model: Model, at: Configuration, velocity: Array, spin: Array, director_rate: Array | float = 0.0
+) -> tuple[float, Fluid]:
     """T [J], and the fluid with P and ∂T/∂q; see `forces.added_mass.fluid_momentum`."""
     fluid = model.fluid.allocated(sizes_of(model))
-    fluid.node_velocity[:], fluid.spin[:] = velocity, spin
+    fluid.node_velocity[:], fluid.spin[:], fluid.director_rate[:] = velocity, spin, director_rate
     return fluid_momentum(fluid, at), fluid

@@ -33,6 +33,7 @@ from bilayer_core.engine.linear.contact_columns import (
     take_rod_contacts,
 )
 from bilayer_core.engine.linear.planar_assembly import assemble_in_plane, gradient_in_plane, step_in_plane
+from bilayer_core.engine.linear.raised_blocks import assemble_raised
 from bilayer_core.engine.linear.widths import eliminate, factorise_band, go_backward, go_forward
 from bilayer_core.engine.request_modes import SLOWEST_GROWTH, WITHOUT_INERTIA
 from bilayer_core.forces.rod_contact import rods_touch
@@ -64,6 +65,8 @@ def assemble(p, at, factor, simplified):
         assemble_in_space(p, factor)
     else:
         assemble_in_plane(p, at, factor)
+    if p.raised.exists:
+        assemble_raised(p, at, factor)
     if p.surfaces.exists and p.sums.arms[0] > 0:
         assemble_arms(p)
     if p.rod_contact.exists:

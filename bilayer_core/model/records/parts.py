@@ -188,11 +188,25 @@ class Mechanisms:
 
 
 @record
+class Raised:
+    """Edges with something that acts off the curve, at x + z m1 of a half edge; see `forces.raised`."""
+
+    first: int  # component of kept directors among strains
+    slot: Indices  # of each director among those that states keep, three strains each, shape (n_raised,)
+    edge: Indices  # likewise
+    first_moment: Matrix  # mass × z of the halves at the first and at the second node [kg m], shape (n_raised, 2)
+    second_moment: Vector  # mass × z² of both halves [kg m²], shape (n_raised,)
+    middle: Vector  # z of the middle of the section, where a fluid acts [m], shape (n_raised,)
+
+
+@record
 class Flow:
     """Drag; see `forces.drag`."""
 
     velocity: Vector  # of the fluid [m/s], shape (3,)
     node: Indices  # that carries a share of its station's drag, shape (n_drag,)
+    raised: Indices  # edge of `Raised` at whose half the share acts, −1 at the node itself, shape (n_drag,)
+    half: Indices  # which half of it
     edge_before: Indices  # likewise, the same as the one after at an end
     edge_after: Indices
     coefficient: Matrix  # ρ_f A C along t, m1, m2 [kg/m], shape (n_drag, 3)
@@ -206,11 +220,15 @@ class Fluid:
     velocity: Vector  # U [m/s], shape (3,)
     edge_node: Indices  # first node of each edge, shape (n_edge,)
     mass: Matrix  # m₁ l̄ and m₂ l̄ [kg] and j l̄ [kg m²] of each edge, shape (n_edge, 3)
+    raised: Indices  # number of each edge in `Raised`, −1 of the others, shape (n_edge,)
+    middle: Vector  # z of the middle of the section [m], shape (n_raised,)
+    slot: Indices  # as in `Raised`
+    director_rate: Matrix = ("raised", 3)  # ṁ1 at which `fluid_momentum` finds what follows [1/s]
     direction1: Matrix = ("edge+clamp", 3)  # m1 of edges and clamp edges at z
     direction2: Matrix = ("edge+clamp", 3)
     node_velocity: Matrix = ("node", 3)  # at which `fluid_momentum` finds the two that follow [m/s]
     spin: Vector = ("edge",)  # likewise [rad/s]
-    momentum: Matrix = ("node", 3)  # P of nodes [N s]
+    momentum: Matrix = ("wet", 3)  # P of nodes [N s], then that of kept directors, z P of their edges [N m s]
     shape_gradient: Matrix = ("edge", 4)  # ∂T/∂(ε, θ) of edges [N, N m]
     inertia: Stack = ("node", 3, 3)  # m + ∂P/∂v of nodes [kg]
     joined: IndexTable  # nodes that closed rods have twice, each with its copy, shape (n_joined, 2)
@@ -229,8 +247,12 @@ class PointForces:
     body_vector: Matrix
     on_nodes: Matrix = ("loaded node", 3)  # the present ones
     on_bodies: Matrix = ("loaded body", 3)
-    edge_before: Indices  # of each loaded node, the same as the one after at an end
+    edge_before: Indices  # of each loaded node; at an end the last edge, and after it the one beside that
     edge_after: Indices
+    part: Matrix  # of both in the directions at the node, shape (n_on_node, 2)
+    lever: Indices  # which of the forces on nodes act off the curve, once for each half edge, shape (n_lever,)
+    lever_raised: Indices  # the edge of the half in `Raised`, likewise
+    lever_height: Vector  # height over the curve times the part of the force at this half [m], likewise
 
 
 @record

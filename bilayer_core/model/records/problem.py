@@ -19,6 +19,7 @@ from bilayer_core.model.records.parts import (
     OffAxis,
     Plane,
     PointForces,
+    Raised,
     Space,
     Strands,
     Viscosity,
@@ -33,7 +34,7 @@ class Sums:
     supplied: Vector = ("force",)  # power of each that supplies energy [W]
     lost: Vector = ("force",)  # and of each that takes some
     selected: Flags = ("force",)  # whether a force is computed, in that order; in steps all are
-    gradients: Vector  # node, edge, pair, body, contact_point and contact in one piece, for clearing
+    gradients: Vector  # node, edge, pair, body, contact_point, contact and pull in one piece, for clearing
     lasting: Vector  # the part of it that stays as it is when other parts follow the configuration
     node: Matrix = ("node", 3)  # ∂/∂x of nodes [N]
     edge: Matrix = ("edge+clamp", 4)  # ∂/∂(e, θ) of edges and clamp edges
@@ -41,6 +42,7 @@ class Sums:
     body: Matrix = ("free", 6)  # ∂/∂(X, φ) of free bodies
     contact_point: Matrix = ("contact_point", 3)  # ∂/∂x of contact points by contact alone [N]; nodes take theirs
     contact: Matrix = ("body+world", 6)  # ∂/∂(X, φ) of all bodies by contact and joints alone; free ones take theirs
+    pull: Matrix = ("raised", 3)  # ∂/∂m1 of raised edges, as of a vector; edges take theirs [J]
     gradient: Vector = ("unknown",)  # of the unknowns, zero where nodes are held
     attached: Matrix = ("attached", 3)  # of held nodes before that
     hessians: Vector  # all second derivatives but those of arms and links in one piece
@@ -49,6 +51,7 @@ class Sums:
     pair_hessian: Stack = ("pair in space", 3, 3)
     node_hessian: Stack = ("node with hessian", 3, 3)
     body_hessian: Matrix = ("body unknown", "body unknown")
+    raised_hessian: Stack = ("wet half", 3, 3)  # ∂²/∂y² of the halves of raised edges by drag and added mass [N/m]
     arms: Indices = (1,)  # number of contacts with an arm from a node; see `forces.rod_arms`
     stencil: Indices = (11,)  # scratch
     arm_node: Indices = ("arm",)
@@ -141,6 +144,7 @@ class Problem:
     plane: Plane
     off_axis: OffAxis
     bonds: Bonds
+    raised: Raised
     bodies: Bodies
     border: Border
     bordered: BorderedSystem

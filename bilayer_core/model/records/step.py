@@ -55,7 +55,8 @@ class Stage:
         3,
         3,
     )  # likewise; R̄ is no rotation: (R − R̄)/(γ h) is dR/dt
-    origin_fluid_momentum: Matrix = ("wet", 3)  # P̄ of the fluid at nodes [N s]; none without added mass
+    origin_fluid_momentum: Matrix = ("wet", 3)  # P̄ of the fluid as in `Fluid.momentum` [N s]; none without added mass
+    predicted_director: Matrix = ("raised", 3)  # of raised edges, as a vector that inertia takes along
     predicted_position: Matrix = ("node", 3)  # x̃ of nodes [m]
     predicted_angle: Vector = ("edge",)  # of edges that inertia prefers, counted from the start of the stage [rad]
     predicted_body_position: Matrix = ("free", 3)  # X̃ of free bodies [m]
@@ -95,8 +96,8 @@ class Point:
     spin: Vector = ("edge",)  # of edges [rad/s]
     body_velocity: Matrix = ("free", 3)  # of free bodies [m/s]
     angular_momentum: Matrix = ("free", 3)  # of free bodies about their mass centres [N m s]
-    fluid_momentum: Matrix = ("wet", 3)  # of the fluid at nodes [N s]
-    strain: Vector = ("strain",)  # of all elements with viscosity, and gaps of damped impacts [m]
+    fluid_momentum: Matrix = ("wet", 3)  # of the fluid as in `Fluid.momentum` [N s]
+    strain: Vector = ("strain",)  # of elements with viscosity, gaps of damped impacts, mechanisms, raised directors
     strain_rate: Vector = ("strain",)  # [1/s]
     rotation: Stack = ("body", 3, 3)  # of all bodies
 
@@ -136,7 +137,6 @@ class StageInputs:
 class RunExtrema:
     """Extrema over a run; see `simulation.statistics`."""
 
-    mass_moment: Vector  # of edges along m1 [kg m], shape (n_edge,) or (0,)
     mass: float  # of all rods [kg]
     voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
     figures: Vector = (5,)  # highest mass centre, smallest gap [m], largest contact force [N], curvature [1/m], strain
