@@ -28,6 +28,7 @@ from bilayer_core.verification.validate import (
     reactions,
     rings,
     torsion,
+    unlike,
     viscosity,
 )
 from bilayer_core.verification.validate.validation_case import Case, Result
@@ -40,6 +41,7 @@ FAMILIES = (
     joints,
     torsion,
     laminate,
+    unlike,
     beams,
     plane,
     loads,
