@@ -18,6 +18,7 @@ WIDTH = 100
 ERROR_OF_A_RUN = (
     "the tolerance bounds the error per step; that of a run is larger: `bilayer run --error-estimate` tells it"
 )
+SETTLES = "at the static equilibrium under gravity, stimuli and loads, which a run looks for first"
 
 
 @click.command(cls=Verb)
@@ -69,6 +70,7 @@ def _report(simulator) -> dict[str, Any]:
         "tolerance": simulator.tolerance,
         "max_step": None if simulator.tolerance is None else simulator.steps.longest,
         "duration": scene.duration,
+        "start": scene.start,
         "terms": plan.terms,
         "contact_pairs": list(plan.contact_pairs),
         "outputs": [
@@ -77,7 +79,7 @@ def _report(simulator) -> dict[str, Any]:
         ],
         "log": {"bytes_per_second": round(size.per_second), "bytes": round(size.total)},
         "within_validity": list(told(figure for figure in figures if not figure.outside)),
-        "warnings": [*plan.warnings, *told(impact_warnings(model))],
+        "warnings": [*plan.warnings, *told(impact_warnings(model)), *simulator.start_warnings],
     }
 
 
@@ -186,6 +188,8 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         yield from _block(name, [choice])
     yield from _block("size", [f"{report['nodes']} nodes, {report['dof']} unknowns"])
     yield from _block("time", [_time(report)])
+    if report["start"] == "settle":
+        yield from _block("start", [SETTLES])
     if report["tolerance"] is not None:
         yield from _block("accuracy", [ERROR_OF_A_RUN])
     yield from _forces(report["terms"])

@@ -56,6 +56,7 @@ RATE_ROUNDING = 1e-9
 @click.option("--tf", is_flag=True, help="Have frames of bodies and ends of rods on /tf in the log.")
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
 @click.option("--summary", metavar="FILE.json|-", help="Write all figures of the run; - is standard output.")
+@click.option("--settle", is_flag=True, help="Start at the static equilibrium: `--set start=settle`.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
 @click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
 @click.option("--at", type=Duration(from_zero=True), metavar="T", help="Of the log of --from-state, its state at T.")
@@ -70,6 +71,10 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     changes = [*overrides, *(f"solver.{key}={options[key]}" for key in SOLVER_OPTIONS if options[key] is not None)]
     if options["dt"] is not None and options["tolerance"] is None:
         changes.append("solver.tolerance=null")  # fixed steps, whatever the scene says
+    if options["settle"]:
+        if options["from_state"] is not None:
+            raise InputError("--settle: has no meaning with --from-state, which has the shape to start with")
+        changes.append("start=settle")
     config = load_scene(scene, changes)
     interrupt = Interrupt()
     observers = _open_outputs(config, options)

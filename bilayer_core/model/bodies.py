@@ -19,17 +19,10 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
     motions = np.eye(6) if plane is None else plane.motions
     free = [index for index, body in enumerate(scene.bodies) if not isinstance(body.motion, Prescribed)]
     count = len(scene.bodies)
-    velocity, angular_velocity = np.zeros((count, 3)), np.zeros((count, 3))
     allowed = []
     for slot, index in enumerate(free):
         motion = scene.bodies[index].motion
-        if isinstance(motion, Free):
-            velocity[index], angular_velocity[index] = motion.velocity, motion.angular_velocity
-            own = motions
-        else:
-            velocity[index] = motion.speed * np.array(motion.axis or (0.0, 0.0, 0.0))
-            angular_velocity[index] = motion.angular_speed * np.array(motion.hinge or (0.0, 0.0, 0.0))
-            own = guided_motions(motion, motions)
+        own = motions if isinstance(motion, Free) else guided_motions(motion, motions)
         columns = np.zeros((6 * len(free), own.shape[1]))
         columns[6 * slot : 6 * slot + 6] = own
         allowed.append(columns)
@@ -45,8 +38,6 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
         names=tuple(body.name for body in scene.bodies),
         start_position=np.array([body.position for body in scene.bodies], dtype=float).reshape(count, 3),
         start_rotation=np.array([rotation_matrix(np.array(b.rotation)) for b in scene.bodies]).reshape(count, 3, 3),
-        start_velocity=velocity,
-        start_angular_velocity=angular_velocity,
         shapes=shapes,
         controlled=np.array([i for i, motion in enumerate(schedules) if motion.controlled], dtype=np.int64),
         times=tuple(np.array(motion.times, dtype=float) for motion in schedules),

@@ -9,7 +9,7 @@ import numpy as np
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.bodies import build_bodies
-from bilayer_core.model.contact_points import build_contact, refuse_penetration
+from bilayer_core.model.contact_points import build_contact
 from bilayer_core.model.force_list import active_forces
 from bilayer_core.model.immersed import build_fluid
 from bilayer_core.model.impacts import stiffness_for_impacts
@@ -31,9 +31,9 @@ from bilayer_core.model.records.parts import (
     Strands,
     Viscosity,
 )
-from bilayer_core.model.rod_penetration import refuse_meeting_rods
 from bilayer_core.model.rod_surfaces import build_rod_surfaces
 from bilayer_core.model.rods import add_bonded_rods
+from bilayer_core.model.start_gaps import refuse_meeting_rods, refuse_penetration
 from bilayer_core.model.strands import Collected
 from bilayer_core.model.unknown_order import Layout, columns, number_unknowns
 from bilayer_core.scene.config import SceneConfig

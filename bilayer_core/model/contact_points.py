@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.errors import PenetrationError
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
 from bilayer_core.model.model import Model, PlacedBodies
@@ -270,30 +269,3 @@ def start_contact_points(model: Model) -> np.ndarray:
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[body]
     of_bodies = base + np.einsum("kij,kj->ki", rotation, model.surfaces.point_position)
     return np.concatenate([model.start_position, of_bodies, model.rod_point_start])
-
-
-def refuse_penetration(model: Model) -> None:
-    """Raise PenetrationError if a contact point starts behind a surface that it meets, or touching it."""
-    surfaces, bodies = model.surfaces, model.bodies
-    position, faults = start_contact_points(model), []
-    base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[surfaces.body]
-    rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[surfaces.body]
-    for s, name in enumerate(model.surface_names):
-        core = Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, rotation[s] @ surfaces.rotation[s])
-        origin = base[s] + rotation[s] @ surfaces.position[s]
-        gap = signed_distance(core, position - origin) - surfaces.rounding[s] - surfaces.radius
-        behind = np.flatnonzero((gap <= 0.0) & surfaces.can_collide[s][surfaces.group])
-        faults += [(gap[i], i, name) for i in behind]
-    if faults:
-        depth, contact_point, surface = min(faults)
-        names = contact_point_names(model)
-        surface = f"body {surface}" if surface in bodies.names else surface
-        raise PenetrationError(
-            f"{model.scene.name}: the scene starts in penetration: {names[contact_point]} at "
-            f"({', '.join(f'{1e3 * c:.3f}' for c in position[contact_point])}) mm is {abs(1e3 * depth):.4g} mm behind "
-            f"the surface of {surface}{f', and {len(faults) - 1} more' if len(faults) > 1 else ''}; "
-            "all gaps must be positive at the start"
-        )
-
-
-_KIND = {number: kind for kind, number in NUMBER.items()}

@@ -72,8 +72,8 @@ def conditions_of(scene: SceneConfig) -> int:
 
     It differs wherever a state's energy may differ.
     """
-    texts_and_steps = {"name", "title", "description", "duration", "solver", "output"}
-    return _number({name: part for name, part in _content(scene).items() if name not in texts_and_steps})
+    others = {"name", "title", "description", "duration", "solver", "output", "start", "velocity", "angular_velocity"}
+    return _number({name: part for name, part in _content(scene).items() if name not in others})
 
 
 def _content(scene: SceneConfig) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from bilayer_core.contact.barrier import barrier
 from bilayer_core.contact.shapes import PLANE
 from bilayer_core.model.findings import Finding
 from bilayer_core.model.model import Model
+from bilayer_core.model.state import initial_state
 
 Array = np.ndarray
 HELD = 0.1
@@ -87,7 +88,7 @@ def reason_of_stiffness(model: Model) -> dict[str, str]:
 
 def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
     """Name, mass [kg], length of contact [m] and speed towards the nearest plane of free bodies and rods [m/s]."""
-    bodies, free, points = model.bodies, model.free_bodies, model.surfaces
+    bodies, free, points, start = model.bodies, model.free_bodies, model.surfaces, initial_state(model)
     if not model.has_surface_contact:
         return
     for slot, body in enumerate(free.body_of_free):
@@ -97,13 +98,14 @@ def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
                 bodies.start_position[body]
                 + points.point_position[own - model.node_count] @ bodies.start_rotation[body].T
             )
-            speed = _speed(model, positions, points.radius[own], bodies.start_velocity[body])
+            speed = _speed(model, positions, points.radius[own], start.body_velocity[body])
             yield f"body {bodies.names[body]!r}", float(free.mass[slot]), float(points.weight[own].max()), speed
     for strand in model.strands:
         nodes = strand.first_node + np.arange(strand.node_count)
         if not np.isin(nodes, model.constrained.node).any():
-            speed = _speed(model, model.start_position[nodes], points.radius[nodes], np.zeros(3))
             mass, length = model.rods.node_mass[nodes].sum(), model.node_length[nodes].sum()
+            velocity = model.rods.node_mass[nodes] @ start.velocity[nodes] / mass
+            speed = _speed(model, model.start_position[nodes], points.radius[nodes], velocity)
             yield f"rod {strand.name!r}", float(mass), float(length), speed
 
 

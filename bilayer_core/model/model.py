@@ -44,8 +44,6 @@ class PlacedBodies(ReadOnlyArrays):
     names: tuple[str, ...]
     start_position: Array  # [m], shape (n_body, 3)
     start_rotation: Array  # shape (n_body, 3, 3)
-    start_velocity: Array  # [m/s], shape (n_body, 3)
-    start_angular_velocity: Array  # [rad/s], shape (n_body, 3)
     shapes: tuple[Shape | None, ...]  # surface of each body
     controlled: Array  # prescribed bodies that controllers may move, shape (n_controlled,)
     times: tuple[Array, ...]  # keyframes of each prescribed body [s]

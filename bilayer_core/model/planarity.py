@@ -21,7 +21,7 @@ from bilayer_core.scene.body import Body, Free, Guided, Prescribed
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.joint import TURNS
 from bilayer_core.scene.profile import extremes
-from bilayer_core.scene.rod import RodCopy
+from bilayer_core.scene.rod import Rod, RodCopy
 
 Array = np.ndarray
 ROUNDING = 1e-9
@@ -144,6 +144,9 @@ class _Survey:
                 yield f"stimuli.{name}.light.from"
         if scene.fluid is not None and not self._lies_in(scene.fluid.velocity):
             yield "fluid.velocity"
+        yield from self._velocities("", scene)
+        for rod in scene.rods:
+            yield from self._velocities(f"rods.{rod.name}.", rod)
         for body in scene.bodies:
             yield from (f"bodies.{body.name}.{key}" for key in self._motions(body))
         for joint in scene.joints:
@@ -195,11 +198,15 @@ class _Survey:
         else:
             if not self._is_on(body.position):
                 yield "position"
-            if not self._lies_in(motion.velocity):
-                yield "motion.velocity"
-            if not self._along_normal(motion.angular_velocity):
-                yield "motion.angular_velocity"
+            yield from self._velocities("motion.", motion)
             yield from self._inertia(body)
+
+    def _velocities(self, where: str, part: SceneConfig | Rod | Free) -> Iterator[str]:
+        """Yield the keys of a part's motion at the start that leave the plane."""
+        if part.velocity is not None and not self._lies_in(part.velocity):
+            yield f"{where}velocity"
+        if part.angular_velocity is not None and not self._along_normal(part.angular_velocity):
+            yield f"{where}angular_velocity"
 
     def _inertia(self, body: Body) -> Iterator[str]:
         """Yield the key of the inertia of a body that turns, if it would turn it out of the plane."""

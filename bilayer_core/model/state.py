@@ -10,12 +10,12 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.fingerprint import FREE, difference
-from bilayer_core.model.free_motions import start_rates
 from bilayer_core.model.lit_elements import light_of, part_seen
 from bilayer_core.model.model import Model
 from bilayer_core.model.override import no_overrides
 from bilayer_core.model.set_friction import none_given
 from bilayer_core.model.sizes import sizes_of
+from bilayer_core.model.start_motion import set_in_motion
 
 Array = np.ndarray
 POSE_GOAL = 26
@@ -216,7 +216,7 @@ def initial_state(
     memory: int = 0,
     conditions: float = 0.0,
 ) -> State:
-    """State at time 0: the scene's shape, at rest but for the velocities that it gives to free bodies.
+    """State at time 0: the scene's shape, with the velocities of `model.start_motion`.
 
     Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
     `with_history` makes arrays for what some integrators keep from step to step, `memory` for so many values of forces;
@@ -224,10 +224,7 @@ def initial_state(
     """
     bodies, sizes = model.bodies, sizes_of(model)
     in_fluid = sizes["wet"] if model.fluid.exists else 0
-    rates = start_rates(model.scene, bodies.start_velocity, bodies.start_angular_velocity)
     strain_rate = np.zeros(sizes["strain"])
-    before_rates = model.strain_count + len(model.impact_pairs)
-    strain_rate[before_rates : before_rates + len(rates)] = rates
     channels = list(model.scene.stimuli.values())
     before = np.array([channel.schedule.value_before(0.0, LAST_STEP) for channel in channels])
     state = State(
@@ -245,8 +242,8 @@ def initial_state(
         body_position=bodies.start_position.copy(),
         body_position_low=np.zeros_like(bodies.start_position),
         body_rotation=bodies.start_rotation.copy(),
-        body_velocity=bodies.start_velocity.copy(),
-        body_angular_velocity=bodies.start_angular_velocity.copy(),
+        body_velocity=np.zeros_like(bodies.start_position),
+        body_angular_velocity=np.zeros_like(bodies.start_position),
         memory=np.zeros(memory),
         has_history=np.zeros(int(with_history)),
         touched=np.full(with_history * (sizes["node"] + sizes["point"]), NOT_KNOWN),
@@ -268,5 +265,6 @@ def initial_state(
         pose_goal=np.zeros((len(bodies.controlled), POSE_GOAL)),
         fingerprint=np.zeros(0) if fingerprint is None else fingerprint.copy(),
     )
+    set_in_motion(model, state)
     turn_directors(model, state)
     return state

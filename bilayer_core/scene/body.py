@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from bilayer_core.scene.faults import ROUNDING, Fault, refuse_all
 from bilayer_core.scene.mechanism import Sliding, Turning, resistance
-from bilayer_core.scene.part import Direction, Name, Part, Point
+from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Point, Velocity
 from bilayer_core.scene.schedule import faults_of_times
 from bilayer_core.scene.shape import RotationVector, Surface
 from bilayer_core.scene.units import (
@@ -39,10 +39,11 @@ class Free(Part):
     a junction those of the half edges that it holds, about their ends."""
     shell: bool = False
     """Whether a ball is hollow: moment of inertia 2/3 m r² instead of 2/5 m r²."""
-    velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
-    """At the start."""
-    angular_velocity: tuple[AngularSpeed, AngularSpeed, AngularSpeed] = (0.0, 0.0, 0.0)
-    """At the start, about the axes of the world."""
+    velocity: Velocity | None = None
+    """At the start. Rods and bodies that hang on the body move with it; a body without `velocity` and
+    `angular_velocity` moves with what it hangs on, and otherwise rests."""
+    angular_velocity: AngularVelocity | None = None
+    """At the start, about the axes of the world, likewise."""
 
     @property
     def turns(self) -> bool:

@@ -13,7 +13,7 @@ from bilayer_core.scene.channel_range import value_in_range
 from bilayer_core.scene.faults import Fault, refuse, refuse_all
 from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
-from bilayer_core.scene.part import Direction, Name, Part
+from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velocity
 from bilayer_core.scene.rod import Rod
 from bilayer_core.scene.schedule import Schedule
 from bilayer_core.scene.shape import Obstacle
@@ -30,7 +30,6 @@ from bilayer_core.scene.units import (
     PositiveRate,
     PositiveSpeed,
     PositiveTime,
-    Speed,
     real,
     whole,
 )
@@ -172,7 +171,7 @@ class Fluid(Part):
 
     density: PositiveDensity = 1000.0
     """Mass per volume of the fluid. There is no buoyancy: take it off `gravity`."""
-    velocity: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)
+    velocity: Velocity = (0.0, 0.0, 0.0)
     """Of a uniform flow."""
     drag_along: NonNegativeNumber
     """Coefficient for motion along the tangent, with the width as area per length."""
@@ -277,6 +276,14 @@ class SceneConfig(Part):
     """Must be given where there is something to touch."""
     fluid: Fluid | None = None
     """Around the rods; none by default."""
+    start: Literal["placed", "settle"] = "placed"
+    """Shape at the start: `placed` as the paths say, `settle` at the static equilibrium under gravity and what stimuli
+    and loads are before time 0, where the robot rests on what is below it."""
+    velocity: Velocity | None = None
+    """Of the robot at the start: of all rods, and of the bodies that they hang on and that have no motion of their
+    own."""
+    angular_velocity: AngularVelocity | None = None
+    """Likewise, about the mass centre of these and the axes of the world."""
     damping: Damping = Damping()
     """None by default."""
     coupling: Coupling = Coupling()

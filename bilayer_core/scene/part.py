@@ -13,8 +13,10 @@ from bilayer_core.names import LONGEST_NAME, NAME
 from bilayer_core.printable import shortened
 from bilayer_core.scene.faults import refuse
 from bilayer_core.scene.units import (
+    AngularSpeed,
     Length,
     Number,
+    Speed,
 )
 
 Derived = TypeVar("Derived")
@@ -37,6 +39,8 @@ def unit_vector(vector: tuple[float, float, float]) -> tuple[float, float, float
 Name = Annotated[str, Field(max_length=LONGEST_NAME, pattern=f"^{NAME}$")]
 """See `bilayer_core.names`."""
 Point = tuple[Length, Length, Length]
+Velocity = tuple[Speed, Speed, Speed]
+AngularVelocity = tuple[AngularSpeed, AngularSpeed, AngularSpeed]
 Direction = Annotated[tuple[Number, Number, Number], AfterValidator(unit_vector)]
 """Unit vector; a file may give any length."""
 

@@ -15,7 +15,7 @@ from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, refuse_all, repeated
 from bilayer_core.scene.imperfection import Imperfection
 from bilayer_core.scene.limits import MOST_NODES
-from bilayer_core.scene.part import Direction, Name, Part
+from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velocity
 from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
 from bilayer_core.scene.pattern import Patterns, Placement, pair_at_one_place, placed, stacked
 from bilayer_core.scene.point_paths import PolylinePath, SplinePath
@@ -106,6 +106,10 @@ class Rod(Part):
     """Body that holds the start, position and direction; free by default."""
     clamp_end: Name | None = None
     """Body that holds the end."""
+    velocity: Velocity | None = None
+    """At the start, of a rod that nothing holds; others move as what holds them, or as the scene says."""
+    angular_velocity: AngularVelocity | None = None
+    """Likewise, about the rod's mass centre."""
 
     @property
     def edge_length(self) -> float:
@@ -259,6 +263,10 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         )
         faults.append((("layers",), [layer.interval for layer in rod.layers], demand))
     faults += _faults_of_copies(rod) if rod.pattern is not None else ()
+    for key in ("velocity", "angular_velocity"):
+        if getattr(rod, key) is not None and any(variant.clamp_start or variant.clamp_end for variant in rod.variants):
+            demand = "must be left out: a rod moves as the body that holds it, which may have it"
+            faults.append(((key,), getattr(rod, key), demand))
     return faults
 
 

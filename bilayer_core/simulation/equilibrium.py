@@ -68,7 +68,11 @@ class StaticReport:
 
 
 def solve_static(
-    stepper: Stepper, state: State, tolerance: float | None = None, in_space: Callable[[], Stepper] | None = None
+    stepper: Stepper,
+    state: State,
+    tolerance: float | None = None,
+    in_space: Callable[[], Stepper] | None = None,
+    ended: float = 0.0,
 ) -> StaticReport:
     """Bring a state to rest in an equilibrium under its present stimuli and loads; its time stays.
 
@@ -84,6 +88,9 @@ def solve_static(
         Displacement that counts as rest [m]; default: `RELATIVE_TOLERANCE` of the longest rod.
     in_space : callable, optional
         Makes the stepper of the same scene in dimension 3, for stability, where `stepper` is one of dimension 2.
+    ended : float
+        Length of a step that ended now [s]: where schedules jump, their values from before act; by default those from
+        now on.
 
     Raises
     ------
@@ -94,7 +101,7 @@ def solve_static(
         raise InputError(f"tolerance: {tolerance} is not allowed; it must be a positive number of metres")
     with ExitStack() as undo:
         undo.callback(state.take, state.copy())
-        report = _Search(stepper, state, tolerance, in_space).run()
+        report = _Search(stepper, state, tolerance, in_space, ended).run()
         undo.pop_all()
     return report
 
@@ -102,8 +109,15 @@ def solve_static(
 class _Search:
     """Rounds of the compiled step's modes for statics, and what to make of them."""
 
-    def __init__(self, stepper: Stepper, state: State, tolerance: float | None, in_space: Callable[[], Stepper] | None):
-        model = stepper.model
+    def __init__(
+        self,
+        stepper: Stepper,
+        state: State,
+        tolerance: float | None,
+        in_space: Callable[[], Stepper] | None,
+        ended: float,
+    ):
+        model, self.ended = stepper.model, ended
         self.stepper, self.state, self.in_space = stepper, state, in_space
         self.time = float(state.time[0])
         self.size = max(rod.path.length for rod in model.scene.rods)
@@ -128,12 +142,12 @@ class _Search:
         """Have the rest strains and the loads of now, and the light on the present shape, in a stepper."""
         state, model = self.state, self.stepper.model
         if len(state.transduction):
-            settled = self.stepper.surroundings.stimulus_at(state, self.time)[model.drives.law_channel]
+            settled = self.stepper.surroundings.stimulus_at(state, self.time, self.ended)[model.drives.law_channel]
             if self.light.exists:
                 place = state.position, state.director1, state.body_position, state.body_rotation
                 settled = settled * part_seen(self.light, *place)
             state.transduction[:] = settled
-        stepper.engine.set_drive(state, self.stepper.surroundings.load_factor(self.state))
+        stepper.engine.set_drive(state, self.stepper.surroundings.load_factor(self.state, self.ended))
 
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine

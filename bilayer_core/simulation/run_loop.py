@@ -85,6 +85,8 @@ class RunLoop:
         Inputs that act during a run, and who is told of them.
     plane_watch : PlaneWatch, optional
         Looks out of the plane of a model of dimension 2 now and then.
+    prepare : callable
+        Makes the state what the scene starts with, once there are kernels.
 
     Attributes
     ----------
@@ -97,8 +99,16 @@ class RunLoop:
         Of observers that look whoever makes steps.
     """
 
-    def __init__(self, stepper: Stepper, state: State, controls: Controls, plane_watch: PlaneWatch | None) -> None:
+    def __init__(
+        self,
+        stepper: Stepper,
+        state: State,
+        controls: Controls,
+        plane_watch: PlaneWatch | None,
+        prepare: Callable[[], None],
+    ) -> None:
         self._stepper, self._state, self._controls, self._plane_watch = stepper, state, controls, plane_watch
+        self._prepare = prepare
         self._compile_time: float | None = None
         self.attached: list[Schedule] = []
         self.start_over()
@@ -128,6 +138,7 @@ class RunLoop:
         if self._compile_time is None:
             ensure_compiled(needed=partial(needed_pieces, self._stepper.model))
             begin = clock.thread_time()
+            self._prepare()
             self._compile_time = 0.0
             self.take_state()
             self._compile_time = clock.thread_time() - begin

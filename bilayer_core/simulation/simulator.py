@@ -14,10 +14,12 @@ from bilayer_core.errors import InputError
 from bilayer_core.forces.force_register import memory_size
 from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.model.build_model import build_model
+from bilayer_core.model.findings import told
 from bilayer_core.model.fingerprint import conditions_of, fingerprint_of
 from bilayer_core.model.impacts import reason_of_stiffness
 from bilayer_core.model.model import Model
 from bilayer_core.model.plan import make_plan
+from bilayer_core.model.start_barrier import start_warnings
 from bilayer_core.model.state import State, initial_state, refuse_out_of_plane, turn_directors
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import RESET, Input
@@ -41,6 +43,7 @@ from bilayer_core.simulation.poses import LEAST_TIME
 from bilayer_core.simulation.run_loop import Callbacks, RunLoop
 from bilayer_core.simulation.run_result import RunResult
 from bilayer_core.simulation.same_model import differing
+from bilayer_core.simulation.settling import SETTLE, settle, unstable_start
 from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
 from bilayer_core.simulation.step_choice import choose_steps
 from bilayer_core.simulation.stepper import Stepper, StepReport
@@ -83,6 +86,8 @@ class Simulator:
     tolerance : float or None
         Of adaptive steps.
     keeps_budget : bool
+    settled : StaticReport or None
+        How a scene that settles first found its equilibrium, once kernels are compiled.
 
     Raises
     ------
@@ -118,11 +123,12 @@ class Simulator:
         self._stepper = self._stepper_of(self.model)
         self.keeps_budget = budget
         self._stepper.ledger = EnergyLedger(self.model) if budget else None
-        self._state = self._initial_state()
+        self._state, self.settled = self._initial_state(), None
         self.plane_watch = PlaneWatch(self._in_dimension, scene.duration) if self.plan.dimension == 2 else None
         self._controls = Controls(self._stepper, self._state)
-        self._loop = RunLoop(self._stepper, self._state, self._controls, self.plane_watch)
-        self._present = Present(self._stepper, self._state, self._loop.compile)
+        self._unsettled = scene.start == SETTLE
+        self._loop = RunLoop(self._stepper, self._state, self._controls, self.plane_watch, self._settle)
+        self._present = Present(self._stepper, lambda: self._now, self._loop.compile)
         self._note_start()
 
     def __repr__(self) -> str:
@@ -145,7 +151,33 @@ class Simulator:
         return initial_state(self.model, self._keeps_history, *marks)
 
     def _note_start(self) -> None:
-        self.start_time, self.start_com, self.start_bodies = self.time, self.com, self._state.body_position.copy()
+        com = center_of_mass(self.model, self._state)
+        self.start_time, self.start_com, self.start_bodies = self.time, com, self._state.body_position.copy()
+
+    @property
+    def _now(self) -> State:
+        """The state; a scene that settles has its first one when kernels are compiled."""
+        if self._unsettled:
+            self.compile()
+        return self._state
+
+    def _settle(self) -> None:
+        """Go to the equilibrium with which a scene starts that settles, and begin to count there."""
+        if self._unsettled:
+            self.settled = settle(self._stepper, self._state, self._in_space)
+            self._unsettled = False
+            self._loop.start_over()
+            self._note_start()
+
+    @property
+    def _in_space(self) -> Callable[[], Stepper] | None:
+        """A function that makes a stepper of the same scene in dimension 3, if this is one of dimension 2."""
+        return (lambda: self._in_dimension(3)) if self.plan.dimension == 2 else None
+
+    @property
+    def start_warnings(self) -> tuple[str, ...]:
+        """Warnings of what the start does to the run, a line for each kind."""
+        return (*told(start_warnings(self.model)), *unstable_start(self.settled))
 
     @property
     def reasons(self) -> dict[str, str]:
@@ -162,12 +194,12 @@ class Simulator:
     @property
     def positions(self) -> Array:
         """Positions of nodes, layer by layer, then of contact points of bodies [m], shape (nodes, 3)."""
-        return positions_with_points(self.model, self._state)
+        return positions_with_points(self.model, self._now)
 
     @property
     def velocities(self) -> Array:
         """Their velocities [m/s], shape (nodes, 3)."""
-        return velocities_with_points(self.model, self._state)
+        return velocities_with_points(self.model, self._now)
 
     @property
     def contact_forces(self) -> Array:
@@ -177,17 +209,17 @@ class Simulator:
     @property
     def com(self) -> Array:
         """Mass centre of the rods [m], shape (3,)."""
-        return center_of_mass(self.model, self._state)
+        return center_of_mass(self.model, self._now)
 
     @property
     def momentum(self) -> Array:
         """Momentum of rods and free bodies, without that of a fluid [N s], shape (3,)."""
-        return momentum_of(self.model, self._state)
+        return momentum_of(self.model, self._now)
 
     @property
     def angular_momentum(self) -> Array:
         """Their angular momentum about the origin [N m s], shape (3,)."""
-        return angular_momentum_of(self.model, self._state)
+        return angular_momentum_of(self.model, self._now)
 
     @property
     def stimulus(self) -> dict[str, float]:
@@ -554,10 +586,9 @@ class Simulator:
             If none is found; nothing is changed then.
         """
         self.compile()
-        in_space = (lambda: self._in_dimension(3)) if self.plan.dimension == 2 else None
         with self._loop.timed():
             try:
-                return solve_static(self._stepper, self._state, tolerance, in_space)
+                return solve_static(self._stepper, self._state, tolerance, self._in_space)
             finally:
                 self._loop.take_state()
 
@@ -597,6 +628,11 @@ class Simulator:
             turn_directors(self.model, self._state)
             if self._state.account[OPEN] == 1.0:
                 self._state.account[OPEN] = QUESTIONED
+        self._unsettled, self.settled = False, None
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin to count at the state, and show it to observers."""
         self.compile()
         self._loop.start_over()
         self._note_start()
@@ -622,7 +658,11 @@ class Simulator:
         if scene is not None:
             self._take_scene(scene if isinstance(scene, SceneConfig) else load_scene(scene))
         self._controls.note(RESET, "")
-        self.load_state(self._initial_state().flat())
+        self._state.take(self._initial_state())
+        self._unsettled = self.scene.start == SETTLE
+        self.compile()
+        self._settle()
+        self._begin()
 
     def same_model(self, scene: SceneConfig) -> bool:
         """Return whether `reset` takes a scene.

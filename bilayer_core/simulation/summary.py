@@ -95,6 +95,7 @@ def summarise(simulator: Any) -> dict:
             name: {"distance": at.distance, "angle": at.angle, **_motions(at)} for name, at in simulator.joints.items()
         },
         "warnings": [
+            *simulator.start_warnings,
             *_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
         ],

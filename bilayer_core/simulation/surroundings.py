@@ -47,9 +47,11 @@ class Surroundings:
         self.actuation: Actuation | None = None
         self.actuation = self._spans_about(0.0)
 
-    def stimulus_at(self, state: State, time: float) -> Array:
-        """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's."""
-        scheduled = [schedule.value(time) for schedule in self._channels]
+    def stimulus_at(self, state: State, time: float, ended: float = 0.0) -> Array:
+        """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's; `ended` as for
+        `load_factor`.
+        """
+        scheduled = [channel.value_before(time, ended) if ended else channel.value(time) for channel in self._channels]
         return _overridden(scheduled, state.override[: len(scheduled)], time)
 
     def load_factor(self, state: State, ended: float = 0.0) -> Array:

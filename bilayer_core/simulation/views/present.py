@@ -23,13 +23,19 @@ class Present:
     Parameters
     ----------
     stepper : Stepper
-    state : State
+    started : callable
+        Returns the state, once it is what the scene starts with.
     ready : callable
         Has kernels and the forces of the first state ready.
     """
 
-    def __init__(self, stepper: Stepper, state: State, ready: Callable[[], object]) -> None:
-        self.state, self._stepper, self._ready = state, stepper, ready
+    def __init__(self, stepper: Stepper, started: Callable[[], State], ready: Callable[[], object]) -> None:
+        self._stepper, self._started, self._ready = stepper, started, ready
+
+    @property
+    def state(self) -> State:
+        """The state."""
+        return self._started()
 
     @property
     def model(self) -> Model:

@@ -1,0 +1,118 @@
+"""Gaps at the start of all that can meet, and refusal of scenes that start with some closed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from bilayer_core.errors import PenetrationError
+from bilayer_core.model.contact_points import contact_point_names, start_contact_points
+from bilayer_core.model.model import Model
+from bilayer_core.model.rod_surfaces import NearPairs
+from bilayer_core.model.shape_numbers import NUMBER, Shape, signed_distance
+
+Array = np.ndarray
+MOST_SHOWN = 1_000_000
+"""Of places of rods within the barrier distance: among how many the deepest is looked for."""
+ROUNDING = 1e-9
+"""Of the radii of two rods: a gap that is no more than that is none."""
+_KIND = {number: kind for kind, number in NUMBER.items()}
+
+
+@dataclass(frozen=True)
+class RodGaps:
+    """Points of rods and edges that they are near; all shapes (n_pair,)."""
+
+    point: Array  # see `contact.broad_phase.RodSearch`
+    own: Array  # edge of the point
+    own_fraction: Array  # where on it
+    edge: Array
+    fraction: Array  # where on that
+    gap: Array  # [m]
+
+    def names(self, model: Model, pair: int) -> tuple[str, str]:
+        """Return the names of the two places of a pair for messages."""
+        first = _place(model, self.own[pair], self.own_fraction[pair])
+        return first, _place(model, self.edge[pair], self.fraction[pair])
+
+
+def surface_gaps(model: Model, within: float) -> Iterator[tuple[int, Array, Array]]:
+    """Yield each surface with the contact points that it meets and that are nearer than `within` [m], and their gaps
+    [m].
+    """
+    surfaces, bodies, position = model.surfaces, model.bodies, start_contact_points(model)
+    base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[surfaces.body]
+    rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[surfaces.body]
+    for s in range(len(model.surface_names)):
+        core = Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, rotation[s] @ surfaces.rotation[s])
+        origin = base[s] + rotation[s] @ surfaces.position[s]
+        gap = signed_distance(core, position - origin) - surfaces.rounding[s] - surfaces.radius
+        near = np.flatnonzero((gap < within) & surfaces.can_collide[s][surfaces.group])
+        yield s, near, gap[near]
+
+
+def rod_gaps(model: Model, within: float) -> RodGaps:
+    """Return the places of rods that are nearer to each other than `within` [m]."""
+    rods, position = model.rod_search, model.start_position
+    if not rods.exists:
+        none, nowhere = np.zeros(0, dtype=np.int64), np.zeros(0)
+        return RodGaps(none, none, nowhere, none, nowhere, nowhere)
+    pairs = NearPairs(rods)
+    pairs.find(position, model.scene.contact.barrier_distance, within, most=MOST_SHOWN)
+    point, edge = pairs.search.point[: pairs.count], pairs.search.edge[: pairs.count]
+    own, i, j = rods.point_edge[point], rods.edge_node[rods.point_edge[point]], rods.edge_node[edge]
+    s, along = rods.point_fraction[point][:, None], position[j + 1] - position[j]
+    between = (1.0 - s) * position[i] + s * position[i + 1] - position[j]
+    t = np.clip((between * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
+    radii = rods.edge_radius[own] + rods.edge_radius[edge]
+    gap = np.linalg.norm(between - t[:, None] * along, axis=1) - radii
+    gap[np.abs(gap) <= ROUNDING * radii] = 0.0
+    return RodGaps(point, own, s[:, 0], edge, t, gap)
+
+
+def _place(model: Model, edge: int, fraction: float) -> str:
+    """Return the name of a point of an edge for messages."""
+    strand = next(s for s in model.strands if s.first_edge <= edge < s.first_edge + s.node_count - 1)
+    return f"node {edge - strand.first_edge + int(round(fraction))} of {strand.name}"
+
+
+def refuse_penetration(model: Model) -> None:
+    """Raise PenetrationError if a contact point starts behind a surface that it meets, or touching it."""
+    faults = [
+        (gap, point, model.surface_names[s])
+        for s, points, gaps in surface_gaps(model, np.nextafter(0.0, 1.0))
+        for point, gap in zip(points.tolist(), gaps.tolist(), strict=True)
+    ]
+    if faults:
+        depth, contact_point, surface = min(faults)
+        place, surface = start_contact_points(model)[contact_point], surface_name(model, surface)
+        raise PenetrationError(
+            f"{model.scene.name}: the scene starts in penetration: {contact_point_names(model)[contact_point]} at "
+            f"({', '.join(f'{1e3 * c:.3f}' for c in place)}) mm is {abs(1e3 * depth):.4g} mm behind "
+            f"the surface of {surface}{f', and {len(faults) - 1} more' if len(faults) > 1 else ''}; "
+            "all gaps must be positive at the start"
+        )
+
+
+def surface_name(model: Model, name: str) -> str:
+    """Return the name of a surface for messages."""
+    return f"body {name}" if name in model.bodies.names else name
+
+
+def refuse_meeting_rods(model: Model) -> None:
+    """Raise PenetrationError if rods start in each other, or touching each other; it names two places."""
+    if not model.rod_search.exists:
+        return
+    found = rod_gaps(model, model.scene.contact.barrier_distance)
+    if not len(found.gap) or found.gap.min() > 0.0:
+        return
+    worst = int(np.argmin(found.gap))
+    first, second = found.names(model, worst)
+    depth = -1e3 * found.gap[worst]
+    raise PenetrationError(
+        f"{model.scene.name}: the scene starts in penetration: "
+        f"{first} {f'is {depth:.4g} mm inside' if depth else 'touches'} {second}"
+        "; all gaps must be positive at the start (contact.rods: false lets rods pass through each other)"
+    )
